@@ -1,0 +1,128 @@
+# Selvedge. `make help` lists the targets.
+SHELL := /bin/bash
+BUILD ?= build
+CC ?= cc
+CXX ?= c++
+SANITIZE ?=
+OPTIMIZE ?= -O3
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+
+ARCH := $(shell uname -m)
+ifeq ($(ARCH),x86_64)
+MACHINE ?= -march=x86-64-v3
+endif
+
+PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt lapacke openblas zlib libzstd libarchive libpng libcurl
+PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) opencv4 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ')
+WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-format-truncation
+WARN_C := $(WARN) -Wconversion -Wstrict-prototypes
+WERROR ?= -Werror
+COMMON := -g $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. $(PKG_CFLAGS) $(WERROR)
+ifneq ($(SANITIZE),)
+COMMON += -fsanitize=$(SANITIZE) -fno-omit-frame-pointer
+LDFLAGS += -fsanitize=$(SANITIZE)
+endif
+CFLAGS_ALL := -std=c17 -D_GNU_SOURCE -pthread $(COMMON) $(WARN_C) $(CFLAGS)
+CXXFLAGS_ALL := -std=c++17 -pthread $(COMMON) $(WARN) $(CXXFLAGS)
+
+# every *_main.c is a program; everything else in its part goes into the part's library
+MAINS := $(shell find base geometry renderer optimizer server clients -name '*_main.c' 2>/dev/null)
+srcs = $(filter-out %_main.c,$(shell find $(1) -name '*.c' -o -name '*.cpp' 2>/dev/null | sort))
+objs = $(patsubst %,$(BUILD)/obj/%.o,$(1))
+PARTS := base geometry renderer optimizer server
+LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
+
+PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom
+LINK_BASE := -lz -lm -pthread
+LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd) -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
+LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
+LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
+LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
+
+.PHONY: all deps test check bench demo clean help layers format asan bench-geometry bench-transport bench-fit fuzz
+all: $(PROGRAMS)   ## build the programs into build/bin
+
+help:              ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 20
+
+define part_rule
+$(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$(1)))
+	@mkdir -p $$(@D)
+	@rm -f $$@
+	@ar rcs $$@ $$^
+endef
+$(foreach p,$(PARTS),$(eval $(call part_rule,$(p))))
+
+$(BUILD)/obj/%.c.o: %.c
+	@mkdir -p $(@D)
+	@echo "  CC   $<"
+	@$(CC) $(CFLAGS_ALL) -MMD -MP -c $< -o $@
+$(BUILD)/obj/%.cpp.o: %.cpp
+	@mkdir -p $(@D)
+	@echo "  C++  $<"
+	@$(CXX) $(CXXFLAGS_ALL) -MMD -MP -c $< -o $@
+
+L = $(BUILD)/lib/lib
+$(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker_main.c.o $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
+$(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom_main.c.o $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
+$(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)optimizer.a $(L)renderer.a $(L)base.a
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
+$(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/null)) $(L)base.a
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -o $@ $^ -lcurl -ljansson -lsodium $(LINK_BASE)
+
+# one test program per file tests/{unit,physics}/test_*.c
+TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
+TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
+BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
+TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
+$(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+	@mkdir -p $(@D)
+	@echo "  LINK $@"
+	@$(CC) $(LDFLAGS) -o $@ $^ -lcmocka $(LINK_SERVER) $(LINK_OPTIMIZER)
+.SECONDARY:
+
+deps:              ## install what is missing (Debian packages, as root or through sudo)
+	@./config/install-dependencies build
+
+build-tests: $(TEST_BINS)
+
+check: | deps      ## quick inner loop: unit tests and layer rules (< 2 minutes)
+	@./config/install-dependencies test
+	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
+	@/usr/bin/python3 tests/run_tests.py --quick --build $(BUILD)
+
+test: | deps       ## everything; ends with "N passed, N failed"
+	@./config/install-dependencies test
+	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
+	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
+
+demo: | deps       ## the main job, end to end, against a daemon started here
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@./clients/demo.sh
+
+bench: | deps      ## every figure, one JSON object a line
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(BENCH_BINS) >&2
+	@/usr/bin/python3 tests/bench/run_bench.py --build $(BUILD)
+
+layers:            ## includes go one way: base <- geometry <- renderer <- optimizer
+	@/usr/bin/python3 tests/check_layers.py
+
+asan:              ## unit and physics tests under the address and undefined-behaviour sanitizers
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
+	@/usr/bin/python3 tests/run_tests.py --quick --build build/asan
+
+format:            ## clang-format the C sources
+	@find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp' | xargs clang-format -i
+
+clean:             ## remove build/
+	rm -rf build
+
+-include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)

@@ -1,0 +1,201 @@
+#include "base/durable.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+static status write_all(int fd, const char *data, size_t n_bytes)
+{
+    while (n_bytes > 0) {
+        ssize_t n = write(fd, data, n_bytes);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return STATUS_IO;
+        data += n;
+        n_bytes -= (size_t)n;
+    }
+    return STATUS_OK;
+}
+
+status durable_sync_folder_of(const char *path, struct error *err)
+{
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%s", path);
+    char *slash = strrchr(folder, '/');
+    if (slash == NULL) snprintf(folder, sizeof folder, ".");
+    else if (slash == folder) folder[1] = '\0';
+    else *slash = '\0';
+    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return error_set_errno(err, "cannot open folder '%s'", folder);
+    status s = STATUS_OK;
+    if (fsync(fd) != 0 && errno != EINVAL) s = error_set_errno(err, "cannot sync folder '%s'", folder);
+    close(fd);
+    return s;
+}
+
+static status replace(const char *path, const void *data, size_t n_bytes, bool sync, struct error *err)
+{
+    char temporary[4096];
+    int n = snprintf(temporary, sizeof temporary, "%s.tmp-XXXXXX", path);
+    if (n < 0 || (size_t)n >= sizeof temporary) return error_set(err, STATUS_INVALID, "path '%.100s...' is too long", path);
+    int fd = mkostemp(temporary, O_CLOEXEC);
+    if (fd < 0) return error_set_errno(err, "cannot write '%s'", path);
+    status s = STATUS_OK;
+    if (write_all(fd, data, n_bytes) != STATUS_OK || (sync && fsync(fd) != 0))
+        s = error_set_errno(err, "cannot write '%s'", path);
+    if (close(fd) != 0 && s == STATUS_OK) s = error_set_errno(err, "cannot write '%s'", path);
+    if (s == STATUS_OK && rename(temporary, path) != 0) s = error_set_errno(err, "cannot replace '%s'", path);
+    if (s != STATUS_OK) {
+        unlink(temporary);
+        return s;
+    }
+    return sync ? durable_sync_folder_of(path, err) : STATUS_OK;
+}
+
+status durable_replace(const char *path, const void *data, size_t n_bytes, struct error *err)
+{
+    return replace(path, data, n_bytes, true, err);
+}
+
+status durable_replace_volatile(const char *path, const void *data, size_t n_bytes, struct error *err)
+{
+    return replace(path, data, n_bytes, false, err);
+}
+
+status durable_make_folder(const char *path, struct error *err)
+{
+    char part[4096];
+    int n = snprintf(part, sizeof part, "%s", path);
+    if (n < 0 || (size_t)n >= sizeof part) return error_set(err, STATUS_INVALID, "path '%.100s...' is too long", path);
+    for (char *c = part + 1;; c++) {
+        if (*c != '/' && *c != '\0') continue;
+        char end = *c;
+        *c = '\0';
+        if (mkdir(part, 0700) != 0 && errno != EEXIST) return error_set_errno(err, "cannot make folder '%s'", part);
+        *c = end;
+        if (end == '\0') return STATUS_OK;
+    }
+}
+
+status file_read_all(const char *path, size_t limit_bytes, char **data, size_t *n_bytes, struct error *err)
+{
+    status s = STATUS_OK;
+    char *buffer = NULL;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return error_set_errno(err, "cannot read '%s'", path);
+    struct stat st;
+    if (fstat(fd, &st) != 0) {
+        s = error_set_errno(err, "cannot read '%s'", path);
+        goto out;
+    }
+    if (!S_ISREG(st.st_mode)) {
+        s = error_set(err, STATUS_INVALID, "cannot read '%s': not a file", path);
+        goto out;
+    }
+    if ((uint64_t)st.st_size > limit_bytes) {
+        s = error_set(err, STATUS_TOO_LARGE, "cannot read '%s': %lld bytes, the limit is %zu", path,
+                      (long long)st.st_size, limit_bytes);
+        goto out;
+    }
+    size_t size = (size_t)st.st_size, used = 0;
+    buffer = malloc(size + 1);
+    if (buffer == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot read '%s': out of memory", path);
+        goto out;
+    }
+    while (used < size) {
+        ssize_t n = read(fd, buffer + used, size - used);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) {
+            s = error_set_errno(err, "cannot read '%s'", path);
+            goto out;
+        }
+        if (n == 0) break;
+        used += (size_t)n;
+    }
+    buffer[used] = '\0';
+    *data = buffer;
+    if (n_bytes != NULL) *n_bytes = used;
+    buffer = NULL;
+out:
+    free(buffer);
+    close(fd);
+    return s;
+}
+
+status record_append(const char *path, const char *json, bool sync, struct error *err)
+{
+    size_t n_json = strlen(json);
+    char *line = malloc(n_json + 16);
+    if (line == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot append to '%s': out of memory", path);
+    unsigned long sum = crc32(0, (const unsigned char *)json, (unsigned)n_json);
+    int n = snprintf(line, n_json + 16, "%08lx %s\n", sum, json);
+    status s = STATUS_OK;
+    int fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    off_t before = -1;
+    if (fd < 0) {
+        s = error_set_errno(err, "cannot append to '%s'", path);
+        goto out;
+    }
+    before = lseek(fd, 0, SEEK_END);
+    if (write_all(fd, line, (size_t)n) != STATUS_OK || (sync && fdatasync(fd) != 0)) {
+        s = error_set_errno(err, "cannot append to '%s'", path);
+        if (before >= 0 && ftruncate(fd, before) != 0) { /* the torn tail is found by its checksum */ }
+    }
+out:
+    if (fd >= 0) close(fd);
+    free(line);
+    return s;
+}
+
+static bool record_valid(const char *line, size_t n)
+{
+    if (n < 10 || line[8] != ' ') return false;
+    char hex[9];
+    memcpy(hex, line, 8);
+    hex[8] = '\0';
+    char *end;
+    unsigned long stated = strtoul(hex, &end, 16);
+    return *end == '\0' && stated == crc32(0, (const unsigned char *)line + 9, (unsigned)(n - 9));
+}
+
+status record_read(const char *path, uint64_t from, record_visitor visit, void *context, uint64_t *next,
+                   struct error *err)
+{
+    FILE *f = fopen(path, "re");
+    if (f == NULL) return error_set_errno(err, "cannot read '%s'", path);
+    status s = STATUS_OK;
+    char *line = NULL;
+    size_t capacity = 0;
+    uint64_t offset = from;
+    if (fseeko(f, (off_t)from, SEEK_SET) != 0) {
+        s = error_set_errno(err, "cannot seek in '%s'", path);
+        goto out;
+    }
+    for (;;) {
+        ssize_t n = getline(&line, &capacity, f);
+        if (n <= 0 || line[n - 1] != '\n' || !record_valid(line, (size_t)n - 1)) break;
+        line[n - 1] = '\0';
+        offset += (uint64_t)n;
+        if (!visit(context, line + 9, (size_t)n - 10)) break;
+    }
+    if (ferror(f)) s = error_set_errno(err, "cannot read '%s'", path);
+    if (next != NULL) *next = offset;
+out:
+    free(line);
+    fclose(f);
+    return s;
+}
+
+status record_truncate(const char *path, uint64_t keep_bytes, struct error *err)
+{
+    struct stat st;
+    if (stat(path, &st) != 0) return errno == ENOENT ? STATUS_OK : error_set_errno(err, "cannot look at '%s'", path);
+    if ((uint64_t)st.st_size <= keep_bytes) return STATUS_OK;
+    if (truncate(path, (off_t)keep_bytes) != 0) return error_set_errno(err, "cannot cut '%s'", path);
+    return STATUS_OK;
+}

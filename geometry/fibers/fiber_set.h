@@ -1,0 +1,43 @@
+/* Fibers as polylines: what geometry gives and the renderer takes.
+ *
+ * Frame: the cloth frame of volume.h, metres. The cloth repeats with period tile_size_m in x and y; vertices may lie a little
+ * outside [0, tile_size_m). Fiber i has vertices first_vertex[i] .. first_vertex[i+1]-1, at least two.
+ * Ownership: init/release; arrays are malloc'ed and owned.
+ */
+#ifndef SELVEDGE_GEOMETRY_FIBER_SET_H
+#define SELVEDGE_GEOMETRY_FIBER_SET_H
+
+#include "base/status.h"
+
+#include <stdint.h>
+
+struct fiber_set {
+    size_t n_fiber;
+    size_t n_vertex;
+    size_t *first_vertex; /* n_fiber + 1 */
+    float *position_m;    /* n_vertex x 3, row-major */
+    float *radius_m;      /* n_fiber */
+    uint8_t *axis_class;  /* n_fiber: 0 x (weft), 1 y (warp), 2 z (pile) */
+    double tile_size_m[2];
+};
+
+/* An empty set that release accepts. */
+void fiber_set_init(struct fiber_set *f);
+void fiber_set_release(struct fiber_set *f);
+/* Room for n_fiber fibers with n_vertex vertices in all; arrays uninitialised. STATUS_NO_MEMORY. */
+status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, struct error *err);
+/* STATUS_INVALID, naming the fiber, for: NaN, fewer than two vertices, radius <= 0, tile size <= 0, no fiber. */
+status fiber_set_validate(const struct fiber_set *f, struct error *err);
+/* Total length of all polylines in metres; lowest and highest z of the fiber surfaces. */
+double fiber_set_length_m(const struct fiber_set *f);
+void fiber_set_z_range_m(const struct fiber_set *f, double *z_min_m, double *z_max_m);
+
+/* Cem Yuksel's .hair (docs/formats.md): positions in millimetres, thickness = DIAMETER in millimetres, per point.
+ * The 88-byte text of the header carries "selvedge tile_mm=<x>,<y>" so that a set read back tiles as before; axis classes are
+ * found again from the directions. Reading checks the header against the file's length before it allocates. */
+status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err);
+status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err);
+/* Text: "x y z radius" per line, millimetres, blank line between fibers. */
+status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err);
+
+#endif

@@ -1,0 +1,43 @@
+/* A regular grid of X-ray densities in memory, and the direction volume computed from it.
+ *
+ * Frame: the cloth frame. x along the weft, y along the warp, z out of the cloth towards camera and lamp. The centre of
+ * voxel (i, j, k) is at (i + 1/2, j + 1/2, k + 1/2) * voxel_size_m; the grid's corner is the origin.
+ * Index of voxel (i, j, k): (k * n[1] + j) * n[0] + i.
+ * Ownership: init/release for the struct in the caller's memory; the arrays are malloc'ed and owned.
+ */
+#ifndef SELVEDGE_GEOMETRY_VOLUME_H
+#define SELVEDGE_GEOMETRY_VOLUME_H
+
+#include "base/status.h"
+
+#include <stdint.h>
+
+struct volume {
+    size_t n[3];
+    double voxel_size_m[3];
+    float *density; /* n[0]*n[1]*n[2]; mapped to [0, 1] after volume_map_density, raw scanner values before */
+};
+
+status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err);
+void volume_release(struct volume *v);
+
+static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
+static inline size_t volume_index(const size_t n[3], size_t i, size_t j, size_t k) { return (k * n[1] + j) * n[0] + i; }
+
+/* Density in [0, 1] as a byte (0 = emptied) and a unit direction as two 16-bit octahedral coordinates: 5 bytes a voxel.
+ * A direction and its opposite mean the same fiber. */
+struct direction_volume {
+    size_t n[3];
+    double voxel_size_m[3];
+    uint8_t *density;
+    int16_t *octahedral; /* 2 per voxel */
+};
+
+status direction_volume_init(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
+                             struct error *err);
+void direction_volume_release(struct direction_volume *v);
+/* Unit direction of a voxel; only meaningful where density > 0. Decoding error below 0.005 degrees. */
+void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3]);
+void direction_volume_set(struct direction_volume *v, size_t i_voxel, const float d[3]);
+
+#endif

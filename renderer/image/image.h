@@ -1,0 +1,28 @@
+/* Float images and their files. Row 0 is the top. rgb, 3 floats a pixel, linear, radiance units. */
+#ifndef SELVEDGE_RENDERER_IMAGE_H
+#define SELVEDGE_RENDERER_IMAGE_H
+
+#include "base/status.h"
+
+#include <stdint.h>
+
+struct image {
+    size_t width, height, n_channel;  /* n_channel planes interleaved: 3 for rgb, more with named layers */
+    float *pixel;                     /* height x width x n_channel */
+    const char *const *channel_name;  /* EXR names, e.g. "R", "G", "B", "var.R", "d_beta_R.R"; static or owned by the caller */
+};
+
+status image_init(struct image *im, size_t width, size_t height, size_t n_channel, struct error *err);
+void image_release(struct image *im);
+
+/* OpenEXR scan-line file, 32-bit float, ZIP, through OpenEXRCore. */
+status image_write_exr(const struct image *im, const char *path, struct error *err);
+/* Reads R, G, B (or Y, copied to all three) of half or float, scan-line or single-level tiled, into n_channel = 3. STATUS_FORMAT naming file and
+ * reason for missing channels, deep data, truncation; at most limit_pixel pixels (STATUS_TOO_LARGE). */
+status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err);
+/* 8-bit sRGB PNG of rgb * exposure. */
+status image_write_png(const struct image *im, double exposure, const char *path, struct error *err);
+/* 8-bit rgb bytes straight to PNG. */
+status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, const char *path, struct error *err);
+
+#endif

@@ -1,0 +1,60 @@
+/* Scattering models of fibers: one file per model, one row in the registry, found by id.
+ *
+ * Frame: fiber frame u, v, w with u along the fiber; w = (sin th, cos th cos ph, cos th sin ph), th in [-pi/2, pi/2] from the normal
+ * plane (fabric thesis, section 5.4). Directions point away from the fiber. S(wi, wo) is the BCSDF; the light leaving along wo is
+ * the integral of S Li cos(th_i) dwi. Energy: integral of S cos(th_o) dwo <= 1 for every wi.
+ *
+ * A model describes its parameters; everyone else (tracer, optimizer, API, dashboard) learns of them from here. Parameters are
+ * numbered flat: a colour parameter takes three consecutive slots r, g, b. Angles are radians inside, degrees in files
+ * (param_info.unit "deg").
+ */
+#ifndef SELVEDGE_RENDERER_SCATTERING_H
+#define SELVEDGE_RENDERER_SCATTERING_H
+
+#include "base/status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { SCATTERING_MAX_PARAM = 16 };
+
+/* One flat parameter slot. */
+struct param_info {
+    const char *name;   /* "C_R.r", "beta_TT": unique in the model */
+    const char *symbol; /* group name: "C_R" */
+    const char *unit;   /* "" or "deg" (how files and users see it) */
+    int channel;        /* 0 r, 1 g, 2 b; -1 acts on all channels */
+    double lower, upper, start; /* internal unit: radians for "deg" */
+};
+
+/* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by threads. */
+struct scattering_state;
+
+struct scattering_model {
+    const char *id;    /* "two_lobe.v1": never reused for changed physics */
+    const char *title; /* one line for people, with the source */
+    size_t n_param;
+    const struct param_info *param;
+
+    /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
+    status (*prepare)(const double *param, struct scattering_state **state, struct error *err);
+    void (*release)(struct scattering_state *state);
+
+    /* S in rgb, and if score != NULL the derivative of ln S_c by each flat parameter: score[c * n_param + p] (zero where a colour
+     * parameter does not touch channel c). wi, wo: unit vectors in the fiber frame, any sign of the components. */
+    void (*eval)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3], float *score);
+    /* Draw wi for a given wo with u in [0,1)^3; returns the density per steradian (> 0), exactly that of pdf(). */
+    float (*sample)(const struct scattering_state *state, const float wo[3], const float u[3], float wi[3]);
+    float (*pdf)(const struct scattering_state *state, const float wi[3], const float wo[3]);
+};
+
+/* All models, NULL-terminated; and by id (NULL when unknown). */
+const struct scattering_model *const *scattering_registry(void);
+const struct scattering_model *scattering_find(const char *id);
+/* Index of a flat parameter by name, or -1. */
+int scattering_param_index(const struct scattering_model *m, const char *name);
+/* value in the unit of files -> internal unit, and back. */
+double param_from_file_unit(const struct param_info *p, double value);
+double param_to_file_unit(const struct param_info *p, double value);
+
+#endif

@@ -1,0 +1,24 @@
+/* A cloth ready for ray tracing: fibers as Embree round linear curves, one tile, instanced in a block; beyond the block rays are
+ * wrapped by whole tiles, so the cloth has no edge. Immutable after scene_new: shared by threads. Millimetres inside.
+ */
+#ifndef SELVEDGE_RENDERER_SCENE_H
+#define SELVEDGE_RENDERER_SCENE_H
+
+#include "base/status.h"
+#include "geometry/fibers/fiber_set.h"
+
+#include <stdbool.h>
+
+struct scene;
+
+struct scene_option {
+    bool black_sheet;   /* true: light that passes the cloth downwards is absorbed and none comes from below */
+};
+
+/* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_INVALID. */
+status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err);
+void scene_free(struct scene *scene);
+size_t scene_memory_bytes(const struct scene *scene);
+size_t scene_n_segment(const struct scene *scene);
+
+#endif
