@@ -1,0 +1,55 @@
+"""The rules of the layout: includes go one way (base <- geometry <- renderer <- optimizer), `server` sees base and the
+optimizer's job-folder, job-document and pipeline headers only, `clients` see base only, no folder includes backwards, and file names are
+unique in the tree. Prints each breach; exit status 1 when there is one."""
+import collections
+import os
+import re
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+SEES = {
+    "base": {"base"},
+    "geometry": {"base", "geometry"},
+    "renderer": {"base", "geometry", "renderer"},
+    "optimizer": {"base", "geometry", "renderer", "optimizer"},
+    "server": {"base", "server"},
+    "clients": {"base", "clients"},
+}
+SERVER_MAY = {"optimizer/job_folder.h", "optimizer/job_document.h", "optimizer/pipeline.h"}
+SHARED_NAMES = {"README.md", "conftest.py", ".gitignore", "index.html"}
+
+
+def main():
+    files = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=True,
+                           capture_output=True, text=True).stdout.split("\n")
+    breaches = []
+    names = collections.defaultdict(list)
+    for path in filter(None, files):
+        if not os.path.exists(os.path.join(ROOT, path)):
+            continue
+        names[os.path.basename(path)].append(path)
+        part = path.split("/")[0]
+        if part not in SEES or not path.endswith((".c", ".h", ".cpp")):
+            continue
+        with open(os.path.join(ROOT, path), encoding="utf-8") as source:
+            for number, line in enumerate(source, 1):
+                match = re.match(r'\s*#\s*include\s+"([^"]+)"', line)
+                if not match:
+                    continue
+                include = match.group(1)
+                if "/" not in include:
+                    breaches.append(f"{path}:{number}: include \"{include}\" by its path from the tree's root")
+                elif include.split("/")[0] not in SEES[part] and not (part == "server" and include in SERVER_MAY):
+                    breaches.append(f"{path}:{number}: {part} must not include \"{include}\"")
+                if part == "renderer" and include.startswith("geometry/phantom"):
+                    breaches.append(f"{path}:{number}: the renderer must not know phantoms")
+    for name, paths in names.items():
+        if len(paths) > 1 and name not in SHARED_NAMES:
+            breaches.append(f"file name '{name}' is not unique: {', '.join(paths)}")
+    print("\n".join(breaches) if breaches else "layers ok")
+    return 1 if breaches else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

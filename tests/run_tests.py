@@ -1,0 +1,124 @@
+"""Run every test and end with "N passed, N failed[, N skipped]"; exit status 1 when one failed or none ran.
+
+C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
+hangs or writes no results counts as one failed test. --quick runs the unit tests, the layer rules and the quick API tests.
+"""
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ElementTree
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+TIMEOUT_S = 600
+PYTEST_TIMEOUT_S = 1500
+
+
+def count_junit(path):
+    """(passed, failed, skipped, [names of the failed], [skip messages]) of one JUnit file."""
+    passed = failed = skipped = 0
+    bad, why = [], []
+    for case in ElementTree.parse(path).getroot().iter("testcase"):
+        if case.find("failure") is not None or case.find("error") is not None:
+            failed += 1
+            bad.append(case.get("name"))
+        elif case.find("skipped") is not None:
+            skipped += 1
+            why.append(f"{case.get('name')}: {case.find('skipped').get('message') or ''}")
+        else:
+            passed += 1
+    return passed, failed, skipped, bad, why
+
+
+def run(command, timeout_s, environment):
+    start = time.monotonic()
+    # a file, not a pipe: a process that outlives its test must not keep us waiting
+    with tempfile.TemporaryFile() as log:
+        try:
+            code = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=log,
+                                  stderr=subprocess.STDOUT, timeout=timeout_s).returncode
+        except subprocess.TimeoutExpired:
+            code = f"no end after {timeout_s} s"
+        log.seek(0)
+        return code, log.read().decode(errors="replace"), time.monotonic() - start
+
+
+class Totals:
+    def __init__(self):
+        self.passed = self.failed = self.skipped = 0
+
+    def add(self, name, junit, code, output, seconds):
+        passed = failed = skipped = 0
+        bad, why = [], []
+        if os.path.exists(junit) and os.path.getsize(junit) > 0:
+            try:
+                passed, failed, skipped, bad, why = count_junit(junit)
+            except ElementTree.ParseError:
+                failed, bad = 1, ["results unreadable"]
+        if passed + failed + skipped == 0 or (code != 0 and failed == 0):
+            failed += 1
+            bad.append(f"ended with {code}")
+        self.passed += passed
+        self.failed += failed
+        self.skipped += skipped
+        state = "FAILED" if failed else "ok"
+        print(f"{state:7s}{name}: {passed} passed, {failed} failed, {skipped} skipped ({seconds:.1f} s)", flush=True)
+        for line in why:
+            print(f"       skipped {line}")
+        if failed:
+            print(f"       failed: {', '.join(str(b) for b in bad)}")
+            print("\n".join("       | " + line for line in output.splitlines()[-80:]), flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", default="build")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", help="run only what has this in its name")
+    arguments = parser.parse_args()
+    environment = dict(os.environ, SELVEDGE_BUILD=os.path.join(ROOT, arguments.build), OPENBLAS_NUM_THREADS="1")
+    environment.setdefault("SELVEDGE_DATA", os.path.join(ROOT, "..", "shared", "data"))
+    totals = Totals()
+    wanted = lambda name: arguments.only is None or arguments.only in name
+
+    with tempfile.TemporaryDirectory() as folder:
+        if wanted("layers"):
+            code, output, seconds = run([sys.executable, "tests/check_layers.py"], TIMEOUT_S, environment)
+            totals.passed += code == 0
+            totals.failed += code != 0
+            print(f"{'ok' if code == 0 else 'FAILED':7s}layers ({seconds:.1f} s)" + ("" if code == 0 else "\n" + output))
+        for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
+            source = os.path.join(ROOT, "tests", kind)
+            for name in sorted(os.listdir(source)) if os.path.isdir(source) else []:
+                if not (name.startswith("test_") and name.endswith(".c") and wanted(name)):
+                    continue
+                junit = os.path.join(folder, name + ".xml")
+                code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", kind, name[:-2])], TIMEOUT_S,
+                                            dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
+                totals.add(f"{kind}/{name[:-2]}", junit, code, output, seconds)
+        for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:
+            source = os.path.join(ROOT, "tests", kind)
+            if not os.path.isdir(source):
+                continue
+            for name in sorted(os.listdir(source)):
+                if not (name.startswith("test_") and name.endswith(".py") and wanted(name)):
+                    continue
+                junit = os.path.join(folder, kind + name + ".xml")
+                command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider",
+                           f"--junitxml={junit}", os.path.join("tests", kind, name)]
+                if arguments.quick:
+                    command += ["-m", "not slow"]
+                code, output, seconds = run(command, PYTEST_TIMEOUT_S, environment)
+                if code == 5 and arguments.quick:  # every test of the file is a slow one
+                    continue
+                totals.add(f"{kind}/{name[:-3]}", junit, code, output, seconds)
+
+    tail = f", {totals.skipped} skipped" if totals.skipped else ""
+    print(f"{totals.passed} passed, {totals.failed} failed{tail}", flush=True)
+    return 1 if totals.failed or totals.passed == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
