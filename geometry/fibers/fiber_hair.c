@@ -1,0 +1,251 @@
+/* Cem Yuksel's .hair; byte layout in docs/formats.md. All numbers little-endian. */
+#include "base/durable.h"
+#include "geometry/fibers/fiber_set.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    HAIR_HEADER_BYTES = 128,
+    HAIR_TEXT_OFFSET = 40,
+    HAIR_TEXT_BYTES = 88,
+    HAIR_MAX_SEGMENT = 65535,
+    HAIR_SEGMENTS = 1,
+    HAIR_POINTS = 2,
+    HAIR_THICKNESS = 4,
+    HAIR_TRANSPARENCY = 8,
+    HAIR_COLOUR = 16,
+    HAIR_KNOWN = 31
+};
+
+static const char tile_key[] = "selvedge tile_mm=";
+
+static void put_u16(uint8_t *to, uint32_t v)
+{
+    to[0] = (uint8_t)v;
+    to[1] = (uint8_t)(v >> 8);
+}
+
+static void put_u32(uint8_t *to, uint32_t v)
+{
+    put_u16(to, v & 0xffffu);
+    put_u16(to + 2, v >> 16);
+}
+
+static void put_f32(uint8_t *to, float v)
+{
+    uint32_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    put_u32(to, bits);
+}
+
+static uint32_t get_u16(const uint8_t *from) { return (uint32_t)from[0] | (uint32_t)from[1] << 8; }
+static uint32_t get_u32(const uint8_t *from) { return get_u16(from) | get_u16(from + 2) << 16; }
+
+static float get_f32(const uint8_t *from)
+{
+    uint32_t bits = get_u32(from);
+    float v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+static status check_writable(const struct fiber_set *f, const char *path, struct error *err)
+{
+    if (f->n_fiber > UINT32_MAX || f->n_vertex > UINT32_MAX)
+        return error_set(err, STATUS_TOO_LARGE, "cannot write fibers '%s': %zu vertices, the format ends at %u", path,
+                         f->n_vertex, UINT32_MAX);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        size_t n = f->first_vertex[i + 1] - f->first_vertex[i];
+        if (n < 2 || n > HAIR_MAX_SEGMENT + 1)
+            return error_set(err, n < 2 ? STATUS_INVALID : STATUS_TOO_LARGE,
+                             "cannot write fibers '%s': fiber %zu has %zu vertices, the format takes 2 to %d", path, i, n,
+                             HAIR_MAX_SEGMENT + 1);
+    }
+    return STATUS_OK;
+}
+
+static void put_header(uint8_t *to, const struct fiber_set *f)
+{
+    memset(to, 0, HAIR_HEADER_BYTES);
+    memcpy(to, "HAIR", 4);
+    put_u32(to + 4, (uint32_t)f->n_fiber);
+    put_u32(to + 8, (uint32_t)f->n_vertex);
+    put_u32(to + 12, HAIR_SEGMENTS | HAIR_POINTS | HAIR_THICKNESS);
+    put_f32(to + 20, f->n_fiber > 0 ? 2000.0f * f->radius_m[0] : 0.0f);
+    for (size_t c = 0; c < 3; c++) put_f32(to + 28 + 4 * c, 1.0f);
+    char text[HAIR_TEXT_BYTES];
+    int n = snprintf(text, sizeof text, "%s%.17g,%.17g", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1]);
+    if (n > 0 && n < HAIR_TEXT_BYTES) memcpy(to + HAIR_TEXT_OFFSET, text, (size_t)n);
+}
+
+status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err)
+{
+    status s = check_writable(f, path, err);
+    if (s != STATUS_OK) return s;
+    size_t n_bytes = HAIR_HEADER_BYTES + 2 * f->n_fiber + 16 * f->n_vertex;
+    uint8_t *data = malloc(n_bytes);
+    if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", path);
+    put_header(data, f);
+    uint8_t *segments = data + HAIR_HEADER_BYTES, *points = segments + 2 * f->n_fiber, *thickness = points + 12 * f->n_vertex;
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        put_u16(segments + 2 * i, (uint32_t)(f->first_vertex[i + 1] - f->first_vertex[i] - 1));
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) put_f32(thickness + 4 * k, 2000.0f * f->radius_m[i]);
+    }
+    for (size_t k = 0; k < 3 * f->n_vertex; k++) put_f32(points + 4 * k, 1000.0f * f->position_m[k]);
+    s = durable_replace(path, data, n_bytes, err);
+    free(data);
+    return s;
+}
+
+struct hair_header {
+    uint32_t n_strand, n_point, flags, default_segments;
+    float default_thickness;
+};
+
+/* Counts of the header against the length of the file; *n_bytes is what the header promises (at most 2^37). */
+static status check_header(const struct hair_header *h, uint64_t file_bytes, const char *path, struct error *err)
+{
+    if ((h->flags & HAIR_POINTS) == 0 || (h->flags & ~(uint32_t)HAIR_KNOWN) != 0)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': flags 0x%x, points are missing or flags unknown", path,
+                         h->flags);
+    if (h->n_strand == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path);
+    uint64_t want = HAIR_HEADER_BYTES + 12 * (uint64_t)h->n_point;
+    if (h->flags & HAIR_SEGMENTS) want += 2 * (uint64_t)h->n_strand;
+    if (h->flags & HAIR_THICKNESS) want += 4 * (uint64_t)h->n_point;
+    if (h->flags & HAIR_TRANSPARENCY) want += 4 * (uint64_t)h->n_point;
+    if (h->flags & HAIR_COLOUR) want += 12 * (uint64_t)h->n_point;
+    if (want != file_bytes)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %llu bytes, its header promises %llu", path,
+                         (unsigned long long)file_bytes, (unsigned long long)want);
+    if (2 * (uint64_t)h->n_strand > h->n_point)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers but only %u points", path, h->n_strand,
+                         h->n_point);
+    if ((h->flags & HAIR_SEGMENTS) == 0 &&
+        (uint64_t)h->n_strand * ((uint64_t)h->default_segments + 1) != h->n_point)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers of %u segments do not make %u points", path,
+                         h->n_strand, h->default_segments, h->n_point);
+    return STATUS_OK;
+}
+
+/* first_vertex from the segment counts. */
+static status get_strands(struct fiber_set *f, const struct hair_header *h, const uint8_t *segments, const char *path,
+                          struct error *err)
+{
+    uint64_t used = 0;
+    for (size_t i = 0; i < h->n_strand; i++) {
+        uint32_t n = segments == NULL ? h->default_segments : get_u16(segments + 2 * i);
+        if (n == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': fiber %zu has no segment", path, i);
+        f->first_vertex[i] = used;
+        used += (uint64_t)n + 1;
+        if (used > h->n_point) break;
+    }
+    if (used != h->n_point)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the segments do not add up to %u points", path,
+                         h->n_point);
+    f->first_vertex[h->n_strand] = used;
+    return STATUS_OK;
+}
+
+static status get_radii(struct fiber_set *f, const struct hair_header *h, const uint8_t *thickness, const char *path,
+                        struct error *err)
+{
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        double sum = 0.0;
+        size_t n = f->first_vertex[i + 1] - f->first_vertex[i];
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++)
+            sum += thickness == NULL ? h->default_thickness : get_f32(thickness + 4 * k);
+        f->radius_m[i] = (float)(0.5e-3 * sum / (double)n);
+        if (!(f->radius_m[i] > 0.0f) || !isfinite(f->radius_m[i]))
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': fiber %zu has no thickness, and neither does the header",
+                             path, i);
+    }
+    return STATUS_OK;
+}
+
+/* Tile size from the header's text; 0 where another program wrote the file. */
+static void get_tile(struct fiber_set *f, const uint8_t *header)
+{
+    char text[HAIR_TEXT_BYTES + 1];
+    memcpy(text, header + HAIR_TEXT_OFFSET, HAIR_TEXT_BYTES);
+    text[HAIR_TEXT_BYTES] = '\0';
+    f->tile_size_m[0] = f->tile_size_m[1] = 0.0;
+    const char *at = strstr(text, tile_key);
+    if (at == NULL) return;
+    char *end;
+    double x = strtod(at + sizeof tile_key - 1, &end);
+    if (*end != ',') return;
+    double y = strtod(end + 1, &end);
+    if (!(x > 0.0) || !(y > 0.0) || !isfinite(x) || !isfinite(y)) return;
+    f->tile_size_m[0] = 1e-3 * x;
+    f->tile_size_m[1] = 1e-3 * y;
+}
+
+static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes, const char *path, struct error *err)
+{
+    if (n_bytes < HAIR_HEADER_BYTES || memcmp(data, "HAIR", 4) != 0)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", path);
+    struct hair_header h = {get_u32(data + 4), get_u32(data + 8), get_u32(data + 12), get_u32(data + 16), get_f32(data + 20)};
+    status s = check_header(&h, n_bytes, path, err);
+    if (s == STATUS_OK) s = fiber_set_reserve(f, h.n_strand, h.n_point, err);
+    if (s != STATUS_OK) return s;
+    const uint8_t *segments = NULL, *at = data + HAIR_HEADER_BYTES;
+    if (h.flags & HAIR_SEGMENTS) {
+        segments = at;
+        at += 2 * (size_t)h.n_strand;
+    }
+    const uint8_t *points = at, *thickness = h.flags & HAIR_THICKNESS ? at + 12 * (size_t)h.n_point : NULL;
+    s = get_strands(f, &h, segments, path, err);
+    if (s == STATUS_OK) s = get_radii(f, &h, thickness, path, err);
+    if (s != STATUS_OK) return s;
+    for (size_t k = 0; k < 3 * (size_t)h.n_point; k++) {
+        f->position_m[k] = 1e-3f * get_f32(points + 4 * k);
+        if (!isfinite(f->position_m[k]))
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", path, k / 3);
+    }
+    get_tile(f, data);
+    fiber_set_classify(f);
+    return STATUS_OK;
+}
+
+/* The header is looked at before the rest is read, so that a wrong count costs nothing. */
+static status check_file(const char *path, struct error *err)
+{
+    FILE *file = fopen(path, "re");
+    if (file == NULL) return error_set_errno(err, "cannot read fibers '%s'", path);
+    uint8_t header[HAIR_HEADER_BYTES];
+    status s = STATUS_OK;
+    off_t n_bytes = -1;
+    if (fread(header, 1, sizeof header, file) != sizeof header || memcmp(header, "HAIR", 4) != 0)
+        s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", path);
+    else if (fseeko(file, 0, SEEK_END) != 0 || (n_bytes = ftello(file)) < 0)
+        s = error_set_errno(err, "cannot read fibers '%s'", path);
+    else {
+        struct hair_header h = {get_u32(header + 4), get_u32(header + 8), get_u32(header + 12), get_u32(header + 16),
+                                get_f32(header + 20)};
+        s = check_header(&h, (uint64_t)n_bytes, path, err);
+    }
+    fclose(file);
+    return s;
+}
+
+status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err)
+{
+    char *data = NULL;
+    size_t n_bytes = 0;
+    struct fiber_set read;
+    fiber_set_init(&read);
+    status s = check_file(path, err);
+    if (s == STATUS_OK) s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
+    if (s == STATUS_OK) s = decode(&read, (const uint8_t *)data, n_bytes, path, err);
+    free(data);
+    if (s != STATUS_OK) {
+        fiber_set_release(&read);
+        return s;
+    }
+    fiber_set_release(f);
+    *f = read;
+    return STATUS_OK;
+}

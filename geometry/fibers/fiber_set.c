@@ -1,0 +1,106 @@
+#include "geometry/fibers/fiber_set.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+void fiber_set_init(struct fiber_set *f) { *f = (struct fiber_set){0}; }
+
+void fiber_set_release(struct fiber_set *f)
+{
+    if (f == NULL) return;
+    free(f->first_vertex);
+    free(f->position_m);
+    free(f->radius_m);
+    free(f->axis_class);
+    *f = (struct fiber_set){.tile_size_m = {f->tile_size_m[0], f->tile_size_m[1]}};
+}
+
+status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, struct error *err)
+{
+    fiber_set_release(f);
+    if (n_fiber < SIZE_MAX / 64 && n_vertex < SIZE_MAX / 64) {
+        f->first_vertex = calloc(n_fiber + 1, sizeof *f->first_vertex);
+        f->position_m = malloc((n_vertex > 0 ? n_vertex : 1) * 3 * sizeof *f->position_m);
+        f->radius_m = malloc((n_fiber > 0 ? n_fiber : 1) * sizeof *f->radius_m);
+        f->axis_class = calloc(n_fiber > 0 ? n_fiber : 1, sizeof *f->axis_class);
+    }
+    if (f->first_vertex == NULL || f->position_m == NULL || f->radius_m == NULL || f->axis_class == NULL) {
+        fiber_set_release(f);
+        return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu fibers with %zu vertices: out of memory", n_fiber,
+                         n_vertex);
+    }
+    f->n_fiber = n_fiber;
+    f->n_vertex = n_vertex;
+    return STATUS_OK;
+}
+
+static status validate_fiber(const struct fiber_set *f, size_t i, struct error *err)
+{
+    size_t first = f->first_vertex[i], end = f->first_vertex[i + 1];
+    if (end > f->n_vertex || end < first || end - first < 2)
+        return error_set(err, STATUS_INVALID, "fiber %zu has fewer than two vertices", i);
+    if (!(f->radius_m[i] > 0.0f) || !isfinite(f->radius_m[i]))
+        return error_set(err, STATUS_INVALID, "fiber %zu has radius %g m, it must be positive", i, (double)f->radius_m[i]);
+    if (f->axis_class[i] > 2)
+        return error_set(err, STATUS_INVALID, "fiber %zu has axis class %u, it must be 0, 1 or 2", i,
+                         (unsigned)f->axis_class[i]);
+    for (size_t k = 3 * first; k < 3 * end; k++)
+        if (!isfinite(f->position_m[k]))
+            return error_set(err, STATUS_INVALID, "vertex %zu of fiber %zu is not a finite point", k / 3 - first, i);
+    return STATUS_OK;
+}
+
+status fiber_set_validate(const struct fiber_set *f, struct error *err)
+{
+    if (f->n_fiber == 0) return error_set(err, STATUS_INVALID, "the cloth has no fiber");
+    for (int a = 0; a < 2; a++)
+        if (!(f->tile_size_m[a] > 0.0) || !isfinite(f->tile_size_m[a]))
+            return error_set(err, STATUS_INVALID, "the tile size in %c is %g m, it must be positive", "xy"[a],
+                             f->tile_size_m[a]);
+    if (f->first_vertex[0] != 0 || f->first_vertex[f->n_fiber] != f->n_vertex)
+        return error_set(err, STATUS_INVALID, "the fibers use %zu vertices, the set has %zu",
+                         f->first_vertex[f->n_fiber] - f->first_vertex[0], f->n_vertex);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        status s = validate_fiber(f, i, err);
+        if (s != STATUS_OK) return s;
+    }
+    return STATUS_OK;
+}
+
+double fiber_set_length_m(const struct fiber_set *f)
+{
+    double length = 0.0;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
+            const float *a = f->position_m + 3 * k, *b = a + 3;
+            double d[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]};
+            length += sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        }
+    return length;
+}
+
+void fiber_set_z_range_m(const struct fiber_set *f, double *z_min_m, double *z_max_m)
+{
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
+            double z = f->position_m[3 * k + 2], r = f->radius_m[i];
+            if (z - r < low) low = z - r;
+            if (z + r > high) high = z + r;
+        }
+    *z_min_m = low;
+    *z_max_m = high;
+}
+
+void fiber_set_classify(struct fiber_set *f)
+{
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        double sum[3] = {0.0, 0.0, 0.0};
+        for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++)
+            for (size_t a = 0; a < 3; a++)
+                sum[a] += fabs((double)f->position_m[3 * k + 3 + a] - (double)f->position_m[3 * k + a]);
+        uint8_t best = sum[1] > sum[0] ? 1 : 0;
+        if (sum[2] > sum[best]) best = 2;
+        f->axis_class[i] = best;
+    }
+}

@@ -1,0 +1,147 @@
+/* Fibers as text: "x y z radius" per line in millimetres, a blank line between fibers (docs/formats.md). */
+#include "base/durable.h"
+#include "geometry/fibers/fiber_set.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err)
+{
+    char *text = NULL;
+    size_t n_bytes = 0;
+    FILE *out = open_memstream(&text, &n_bytes);
+    if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", path);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        if (i > 0) fputc('\n', out);
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
+            const float *p = f->position_m + 3 * k;
+            fprintf(out, "%.9g %.9g %.9g %.9g\n", 1e3 * (double)p[0], 1e3 * (double)p[1], 1e3 * (double)p[2],
+                    1e3 * (double)f->radius_m[i]);
+        }
+    }
+    bool failed = ferror(out) != 0;
+    failed = fclose(out) != 0 || failed;
+    status s = failed ? error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", path)
+                      : durable_replace(path, text, n_bytes, err);
+    free(text);
+    return s;
+}
+
+struct line_reader {
+    const char *at, *end;
+    size_t i_line; /* of the line last read, from 1 */
+};
+
+enum { LINE_BYTES = 256 };
+
+enum line_kind { LINE_END, LINE_BLANK, LINE_POINT, LINE_TOO_LONG };
+
+/* Next line into a buffer of its own, so that strtod cannot run over the line's end. */
+static enum line_kind next_line(struct line_reader *r, char line[LINE_BYTES])
+{
+    if (r->at >= r->end) return LINE_END;
+    const char *stop = memchr(r->at, '\n', (size_t)(r->end - r->at));
+    if (stop == NULL) stop = r->end;
+    size_t n = (size_t)(stop - r->at);
+    const char *from = r->at;
+    r->at = stop + 1;
+    r->i_line++;
+    if (n >= LINE_BYTES) return LINE_TOO_LONG;
+    memcpy(line, from, n);
+    line[n] = '\0';
+    return line[strspn(line, " \t\r")] == '\0' && strlen(line) == n ? LINE_BLANK : LINE_POINT;
+}
+
+static size_t count_points(const char *data, size_t n_bytes, size_t *n_fiber)
+{
+    struct line_reader r = {data, data + n_bytes, 0};
+    char line[LINE_BYTES];
+    size_t n_vertex = 0;
+    bool inside = false;
+    *n_fiber = 0;
+    for (enum line_kind kind; (kind = next_line(&r, line)) != LINE_END;) {
+        if (kind == LINE_BLANK) {
+            inside = false;
+            continue;
+        }
+        if (!inside) ++*n_fiber;
+        inside = true;
+        n_vertex++;
+    }
+    return n_vertex;
+}
+
+/* Four finite numbers; false for anything else. */
+static bool parse_point(const char *line, double value[4])
+{
+    for (int a = 0; a < 4; a++) {
+        char *end;
+        value[a] = strtod(line, &end);
+        if (end == line || !isfinite(value[a])) return false;
+        line = end;
+    }
+    return line[strspn(line, " \t\r")] == '\0' && value[3] > 0.0;
+}
+
+static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, double radius_sum, const char *path,
+                          size_t i_line, struct error *err)
+{
+    size_t n = n_vertex - f->first_vertex[i_fiber];
+    if (n < 2)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the fiber ending at line %zu has one point only", path,
+                         i_line);
+    f->radius_m[i_fiber] = (float)(1e-3 * radius_sum / (double)n);
+    f->first_vertex[i_fiber + 1] = n_vertex;
+    return STATUS_OK;
+}
+
+static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const char *path, struct error *err)
+{
+    struct line_reader r = {data, data + n_bytes, 0};
+    char line[LINE_BYTES];
+    size_t i_fiber = 0, n_vertex = 0;
+    double radius_sum = 0.0, value[4];
+    for (;;) {
+        enum line_kind kind = next_line(&r, line);
+        bool inside = n_vertex > f->first_vertex[i_fiber];
+        if ((kind == LINE_BLANK || kind == LINE_END) && inside) {
+            status s = close_fiber(f, i_fiber++, n_vertex, radius_sum, path, r.i_line, err);
+            if (s != STATUS_OK) return s;
+            radius_sum = 0.0;
+        }
+        if (kind == LINE_END) return STATUS_OK;
+        if (kind == LINE_BLANK) continue;
+        if (kind == LINE_TOO_LONG || !parse_point(line, value))
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu is not \"x y z radius\"", path, r.i_line);
+        for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * value[a]);
+        radius_sum += value[3];
+        n_vertex++;
+    }
+}
+
+status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *err)
+{
+    char *data = NULL;
+    size_t n_bytes = 0, n_fiber = 0;
+    struct fiber_set read;
+    fiber_set_init(&read);
+    status s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
+    if (s != STATUS_OK) return s;
+    size_t n_vertex = count_points(data, n_bytes, &n_fiber);
+    if (n_fiber == 0) s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path);
+    if (s == STATUS_OK) s = fiber_set_reserve(&read, n_fiber, n_vertex, err);
+    if (s == STATUS_OK) s = parse(&read, data, n_bytes, path, err);
+    free(data);
+    if (s != STATUS_OK) {
+        fiber_set_release(&read);
+        return s;
+    }
+    fiber_set_classify(&read);
+    fiber_set_release(f);
+    *f = read;
+    f->tile_size_m[0] = f->tile_size_m[1] = 0.0;
+    return STATUS_OK;
+}
