@@ -46,6 +46,8 @@ struct scattering_model {
     /* Draw wi for a given wo with u in [0,1)^3; returns the density per steradian (> 0), exactly that of pdf(). */
     float (*sample)(const struct scattering_state *state, const float wo[3], const float u[3], float wi[3]);
     float (*pdf)(const struct scattering_state *state, const float wi[3], const float wo[3]);
+    /* eval and pdf in one pass, for the inner loop: they share most of their work. Exactly the same values. */
+    float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3], float *score);
 };
 
 /* All models, NULL-terminated; and by id (NULL when unknown). */

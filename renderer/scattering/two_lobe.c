@@ -1,0 +1,46 @@
+/* two_lobe.v1: the textile fiber model of the fabric thesis, section 5.4, as published. */
+#include "renderer/scattering/gauss_polynomial.h"
+#include "renderer/scattering/two_lobe_core.h"
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    status st = scattering_check_param(&scattering_two_lobe, param, err);
+    if (st != STATUS_OK) return st;
+    struct scattering_state *s = two_lobe_state_new(param);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++)
+        for (int k = 0; k < 2; k++) {
+            double d_beta;
+            double g = lobe_normaliser(i * (M_PI_2 / TWO_LOBE_N_TABLE), param[TWO_LOBE_P_BETA_R + k], NULL, &d_beta);
+            s->normal[i].value[k] = (float)g;
+            s->normal[i].d_beta[k] = (float)d_beta;
+        }
+    two_lobe_fill_sampling(s, false);
+    *state = s;
+    return STATUS_OK;
+}
+
+static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
+{
+    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
+    two_lobe_eval_terms(s, false, &di, &dout, &t, s_rgb, score);
+}
+
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
+{
+    return two_lobe_eval_pdf(s, false, wi, wo, s_rgb, score);
+}
+
+const struct scattering_model scattering_two_lobe = {
+    .id = "two_lobe.v1",
+    .title = "Two-lobe textile fiber (R and TT), fabric thesis section 5.4",
+    .n_param = TWO_LOBE_N_PARAM,
+    .param = two_lobe_param,
+    .prepare = prepare,
+    .release = two_lobe_release,
+    .eval = eval,
+    .sample = two_lobe_sample,
+    .pdf = two_lobe_pdf,
+    .eval_pdf = eval_pdf,
+};

@@ -1,0 +1,116 @@
+#include "renderer/scattering/two_lobe_core.h"
+
+#include <math.h>
+
+#define DEG (M_PI / 180)
+
+/* Fabric thesis, Table 5.1. */
+const struct param_info two_lobe_param[TWO_LOBE_N_PARAM] = {
+    {"C_R.r", "C_R", "", 0, 0.001, 0.999, 0.1},
+    {"C_R.g", "C_R", "", 1, 0.001, 0.999, 0.1},
+    {"C_R.b", "C_R", "", 2, 0.001, 0.999, 0.1},
+    {"C_TT.r", "C_TT", "", 0, 0.001, 0.999, 0.85},
+    {"C_TT.g", "C_TT", "", 1, 0.001, 0.999, 0.85},
+    {"C_TT.b", "C_TT", "", 2, 0.001, 0.999, 0.85},
+    {"beta_R", "beta_R", "deg", -1, 1 * DEG, 10 * DEG, 5 * DEG},
+    {"beta_TT", "beta_TT", "deg", -1, 10 * DEG, 45 * DEG, 10 * DEG},
+    {"gamma_TT", "gamma_TT", "deg", -1, 1 * DEG, 45 * DEG, 10 * DEG},
+};
+
+struct scattering_state *two_lobe_state_new(const double *param)
+{
+    struct scattering_state *s = calloc(1, sizeof *s);
+    if (s == NULL) return NULL;
+    for (int c = 0; c < 3; c++) {
+        s->c_r[c] = (float)param[TWO_LOBE_P_C_R + c];
+        s->c_tt[c] = (float)param[TWO_LOBE_P_C_TT + c];
+    }
+    for (int k = 0; k < 2; k++) {
+        double beta = param[TWO_LOBE_P_BETA_R + k];
+        s->beta[k] = (float)beta;
+        s->peak[k] = (float)(1 / (sqrt(2 * M_PI) * beta));
+        s->inv_2var[k] = (float)(0.5 / (beta * beta));
+        s->inv[k] = (float)(1 / beta);
+        s->inv_cube[k] = (float)(1 / (beta * beta * beta));
+    }
+    von_mises_init(&s->azimuth, param[TWO_LOBE_P_GAMMA_TT]);
+    return s;
+}
+
+/* Energy that each lobe brings to th_o from a uniform environment, mean of the channels: the odds of sampling it. */
+static void lobe_energy(const struct scattering_state *s, bool balanced, float theta_o, float energy[2])
+{
+    enum { N = 24 };
+    float scale_o[2] = {1, 1}, unused[2];
+    if (balanced) two_lobe_scale_at(s, true, theta_o, scale_o, unused);
+    for (int k = 0; k < 2; k++) {
+        float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]), hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
+        float step = (hi - lo) / N, sum = 0;
+        for (int i = 0; i < N; i++) {
+            float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2], mean = 0;
+            two_lobe_scale_at(s, balanced, t, scale, unused);
+            float schlick = two_lobe_schlick(balanced ? cosf(0.5f * (t - theta_o)) : cos_t);
+            for (int c = 0; c < 3; c++) {
+                float f = s->c_r[c] + (1 - s->c_r[c]) * schlick;
+                mean += (k == TWO_LOBE_R ? f : s->c_tt[c] * (1 - f)) * (1.0f / 3);
+            }
+            sum += mean * expf(-x * x * s->inv_2var[k]) * scale[k] * cos_t * cos_t;
+        }
+        energy[k] = sum * step * s->peak[k] * scale_o[k];
+    }
+}
+
+void two_lobe_fill_sampling(struct scattering_state *s, bool balanced)
+{
+    enum { STRIDE = 16 };
+    const double step = M_PI_2 / TWO_LOBE_N_TABLE;
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE) {
+        float energy[2];
+        lobe_energy(s, balanced, (float)(i * step), energy);
+        float p = energy[TWO_LOBE_R] / (energy[TWO_LOBE_R] + energy[TWO_LOBE_TT]);
+        /* neither lobe is starved: both carry derivatives even where one is dark (also catches 0/0) */
+        s->sampling[i].p_r = p > 0.05f ? fminf(p, 0.95f) : 0.05f;
+    }
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
+        struct two_lobe_sampling_entry *e = &s->sampling[i];
+        int i0 = i / STRIDE * STRIDE;
+        if (i != i0) {
+            float t = (float)(i - i0) / STRIDE;
+            e->p_r = two_lobe_mix(s->sampling[i0].p_r, s->sampling[i0 + STRIDE].p_r, t);
+        }
+        for (int k = 0; k < 2; k++) {
+            e->near[k] = (float)erf((M_PI_2 - i * step) / (M_SQRT2 * (double)s->beta[k]));
+            e->far[k] = (float)erf((M_PI_2 + i * step) / (M_SQRT2 * (double)s->beta[k]));
+        }
+    }
+}
+
+float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3])
+{
+    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
+    return two_lobe_pdf_terms(s, &di, &dout, &t);
+}
+
+float two_lobe_sample(const struct scattering_state *s, const float wo[3], const float u[3], float wi[3])
+{
+    struct fiber_direction dout = fiber_direction_of(wo);
+    struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);
+    int k = u[0] < e.p_r ? TWO_LOBE_R : TWO_LOBE_TT;
+
+    /* th_i about -th_o: the pole on the side of -th_o is the near one */
+    bool upper_near = dout.theta_rad <= 0;
+    float hi = upper_near ? e.near[k] : e.far[k], lo = -(upper_near ? e.far[k] : e.near[k]);
+    float theta = -dout.theta_rad + (float)M_SQRT2 * s->beta[k] * erf_inverse(lo + u[1] * (hi - lo));
+    theta = fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
+    float sin_theta = sinf(theta), cos_theta = fmaxf(cosf(theta), 0);
+
+    float delta = k == TWO_LOBE_R ? (float)(2 * M_PI) * u[2] : von_mises_sample(&s->azimuth, u[2]);
+    float c = -cosf(delta), d = -sinf(delta); /* turned by pi: forward is behind the fiber */
+    wi[0] = sin_theta;
+    wi[1] = cos_theta * (c * dout.azimuth[0] - d * dout.azimuth[1]);
+    wi[2] = cos_theta * (d * dout.azimuth[0] + c * dout.azimuth[1]);
+    return two_lobe_pdf(s, wi, wo);
+}
+
+void two_lobe_release(struct scattering_state *s) { free(s); }

@@ -1,0 +1,198 @@
+#include "renderer/scene/scene_data.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MM_PER_M 1e3
+
+static void on_device_error(void *user, enum RTCError code, const char *text)
+{
+    struct error *e = user;
+    if (e->code != STATUS_OK) return; /* the first is the cause */
+    error_set_at(e, code == RTC_ERROR_OUT_OF_MEMORY ? STATUS_NO_MEMORY : STATUS_INTERNAL, "embree", "",
+                 "cannot build scene: Embree: %s", text == NULL ? "unknown error" : text);
+}
+
+static bool count_device_memory(void *user, ssize_t bytes, bool post)
+{
+    (void)post;
+    struct scene *s = user;
+    atomic_fetch_add_explicit(&s->device_bytes, bytes, memory_order_relaxed);
+    return true;
+}
+
+/* Ng points out of the fiber: a positive product with the direction is a way out. The packets' arrays hold one field after the
+ * other (rtcore_ray.h: dir_x is field 4 of a ray, Ng_x field 0 of a hit). */
+static void reject_back_faces(const struct RTCFilterFunctionNArguments *a)
+{
+    const float *ray = (const float *)a->ray, *hit = (const float *)a->hit;
+    const size_t n = a->N;
+    for (size_t i = 0; i < n; i++) {
+        float d = ray[4 * n + i] * hit[i] + ray[5 * n + i] * hit[n + i] + ray[6 * n + i] * hit[2 * n + i];
+        if (d > 0) a->valid[i] = 0;
+    }
+}
+
+/* Vertices in millimetres, z from the top; repeated points are left out, and fibers of one point with them. */
+static status copy_fibers(struct scene *s, const struct fiber_set *f, struct error *err)
+{
+    double z_min_m, z_max_m;
+    fiber_set_z_range_m(f, &z_min_m, &z_max_m);
+    s->bottom_mm = (float)((z_min_m - z_max_m) * MM_PER_M);
+    s->vertex = malloc(f->n_vertex * sizeof *s->vertex);
+    s->segment_vertex = malloc(f->n_vertex * sizeof *s->segment_vertex);
+    s->segment_fiber = malloc(f->n_vertex * sizeof *s->segment_fiber);
+    s->segment_flag = malloc(f->n_vertex);
+    if (s->vertex == NULL || s->segment_vertex == NULL || s->segment_fiber == NULL || s->segment_flag == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu vertices", f->n_vertex);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        float radius = f->radius_m[i] * (float)MM_PER_M;
+        size_t first = s->n_vertex;
+        for (size_t v = f->first_vertex[i]; v < f->first_vertex[i + 1]; v++) {
+            const float *p = f->position_m + 3 * v;
+            struct scene_vertex q = {(float)((double)p[0] * MM_PER_M), (float)((double)p[1] * MM_PER_M),
+                                     (float)(((double)p[2] - z_max_m) * MM_PER_M), radius};
+            if (s->n_vertex > first) {
+                const struct scene_vertex *last = &s->vertex[s->n_vertex - 1];
+                float dx = q.x - last->x, dy = q.y - last->y, dz = q.z - last->z;
+                if (dx * dx + dy * dy + dz * dz < 1e-6f * radius * radius) continue;
+            }
+            s->vertex[s->n_vertex++] = q;
+        }
+        if (s->n_vertex - first < 2) {
+            s->n_vertex = first;
+            continue;
+        }
+        for (size_t v = first; v + 1 < s->n_vertex; v++) {
+            s->segment_vertex[s->n_segment] = (uint32_t)v;
+            s->segment_fiber[s->n_segment] = (uint32_t)i;
+            s->segment_flag[s->n_segment++] =
+                (unsigned char)((v > first ? RTC_CURVE_FLAG_NEIGHBOR_LEFT : 0) |
+                                (v + 2 < s->n_vertex ? RTC_CURVE_FLAG_NEIGHBOR_RIGHT : 0));
+        }
+    }
+    if (s->n_segment == 0) return error_set(err, STATUS_INVALID, "cannot build scene: no fiber longer than its points' rounding");
+    return STATUS_OK;
+}
+
+/* How far a local origin in the centre tile may travel before the block's copies no longer cover it. */
+static status choose_block(struct scene *s, const struct fiber_set *f, struct error *err)
+{
+    float lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
+    for (size_t v = 0; v < s->n_vertex; v++) {
+        float p[2] = {s->vertex[v].x, s->vertex[v].y}, r = s->vertex[v].radius;
+        for (int a = 0; a < 2; a++) {
+            lo[a] = fminf(lo[a], p[a] - r);
+            hi[a] = fmaxf(hi[a], p[a] + r);
+        }
+    }
+    for (int a = 0; a < 2; a++) {
+        double tile = f->tile_size_m[a] * MM_PER_M;
+        s->tile_mm[a] = tile;
+        double reach = fmax(0.5 * tile, -3.0 * (double)s->bottom_mm); /* beyond the centre tile */
+        int h = 1;
+        while (h < SCENE_MAX_HALF_BLOCK &&
+               ((h + 1) * tile + (double)lo[a] < tile + reach || (h + 1) * tile - (double)hi[a] < reach))
+            h++;
+        s->half_block[a] = h;
+        s->inset_low_mm[a] = (float)((double)hi[a] - (h + 1) * tile);
+        s->inset_high_mm[a] = (float)((double)lo[a] + (h + 1) * tile);
+        if (s->inset_low_mm[a] > -0.25f * (float)tile || s->inset_high_mm[a] < 1.25f * (float)tile)
+            return error_set(err, STATUS_INVALID,
+                             "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm", (double)lo[a],
+                             (double)hi[a], a == 0 ? "x" : "y", tile);
+    }
+    return STATUS_OK;
+}
+
+static void build_tile(struct scene *s)
+{
+    RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, s->vertex, 0, sizeof *s->vertex, s->n_vertex);
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, s->segment_vertex, 0, sizeof *s->segment_vertex,
+                               s->n_segment);
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, s->segment_flag, 0, 1, s->n_segment);
+    rtcSetGeometryIntersectFilterFunction(g, reject_back_faces);
+    rtcSetGeometryOccludedFilterFunction(g, reject_back_faces);
+    rtcCommitGeometry(g);
+    s->tile = rtcNewScene(s->device);
+    rtcAttachGeometry(s->tile, g);
+    rtcReleaseGeometry(g);
+    rtcCommitScene(s->tile);
+}
+
+static void build_block(struct scene *s)
+{
+    s->block = rtcNewScene(s->device);
+    for (int j = -s->half_block[1]; j <= s->half_block[1]; j++)
+        for (int i = -s->half_block[0]; i <= s->half_block[0]; i++) {
+            RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_INSTANCE);
+            float m[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, (float)(i * s->tile_mm[0]), (float)(j * s->tile_mm[1]), 0};
+            rtcSetGeometryInstancedScene(g, s->tile);
+            rtcSetGeometryTransform(g, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, m);
+            rtcCommitGeometry(g);
+            rtcAttachGeometry(s->block, g);
+            rtcReleaseGeometry(g);
+        }
+    rtcCommitScene(s->block);
+}
+
+status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err)
+{
+    status st = fiber_set_validate(f, err);
+    if (st != STATUS_OK) return st;
+    struct error device_error = {0};
+    struct scene *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
+    s->black_sheet = o->black_sheet;
+    st = copy_fibers(s, f, err);
+    if (st != STATUS_OK) goto out;
+    st = choose_block(s, f, err);
+    if (st != STATUS_OK) goto out;
+    /* one build thread: the order of the tree's leaves, which decides ties, must not depend on timing */
+    s->device = rtcNewDevice("threads=1,set_affinity=0");
+    if (s->device == NULL) {
+        st = error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)", (int)rtcGetDeviceError(NULL));
+        goto out;
+    }
+    rtcSetDeviceErrorFunction(s->device, on_device_error, &device_error);
+    rtcSetDeviceMemoryMonitorFunction(s->device, count_device_memory, s);
+    build_tile(s);
+    build_block(s);
+    rtcSetDeviceErrorFunction(s->device, NULL, NULL); /* device_error is on this stack */
+    if (device_error.code != STATUS_OK) {
+        st = device_error.code;
+        if (err != NULL) *err = device_error;
+        goto out;
+    }
+    *scene = s;
+    s = NULL;
+out:
+    scene_free(s);
+    return st;
+}
+
+void scene_free(struct scene *s)
+{
+    if (s == NULL) return;
+    if (s->block != NULL) rtcReleaseScene(s->block);
+    if (s->tile != NULL) rtcReleaseScene(s->tile);
+    if (s->device != NULL) rtcReleaseDevice(s->device);
+    free(s->vertex);
+    free(s->segment_vertex);
+    free(s->segment_fiber);
+    free(s->segment_flag);
+    free(s);
+}
+
+size_t scene_memory_bytes(const struct scene *s)
+{
+    long long device = atomic_load(&s->device_bytes);
+    return sizeof *s + (device > 0 ? (size_t)device : 0) + s->n_vertex * sizeof *s->vertex +
+           s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1);
+}
+
+size_t scene_n_segment(const struct scene *s) { return s->n_segment; }
+bool scene_has_black_sheet(const struct scene *s) { return s->black_sheet; }
+double scene_thickness_mm(const struct scene *s) { return -(double)s->bottom_mm; }

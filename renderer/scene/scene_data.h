@@ -1,0 +1,32 @@
+/* Inside of struct scene, for the files of this folder. Millimetres. */
+#ifndef SELVEDGE_RENDERER_SCENE_DATA_H
+#define SELVEDGE_RENDERER_SCENE_DATA_H
+
+#include "renderer/scene/scene_ray.h"
+
+#include <embree3/rtcore.h>
+#include <stdatomic.h>
+
+enum { SCENE_MAX_HALF_BLOCK = 12 };
+
+struct scene_vertex {
+    float x, y, z, radius; /* Embree's FLOAT4 */
+};
+
+struct scene {
+    RTCDevice device;
+    RTCScene tile, block;
+    size_t n_vertex, n_segment;
+    struct scene_vertex *vertex;
+    uint32_t *segment_vertex; /* first of two */
+    uint32_t *segment_fiber;
+    unsigned char *segment_flag;
+    double tile_mm[2];
+    int half_block[2];        /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
+    float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */
+    float bottom_mm;          /* < 0; the top is 0 */
+    bool black_sheet;
+    atomic_llong device_bytes;
+};
+
+#endif

@@ -1,0 +1,153 @@
+#include "renderer/scene/scene_data.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SLAB_MARGIN_MM 1e-3f
+
+/* Local origin into the centre tile. */
+static inline void wrap(const struct scene *s, struct scene_ray *r)
+{
+    for (int a = 0; a < 2; a++) {
+        float tile = (float)s->tile_mm[a];
+        if (r->origin_mm[a] >= 0 && r->origin_mm[a] < tile) continue;
+        double n = floor((double)r->origin_mm[a] / s->tile_mm[a]);
+        r->offset_mm[a] += n * s->tile_mm[a];
+        r->origin_mm[a] = (float)((double)r->origin_mm[a] - n * s->tile_mm[a]);
+    }
+}
+
+/* Distance to where the ray leaves the slab (*leaves) or the covered part of the block, whichever comes first. */
+static inline float reach(const struct scene *s, const struct scene_ray *r, bool *leaves)
+{
+    const float *o = r->origin_mm, *d = r->direction;
+    float t = INFINITY;
+    for (int a = 0; a < 2; a++) {
+        float to = (d[a] > 0 ? s->inset_high_mm[a] : s->inset_low_mm[a]) - o[a];
+        if (d[a] != 0) t = fminf(t, to / d[a]);
+    }
+    float plane = d[2] > 0 ? SLAB_MARGIN_MM : s->bottom_mm - SLAB_MARGIN_MM;
+    float t_slab = d[2] != 0 ? (plane - o[2]) / d[2] : INFINITY;
+    *leaves = t_slab <= t;
+    return fminf(t, t_slab);
+}
+
+static inline void advance(struct scene_ray *r, float t)
+{
+    for (int a = 0; a < 3; a++) r->origin_mm[a] += t * r->direction[a];
+    r->tnear_mm = fmaxf(r->tnear_mm - t, 0);
+}
+
+static inline void fill_ray(struct RTCRay *q, const struct scene_ray *r, float tfar)
+{
+    q->org_x = r->origin_mm[0];
+    q->org_y = r->origin_mm[1];
+    q->org_z = r->origin_mm[2];
+    q->tnear = r->tnear_mm;
+    q->dir_x = r->direction[0];
+    q->dir_y = r->direction[1];
+    q->dir_z = r->direction[2];
+    q->time = 0;
+    q->tfar = tfar;
+    q->mask = ~0u;
+    q->id = 0;
+    q->flags = 0;
+}
+
+static void fill_hit(const struct scene *s, const struct scene_ray *r, const struct RTCRayHit *q, struct scene_hit *hit)
+{
+    for (int a = 0; a < 3; a++) hit->position_mm[a] = r->origin_mm[a] + q->ray.tfar * r->direction[a];
+    float n[3] = {q->hit.Ng_x, q->hit.Ng_y, q->hit.Ng_z};
+    float inv = 1 / sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int a = 0; a < 3; a++) hit->normal[a] = n[a] * inv;
+    hit->i_segment = q->hit.primID;
+    hit->i_fiber = s->segment_fiber[hit->i_segment];
+    const struct scene_vertex *v = &s->vertex[s->segment_vertex[hit->i_segment]];
+    float t[3] = {v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z};
+    inv = 1 / sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+    for (int a = 0; a < 3; a++) hit->tangent[a] = t[a] * inv;
+    hit->radius_mm = v[0].radius;
+}
+
+bool scene_trace(const struct scene *s, struct scene_ray *r, struct scene_hit *hit)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    for (int i = 0; i < SCENE_MAX_WRAP; i++) {
+        bool leaves;
+        wrap(s, r);
+        float t = reach(s, r, &leaves);
+        if (t > r->tnear_mm) {
+            struct RTCRayHit q;
+            fill_ray(&q.ray, r, t);
+            q.hit.geomID = q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+            rtcIntersect1(s->block, &context, &q);
+            if (q.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+                fill_hit(s, r, &q, hit);
+                return true;
+            }
+        }
+        if (leaves || !isfinite(t)) return false;
+        advance(r, t);
+    }
+    return false;
+}
+
+bool scene_occluded(const struct scene *s, const struct scene_ray *ray)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct scene_ray r = *ray;
+    for (int i = 0; i < SCENE_MAX_WRAP; i++) {
+        bool leaves;
+        wrap(s, &r);
+        float t = reach(s, &r, &leaves);
+        if (t > r.tnear_mm) {
+            struct RTCRay q;
+            fill_ray(&q, &r, t);
+            rtcOccluded1(s->block, &context, &q);
+            if (q.tfar < 0) return true;
+        }
+        if (leaves || !isfinite(t)) return false;
+        advance(&r, t);
+    }
+    return false;
+}
+
+void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3], struct scene_ray *r)
+{
+    const float *n = hit->normal, *d = hit->tangent, *w = direction;
+    float cos_n = n[0] * w[0] + n[1] * w[1] + n[2] * w[2], along = d[0] * w[0] + d[1] * w[1] + d[2] * w[2];
+    float tnear = 0;
+    if (cos_n < 0) { /* chord of the cylinder; capped, as fibers bend */
+        float sin2 = fmaxf(1 - along * along, 1e-6f);
+        tnear = fminf(-2 * cos_n / sin2, 4) * hit->radius_mm;
+    }
+    memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
+    memcpy(r->origin_mm, hit->position_mm, sizeof r->origin_mm);
+    memcpy(r->direction, direction, sizeof r->direction);
+    r->tnear_mm = tnear + 1e-3f * hit->radius_mm;
+}
+
+bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const double direction[3], struct scene_ray *r)
+{
+    double top = (double)SLAB_MARGIN_MM, bottom = (double)(s->bottom_mm - SLAB_MARGIN_MM), z = origin_mm[2], t = 0;
+    if (z > top) {
+        if (direction[2] >= 0) return false;
+        t = (top - z) / direction[2];
+    } else if (z < bottom) {
+        if (direction[2] <= 0) return false;
+        t = (bottom - z) / direction[2];
+    }
+    for (int a = 0; a < 3; a++) {
+        double p = origin_mm[a] + t * direction[a];
+        if (a < 2) {
+            r->offset_mm[a] = floor(p / s->tile_mm[a]) * s->tile_mm[a];
+            p -= r->offset_mm[a];
+        }
+        r->origin_mm[a] = (float)p;
+        r->direction[a] = (float)direction[a];
+    }
+    r->tnear_mm = 0;
+    return true;
+}
