@@ -1,0 +1,43 @@
+/* What every command gets, and the commands. A command prints results to `out` and progress to `note`; errors go up to main.
+ * *exit_code is 0 when it starts; a command that follows a job sets it to tell how the job ended. */
+#ifndef SELVEDGE_CLIENTS_CLI_H
+#define SELVEDGE_CLIENTS_CLI_H
+
+#include "clients/cli/cli_args.h"
+#include "clients/cli/cli_http.h"
+
+#include <stdio.h>
+
+enum cli_exit { CLI_EXIT_OK = 0, CLI_EXIT_ERROR = 1, CLI_EXIT_USAGE = 2, CLI_EXIT_CANCELLED = 3, CLI_EXIT_INTERRUPTED = 130 };
+
+struct cli {
+    const struct cli_args *args;
+    struct http *http;
+    FILE *out, *note;
+    bool note_is_terminal;
+};
+
+status cli_submit(struct cli *cli, int *exit_code, struct error *err);
+status cli_status(struct cli *cli, int *exit_code, struct error *err);
+status cli_watch(struct cli *cli, int *exit_code, struct error *err);
+status cli_list(struct cli *cli, int *exit_code, struct error *err);
+status cli_cancel(struct cli *cli, int *exit_code, struct error *err);
+status cli_retry(struct cli *cli, int *exit_code, struct error *err);
+status cli_results(struct cli *cli, int *exit_code, struct error *err);
+status cli_log(struct cli *cli, int *exit_code, struct error *err);
+status cli_series(struct cli *cli, int *exit_code, struct error *err);
+status cli_delete(struct cli *cli, int *exit_code, struct error *err);
+
+/* Follow job `id` until it ends; prints the fitted parameters. */
+status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
+/* "/v1/jobs/ID" + tail into path; STATUS_INVALID when the id has characters that no id has. */
+status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err);
+/* Width of the terminal behind `note`, 80 when it cannot be told. */
+size_t cli_columns(const struct cli *cli);
+
+/* tus: send file->path to upload_url from wherever it stands; retries. changed is called with the offset reached. */
+struct cli_file;
+status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url,
+                       void (*changed)(void *context, uint64_t offset), void *context, struct error *err);
+
+#endif

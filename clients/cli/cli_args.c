@@ -1,0 +1,245 @@
+#include "clients/cli/cli_args.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { OPT_SERVER = 1, OPT_TOKEN = 2, OPT_INPUT = 4, OPT_WATCH = 8, OPT_RESUME = 16, OPT_JSON = 32, OPT_OUT = 64,
+       OPT_FOLLOW = 128, OPT_DRAFT = 256, OPT_HELP = 512, OPT_VERSION = 1024 };
+#define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
+
+static const struct cli_command {
+    const char *name, *operand, *what, *more;
+    int option;
+} command_table[CLI_N_COMMAND] = {
+    [CLI_SUBMIT] = {"submit", "JOB.json", "send a job document and its files, and start the job",
+                    "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
+                    "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
+                    "continues a submit that was interrupted. Prints the job's id on standard output.\n",
+                    OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT},
+    [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
+    [CLI_WATCH] = {"watch", "ID", "follow a job until it ends",
+                   "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
+                   "1 when it failed, 3 when it was cancelled.\n", 0},
+    [CLI_LIST] = {"list", NULL, "list the jobs, newest first", "", OPT_JSON},
+    [CLI_CANCEL] = {"cancel", "ID", "stop a job; what it has computed so far is kept", "", 0},
+    [CLI_RETRY] = {"retry", "ID", "start a failed or cancelled job again from its last checkpoint", "", 0},
+    [CLI_RESULTS] = {"results", "ID", "download the results",
+                     "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
+                     "files that are already whole are not fetched again.\n", OPT_OUT},
+    [CLI_LOG] = {"log", "ID", "print the job's log", "", OPT_FOLLOW},
+    [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "", OPT_JSON},
+    [CLI_DELETE] = {"delete", "ID", "remove a job and its files", "A running job must be cancelled first.\n", 0},
+};
+
+static const struct cli_option {
+    int bit;
+    char letter;
+    const char *name, *value, *what;
+} option_table[] = {
+    {OPT_INPUT, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)"},
+    {OPT_WATCH, 'w', "watch", NULL, "follow the job until it ends"},
+    {OPT_RESUME, 0, "resume", "ID", "continue an interrupted submit of job ID (JOB.json is then not needed\n"
+                                    "                      if the files are in the current folder or --input-dir)"},
+    {OPT_DRAFT, 0, "draft", NULL, "upload everything but do not start the job"},
+    {OPT_JSON, 0, "json", NULL, "print the server's JSON"},
+    {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
+    {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
+    {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")"},
+    {OPT_TOKEN, 0, "token", "TOKEN", "access token (default: SELVEDGE_TOKEN; visible to other users in the\n"
+                                     "                      process list, so prefer the variable)"},
+    {OPT_HELP, 'h', "help", NULL, "show this text"},
+    {OPT_VERSION, 'V', "version", NULL, "show the version"},
+};
+enum { N_OPTION = sizeof option_table / sizeof option_table[0] };
+
+const char *cli_command_name(enum cli_command_id id)
+{
+    return (unsigned)id < CLI_N_COMMAND ? command_table[id].name : "?";
+}
+
+/* Edit distance of two short words, for "did you mean". */
+static size_t distance(const char *a, const char *b)
+{
+    size_t row[32], n_b = strlen(b);
+    if (n_b >= 32 || strlen(a) >= 32) return 99;
+    for (size_t j = 0; j <= n_b; j++) row[j] = j;
+    for (size_t i = 1; a[i - 1] != '\0'; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= n_b; j++) {
+            size_t best = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            if (row[j] + 1 < best) best = row[j] + 1;
+            if (row[j - 1] + 1 < best) best = row[j - 1] + 1;
+            row[j] = best;
+        }
+    }
+    return row[n_b];
+}
+
+static status find_command(const char *word, enum cli_command_id *id, struct error *err)
+{
+    size_t best = 99;
+    for (int i = 0; i < CLI_N_COMMAND; i++) {
+        size_t d = distance(word, command_table[i].name);
+        if (d < best) best = d, *id = (enum cli_command_id)i;
+    }
+    if (best == 0) return STATUS_OK;
+    if (best <= 2)
+        return error_set(err, STATUS_INVALID, "unknown command '%s'; did you mean '%s'?", word, command_table[*id].name);
+    return error_set(err, STATUS_INVALID, "unknown command '%s'; `selvedge --help` lists them", word);
+}
+
+static const struct cli_option *find_option(const char *word, const char **value)
+{
+    *value = NULL;
+    for (size_t i = 0; i < N_OPTION; i++) {
+        const struct cli_option *o = &option_table[i];
+        if (word[1] != '-') {
+            if (o->letter != 0 && word[1] == o->letter && word[2] == '\0') return o;
+            continue;
+        }
+        size_t n = strlen(o->name);
+        if (strncmp(word + 2, o->name, n) != 0) continue;
+        if (word[2 + n] == '\0') return o;
+        if (word[2 + n] == '=') {
+            *value = word + 3 + n;
+            return o;
+        }
+    }
+    return NULL;
+}
+
+static void apply(struct cli_args *a, int bit, const char *value)
+{
+    switch (bit) {
+    case OPT_SERVER: a->server = value; break;
+    case OPT_TOKEN: a->token = value; break;
+    case OPT_INPUT: a->input_dir = value; break;
+    case OPT_RESUME: a->resume_id = value; break;
+    case OPT_OUT: a->out_dir = value; break;
+    case OPT_WATCH: a->watch = true; break;
+    case OPT_JSON: a->json = true; break;
+    case OPT_FOLLOW: a->follow = true; break;
+    case OPT_DRAFT: a->draft = true; break;
+    case OPT_HELP: a->help = true; break;
+    default: a->version = true; break;
+    }
+}
+
+static status parse_option(int argc, char *const *argv, int *i, struct cli_args *a, int *given, struct error *err)
+{
+    const char *value;
+    const struct cli_option *o = find_option(argv[*i], &value);
+    if (o == NULL) return error_set(err, STATUS_INVALID, "unknown option '%s'; try --help", argv[*i]);
+    if (o->value == NULL && value != NULL)
+        return error_set(err, STATUS_INVALID, "option '--%s' takes no value", o->name);
+    if (o->value != NULL && value == NULL) {
+        if (*i + 1 >= argc) return error_set(err, STATUS_INVALID, "option '--%s' needs a value: --%s %s", o->name, o->name, o->value);
+        value = argv[++*i];
+    }
+    if (o->value != NULL && value[0] == '\0') return error_set(err, STATUS_INVALID, "option '--%s' has an empty value", o->name);
+    *given |= o->bit;
+    apply(a, o->bit, value);
+    return STATUS_OK;
+}
+
+/* Options and operands must belong to the command. */
+static status check(const struct cli_args *a, int given, struct error *err)
+{
+    const struct cli_command *c = &command_table[a->command];
+    int foreign = given & ~(c->option | OPT_EVERYWHERE | OPT_VERSION);
+    for (size_t i = 0; i < N_OPTION; i++)
+        if (foreign & option_table[i].bit)
+            return error_set(err, STATUS_INVALID, "'selvedge %s' has no option '--%s'", c->name, option_table[i].name);
+    bool may_lack = a->command == CLI_SUBMIT && a->resume_id != NULL;
+    if (c->operand != NULL && a->operand == NULL && !may_lack)
+        return error_set(err, STATUS_INVALID, "'selvedge %s' needs %s: selvedge %s %s", c->name,
+                         a->command == CLI_SUBMIT ? "a job document" : "a job id (`selvedge list` shows them)", c->name, c->operand);
+    if (c->operand == NULL && a->operand != NULL)
+        return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
+    if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0)
+        return error_set(err, STATUS_INVALID, "server '%s' is not an http:// or https:// address", a->server);
+    return STATUS_OK;
+}
+
+status cli_args_parse(int argc, char *const *argv, const char *server_env, const char *token_env, struct cli_args *args,
+                      struct error *err)
+{
+    *args = (struct cli_args){.server = server_env != NULL && server_env[0] != '\0' ? server_env : CLI_DEFAULT_SERVER,
+                              .token = token_env != NULL && token_env[0] != '\0' ? token_env : NULL};
+    int given = 0;
+    bool only_operands = false;
+    for (int i = 1; i < argc; i++) {
+        const char *word = argv[i];
+        status s = STATUS_OK;
+        if (!only_operands && strcmp(word, "--") == 0) {
+            only_operands = true;
+        } else if (!only_operands && word[0] == '-' && word[1] != '\0') {
+            s = parse_option(argc, argv, &i, args, &given, err);
+        } else if (!args->has_command) {
+            s = find_command(word, &args->command, err);
+            args->has_command = s == STATUS_OK;
+        } else if (args->operand == NULL) {
+            args->operand = word;
+        } else {
+            s = error_set(err, STATUS_INVALID, "'selvedge %s' takes one %s, but '%s' follows '%s'",
+                          command_table[args->command].name,
+                          command_table[args->command].operand == NULL ? "command" : command_table[args->command].operand, word,
+                          args->operand);
+        }
+        if (s != STATUS_OK) return s;
+    }
+    if (args->help || args->version) return STATUS_OK;
+    if (!args->has_command) return error_set(err, STATUS_INVALID, "no command given; `selvedge --help` lists them");
+    return check(args, given, err);
+}
+
+/* Append to a bounded buffer; *at never passes n. */
+static void put(char *text, size_t n, size_t *at, const char *format, ...) __attribute__((format(printf, 4, 5)));
+static void put(char *text, size_t n, size_t *at, const char *format, ...)
+{
+    if (*at >= n) return;
+    va_list list;
+    va_start(list, format);
+    int written = vsnprintf(text + *at, n - *at, format, list);
+    va_end(list);
+    if (written > 0) *at += (size_t)written;
+}
+
+static void put_options(int mask, char *text, size_t n, size_t *at)
+{
+    for (size_t i = 0; i < N_OPTION; i++) {
+        const struct cli_option *o = &option_table[i];
+        if ((o->bit & mask) == 0) continue;
+        char left[32];
+        snprintf(left, sizeof left, "--%s%s%s", o->name, o->value == NULL ? "" : " ", o->value == NULL ? "" : o->value);
+        char letter[5] = "    ";
+        if (o->letter != 0) snprintf(letter, sizeof letter, "-%c, ", o->letter);
+        put(text, n, at, "  %s%-15s %s\n", letter, left, o->what);
+    }
+}
+
+void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
+{
+    size_t at = 0;
+    if (args->has_command) {
+        const struct cli_command *c = &command_table[args->command];
+        put(text, n_bytes, &at, "usage: selvedge %s%s%s [options]\n\n%s%s.\n%s%s\noptions:\n", c->name,
+            c->operand == NULL ? "" : " ", c->operand == NULL ? "" : c->operand, "", c->what, c->more[0] == '\0' ? "" : "\n", c->more);
+        put_options(c->option | OPT_EVERYWHERE, text, n_bytes, &at);
+        return;
+    }
+    put(text, n_bytes, &at, "selvedge: fit the scattering of a cloth's fibers, through a selvedged server\n\n"
+                            "usage: selvedge COMMAND [options]\n\ncommands:\n");
+    for (int i = 0; i < CLI_N_COMMAND; i++) {
+        char left[32];
+        const struct cli_command *c = &command_table[i];
+        snprintf(left, sizeof left, "%s %s", c->name, c->operand == NULL ? "" : c->operand);
+        put(text, n_bytes, &at, "  %-18s %s\n", left, c->what);
+    }
+    put(text, n_bytes, &at, "\noptions of every command:\n");
+    put_options(OPT_EVERYWHERE | OPT_VERSION, text, n_bytes, &at);
+    put(text, n_bytes, &at, "\n`selvedge COMMAND --help` tells more. docs/sample-preparation.md describes the job document.\n"
+                            "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
+}

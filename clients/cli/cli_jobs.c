@@ -1,0 +1,199 @@
+/* The short commands: one or two calls and some printing. */
+#include "clients/cli/cli.h"
+#include "clients/cli/cli_report.h"
+#include "clients/cli/cli_text.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err)
+{
+    size_t n = strlen(id);
+    bool good = n > 0 && n < 80;
+    for (size_t i = 0; i < n && good; i++)
+        good = (id[i] >= '0' && id[i] <= '9') || (id[i] >= 'a' && id[i] <= 'z') || (id[i] >= 'A' && id[i] <= 'Z') || id[i] == '-' || id[i] == '_';
+    if (!good) return error_set(err, STATUS_INVALID, "'%.80s' is not a job id; `selvedge list` shows them", id);
+    snprintf(path, n_path, "/v1/jobs/%s%s", id, tail);
+    return STATUS_OK;
+}
+
+static status job_call(struct cli *cli, const char *method, const char *tail, json_t **job, struct error *err)
+{
+    char path[256];
+    status s = cli_job_path(cli->args->operand, tail, path, sizeof path, err);
+    return s != STATUS_OK ? s : http_json(cli->http, method, path, NULL, NULL, job, err);
+}
+
+static void print_json(const json_t *value, FILE *out)
+{
+    json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    fputc('\n', out);
+}
+
+status cli_status(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    json_t *job = NULL;
+    status s = job_call(cli, "GET", "", &job, err);
+    if (s == STATUS_OK && cli->args->json) print_json(job, cli->out);
+    if (s == STATUS_OK && !cli->args->json) report_job(job, cli->out);
+    json_decref(job);
+    return s;
+}
+
+status cli_list(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    char path[400] = "/v1/jobs?limit=100";
+    size_t n_job = 0;
+    json_t *all = json_array();
+    status s;
+    for (;;) { /* page by page */
+        json_t *page = NULL, *job;
+        size_t i;
+        if ((s = http_json(cli->http, "GET", path, NULL, NULL, &page, err)) != STATUS_OK) break;
+        json_array_foreach(json_object_get(page, "jobs"), i, job) {
+            if (cli->args->json) json_array_append(all, job);
+            if (!cli->args->json && n_job == 0) fprintf(cli->out, "%-36s  %-10s %6s %8s  %s\n", "id", "state", "done", "ETA", "sample");
+            if (!cli->args->json) report_summary(job, cli->out);
+            n_job++;
+        }
+        const char *cursor = json_string_value(json_object_get(page, "next_cursor"));
+        if (cursor != NULL) snprintf(path, sizeof path, "/v1/jobs?limit=100&cursor=%s", cursor);
+        bool more = cursor != NULL && json_array_size(json_object_get(page, "jobs")) > 0;
+        json_decref(page);
+        if (!more) break;
+    }
+    if (s == STATUS_OK && cli->args->json) print_json(all, cli->out);
+    if (s == STATUS_OK && !cli->args->json && n_job == 0) fprintf(cli->note, "no jobs; `selvedge submit JOB.json` makes one\n");
+    json_decref(all);
+    return s;
+}
+
+static status act(struct cli *cli, const char *tail, const char *done, struct error *err)
+{
+    json_t *job = NULL;
+    status s = job_call(cli, "POST", tail, &job, err);
+    const char *state = json_string_value(json_object_get(job, "state"));
+    if (s == STATUS_OK) fprintf(cli->out, "%s: %s (now %s)\n", cli->args->operand, done, state == NULL ? "?" : state);
+    json_decref(job);
+    return s;
+}
+
+status cli_cancel(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    return act(cli, "/cancel", "asked to stop", err);
+}
+
+status cli_retry(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    return act(cli, "/retry", "goes on from its last checkpoint", err);
+}
+
+status cli_delete(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    status s = job_call(cli, "DELETE", "", NULL, err);
+    if (s == STATUS_OK) fprintf(cli->out, "%s: deleted\n", cli->args->operand);
+    return s;
+}
+
+/* Log lines from `offset` on; *n_new tells how much came. */
+static status log_piece(struct cli *cli, int64_t *offset, size_t *n_new, struct error *err)
+{
+    char path[256], tail[96];
+    struct http_reply reply;
+    snprintf(tail, sizeof tail, "/log?offset=%lld&max_bytes=1048576", (long long)*offset);
+    status s = cli_job_path(cli->args->operand, tail, path, sizeof path, err);
+    if (s != STATUS_OK) return s;
+    s = http_call(cli->http, "GET", path, NULL, NULL, 0, &reply, err);
+    if (s == STATUS_OK && reply.code != 200 && reply.code != 204) s = http_problem(&reply, err);
+    *n_new = 0;
+    if (s == STATUS_OK && reply.n_body > 0) {
+        for (size_t i = 0; i < reply.n_body; i++) { /* a log may quote names of files: keep their escapes from the terminal */
+            unsigned char c = (unsigned char)reply.body[i];
+            fputc(c < 0x20 && c != '\n' && c != '\t' ? '?' : c, cli->out);
+        }
+        fflush(cli->out);
+        *n_new = reply.n_body;
+        *offset = reply.log_next >= 0 ? reply.log_next : *offset + (int64_t)reply.n_body;
+    }
+    http_reply_release(&reply);
+    return s;
+}
+
+static status job_lives(struct cli *cli, bool *lives, struct error *err)
+{
+    json_t *job = NULL;
+    struct job_view view;
+    status s = job_call(cli, "GET", "", &job, err);
+    report_view(job, &view);
+    *lives = strcmp(view.state, "running") == 0 || strcmp(view.state, "queued") == 0 || strcmp(view.state, "paused") == 0;
+    json_decref(job);
+    return s;
+}
+
+status cli_log(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    int64_t offset = 0;
+    status s = STATUS_OK;
+    for (;;) {
+        size_t n_new;
+        bool lives = false;
+        if (cli->args->follow && (s = job_lives(cli, &lives, err)) != STATUS_OK) break; /* asked first: what ends a job is in the log */
+        do {
+            if ((s = log_piece(cli, &offset, &n_new, err)) != STATUS_OK) return s;
+        } while (n_new > 0);
+        if (!lives || http_stopped(cli->http)) break;
+        http_sleep(cli->http, 1.0);
+    }
+    return s;
+}
+
+static void print_point(const json_t *point, FILE *out)
+{
+    size_t i;
+    const json_t *value;
+    fprintf(out, "%lld\t%s\t%.2f\t%.0f\t%.8g\t%.4g\t%.6g", (long long)json_integer_value(json_object_get(point, "step")),
+            json_string_value(json_object_get(point, "phase")) == NULL ? "-" : json_string_value(json_object_get(point, "phase")),
+            json_number_value(json_object_get(point, "wall_s")), json_number_value(json_object_get(point, "n_path_total")),
+            json_number_value(json_object_get(point, "objective")), json_number_value(json_object_get(point, "objective_se")),
+            json_number_value(json_object_get(point, "rel_rms")));
+    json_array_foreach(json_object_get(point, "parameter"), i, value) fprintf(out, "\t%.7g", json_number_value(value));
+    fputc('\n', out);
+}
+
+status cli_series(struct cli *cli, int *exit_code, struct error *err)
+{
+    (void)exit_code;
+    long long after = -1;
+    bool first = true;
+    json_t *all = json_array();
+    status s;
+    for (;;) {
+        char tail[96];
+        json_t *page = NULL, *point;
+        size_t i;
+        snprintf(tail, sizeof tail, "/series?after_step=%lld&max_points=5000", after);
+        if ((s = job_call(cli, "GET", tail, &page, err)) != STATUS_OK) break;
+        const json_t *points = json_object_get(page, "points");
+        json_array_foreach(points, i, point) {
+            if (cli->args->json) json_array_append(all, point);
+            if (!cli->args->json && first) fprintf(cli->out, "step\tphase\twall_s\tn_path_total\tobjective\tobjective_se\trel_rms\tparameters\n");
+            if (!cli->args->json) print_point(point, cli->out);
+            first = false;
+        }
+        long long next = json_integer_value(json_object_get(page, "next_after_step"));
+        bool more = json_array_size(points) > 0 && next > after;
+        after = next;
+        json_decref(page);
+        if (!more) break;
+    }
+    if (s == STATUS_OK && cli->args->json) print_json(all, cli->out);
+    if (s == STATUS_OK && !cli->args->json && first) fprintf(cli->note, "the fit has not begun\n");
+    json_decref(all);
+    return s;
+}

@@ -1,0 +1,84 @@
+/* selvedge: the command line client. Sees the daemon through HTTP only. */
+#include "clients/cli/cli.h"
+#include "clients/cli/cli_text.h"
+
+#include <curl/curl.h>
+#include <locale.h>
+#include <signal.h>
+#include <sodium.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define CLI_VERSION "0.1"
+
+static volatile sig_atomic_t interrupted; /* written by the signal handler alone */
+
+static void on_signal(int number)
+{
+    if (interrupted) _exit(128 + number); /* asked twice: do not be polite */
+    interrupted = 1;
+}
+
+static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) = {
+    [CLI_SUBMIT] = cli_submit,   [CLI_STATUS] = cli_status,   [CLI_WATCH] = cli_watch, [CLI_LIST] = cli_list,     [CLI_CANCEL] = cli_cancel,
+    [CLI_RETRY] = cli_retry,     [CLI_RESULTS] = cli_results, [CLI_LOG] = cli_log,     [CLI_SERIES] = cli_series, [CLI_DELETE] = cli_delete,
+};
+
+static void print_error(const struct error *err)
+{
+    char field[sizeof err->field], text[sizeof err->text];
+    text_clean(err->field, field, sizeof field);
+    text_clean(err->text, text, sizeof text);
+    /* the server's sentences often begin with the field themselves */
+    if (field[0] != '\0' && strstr(text, field) == NULL)
+        fprintf(stderr, "error: %s: %s\n", field, text);
+    else
+        fprintf(stderr, "error: %s\n", text);
+}
+
+static int execute(const struct cli_args *args)
+{
+    struct error err = {0};
+    int exit_code = CLI_EXIT_OK;
+    struct cli cli = {.args = args, .out = stdout, .note = stderr, .note_is_terminal = isatty(STDERR_FILENO) == 1};
+    status s = http_new(args->server, args->token, &interrupted, &cli.http, &err);
+    if (s == STATUS_OK) s = run[args->command](&cli, &exit_code, &err);
+    http_free(cli.http);
+    if (s == STATUS_OK && (fflush(stdout) != 0 || ferror(stdout))) s = error_set(&err, STATUS_IO, "cannot write to standard output");
+    if (s == STATUS_OK) return exit_code;
+    print_error(&err);
+    return s == STATUS_CANCELLED ? CLI_EXIT_INTERRUPTED : CLI_EXIT_ERROR;
+}
+
+int main(int argc, char **argv)
+{
+    struct cli_args args;
+    struct error err = {0};
+    setlocale(LC_CTYPE, "");
+    if (cli_args_parse(argc, argv, getenv("SELVEDGE_SERVER"), getenv("SELVEDGE_TOKEN"), &args, &err) != STATUS_OK) {
+        print_error(&err);
+        return CLI_EXIT_USAGE;
+    }
+    if (args.help) {
+        char text[8192];
+        cli_help(&args, text, sizeof text);
+        fputs(text, stdout);
+        return CLI_EXIT_OK;
+    }
+    if (args.version) {
+        puts("selvedge " CLI_VERSION);
+        return CLI_EXIT_OK;
+    }
+    struct sigaction action = {.sa_handler = on_signal};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    if (sodium_init() < 0 || curl_global_init(CURL_GLOBAL_DEFAULT) != CURLE_OK) {
+        fputs("error: cannot start libsodium or libcurl\n", stderr);
+        return CLI_EXIT_ERROR;
+    }
+    int exit_code = execute(&args);
+    curl_global_cleanup();
+    return exit_code;
+}

@@ -1,0 +1,152 @@
+#include "clients/cli/cli_report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static const char *member_text(const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    return text == NULL ? "" : text;
+}
+
+static double member_number(const json_t *object, const char *key)
+{
+    const json_t *value = json_object_get(object, key);
+    return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
+static long member_count(const json_t *object, const char *key)
+{
+    const json_t *value = json_object_get(object, key);
+    return json_is_integer(value) ? (long)json_integer_value(value) : -1;
+}
+
+void report_view(const json_t *job, struct job_view *view)
+{
+    *view = (struct job_view){.rel_rms = NAN};
+    text_clean(member_text(job, "state"), view->state, sizeof view->state);
+    if (strcmp(view->state, "running") == 0) text_clean(member_text(job, "stage"), view->stage, sizeof view->stage);
+    text_clean(member_text(job, "message"), view->message, sizeof view->message);
+    view->fraction = member_number(job, "fraction");
+    view->eta_s = member_number(job, "eta_s");
+    view->objective = member_number(job, "objective");
+    view->objective_se = member_number(job, "objective_se");
+    view->step = member_count(job, "step");
+    view->i_stage = member_count(job, "i_stage");
+    view->n_stage = member_count(job, "n_stage");
+}
+
+static void print_time(const json_t *job, const char *key, const char *label, FILE *out)
+{
+    double t = member_number(job, key);
+    if (!(t > 0.0)) return;
+    time_t seconds = (time_t)t;
+    struct tm local;
+    char text[64];
+    if (localtime_r(&seconds, &local) == NULL || strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S %Z", &local) == 0) return;
+    fprintf(out, "%-12s %s\n", label, text);
+}
+
+static void print_text(const char *label, const char *text, FILE *out)
+{
+    char clean[700];
+    if (text[0] == '\0') return;
+    text_clean(text, clean, sizeof clean);
+    fprintf(out, "%-12s %s\n", label, clean);
+}
+
+static void print_files(const json_t *job, FILE *out)
+{
+    size_t i, n_complete = 0;
+    const json_t *file, *files = json_object_get(job, "files"), *missing = json_object_get(job, "missing_files");
+    json_array_foreach(files, i, file) n_complete += strcmp(member_text(file, "state"), "complete") == 0;
+    if (json_array_size(files) > 0) fprintf(out, "%-12s %zu of %zu uploaded\n", "files", n_complete, json_array_size(files));
+    for (i = 0; i < json_array_size(missing) && i < 5; i++)
+        print_text(i == 0 ? "missing" : "", json_string_value(json_array_get(missing, i)), out);
+    if (json_array_size(missing) > 5) fprintf(out, "%-12s and %zu more\n", "", json_array_size(missing) - 5);
+}
+
+void report_job(const json_t *job, FILE *out)
+{
+    struct job_view view;
+    char line[512];
+    size_t i;
+    const json_t *value, *error = json_object_get(job, "error");
+    report_view(job, &view);
+    print_text("job", member_text(job, "id"), out);
+    print_text("sample", member_text(job, "sample"), out);
+    print_text("state", view.state, out);
+    if (strcmp(view.state, "running") == 0) {
+        text_progress_plain(&view, line, sizeof line);
+        print_text("progress", line, out);
+    }
+    print_text("message", view.message, out);
+    print_time(job, "created_unix_s", "created", out);
+    print_time(job, "started_unix_s", "started", out);
+    print_time(job, "finished_unix_s", "finished", out);
+    if (member_count(job, "attempt") > 1) fprintf(out, "%-12s %ld\n", "attempt", member_count(job, "attempt"));
+    print_files(job, out);
+    json_array_foreach(json_object_get(job, "warnings"), i, value)
+        if (json_is_string(value)) print_text("warning", json_string_value(value), out);
+    if (json_is_object(error)) {
+        snprintf(line, sizeof line, "%s%s%s", member_text(error, "field"), member_text(error, "field")[0] == '\0' ? "" : ": ",
+                 member_text(error, "text"));
+        print_text("error", line, out);
+    }
+    report_result(job, out);
+}
+
+static void print_flags(const json_t *parameter, FILE *out)
+{
+    size_t i;
+    const json_t *flag;
+    const char *between = "";
+    json_array_foreach(json_object_get(parameter, "flags"), i, flag) {
+        char clean[64];
+        if (!json_is_string(flag)) continue;
+        text_clean(json_string_value(flag), clean, sizeof clean);
+        fprintf(out, "%s%s", between, clean);
+        between = ", ";
+    }
+}
+
+static void print_parameter(const json_t *parameter, FILE *out)
+{
+    char name[64], unit[24], value[CLI_SHORT_TEXT];
+    text_clean(member_text(parameter, "name"), name, sizeof name);
+    text_clean(member_text(parameter, "unit"), unit, sizeof unit);
+    text_with_error(member_number(parameter, "value"), member_number(parameter, "se"), value);
+    fprintf(out, "  %-12s %-24s %-4s ", name, value, unit);
+    print_flags(parameter, out);
+    fputc('\n', out);
+}
+
+void report_result(const json_t *job, FILE *out)
+{
+    static const struct {
+        const char *key, *label;
+    } residual[] = {{"fit_rel_rms", "relative RMS error, fitted"}, {"heldout_rel_rms", "relative RMS error, held out"}};
+    size_t i;
+    const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
+    if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
+    json_array_foreach(parameters, i, parameter) print_parameter(parameter, out);
+    for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {
+        double x = member_number(result, residual[i].key);
+        if (!isnan(x)) fprintf(out, "%s: %.2f %%\n", residual[i].label, 100.0 * x);
+    }
+    const json_t *converged = json_object_get(result, "converged");
+    if (json_is_false(converged)) fprintf(out, "The fit has NOT converged; see the log.\n");
+}
+
+void report_summary(const json_t *job, FILE *out)
+{
+    struct job_view view;
+    char id[64], sample[80], eta[CLI_SHORT_TEXT];
+    report_view(job, &view);
+    text_clean(member_text(job, "id"), id, sizeof id);
+    text_clean(member_text(job, "sample"), sample, sizeof sample);
+    text_duration(view.eta_s, eta);
+    fprintf(out, "%-36s  %-10s %4.0f %% %8s  %s\n", id, view.state, isnan(view.fraction) ? 0.0 : 100.0 * view.fraction, eta, sample);
+}

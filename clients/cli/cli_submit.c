@@ -1,0 +1,246 @@
+#include "clients/cli/cli.h"
+#include "clients/cli/cli_job_files.h"
+#include "clients/cli/cli_text.h"
+
+#include "base/clock.h"
+
+#include <math.h>
+#include <sodium.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct submit {
+    struct cli *cli;
+    json_t *document, *job;
+    struct cli_file_list list;
+    char id[80];
+    /* progress over all files */
+    const char *verb, *name;
+    uint64_t n_total, n_before, n_now;
+    double started_s, shown_s;
+    bool drawn;
+};
+
+/* ---- progress line ---- */
+
+static void draw(struct submit *u, bool force)
+{
+    double now = clock_monotonic_s();
+    if (!u->cli->note_is_terminal || (!force && now - u->shown_s < 0.1)) return;
+    u->shown_s = now;
+    u->drawn = true;
+    char bar[40], done[CLI_SHORT_TEXT], total[CLI_SHORT_TEXT], rate[CLI_SHORT_TEXT], eta[CLI_SHORT_TEXT], name[48], line[400];
+    double n = (double)(u->n_before + u->n_now), all = (double)u->n_total, speed = n / fmax(now - u->started_s, 1e-3);
+    text_bar(all > 0.0 ? n / all : 1.0, 24, bar, sizeof bar);
+    text_size(n, done);
+    text_size(all, total);
+    text_size(speed, rate);
+    text_duration(speed > 0.0 ? (all - n) / speed : NAN, eta);
+    text_clean(u->name, name, sizeof name);
+    int len = snprintf(line, sizeof line, "%s %s  %s of %s  %s/s  ETA %s  %s", u->verb, bar, done, total, rate, eta, name);
+    size_t width = cli_columns(u->cli);
+    if (len > 0 && (size_t)len >= width && width > 1 && width < sizeof line) line[width - 1] = '\0';
+    fprintf(u->cli->note, "\r\033[K%s", line);
+    fflush(u->cli->note);
+}
+
+static void draw_end(struct submit *u)
+{
+    if (u->drawn) fputs("\r\033[K", u->cli->note);
+    u->drawn = false;
+}
+
+static void uploaded(void *context, uint64_t offset)
+{
+    struct submit *u = context;
+    u->n_now = offset;
+    draw(u, false);
+}
+
+static bool hashed(void *context, uint64_t n_done)
+{
+    struct submit *u = context;
+    u->n_now = n_done;
+    draw(u, false);
+    return !http_stopped(u->cli->http);
+}
+
+/* ---- steps ---- */
+
+static status read_document(struct submit *u, const char *path, struct error *err)
+{
+    json_error_t where;
+    u->document = json_load_file(path, JSON_REJECT_DUPLICATES, &where);
+    if (u->document == NULL && where.line <= 0)
+        return error_set(err, STATUS_NOT_FOUND, "cannot read the job document: %s", where.text);
+    if (u->document == NULL)
+        return error_set(err, STATUS_INVALID, "job document '%s', line %d, column %d: %s", path, where.line, where.column, where.text);
+    if (!json_is_object(u->document)) return error_set(err, STATUS_INVALID, "job document '%s' is not a JSON object", path);
+    return STATUS_OK;
+}
+
+/* --input-dir, else the folder of the document, else the current one. */
+static status list_files(struct submit *u, struct error *err)
+{
+    const struct cli_args *a = u->cli->args;
+    char folder[4096] = ".";
+    const char *slash = a->operand == NULL ? NULL : strrchr(a->operand, '/');
+    if (a->input_dir != NULL)
+        snprintf(folder, sizeof folder, "%s", a->input_dir);
+    else if (slash != NULL)
+        snprintf(folder, sizeof folder, "%.*s", slash == a->operand ? 1 : (int)(slash - a->operand), a->operand);
+    return cli_job_files_list(u->document, folder, &u->list, err);
+}
+
+static status hash_files(struct submit *u, struct error *err)
+{
+    status s = STATUS_OK;
+    u->verb = "checking ";
+    u->started_s = clock_monotonic_s();
+    u->n_before = u->n_now = u->n_total = 0;
+    for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) { /* sizes first, so that the bar knows the whole */
+        FILE *f = fopen(u->list.file[i].path, "rb");
+        if (f != NULL && fseeko(f, 0, SEEK_END) == 0) u->n_total += (uint64_t)ftello(f);
+        if (f != NULL) fclose(f);
+    }
+    for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) {
+        u->name = u->list.file[i].name;
+        u->n_now = 0;
+        s = cli_file_hash(&u->list.file[i], hashed, u, err);
+        u->n_before += u->list.file[i].n_bytes;
+        if (s == STATUS_OK && u->list.file[i].n_bytes == 0)
+            s = error_set(err, STATUS_INVALID, "input file '%s' is empty", u->list.file[i].path);
+    }
+    u->n_total = u->n_before;
+    draw_end(u);
+    return s;
+}
+
+static status create_job(struct submit *u, struct error *err)
+{
+    unsigned char random[16];
+    char key[2 * sizeof random + 1];
+    randombytes_buf(random, sizeof random);
+    sodium_bin2hex(key, sizeof key, random, sizeof random);
+    status s = http_json(u->cli->http, "POST", "/v1/jobs", key, u->document, &u->job, err);
+    if (s != STATUS_OK) return error_prefix(err, "the job document was refused");
+    const char *id = json_string_value(json_object_get(u->job, "id"));
+    if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's answer has no job id");
+    snprintf(u->id, sizeof u->id, "%s", id);
+    fprintf(u->cli->note, "job %s created\n", u->id);
+    return STATUS_OK;
+}
+
+/* --resume: the job is there; a document given again replaces the server's when it differs. */
+static status open_job(struct submit *u, struct error *err)
+{
+    char path[256];
+    snprintf(u->id, sizeof u->id, "%s", u->cli->args->resume_id);
+    status s = cli_job_path(u->id, "", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(u->cli->http, "GET", path, NULL, NULL, &u->job, err);
+    if (s != STATUS_OK) return s;
+    const json_t *theirs = json_object_get(u->job, "document");
+    if (u->document == NULL) {
+        u->document = json_deep_copy(theirs);
+        if (u->document == NULL) return error_set(err, STATUS_FORMAT, "the server's answer has no job document");
+        return STATUS_OK;
+    }
+    if (json_equal(theirs, u->document)) return STATUS_OK;
+    snprintf(path + strlen(path), sizeof path - strlen(path), "/document");
+    s = http_json(u->cli->http, "PUT", path, NULL, u->document, NULL, err);
+    return s == STATUS_OK ? s : error_prefix(err, "the changed job document was refused");
+}
+
+static status declare(struct submit *u, const struct cli_file *file, json_t **answer, struct error *err)
+{
+    char path[256];
+    status s = cli_job_path(u->id, "/files", path, sizeof path, err);
+    if (s != STATUS_OK) return s;
+    json_t *body = json_pack("{s:s, s:s, s:I, s:s}", "name", file->name, "role", file->role, "size", (json_int_t)file->n_bytes, "sha256",
+                             file->sha256);
+    if (body == NULL) return error_set(err, STATUS_INVALID, "file name '%s' is not UTF-8", file->name);
+    s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
+    if (s == STATUS_CONFLICT && u->cli->args->resume_id != NULL) { /* the file has changed since: the new one replaces it */
+        char *escaped = path + strlen(path);
+        snprintf(escaped, sizeof path - strlen(path), "/%s", file->name);
+        s = http_json(u->cli->http, "DELETE", path, NULL, NULL, NULL, err);
+        *escaped = '\0';
+        if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
+    }
+    json_decref(body);
+    return s == STATUS_OK ? s : error_prefix(err, "cannot declare '%s'", file->name);
+}
+
+static status send_files(struct submit *u, struct error *err)
+{
+    status s = STATUS_OK;
+    size_t n_sent = 0;
+    u->verb = "uploading";
+    u->started_s = clock_monotonic_s();
+    u->n_before = u->n_now = 0;
+    for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) {
+        const struct cli_file *file = &u->list.file[i];
+        json_t *answer = NULL;
+        u->name = file->name;
+        u->n_now = 0;
+        s = declare(u, file, &answer, err);
+        const char *state = json_string_value(json_object_get(answer, "state"));
+        const char *url = json_string_value(json_object_get(answer, "upload_url"));
+        bool complete = state != NULL && strcmp(state, "complete") == 0;
+        if (s == STATUS_OK && !complete && url == NULL)
+            s = error_set(err, STATUS_FORMAT, "the server gives no address to upload '%s' to", file->name);
+        if (s == STATUS_OK && !complete) {
+            s = cli_upload_file(u->cli, file, url, uploaded, u, err);
+            if (s == STATUS_CHECKSUM) /* damaged on its way: once more from the start */
+                s = cli_upload_file(u->cli, file, url, uploaded, u, err);
+            n_sent += s == STATUS_OK;
+        }
+        u->n_before += file->n_bytes;
+        json_decref(answer);
+    }
+    draw_end(u);
+    char size[CLI_SHORT_TEXT];
+    text_size((double)u->n_before, size);
+    if (s == STATUS_OK)
+        fprintf(u->cli->note, "%zu file%s in place (%s), %zu uploaded now, in %.1f s\n", u->list.n_file, u->list.n_file == 1 ? "" : "s", size,
+                n_sent, clock_monotonic_s() - u->started_s);
+    return s;
+}
+
+static status start_job(struct submit *u, struct error *err)
+{
+    char path[256];
+    status s = cli_job_path(u->id, "/start", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, NULL, NULL, err);
+    return s == STATUS_OK ? s : error_prefix(err, "cannot start the job");
+}
+
+status cli_submit(struct cli *cli, int *exit_code, struct error *err)
+{
+    struct submit u = {.cli = cli};
+    status s = STATUS_OK;
+    if (cli->args->operand != NULL && (s = read_document(&u, cli->args->operand, err)) != STATUS_OK) goto out;
+    if (cli->args->resume_id != NULL && (s = open_job(&u, err)) != STATUS_OK) goto out;
+    if ((s = list_files(&u, err)) != STATUS_OK) goto out;
+    if ((s = hash_files(&u, err)) != STATUS_OK) goto out; /* before the job is made: a missing file costs nothing */
+    if (cli->args->resume_id == NULL && (s = create_job(&u, err)) != STATUS_OK) goto out;
+    if ((s = send_files(&u, err)) != STATUS_OK) goto out;
+    if (!cli->args->draft && (s = start_job(&u, err)) != STATUS_OK) goto out;
+    fprintf(cli->out, "%s\n", u.id);
+    fflush(cli->out);
+    if (cli->args->draft)
+        fprintf(cli->note, "not started; start it with: selvedge submit --resume %s\n", u.id);
+    else if (!cli->args->watch)
+        fprintf(cli->note, "started; follow it with: selvedge watch %s, or at %s/#%s\n", u.id, http_server(cli->http), u.id);
+    else
+        s = cli_watch_job(cli, u.id, exit_code, err);
+out:
+    draw_end(&u);
+    if (s != STATUS_OK && u.id[0] != '\0' && !(cli->args->watch && s == STATUS_CANCELLED))
+        fprintf(cli->note, "continue with: selvedge submit --resume %s%s%s\n", u.id, cli->args->operand == NULL ? "" : " ",
+                cli->args->operand == NULL ? "" : cli->args->operand);
+    cli_job_files_release(&u.list);
+    json_decref(u.document);
+    json_decref(u.job);
+    return s;
+}

@@ -1,0 +1,139 @@
+#include "clients/cli/cli_text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+void text_size(double n_bytes, char out[CLI_SHORT_TEXT])
+{
+    static const char *const unit[] = {"B", "kB", "MB", "GB", "TB", "PB"};
+    if (!(n_bytes >= 0.0)) {
+        snprintf(out, CLI_SHORT_TEXT, "?");
+        return;
+    }
+    size_t i = 0;
+    while (n_bytes >= 999.5 && i + 1 < sizeof unit / sizeof unit[0]) n_bytes /= 1000.0, i++;
+    int digits = i == 0 || n_bytes >= 99.95 ? 0 : n_bytes >= 9.995 ? 1 : 2;
+    snprintf(out, CLI_SHORT_TEXT, "%.*f %s", digits, n_bytes, unit[i]);
+}
+
+void text_duration(double s, char out[CLI_SHORT_TEXT])
+{
+    if (!(s >= 0.0) || s > 1e9) {
+        snprintf(out, CLI_SHORT_TEXT, "-");
+        return;
+    }
+    long t = lround(s);
+    if (t >= 3600)
+        snprintf(out, CLI_SHORT_TEXT, "%ld:%02ld:%02ld", t / 3600, t / 60 % 60, t % 60);
+    else
+        snprintf(out, CLI_SHORT_TEXT, "%ld:%02ld", t / 60, t % 60);
+}
+
+void text_bar(double fraction, size_t width, char *out, size_t n_out)
+{
+    if (n_out == 0) return;
+    if (width < 3) width = 3;
+    if (width > n_out - 1) width = n_out - 1;
+    if (width < 3) {
+        out[0] = '\0';
+        return;
+    }
+    if (!(fraction > 0.0)) fraction = 0.0;
+    if (fraction > 1.0) fraction = 1.0;
+    size_t inner = width - 2, filled = (size_t)(fraction * (double)inner + 1e-9);
+    out[0] = '[';
+    memset(out + 1, '#', filled);
+    memset(out + 1 + filled, '-', inner - filled);
+    out[width - 1] = ']';
+    out[width] = '\0';
+}
+
+void text_with_error(double value, double standard_error, char out[CLI_SHORT_TEXT])
+{
+    if (isnan(value)) {
+        snprintf(out, CLI_SHORT_TEXT, "-");
+    } else if (!(standard_error > 0.0) || isinf(standard_error)) {
+        snprintf(out, CLI_SHORT_TEXT, "%.4g", value);
+    } else {
+        int digits = 1 - (int)floor(log10(standard_error));
+        if (digits < 0) digits = 0;
+        if (digits > 8)
+            snprintf(out, CLI_SHORT_TEXT, "%.5g +- %.2g", value, standard_error);
+        else
+            snprintf(out, CLI_SHORT_TEXT, "%.*f +- %.*f", digits, value, digits, standard_error);
+    }
+}
+
+/* Length of the UTF-8 sequence at p, 0 when it is broken or a control character (C0, DEL, C1). */
+static size_t utf8_printable(const unsigned char *p)
+{
+    if (p[0] < 0x80) return p[0] >= 0x20 && p[0] != 0x7f;
+    size_t n = p[0] >= 0xf0 && p[0] < 0xf5 ? 4 : p[0] >= 0xe0 ? 3 : p[0] >= 0xc2 ? 2 : 0;
+    if (p[0] >= 0xf5) n = 0;
+    for (size_t i = 1; i < n; i++)
+        if ((p[i] & 0xc0) != 0x80) return 0;
+    if (n == 2 && p[0] == 0xc2 && p[1] < 0xa0) return 0;
+    return n;
+}
+
+void text_clean(const char *in, char *out, size_t n_out)
+{
+    size_t at = 0;
+    const unsigned char *p = (const unsigned char *)in;
+    while (*p != '\0' && n_out > 0) {
+        size_t n = utf8_printable(p);
+        if (at + (n == 0 ? 1 : n) >= n_out) break;
+        if (n == 0) {
+            out[at++] = '?';
+            p++;
+        } else {
+            memcpy(out + at, p, n);
+            at += n;
+            p += n;
+        }
+    }
+    if (n_out > 0) out[at] = '\0';
+}
+
+static void fit_part(const struct job_view *v, char *out, size_t n_out)
+{
+    char objective[CLI_SHORT_TEXT];
+    out[0] = '\0';
+    if (isnan(v->objective)) return;
+    text_with_error(v->objective, v->objective_se, objective);
+    int n = v->step >= 0 ? snprintf(out, n_out, "  step %ld  objective %s", v->step, objective)
+                         : snprintf(out, n_out, "  objective %s", objective);
+    if (n > 0 && (size_t)n < n_out && !isnan(v->rel_rms))
+        snprintf(out + n, n_out - (size_t)n, "  rel.RMS %.2f %%", 100.0 * v->rel_rms);
+}
+
+static void stage_part(const struct job_view *v, char *out, size_t n_out)
+{
+    const char *stage = v->stage[0] == '\0' ? v->state : v->stage;
+    if (v->i_stage >= 0 && v->n_stage > 0 && v->stage[0] != '\0')
+        snprintf(out, n_out, "%s (%ld/%ld)", stage, v->i_stage + 1, v->n_stage);
+    else
+        snprintf(out, n_out, "%s", stage);
+}
+
+void text_progress(const struct job_view *v, size_t n_column, char *out, size_t n_out)
+{
+    char stage[96], fit[160], eta[CLI_SHORT_TEXT], bar[48];
+    stage_part(v, stage, sizeof stage);
+    fit_part(v, fit, sizeof fit);
+    text_duration(v->eta_s, eta);
+    double fraction = isnan(v->fraction) ? 0.0 : v->fraction;
+    text_bar(fraction, n_column >= 100 ? 32 : 20, bar, sizeof bar);
+    int n = snprintf(out, n_out, "%s %3.0f %%  %-18s ETA %s%s", bar, 100.0 * fraction, stage, eta, fit);
+    if (n > 0 && (size_t)n < n_out && n_column > 0 && (size_t)n > n_column) out[n_column] = '\0';
+}
+
+void text_progress_plain(const struct job_view *v, char *out, size_t n_out)
+{
+    char stage[96], fit[160], eta[CLI_SHORT_TEXT];
+    stage_part(v, stage, sizeof stage);
+    fit_part(v, fit, sizeof fit);
+    text_duration(v->eta_s, eta);
+    snprintf(out, n_out, "%3.0f %%  %s  ETA %s%s", isnan(v->fraction) ? 0.0 : 100.0 * v->fraction, stage, eta, fit);
+}

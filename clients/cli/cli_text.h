@@ -1,0 +1,31 @@
+/* Texts for people: sizes, durations, progress bars, values with errors. Pure. */
+#ifndef SELVEDGE_CLIENTS_CLI_TEXT_H
+#define SELVEDGE_CLIENTS_CLI_TEXT_H
+
+#include <stddef.h>
+
+enum { CLI_SHORT_TEXT = 48 };
+
+/* 1234567 -> "1.23 MB"; n_bytes < 0: "?". */
+void text_size(double n_bytes, char out[CLI_SHORT_TEXT]);
+/* 83 -> "1:23", 7500 -> "2:05:00"; NaN or negative: "-". */
+void text_duration(double s, char out[CLI_SHORT_TEXT]);
+/* "[#####-----]" of width columns in all (at least 3). fraction is clamped to 0..1, NaN is 0. */
+void text_bar(double fraction, size_t width, char *out, size_t n_out);
+/* "0.0236 +- 0.0008": as many digits as the standard error warrants (two of its own); without one, four significant digits. */
+void text_with_error(double value, double standard_error, char out[CLI_SHORT_TEXT]);
+/* Copy with control characters (terminal escapes from a server or a file name) and broken UTF-8 as '?'. */
+void text_clean(const char *in, char *out, size_t n_out);
+
+/* What a watched job says; NaN or "" or -1 where it says nothing. */
+struct job_view {
+    char state[24], stage[40], message[200];
+    double fraction, eta_s, objective, objective_se, rel_rms;
+    long step, i_stage, n_stage;
+};
+/* One line of at most n_column columns: bar, percent, stage, ETA, step, objective. */
+void text_progress(const struct job_view *v, size_t n_column, char *out, size_t n_out);
+/* The same without a bar, for logs. */
+void text_progress_plain(const struct job_view *v, char *out, size_t n_out);
+
+#endif

@@ -1,0 +1,110 @@
+/* The client's side of tus 1.0: ask for the offset, send pieces, go on after a broken connection. */
+#include "clients/cli/cli.h"
+#include "clients/cli/cli_job_files.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PIECE_BYTES = 16 << 20, MAX_FRUITLESS = 8 };
+
+struct upload {
+    struct cli *cli;
+    const struct cli_file *file;
+    const char *url;
+    int fd;
+    uint64_t offset, sending;
+    void (*changed)(void *context, uint64_t offset);
+    void *context;
+};
+
+static void sent(void *context, uint64_t n_bytes)
+{
+    struct upload *u = context;
+    u->sending += n_bytes;
+    if (u->changed != NULL) u->changed(u->context, u->sending);
+}
+
+static status ask_offset(struct upload *u, struct http_reply *reply, struct error *err)
+{
+    static const char *const header[] = {"Tus-Resumable: 1.0.0", NULL};
+    status s = http_call(u->cli->http, "HEAD", u->url, header, NULL, 0, reply, err);
+    if (s != STATUS_OK) return s;
+    if (reply->code == 200 || reply->code == 204) {
+        if (reply->upload_offset < 0 || (uint64_t)reply->upload_offset > u->file->n_bytes)
+            return error_set(err, STATUS_FORMAT, "the server gives no usable offset for '%s'", u->file->name);
+        u->offset = (uint64_t)reply->upload_offset;
+        return STATUS_OK;
+    }
+    http_problem(reply, err);
+    return error_prefix(err, "cannot continue the upload of '%s'", u->file->name);
+}
+
+static status send_piece(struct upload *u, struct http_reply *reply, struct error *err)
+{
+    char offset_line[64];
+    const char *const header[] = {"Tus-Resumable: 1.0.0", "Content-Type: application/offset+octet-stream", offset_line, NULL};
+    uint64_t left = u->file->n_bytes - u->offset;
+    struct http_source source = {.fd = u->fd, .n_bytes = left < PIECE_BYTES ? left : PIECE_BYTES, .sent = sent, .context = u};
+    snprintf(offset_line, sizeof offset_line, "Upload-Offset: %llu", (unsigned long long)u->offset);
+    if (lseek(u->fd, (off_t)u->offset, SEEK_SET) < 0) return error_set_errno(err, "cannot read '%s'", u->file->path);
+    u->sending = u->offset;
+    return http_patch(u->cli->http, u->url, header, &source, reply, err);
+}
+
+/* One piece, or one question for the offset. *known says whether the offset is the server's; *again asks for a pause. */
+static status step(struct upload *u, bool *known, bool *again, struct error *err)
+{
+    struct http_reply reply = {0};
+    *again = false;
+    status s = *known ? send_piece(u, &reply, err) : ask_offset(u, &reply, err);
+    if (s != STATUS_OK) {
+        *again = reply.cut_off;
+        *known = false;
+    } else if (!*known) {
+        *known = true;
+    } else if (reply.code == 204 || reply.code == 200) {
+        u->offset = reply.upload_offset >= 0 ? (uint64_t)reply.upload_offset : u->sending;
+    } else if (reply.code == 409 || reply.code == 423 || reply.code == 408) {
+        *known = false; /* our idea of the offset is old, or we were too slow */
+        *again = true;
+        http_problem(&reply, err);
+        s = err == NULL ? STATUS_CONFLICT : err->code;
+    } else if ((reply.code == 503 || reply.code == 429) && reply.retry_after_s >= 0.0) {
+        *again = true;
+        s = http_problem(&reply, err);
+    } else {
+        http_problem(&reply, err);
+        s = error_prefix(err, "cannot upload '%s'", u->file->name);
+    }
+    http_reply_release(&reply);
+    return s;
+}
+
+status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url,
+                       void (*changed)(void *context, uint64_t offset), void *context, struct error *err)
+{
+    struct upload u = {.cli = cli, .file = file, .url = upload_url, .changed = changed, .context = context};
+    bool known = false;
+    int n_fruitless = 0;
+    status s = STATUS_OK;
+    u.fd = open(file->path, O_RDONLY | O_CLOEXEC);
+    if (u.fd < 0) return error_set_errno(err, "cannot open input file '%s'", file->path);
+    while (!known || u.offset < file->n_bytes) {
+        bool again;
+        uint64_t before = u.offset;
+        s = step(&u, &known, &again, err);
+        if (s == STATUS_OK) {
+            if (u.offset > before) n_fruitless = 0;
+            if (changed != NULL) changed(context, u.offset);
+            continue;
+        }
+        if (!again || ++n_fruitless > MAX_FRUITLESS || http_stopped(cli->http)) break;
+        http_sleep(cli->http, 0.25 * (double)(1 << (n_fruitless < 6 ? n_fruitless : 6)));
+        s = STATUS_OK;
+    }
+    if (http_stopped(cli->http)) s = error_set(err, STATUS_CANCELLED, "interrupted");
+    close(u.fd);
+    return s;
+}

@@ -1,0 +1,177 @@
+/* Following a job: poll with the ETag, draw what changed, tell the outcome. */
+#include "clients/cli/cli.h"
+#include "clients/cli/cli_report.h"
+#include "clients/cli/cli_text.h"
+
+#include "base/clock.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+enum { PLAIN_INTERVAL_S = 10, GONE_S = 120 };
+
+struct watch {
+    struct cli *cli;
+    char path[256], id[80], etag[160];
+    json_t *job;                 /* the last whole answer */
+    struct job_view view, shown; /* now, and what the last plain line said */
+    double shown_s, lost_s;      /* lost_s: since when there has been no answer, 0 when there is one */
+    size_t n_warning;            /* already printed */
+    bool drawn;
+};
+
+size_t cli_columns(const struct cli *cli)
+{
+    struct winsize size;
+    int fd = fileno(cli->note);
+    return fd >= 0 && ioctl(fd, TIOCGWINSZ, &size) == 0 && size.ws_col >= 40 ? size.ws_col : 80;
+}
+
+static void wipe(struct watch *w)
+{
+    if (w->drawn) fputs("\r\033[K", w->cli->note);
+    w->drawn = false;
+}
+
+static void draw_live(struct watch *w)
+{
+    char line[512];
+    size_t width = cli_columns(w->cli);
+    text_progress(&w->view, width - 1, line, sizeof line);
+    fprintf(w->cli->note, "\r\033[K%s", line);
+    fflush(w->cli->note);
+    w->drawn = true;
+}
+
+static void draw_plain(struct watch *w)
+{
+    const struct job_view *a = &w->shown, *b = &w->view;
+    double now = clock_monotonic_s();
+    bool other = strcmp(a->state, b->state) != 0 || strcmp(a->stage, b->stage) != 0 || a->step != b->step;
+    if (!other && now - w->shown_s < PLAIN_INTERVAL_S) return;
+    char line[512];
+    text_progress_plain(b, line, sizeof line);
+    fprintf(w->cli->note, "%s\n", line);
+    fflush(w->cli->note);
+    w->shown = *b;
+    w->shown_s = now;
+}
+
+static void draw(struct watch *w)
+{
+    const json_t *warnings = json_object_get(w->job, "warnings");
+    for (; w->n_warning < json_array_size(warnings); w->n_warning++) {
+        char clean[640];
+        const char *text = json_string_value(json_array_get(warnings, w->n_warning));
+        text_clean(text == NULL ? "?" : text, clean, sizeof clean);
+        wipe(w);
+        fprintf(w->cli->note, "warning: %s\n", clean);
+    }
+    if (w->cli->note_is_terminal)
+        draw_live(w);
+    else
+        draw_plain(w);
+}
+
+static status take_answer(struct watch *w, const struct http_reply *reply, struct error *err)
+{
+    if (reply->code == 304) return STATUS_OK;
+    if (reply->code != 200) return http_problem(reply, err);
+    json_t *job = json_loadb(reply->body, reply->n_body, 0, NULL);
+    if (!json_is_object(job)) {
+        json_decref(job);
+        return error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON", http_server(w->cli->http));
+    }
+    json_decref(w->job);
+    w->job = job;
+    snprintf(w->etag, sizeof w->etag, "%s", reply->etag);
+    report_view(job, &w->view);
+    return STATUS_OK;
+}
+
+/* The server may be restarted while we watch: wait for it, but not for ever. */
+static bool may_wait(struct watch *w, const struct error *err)
+{
+    double now = clock_monotonic_s();
+    if (w->job == NULL) return false;
+    if (w->lost_s <= 0.0) {
+        w->lost_s = now;
+        wipe(w);
+        fprintf(w->cli->note, "%s; waiting for it\n", err->text);
+    }
+    return now - w->lost_s < GONE_S;
+}
+
+static status poll_once(struct watch *w, struct error *err)
+{
+    char line[200];
+    const char *header[2] = {NULL, NULL};
+    struct http_reply reply;
+    struct error local = {0};
+    if (w->etag[0] != '\0') {
+        snprintf(line, sizeof line, "If-None-Match: %s", w->etag);
+        header[0] = line;
+    }
+    status s = http_call(w->cli->http, "GET", w->path, header, NULL, 0, &reply, &local);
+    if (s == STATUS_OK) {
+        w->lost_s = 0.0;
+        s = take_answer(w, &reply, &local);
+        if (reply.code == 503 || reply.code == 429) s = may_wait(w, &local) ? STATUS_OK : s;
+    } else if (reply.cut_off && may_wait(w, &local)) {
+        s = STATUS_OK;
+    }
+    http_reply_release(&reply);
+    if (s != STATUS_OK && err != NULL) *err = local;
+    return s;
+}
+
+static bool ended(const struct job_view *v)
+{
+    return strcmp(v->state, "succeeded") == 0 || strcmp(v->state, "failed") == 0 || strcmp(v->state, "cancelled") == 0 ||
+           strcmp(v->state, "draft") == 0;
+}
+
+static status tell_end(struct watch *w, int *exit_code, struct error *err)
+{
+    const char *state = w->view.state;
+    const json_t *problem = json_object_get(w->job, "error");
+    const char *text = json_string_value(json_object_get(problem, "text")), *field = json_string_value(json_object_get(problem, "field"));
+    if (strcmp(state, "succeeded") == 0) {
+        report_result(w->job, w->cli->out);
+        fprintf(w->cli->note, "results: selvedge results %s, or %s/#%s\n", w->id, http_server(w->cli->http), w->id);
+        return STATUS_OK;
+    }
+    if (strcmp(state, "draft") == 0)
+        return error_set(err, STATUS_CONFLICT, "job %s has not been started: selvedge submit --resume %s", w->id, w->id);
+    if (strcmp(state, "cancelled") == 0) {
+        fprintf(w->cli->note, "job %s was cancelled; `selvedge retry %s` goes on from its last checkpoint\n", w->id, w->id);
+        *exit_code = CLI_EXIT_CANCELLED;
+        return STATUS_OK;
+    }
+    return error_set_field(err, STATUS_CONFLICT, field == NULL ? "" : field, "job %s failed: %s", w->id, text == NULL ? "no reason given" : text);
+}
+
+status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err)
+{
+    struct watch w = {.cli = cli};
+    w.shown.step = -2;
+    snprintf(w.id, sizeof w.id, "%s", id);
+    status s = cli_job_path(id, "", w.path, sizeof w.path, err);
+    while (s == STATUS_OK) {
+        s = poll_once(&w, err);
+        if (http_stopped(cli->http)) s = error_set(err, STATUS_CANCELLED, "interrupted; the job goes on (selvedge cancel %s stops it)", id);
+        if (s != STATUS_OK) break;
+        if (w.job != NULL && w.lost_s <= 0.0) draw(&w);
+        if (w.job != NULL && ended(&w.view)) break;
+        http_sleep(cli->http, cli->note_is_terminal ? 0.5 : 1.0);
+    }
+    wipe(&w);
+    if (s == STATUS_OK) s = tell_end(&w, exit_code, err);
+    json_decref(w.job);
+    return s;
+}
+
+status cli_watch(struct cli *cli, int *exit_code, struct error *err) { return cli_watch_job(cli, cli->args->operand, exit_code, err); }
