@@ -1,0 +1,237 @@
+/* Pushing fibers apart: overlapping nodes of different fibers each give way by half, across their fibers; then displacements
+ * (not positions, so that crimp and twist stay) are smoothed along each strand. Jacobi rounds: every node looks, then every node moves. */
+#include "geometry/phantom/phantom_strand.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NODES_PER_TASK = 2048 };
+
+struct relax {
+    struct strand_set *s;
+    uint32_t *strand_of; /* node -> strand */
+    double (*move)[3];
+    double *depth; /* deepest overlap of a node, over the sum of radii */
+    double r_max;
+    size_t n_cell[3];
+    double cell_m[3], z_low_m;
+    size_t *cell_first; /* counting sort by cell */
+    uint32_t *cell_node;
+    uint32_t *cell_of;
+};
+
+static void relax_release(struct relax *r)
+{
+    free(r->strand_of);
+    free(r->move);
+    free(r->depth);
+    free(r->cell_first);
+    free(r->cell_node);
+    free(r->cell_of);
+}
+
+static size_t wrap_cell(double x, double cell_m, size_t n_cell)
+{
+    double c = fmod(floor(x / cell_m), (double)n_cell);
+    if (c < 0.0) c += (double)n_cell;
+    return (size_t)c < n_cell ? (size_t)c : n_cell - 1;
+}
+
+static size_t clamp_cell(double x, double cell_m, size_t n_cell)
+{
+    double c = floor(x / cell_m);
+    return c < 0.0 ? 0 : c >= (double)n_cell ? n_cell - 1 : (size_t)c;
+}
+
+static status relax_init(struct relax *r, struct strand_set *s, struct error *err)
+{
+    *r = (struct relax){.s = s};
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < s->n_strand; i++) r->r_max = fmax(r->r_max, s->strand[i].radius_m);
+    for (size_t k = 0; k < s->n_node; k++) {
+        low = fmin(low, s->start[k][2]);
+        high = fmax(high, s->start[k][2]);
+    }
+    r->z_low_m = low - 4.0 * r->r_max;
+    double extent[3] = {s->tile_m[0], s->tile_m[1], high - low + 8.0 * r->r_max};
+    for (int a = 0; a < 3; a++) {
+        r->n_cell[a] = (size_t)fmax(1.0, floor(extent[a] / (2.0 * r->r_max)));
+        r->cell_m[a] = extent[a] / (double)r->n_cell[a];
+    }
+    size_t n_cell = r->n_cell[0] * r->n_cell[1] * r->n_cell[2];
+    r->strand_of = calloc(s->n_node, sizeof *r->strand_of);
+    r->move = calloc(s->n_node, sizeof *r->move);
+    r->depth = calloc(s->n_node, sizeof *r->depth);
+    r->cell_first = calloc(n_cell + 2, sizeof *r->cell_first);
+    r->cell_node = calloc(s->n_node, sizeof *r->cell_node);
+    r->cell_of = calloc(s->n_node, sizeof *r->cell_of);
+    if (!r->strand_of || !r->move || !r->depth || !r->cell_first || !r->cell_node || !r->cell_of)
+        return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
+    for (size_t i = 0; i < s->n_strand; i++)
+        for (size_t k = 0; k < s->strand[i].n; k++) r->strand_of[s->strand[i].first + k] = (uint32_t)i;
+    return STATUS_OK;
+}
+
+static void sort_into_cells(struct relax *r)
+{
+    const struct strand_set *s = r->s;
+    size_t n_cell = r->n_cell[0] * r->n_cell[1] * r->n_cell[2];
+    memset(r->cell_first, 0, (n_cell + 2) * sizeof *r->cell_first);
+    for (size_t k = 0; k < s->n_node; k++) {
+        size_t c = (clamp_cell(s->p[k][2] - r->z_low_m, r->cell_m[2], r->n_cell[2]) * r->n_cell[1] +
+                    wrap_cell(s->p[k][1], r->cell_m[1], r->n_cell[1])) * r->n_cell[0] +
+                   wrap_cell(s->p[k][0], r->cell_m[0], r->n_cell[0]);
+        r->cell_of[k] = (uint32_t)c;
+        r->cell_first[c + 2]++;
+    }
+    for (size_t c = 0; c < n_cell; c++) r->cell_first[c + 2] += r->cell_first[c + 1];
+    for (size_t k = 0; k < s->n_node; k++) r->cell_node[r->cell_first[r->cell_of[k] + 1]++] = (uint32_t)k;
+}
+
+/* Position of node k + step along its strand; false behind an open end. */
+static bool neighbour(const struct strand *t, size_t k, long step, double (*from)[3], double out[3])
+{
+    long i = (long)(k - t->first) + step, n = (long)t->n;
+    long turn = i < 0 ? -1 : i >= n ? 1 : 0;
+    if (turn != 0 && t->n_period == 0) return false;
+    const double *q = from[t->first + (size_t)(i - turn * n)];
+    out[0] = q[0] + (double)turn * t->shift[0];
+    out[1] = q[1] + (double)turn * t->shift[1];
+    out[2] = q[2];
+    return true;
+}
+
+/* Nodes of one strand that are near each other along it are one fiber, not two. */
+static bool same_fiber(const struct strand_set *s, const uint32_t *strand_of, size_t i, size_t j)
+{
+    if (strand_of[i] != strand_of[j]) return false;
+    const struct strand *t = &s->strand[strand_of[i]];
+    size_t gap = i > j ? i - j : j - i;
+    if (t->n_period > 0 && t->n - gap < gap) gap = t->n - gap;
+    return gap < 8; /* nodes are a radius apart: beyond a half circle of radius 2 r */
+}
+
+struct push {
+    double sum[3], depth;
+    size_t n;
+};
+
+static void push_from(const struct relax *r, size_t i, size_t j, struct push *push)
+{
+    const struct strand_set *s = r->s;
+    if (same_fiber(s, r->strand_of, i, j)) return;
+    double want = s->strand[r->strand_of[i]].radius_m + s->strand[r->strand_of[j]].radius_m;
+    double d[3];
+    for (int a = 0; a < 3; a++) {
+        d[a] = s->p[i][a] - s->p[j][a];
+        if (a < 2) d[a] -= s->tile_m[a] * round(d[a] / s->tile_m[a]);
+    }
+    double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    if (d2 >= want * want) return;
+    double distance = sqrt(d2), depth = want - distance;
+    if (distance < 1e-9 * want) { /* on top of each other: the lower number goes down */
+        d[0] = d[1] = 0.0;
+        d[2] = i < j ? -1.0 : 1.0;
+        distance = 1.0;
+    }
+    for (int a = 0; a < 3; a++) push->sum[a] += 0.5 * depth * d[a] / distance;
+    push->depth = fmax(push->depth, depth / want);
+    push->n++;
+}
+
+static void push_from_cell_row(const struct relax *r, size_t i, size_t z, size_t y, size_t at_x, struct push *push)
+{
+    size_t reach = r->n_cell[0] >= 3 ? 3 : r->n_cell[0]; /* on a very small tile the neighbours would repeat */
+    for (size_t dx = 0; dx < reach; dx++) {
+        size_t x = (at_x + r->n_cell[0] + dx - 1) % r->n_cell[0];
+        size_t cell = (z * r->n_cell[1] + y) * r->n_cell[0] + x;
+        for (size_t k = r->cell_first[cell]; k < r->cell_first[cell + 1]; k++) push_from(r, i, r->cell_node[k], push);
+    }
+}
+
+static void look_from(struct relax *r, size_t i)
+{
+    const struct strand_set *s = r->s;
+    struct push push = {{0.0, 0.0, 0.0}, 0.0, 0};
+    size_t c = r->cell_of[i], at[3] = {c % r->n_cell[0], c / r->n_cell[0] % r->n_cell[1], c / (r->n_cell[0] * r->n_cell[1])};
+    size_t reach = r->n_cell[1] >= 3 ? 3 : r->n_cell[1];
+    size_t z_from = at[2] > 0 ? at[2] - 1 : 0, z_to = at[2] + 1 < r->n_cell[2] ? at[2] + 1 : at[2];
+    for (size_t z = z_from; z <= z_to; z++)
+        for (size_t dy = 0; dy < reach; dy++)
+            push_from_cell_row(r, i, z, (at[1] + r->n_cell[1] + dy - 1) % r->n_cell[1], at[0], &push);
+    const struct strand *t = &s->strand[r->strand_of[i]];
+    double before[3], after[3], along[3], length2 = 0.0, dot = 0.0;
+    if (!neighbour(t, i, -1, s->p, before)) memcpy(before, s->p[i], sizeof before);
+    if (!neighbour(t, i, 1, s->p, after)) memcpy(after, s->p[i], sizeof after);
+    for (int a = 0; a < 3; a++) {
+        along[a] = after[a] - before[a];
+        length2 += along[a] * along[a];
+        dot += along[a] * push.sum[a];
+    }
+    for (int a = 0; a < 3; a++) /* the part along the fiber would only shuffle nodes */
+        r->move[i][a] = push.n == 0 ? 0.0 : (push.sum[a] - dot * along[a] / length2) / (0.5 * (double)push.n + 0.5);
+    r->depth[i] = push.depth;
+}
+
+static void look(void *context, size_t i_task, size_t i_thread)
+{
+    struct relax *r = context;
+    size_t end = (i_task + 1) * NODES_PER_TASK < r->s->n_node ? (i_task + 1) * NODES_PER_TASK : r->s->n_node;
+    (void)i_thread;
+    for (size_t i = i_task * NODES_PER_TASK; i < end; i++) look_from(r, i);
+}
+
+/* p = start + displacement, smoothed once with weights 1/4 1/2 1/4 blended by `amount`. */
+static void smooth(struct relax *r, double amount)
+{
+    struct strand_set *s = r->s;
+    for (size_t k = 0; k < s->n_node; k++)
+        for (int a = 0; a < 3; a++) r->move[k][a] = s->p[k][a] - s->start[k][a];
+    for (size_t i = 0; i < s->n_strand; i++) {
+        const struct strand *t = &s->strand[i];
+        for (size_t k = 0; k < t->n; k++) {
+            bool first = k == 0, last = k + 1 == t->n;
+            size_t before = !first ? k - 1 : t->n_period > 0 ? t->n - 1 : k, after = !last ? k + 1 : t->n_period > 0 ? 0 : k;
+            for (int a = 0; a < 3; a++) {
+                double own = r->move[t->first + k][a];
+                double mean = 0.5 * own + 0.25 * (r->move[t->first + before][a] + r->move[t->first + after][a]);
+                s->p[t->first + k][a] = s->start[t->first + k][a] + own + amount * (mean - own);
+            }
+        }
+    }
+}
+
+status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *pool, const struct progress *progress,
+                    double *overlap_mean, double *overlap_max, struct error *err)
+{
+    struct relax r;
+    status st = STATUS_OK;
+    memcpy(s->p, s->start, s->n_node * sizeof *s->p);
+    st = relax_init(&r, s, err);
+    if (st != STATUS_OK) goto out;
+    size_t n_task = (s->n_node + NODES_PER_TASK - 1) / NODES_PER_TASK;
+    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    for (size_t i_round = 0; i_round <= n_round; i_round++) {
+        sort_into_cells(&r);
+        st = thread_pool_run(pool, n_task, look, &r, &quiet);
+        if (st != STATUS_OK) {
+            error_set(err, st, "cancelled while making the phantom");
+            goto out;
+        }
+        if (i_round == n_round) break; /* the last look only measures */
+        for (size_t k = 0; k < s->n_node; k++)
+            for (int a = 0; a < 3; a++) s->p[k][a] += r.move[k][a];
+        /* ever less smoothing, so that the last rounds only separate */
+        smooth(&r, 1.0 - 0.9 * (double)i_round / (double)n_round);
+        progress_report(progress, (double)(i_round + 1) / (double)n_round);
+    }
+    *overlap_mean = *overlap_max = 0.0;
+    for (size_t k = 0; k < s->n_node; k++) {
+        *overlap_mean += r.depth[k] / (double)s->n_node;
+        *overlap_max = fmax(*overlap_max, r.depth[k]);
+    }
+out:
+    relax_release(&r);
+    return st;
+}

@@ -1,0 +1,68 @@
+/* Inside phantom/: strands, the working form of fibers while a phantom is made.
+ *
+ * A strand is a chain of nodes about one radius apart. A closed strand runs through n_period tiles before it meets itself again: its node
+ * n is node 0 moved by `shift`. An open strand simply ends. Lengths are metres, before the tile is moved to its place in z.
+ */
+#ifndef SELVEDGE_GEOMETRY_PHANTOM_STRAND_H
+#define SELVEDGE_GEOMETRY_PHANTOM_STRAND_H
+
+#include "geometry/phantom/phantom.h"
+
+/* Where a closed strand is cut into fibers. */
+enum strand_cut { CUT_NONE, CUT_FACE_X = 1, CUT_FACE_Y = 2, CUT_FACE_XY = 3, CUT_PERIOD = 4 };
+
+struct strand {
+    size_t first, n;      /* nodes */
+    double shift[2];      /* of a closed strand; 0, 0 when open */
+    size_t n_period;      /* 0: open */
+    double radius_m;
+    uint8_t axis_class;
+    enum strand_cut cut;
+};
+
+struct strand_set {
+    double tile_m[2];
+    size_t n_strand, strand_capacity;
+    struct strand *strand;
+    size_t n_node, node_capacity;
+    double (*start)[3]; /* where the design put the node */
+    double (*p)[3];     /* where it is now */
+};
+
+void strand_set_release(struct strand_set *s);
+/* Append a strand with n nodes at zero; *node is where to write them (valid until the next call). */
+status strand_add(struct strand_set *s, const struct strand *like, size_t n, double (**node)[3], struct error *err);
+
+/* Push nodes of different fibers apart until they are at least the sum of their radii away, keeping displacements smooth along fibers. */
+status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *pool, const struct progress *progress,
+                    double *overlap_mean, double *overlap_max, struct error *err);
+
+/* Cut, subdivide to the given spacing (Catmull-Rom through the nodes) and move to z_min = margin. */
+status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f, struct error *err);
+
+/* A yarn's path over one tile, closed on the torus: n points, point n = point 0 + shift. */
+struct yarn {
+    size_t n;
+    double (*point)[3];
+    double shift[2];
+    double radius_m;     /* of its fibers */
+    uint8_t axis_class;
+    enum strand_cut cut;
+    uint32_t number;     /* names its random stream */
+};
+
+/* Radius of a yarn's round section (to the outermost fiber's surface). */
+double yarn_section_radius_m(const struct phantom_option *o, double fiber_radius_m);
+/* Fibers of one yarn, and its fly-aways. */
+status yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, struct error *err);
+
+/* Fill the set; o has been checked. They set tile_m to whole voxels. */
+status weave_make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err);
+status knit_make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err);
+status felt_make(struct strand_set *s, const struct phantom_option *o, struct error *err);
+status pile_add(struct strand_set *s, const struct phantom_option *o, double ground_z_m, struct error *err);
+
+/* Random streams of the parts. */
+enum phantom_stream { STREAM_YARN = 1, STREAM_FLYAWAY, STREAM_PILE, STREAM_FELT, STREAM_NOISE, STREAM_RING };
+
+#endif

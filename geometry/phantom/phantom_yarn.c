@@ -1,0 +1,188 @@
+/* Fibers of one yarn: hexagonal lattice in a flattened section, twisted about the path, migrating; and fly-aways. */
+#include "base/rng.h"
+#include "geometry/phantom/phantom_strand.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { LATTICE_FOLD = 6, LATTICE_REACH = 40, FLYAWAY_NODES_MIN = 6 };
+
+/* Lattice spacing in fiber radii: packing = pi r^2 / (sqrt(3)/2 d^2). */
+static double lattice_spacing(double packing) { return sqrt(2.0 * M_PI / (sqrt(3.0) * packing)); }
+
+struct orbit {
+    double u, v, rho2;
+};
+
+static int by_distance(const void *a, const void *b)
+{
+    const struct orbit *x = a, *y = b;
+    if (x->rho2 != y->rho2) return x->rho2 < y->rho2 ? -1 : 1;
+    double ax = atan2(x->v, x->u), ay = atan2(y->v, y->u);
+    return ax < ay ? -1 : ax > ay;
+}
+
+/* The n orbits nearest to the centre of the lattice with spacing 1, one representative in the sector 0 <= angle < 60 degrees each.
+ * The others follow by turning. Returns the number found (n unless n is enormous). */
+static size_t lattice_orbits(struct orbit *orbit, size_t n)
+{
+    static const double half_sqrt3 = 0.86602540378443865;
+    struct orbit all[LATTICE_REACH * (LATTICE_REACH + 1) / 2 + LATTICE_REACH];
+    size_t count = 0;
+    for (int i = 1; i <= LATTICE_REACH; i++)
+        for (int j = 0; i + j <= LATTICE_REACH; j++) {
+            double u = i + 0.5 * j, v = half_sqrt3 * j;
+            all[count++] = (struct orbit){u, v, round(1e6 * (u * u + v * v)) * 1e-6};
+        }
+    qsort(all, count, sizeof *all, by_distance);
+    if (n > count) n = count;
+    for (size_t i = 0; i < n; i++) orbit[i] = all[i];
+    return n;
+}
+
+static size_t n_orbit_of(const struct phantom_option *o) { return (o->n_fiber_per_yarn + LATTICE_FOLD - 2) / LATTICE_FOLD; }
+
+double yarn_section_radius_m(const struct phantom_option *o, double fiber_radius_m)
+{
+    size_t n = n_orbit_of(o);
+    if (n == 0) return fiber_radius_m;
+    struct orbit *orbit = calloc(n, sizeof *orbit);
+    if (orbit == NULL) return NAN;
+    size_t found = lattice_orbits(orbit, n);
+    double rho = found > 0 ? sqrt(orbit[found - 1].rho2) : 0.0;
+    free(orbit);
+    return fiber_radius_m * (1.0 + rho * lattice_spacing(o->packing));
+}
+
+/* Path point and frame at parameter s in [0, 1): tangent t, b in the cloth's plane, n = t x b upwards. */
+static void path_at(const struct yarn *y, double s, double point[3], double b[3], double n[3])
+{
+    double at = s * (double)y->n;
+    size_t i = (size_t)at % y->n;
+    double w = at - floor(at);
+    double q[4][3];
+    for (int k = 0; k < 4; k++) { /* four points around, wrapped with the shift */
+        long j = (long)i + k - 1, m = (long)y->n;
+        long turn = j < 0 ? -1 : j >= m ? 1 : 0;
+        for (int a = 0; a < 3; a++)
+            q[k][a] = y->point[j - turn * m][a] + (a < 2 ? (double)turn * y->shift[a] : 0.0);
+    }
+    double t[3], length = 0.0;
+    for (int a = 0; a < 3; a++) {
+        double d1 = 0.5 * (q[2][a] - q[0][a]), d2 = 0.5 * (q[3][a] - q[1][a]);
+        point[a] = q[1][a] + w * (q[2][a] - q[1][a]);
+        t[a] = (1.0 - w) * d1 + w * d2;
+        length += t[a] * t[a];
+    }
+    for (int a = 0; a < 3; a++) t[a] /= sqrt(length);
+    double h = sqrt(t[0] * t[0] + t[1] * t[1]); /* paths are never vertical */
+    b[0] = -t[1] / h;
+    b[1] = t[0] / h;
+    b[2] = 0.0;
+    n[0] = t[1] * b[2] - t[2] * b[1];
+    n[1] = t[2] * b[0] - t[0] * b[2];
+    n[2] = t[0] * b[1] - t[1] * b[0];
+}
+
+static double path_length_m(const struct yarn *y)
+{
+    double length = 0.0;
+    for (size_t i = 0; i < y->n; i++) {
+        double d2 = 0.0;
+        for (int a = 0; a < 3; a++) {
+            double next = i + 1 < y->n ? y->point[i + 1][a] : y->point[0][a] + (a < 2 ? y->shift[a] : 0.0);
+            d2 += (next - y->point[i][a]) * (next - y->point[i][a]);
+        }
+        length += sqrt(d2);
+    }
+    return length;
+}
+
+struct section {
+    double wide, high; /* area-preserving flattening */
+    double twist_turns;
+    double length_m;
+};
+
+/* A point at lattice position (rho_m, angle) of the section, s tiles along the yarn. */
+static void section_point(const struct yarn *y, const struct section *c, double s, double rho_m, double angle, double out[3])
+{
+    double point[3], b[3], n[3];
+    double whole = floor(s);
+    path_at(y, s - whole, point, b, n);
+    double turned = angle + 2.0 * M_PI * c->twist_turns * s;
+    double u = rho_m * cos(turned) * c->wide, v = rho_m * sin(turned) * c->high;
+    for (int a = 0; a < 3; a++) out[a] = point[a] + u * b[a] + v * n[a] + (a < 2 ? whole * y->shift[a] : 0.0);
+}
+
+static size_t greatest_divisor(size_t a, size_t b) { return b == 0 ? a : greatest_divisor(b, a % b); }
+
+/* The strands that one orbit of lattice points makes: turning by k sixths a tile, a fiber meets itself after 6 / gcd(k, 6) tiles. */
+static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, const struct section *c,
+                        double rho_m, double angle, struct rng *rng, struct error *err)
+{
+    size_t fold = rho_m > 0.0 ? LATTICE_FOLD : 1;
+    size_t sixths = (size_t)llabs(llround(LATTICE_FOLD * c->twist_turns));
+    size_t n_period = fold / greatest_divisor(fold, sixths);
+    size_t per_tile = (size_t)ceil(c->length_m / y->radius_m);
+    struct strand like = {.shift = {y->shift[0] * (double)n_period, y->shift[1] * (double)n_period},
+                          .n_period = n_period, .radius_m = y->radius_m, .axis_class = y->axis_class, .cut = y->cut};
+    for (size_t i = 0; i < fold / n_period; i++) {
+        double (*node)[3];
+        status st = strand_add(s, &like, per_tile * n_period, &node, err);
+        if (st != STATUS_OK) return st;
+        double phase = 2.0 * M_PI * rng_double(rng);
+        double waves = (double)(n_period + 1) / (double)n_period;
+        for (size_t k = 0; k < per_tile * n_period; k++) {
+            double at = (double)k / (double)per_tile;
+            double rho = rho_m * (1.0 + o->migration * cos(2.0 * M_PI * waves * at + phase));
+            section_point(y, c, at, rho, angle + 2.0 * M_PI * (double)i / LATTICE_FOLD, node[k]);
+        }
+    }
+    return STATUS_OK;
+}
+
+/* A hair that leaves the yarn's surface and bends away from it. Lengths relative to the yarn after the fits in Zhao et al. 2016:
+ * reach about half a yarn radius, with wide scatter. */
+static status add_flyaway(struct strand_set *s, const struct yarn *y, const struct section *c,
+                          double section_radius_m, struct rng *rng, struct error *err)
+{
+    double normal[2];
+    rng_normal_pair(rng, normal);
+    double reach = section_radius_m * fmax(0.25, 0.5 + 0.3 * normal[0]);
+    double along = fmax(2.0, 3.0 + normal[1]) * section_radius_m / c->length_m;
+    double from = rng_double(rng), angle = 2.0 * M_PI * rng_double(rng), curl = 1.5 * (rng_double(rng) - 0.5);
+    double side = rng_double(rng) < 0.5 ? -1.0 : 1.0;
+    size_t n = (size_t)ceil(fabs(along) * c->length_m / y->radius_m) + FLYAWAY_NODES_MIN;
+    struct strand like = {.radius_m = y->radius_m, .axis_class = y->axis_class, .cut = CUT_NONE};
+    double (*node)[3];
+    status st = strand_add(s, &like, n, &node, err);
+    if (st != STATUS_OK) return st;
+    for (size_t k = 0; k < n; k++) {
+        double w = (double)k / (double)(n - 1);
+        section_point(y, c, from + side * along * w, section_radius_m + y->radius_m + reach * w * w, angle + curl * w, node[k]);
+    }
+    return STATUS_OK;
+}
+
+status yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, struct error *err)
+{
+    size_t n_orbit = n_orbit_of(o);
+    struct orbit *orbit = calloc(n_orbit + 1, sizeof *orbit);
+    if (orbit == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
+    n_orbit = lattice_orbits(orbit, n_orbit);
+    struct section c = {.wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = path_length_m(y),
+                        .twist_turns = round(LATTICE_FOLD * o->twist_turns) / LATTICE_FOLD};
+    const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN}, fly_key = {.seed = o->seed, .iteration = STREAM_FLYAWAY};
+    struct rng rng;
+    rng_start(&rng, &key, y->number, 0);
+    double turn = 2.0 * M_PI * rng_double(&rng), spacing_m = y->radius_m * lattice_spacing(o->packing);
+    status st = add_orbit(s, o, y, &c, 0.0, 0.0, &rng, err);
+    for (size_t i = 0; i < n_orbit && st == STATUS_OK; i++)
+        st = add_orbit(s, o, y, &c, spacing_m * sqrt(orbit[i].rho2), turn + atan2(orbit[i].v, orbit[i].u), &rng, err);
+    rng_start(&rng, &fly_key, y->number, 0);
+    for (size_t i = 0; i < o->n_flyaway_per_yarn && st == STATUS_OK; i++)
+        st = add_flyaway(s, y, &c, yarn_section_radius_m(o, y->radius_m), &rng, err);
+    free(orbit);
+    return st;
+}
