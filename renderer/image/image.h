@@ -10,8 +10,10 @@ struct image {
     size_t width, height, n_channel;  /* n_channel planes interleaved: 3 for rgb, more with named layers */
     float *pixel;                     /* height x width x n_channel */
     const char *const *channel_name;  /* EXR names, e.g. "R", "G", "B", "var.R", "d_beta_R.R"; static or owned by the caller */
+    void *name_storage;               /* NULL, or the memory behind channel_name when the image owns it (render.h) */
 };
 
+/* Zero pixels. n_channel == 3 gets the names R, G, B; otherwise channel_name is NULL until the caller sets it. */
 status image_init(struct image *im, size_t width, size_t height, size_t n_channel, struct error *err);
 void image_release(struct image *im);
 

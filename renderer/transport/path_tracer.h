@@ -1,0 +1,56 @@
+/* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric thesis 5.5.1,
+ * figure 5.3): beside the throughput T runs the sum H of scores d ln S / d p, and every light connection adds L and L (H + score).
+ * The sampling densities, the roulette and the weights that combine lamp and scattering samples (power heuristic) are held fixed.
+ */
+#ifndef SELVEDGE_RENDERER_PATH_TRACER_H
+#define SELVEDGE_RENDERER_PATH_TRACER_H
+
+#include "base/rng.h"
+#include "renderer/scattering/scattering.h"
+#include "renderer/scene/scene_ray.h"
+#include "renderer/transport/lamp.h"
+
+enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_PARAM };
+
+struct path_setting {
+    const struct scene *scene;
+    const struct scattering_model *model;
+    const struct scattering_state *state;
+    struct lamp lamp;
+    bool has_lamp;
+    bool has_environment;
+    float environment[3];    /* the same radiance from every direction (from below only without the black sheet) */
+    float roulette_below;    /* throughput under which paths are ended at random; 0: never */
+    bool want_jacobian;
+};
+
+/* Roulette at the usual place, the configuration's lamp, no environment. */
+void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
+                       const struct scattering_state *state, const struct configuration *c, bool want_jacobian);
+
+struct path_result {
+    float radiance[3];
+    float jac[PATH_N_DERIVATIVE]; /* [c * n_param + p] */
+    uint32_t n_vertex;
+};
+
+/* All that a path's value depends on besides S: value = sum over steps of T S(light_wi, wo) light + T' escape with
+ * T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
+struct path_step {
+    float wo[3], wi[3];
+    float weight;          /* cos th_i / (density * survival) */
+    float light_wi[3];
+    float light;           /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
+    float escape[3];       /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
+};
+
+struct path_record {
+    size_t n_step, capacity;
+    struct path_step *step; /* the caller's; steps beyond capacity are counted but not stored */
+};
+
+/* ray: as camera_ray made it; changed. record: NULL, or n_step set to 0 by the caller. */
+void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
+                struct path_record *record);
+
+#endif
