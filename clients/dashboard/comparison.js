@@ -1,0 +1,76 @@
+// Measured against rendered: pictures side by side, and a scatter plot of the means.
+import { colour, el, percent, svg } from "./page_parts.js";
+
+const RGB = ["var(--red)", "var(--green)", "var(--blue)"];
+const degrees = (x) => (typeof x === "number" ? `${Number(x.toFixed(1))}°` : "–");
+
+function picture(url, rgb, exposure, what) {
+  if (url) return el("img", { src: url, alt: what, loading: "lazy", title: what });
+  const swatch = el("div", { title: `${what}: mean ${rgb ? rgb.map((v) => v.toFixed(4)).join(", ") : "unknown"}` });
+  if (rgb) swatch.style.background = colour(rgb, exposure);
+  return swatch;
+}
+
+// One exposure for all swatches, so that they can be compared: the brightest tenth of the means may clip.
+export function commonExposure(list) {
+  const peak = list.filter((c) => c.measured).map((c) => Math.max(...c.measured)).sort((a, b) => a - b);
+  return peak.length ? 0.8 / Math.max(peak[Math.floor(0.9 * (peak.length - 1))], 1e-6) : 1;
+}
+
+export function gallery(list) {
+  const exposure = commonExposure(list);
+  const cards = list.map((c) => el("div", { class: c.held ? "pair held" : "pair" },
+    el("div", { class: "pictures" }, picture(c.measuredPicture, c.measured, exposure, "measured"), picture(c.renderedPicture, c.rendered, exposure, "rendered")),
+    el("div", { class: "label" },
+      el("div", { class: "row" }, el("b", {}, c.name), c.held ? el("span", { class: "tag" }, "held out") : null),
+      el("div", { class: "row" }, el("span", {}, "lamp"), el("span", {}, `θ ${degrees(c.angles.light_theta_deg)}  φ ${degrees(c.angles.light_phi_deg)}`)),
+      el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(c.angles.camera_theta_deg)}  φ ${degrees(c.angles.camera_phi_deg)}`)),
+      el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, degrees(c.angles.cloth_rotation_deg))),
+      el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percent(c.error))))));
+  return [
+    el("p", { class: "hint" }, "Left measured, right rendered with the fitted parameters; dashed frames were held out of the fit. Plain squares show mean colours, all at one exposure."),
+    el("div", { class: "gallery" }, cards),
+  ];
+}
+
+function axisTicks(low, high) {
+  const ticks = [];
+  for (let e = Math.floor(Math.log10(low)); e <= Math.ceil(Math.log10(high)); e++)
+    for (const m of [1, 2, 5]) {
+      const v = m * 10 ** e;
+      if (v >= low && v <= high) ticks.push(v);
+    }
+  return ticks;
+}
+
+export function scatterPlot(list) {
+  const points = list.filter((c) => c.measured && c.rendered)
+    .flatMap((c) => c.measured.map((m, i) => ({ m, r: c.rendered[i], channel: i, c }))).filter((p) => p.m > 0 && p.r > 0);
+  if (points.length === 0) return el("p", { class: "hint" }, "Nothing to compare.");
+  const W = 520, H = 440, L = 52, B = 40, T = 10, R = 12;
+  const values = points.flatMap((p) => [p.m, p.r]);
+  const low = Math.min(...values) / 1.3, high = Math.max(...values) * 1.3;
+  const t = (v) => Math.log(v / low) / Math.log(high / low);
+  const X = (v) => L + t(v) * (W - L - R), Y = (v) => H - B - t(v) * (H - B - T);
+  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "scatter", role: "img", "aria-label": "rendered against measured mean radiance" });
+  const k = 1.1, corner = (f) => [[low, low * f], [high, high * f]];
+  const clip = ([x, y]) => `${X(Math.min(Math.max(x, low), high))},${Math.min(Math.max(Y(y), T), H - B)}`;
+  root.append(svg("polygon", { class: "band", points: [...corner(k), ...corner(1 / k).reverse()].map(clip).join(" ") }),
+    svg("line", { class: "one", x1: X(low), y1: Y(low), x2: X(high), y2: Y(high) }));
+  for (const v of axisTicks(low, high)) {
+    const label = v < 0.01 ? v.toExponential(0) : String(Number(v.toPrecision(1)));
+    root.append(svg("line", { class: "axis", x1: X(v), y1: T, x2: X(v), y2: H - B }), svg("line", { class: "axis", x1: L, y1: Y(v), x2: W - R, y2: Y(v) }),
+      svg("text", { x: X(v), y: H - B + 15, "text-anchor": "middle" }, label), svg("text", { x: L - 6, y: Y(v) + 4, "text-anchor": "end" }, label));
+  }
+  root.append(svg("text", { x: (L + W) / 2, y: H - 6, "text-anchor": "middle" }, "measured mean radiance"),
+    svg("text", { x: 12, y: H / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${H / 2})` }, "rendered"));
+  for (const p of points) {
+    const mark = svg("circle", { cx: X(p.m), cy: Y(p.r), r: 4, stroke: RGB[p.channel], "stroke-width": 1.6, fill: p.c.held ? "none" : RGB[p.channel], "fill-opacity": 0.75 });
+    mark.append(svg("title", {}, `${p.c.name} ${"rgb"[p.channel]}: measured ${p.m.toPrecision(4)}, rendered ${p.r.toPrecision(4)}`));
+    root.append(mark);
+  }
+  return [
+    el("div", { class: "legend-row" }, el("span", {}, "● fitted"), el("span", {}, "○ held out"), el("span", {}, "shaded: ± 10 %"), el("span", {}, "logarithmic axes, colour = channel")),
+    root,
+  ];
+}

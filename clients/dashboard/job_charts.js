@@ -1,0 +1,82 @@
+// The curves of one fit: objective (log axis), relative RMS, and one chart a parameter, fed by the incremental series.
+import { CurveChart } from "./curve_charts.js";
+import { el } from "./page_parts.js";
+import { finite, parameterGroups, parameterNames } from "./result_view.js";
+import { getJson } from "./server_link.js";
+
+const BAND = 2; // standard errors
+const MAX_POINT = 1200;
+const RGB = ["--red", "--green", "--blue"];
+
+function band(value, se, { positive = false } = {}) {
+  if (finite(value) === null || (positive && value <= 0)) return null;
+  const half = finite(se) === null ? 0 : BAND * se;
+  return [positive ? Math.max(value - half, value * 0.05) : value - half, value, value + half];
+}
+
+function block(title, tall) {
+  const legend = el("span", { class: "legend" }), node = el("div", { class: tall ? "chart tall" : "chart" });
+  return { legend, node, box: el("div", {}, el("div", { class: "chart-title" }, el("span", {}, title), legend), node) };
+}
+
+export class JobCharts {
+  constructor(fitCard, parameterCard) {
+    this.fitCard = fitCard;
+    this.parameterCard = parameterCard;
+    this.reset(null);
+  }
+
+  reset(generation) {
+    this.destroy();
+    this.generation = generation;
+    this.points = [];
+    this.after = -1;
+    this.charts = [];
+    this.parameterCharts = null;
+    this.fitCard.replaceChildren(el("p", { class: "hint" }, "The curve begins with the fit."));
+    this.parameterCard.replaceChildren(el("p", { class: "hint" }, "The curves begin with the fit."));
+  }
+
+  async update(job) {
+    if (job.generation !== this.generation) this.reset(job.generation);
+    for (let round = 0; round < 20; round++) {
+      const series = await getJson(`/v1/jobs/${job.id}/series?after_step=${this.after}&max_points=${MAX_POINT}`);
+      if (series.generation !== undefined && series.generation !== this.generation) { this.reset(series.generation); continue; }
+      if (series.points.length === 0) break;
+      this.points.push(...series.points);
+      this.after = series.next_after_step ?? this.points[this.points.length - 1].step;
+      if (this.points.length > 2 * MAX_POINT) { this.points = []; this.after = -1; continue; } // let the server thin it out
+      this.draw(job);
+    }
+  }
+
+  draw(job) {
+    if (this.charts.length === 0) this.build(job);
+    const p = this.points;
+    this.objective.set(p.map((x) => [x.step, band(x.objective, x.objective_se, { positive: true })]));
+    this.rms.set(p.map((x) => [x.step, finite(x.rel_rms) === null || x.rel_rms <= 0 ? null : [100 * x.rel_rms, 100 * x.rel_rms, 100 * x.rel_rms]]));
+    for (const { group, chart } of this.parameterCharts)
+      chart.set(p.map((x) => [x.step, ...group.flat.map((f) => band(x.parameter?.[f.i], x.parameter_se?.[f.i]))]));
+  }
+
+  build(job) {
+    const objective = block("Objective f ± 2 s.e. (log)", true), rms = block("Relative RMS error of the fitted means, % (log)");
+    this.fitCard.replaceChildren(objective.box, rms.box);
+    this.objective = new CurveChart(objective.node, objective.legend, ["f"], ["--accent"], { log: true });
+    this.rms = new CurveChart(rms.node, rms.legend, ["%"], ["--warn"], { log: true, digits: 3 });
+    const names = parameterNames(job, this.points[0].parameter?.length ?? 0);
+    this.parameterCharts = parameterGroups(names).map((group) => {
+      const part = block(group.symbol + (group.unit ? ` (${group.unit === "deg" ? "°" : group.unit})` : ""));
+      const colours = group.flat.map((f) => (f.channel < 0 ? "--accent" : RGB[f.channel]));
+      const labels = group.flat.map((f) => (f.channel < 0 ? f.name : "rgb"[f.channel]));
+      return { group, box: part.box, chart: new CurveChart(part.node, part.legend, labels, colours, { digits: 4 }) };
+    });
+    this.parameterCard.replaceChildren(el("div", { class: "charts" }, this.parameterCharts.map((c) => c.box)));
+    this.charts = [this.objective, this.rms, ...this.parameterCharts.map((c) => c.chart)];
+  }
+
+  destroy() {
+    for (const chart of this.charts ?? []) chart.destroy();
+    this.charts = [];
+  }
+}

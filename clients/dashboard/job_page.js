@@ -1,0 +1,130 @@
+// One job: state and stages, live curves, and at the end parameters, comparison, fibers, downloads.
+import { gallery, scatterPlot } from "./comparison.js";
+import { fiberView } from "./fiber_view.js";
+import { JobCharts } from "./job_charts.js";
+import { LogTail } from "./log_tail.js";
+import { duration, el, isNumber, percent, refill, size, stateTag, when, withError } from "./page_parts.js";
+import { configurations, fiberFile, fitted, residuals, sliceFiles } from "./result_view.js";
+import { getJson, poll, sendJson } from "./server_link.js";
+
+const LIVE = new Set(["queued", "running", "paused"]);
+
+function card(title, ...content) {
+  return el("section", { class: "card" }, el("h2", {}, title), ...content);
+}
+
+function stagesOf(job, stages) {
+  return stages.map((s, i) => {
+    const over = job.state === "succeeded" || (job.i_stage !== null && i < job.i_stage);
+    const now = job.state === "running" && i === job.i_stage;
+    const fill = el("div", { class: "fill" });
+    if (!over && i === job.i_stage) fill.style.width = `${100 * (job.stage_fraction || 0)}%`;
+    return el("div", { class: `stage${over ? " done" : ""}${now ? " now" : ""}`, title: s.title },
+      el("div", { class: "track" }, fill), el("div", { class: "name" }, s.name));
+  });
+}
+
+function fact(name, value) {
+  return el("span", {}, `${name} `, el("b", {}, value));
+}
+
+function factsOf(job) {
+  const facts = [];
+  if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", duration(job.eta_s)));
+  if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
+  if (isNumber(job.objective)) facts.push(fact("objective", withError(job.objective, job.objective_se)));
+  const { fit, held } = residuals(job);
+  if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percent(fit, 2)));
+  if (isNumber(held)) facts.push(fact("held out", percent(held, 2)));
+  if (isNumber(job.started_unix_s) && isNumber(job.finished_unix_s)) facts.push(fact("took", duration(job.finished_unix_s - job.started_unix_s)));
+  if (job.attempt > 1) facts.push(fact("attempt", String(job.attempt)));
+  if (job.peak_rss_bytes > 0) facts.push(fact("memory", size(job.peak_rss_bytes)));
+  facts.push(fact("created", when(job.created_unix_s)));
+  return facts;
+}
+
+function notesOf(job) {
+  const notes = job.warnings.map((w) => el("p", { class: "note" }, w));
+  if (job.error && !LIVE.has(job.state)) {
+    const field = job.error.field && !job.error.text.includes(job.error.field) ? `${job.error.field}: ` : "";
+    notes.push(el("p", { class: "note bad" }, field + job.error.text));
+  }
+  if (job.missing_files?.length && job.state === "draft") notes.push(el("p", { class: "note" }, `Files still missing: ${job.missing_files.join(", ")}`));
+  if (residuals(job).converged === false) notes.push(el("p", { class: "note" }, "The fit has not converged; the parameters are the best point found."));
+  return notes;
+}
+
+function parameterTable(job) {
+  const rows = fitted(job).map((p) => el("tr", {}, el("td", { class: "mono" }, p.name), el("td", { class: "number" }, withError(p.value, p.se)),
+    el("td", {}, p.unit === "deg" ? "°" : p.unit), el("td", { class: "number hint" }, isNumber(p.lower) ? `${Number(p.lower.toPrecision(4))} … ${Number(p.upper.toPrecision(4))}` : ""),
+    el("td", {}, p.flags.map((f) => el("span", { class: "tag warn" }, f)))));
+  return el("table", { id: "parameters" }, el("thead", {}, el("tr", {}, el("th", {}, "Parameter"), el("th", { class: "number" }, "Value ± standard error"), el("th", {}, ""),
+    el("th", { class: "number" }, "Allowed"), el("th", {}, "Remarks"))), el("tbody", {}, rows));
+}
+
+function downloads(job, list) {
+  const rows = list.files.map((f) => el("tr", {}, el("td", {}, el("a", { href: f.url, class: "mono", download: f.path.split("/").pop() }, f.path)), el("td", { class: "number" }, size(f.size))));
+  return [el("p", {}, el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("table", { id: "files" }, el("tbody", {}, rows))];
+}
+
+export function jobPage(page, id) {
+  const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), notes = el("div");
+  const fitCard = el("div"), curveCard = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
+  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode);
+  const logLink = el("a", { href: `/v1/jobs/${id}/log`, target: "_blank" }, "whole log");
+  page.append(el("section", { class: "card", id: "state" }, head, stages, facts, notes),
+    el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard)), results,
+    el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "the last lines; ", logLink)), logNode));
+  let about = null, generation = null, closeFibers = null, gone = false;
+
+  const act = (verb) => async (event) => {
+    event.target.disabled = true;
+    try {
+      if (verb === "delete") {
+        if (!confirm("Delete this job with all its files?")) { event.target.disabled = false; return; }
+        await sendJson("DELETE", `/v1/jobs/${id}`);
+        location.hash = "";
+      } else await sendJson("POST", `/v1/jobs/${id}/${verb}`);
+      poller.wake();
+    } catch (error) { notes.replaceChildren(el("p", { class: "note bad" }, error.message)); event.target.disabled = false; }
+  };
+  const buttons = (job) => [
+    job.state === "draft" && !job.missing_files.length ? el("button", { class: "main", onclick: act("start") }, "Start") : null,
+    LIVE.has(job.state) ? el("button", { onclick: act("cancel"), disabled: job.cancel_requested }, job.cancel_requested ? "Stopping ..." : "Cancel") : null,
+    job.state === "failed" || job.state === "cancelled" ? el("button", { class: "main", onclick: act("retry") }, "Retry from checkpoint") : null,
+    LIVE.has(job.state) ? null : el("button", { onclick: act("delete") }, "Delete"),
+  ];
+
+  const showResults = async (job) => {
+    if (job.state !== "succeeded" || results.childElementCount > 0) return;
+    const list = await getJson(`/v1/jobs/${id}/results`);
+    if (gone || results.childElementCount > 0) return;
+    const compared = configurations(job, new Map(list.files.map((f) => [f.path, f.url])));
+    const slices = sliceFiles(list.files), hair = fiberFile(list.files);
+    const fibers = hair ? fiberView(hair) : null;
+    closeFibers = fibers?.close ?? null;
+    results.append(
+      el("div", { class: "columns" }, card("Fitted parameters", parameterTable(job)), card("Measured against rendered", scatterPlot(compared))),
+      compared.length ? card("Measured beside rendered", gallery(compared)) : "",
+      slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
+      fibers ? card("Fibers", fibers.box) : "",
+      card("Downloads", downloads(job, list)));
+  };
+
+  const poller = poll(async () => {
+    about ??= await getJson("/v1/about");
+    const job = await getJson(`/v1/jobs/${id}`);
+    if (gone) return 5;
+    document.title = `${job.state === "running" ? `${Math.round(100 * job.fraction)} % ` : ""}${job.sample} – Selvedge`;
+    if (job.generation !== generation) { generation = job.generation; log.reset(); results.replaceChildren(); closeFibers?.(); closeFibers = null; }
+    refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
+    refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
+    refill(facts, [job.state, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
+    refill(notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
+    await charts.update(job);
+    await log.update(id);
+    await showResults(job);
+    return job.state === "running" ? 1 : LIVE.has(job.state) ? 2 : 10;
+  });
+  return () => { gone = true; poller.stop(); charts.destroy(); closeFibers?.(); };
+}

@@ -1,0 +1,39 @@
+// All jobs, newest first, and a place to drop a new one.
+import { duration, el, refill, stateTag, when } from "./page_parts.js";
+import { getJson, poll } from "./server_link.js";
+import { submitPanel } from "./submit_panel.js";
+
+const PAGE_SIZE = 100;
+
+function row(job) {
+  const busy = job.state === "running" || job.state === "queued" || job.state === "paused";
+  return el("tr", { class: "link", onclick: () => { location.hash = job.id; } },
+    el("td", {}, el("a", { href: `#${job.id}` }, job.sample || "(no name)")),
+    el("td", {}, stateTag(job.state)),
+    el("td", {}, busy ? el("progress", { max: 1, value: job.fraction, title: `${Math.round(100 * job.fraction)} %` }) : null),
+    el("td", {}, job.state === "running" ? job.stage ?? "" : job.state === "failed" ? job.error?.text ?? "" : ""),
+    el("td", { class: "number" }, busy ? duration(job.eta_s) : ""),
+    el("td", { class: "number" }, when(job.created_unix_s)));
+}
+
+export function listPage(page) {
+  const body = el("tbody");
+  const empty = el("p", { class: "hint hidden" }, "No jobs yet. Drop a job document and its files below, or use `selvedge submit JOB.json`.");
+  const more = el("button", { class: "hidden", onclick: () => { limit += PAGE_SIZE; poller.wake(); } }, "Show more");
+  let limit = PAGE_SIZE;
+  page.append(
+    el("section", { class: "card" }, el("h2", {}, "Jobs"),
+      el("table", { id: "jobs" },
+        el("thead", {}, el("tr", {}, el("th", {}, "Sample"), el("th", {}, "State"), el("th", { width: "170" }, "Progress"), el("th", {}, ""),
+          el("th", { class: "number" }, "Time left"), el("th", { class: "number" }, "Created"))), body),
+      empty, more),
+    submitPanel());
+  const poller = poll(async () => {
+    const { jobs, next_cursor: next } = await getJson(`/v1/jobs?limit=${Math.min(limit, 500)}`);
+    refill(body, jobs, () => jobs.map(row));
+    empty.classList.toggle("hidden", jobs.length > 0);
+    more.classList.toggle("hidden", next === null || next === undefined || limit >= 500);
+    return jobs.some((j) => j.state === "running" || j.state === "queued") ? 2 : 8;
+  });
+  return () => poller.stop();
+}

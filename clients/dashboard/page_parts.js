@@ -1,0 +1,66 @@
+// Small parts of pages: elements without innerHTML (names come from users), numbers as text.
+
+export function el(tag, attributes = {}, ...children) {
+  const node = document.createElement(tag);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+    else if (key === "class") node.className = value;
+    else if (key in node && key !== "list") node[key] = value;
+    else node.setAttribute(key, value);
+  }
+  node.append(...children.flat().filter((c) => c !== null && c !== undefined));
+  return node;
+}
+
+export function svg(tag, attributes = {}, ...children) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children);
+  return node;
+}
+
+// Replace the children only when they differ in what `key` says, so that a poll does not disturb a selection or a scroll position.
+export function refill(node, key, make) {
+  const text = JSON.stringify(key);
+  if (node.dataset.key === text) return;
+  node.dataset.key = text;
+  node.replaceChildren(...[make()].flat().filter((c) => c !== null && c !== undefined));
+}
+
+export const isNumber = (x) => typeof x === "number" && Number.isFinite(x);
+
+export function duration(s) {
+  if (!isNumber(s) || s < 0) return "–";
+  const t = Math.round(s);
+  const two = (n) => String(n).padStart(2, "0");
+  return t >= 3600 ? `${Math.floor(t / 3600)}:${two(Math.floor(t / 60) % 60)}:${two(t % 60)}` : `${Math.floor(t / 60)}:${two(t % 60)}`;
+}
+
+export function size(n) {
+  const unit = ["B", "kB", "MB", "GB", "TB"];
+  let i = 0;
+  while (n >= 999.5 && i < unit.length - 1) { n /= 1000; i++; }
+  return `${n.toFixed(i === 0 || n >= 99.95 ? 0 : n >= 9.995 ? 1 : 2)} ${unit[i]}`;
+}
+
+// As many digits as the standard error warrants.
+export function withError(value, se) {
+  if (!isNumber(value)) return "–";
+  if (!isNumber(se) || se <= 0) return Number(value.toPrecision(4)).toString();
+  const digits = Math.min(8, Math.max(0, 1 - Math.floor(Math.log10(se))));
+  return `${value.toFixed(digits)} ± ${se.toFixed(digits)}`;
+}
+
+export const percent = (x, digits = 1) => (isNumber(x) ? `${(100 * x).toFixed(digits)} %` : "–");
+export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
+export const stateTag = (state) => el("span", { class: `state ${state}` }, state);
+
+// Linear radiance to an sRGB byte colour.
+export function colour(rgb, exposure) {
+  const byte = (x) => {
+    const v = Math.min(1, Math.max(0, x * exposure));
+    return Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));
+  };
+  return `rgb(${byte(rgb[0])},${byte(rgb[1])},${byte(rgb[2])})`;
+}

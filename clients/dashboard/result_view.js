@@ -1,0 +1,52 @@
+// One place that knows the shapes of result.json and of series records (docs/file-formats.md); the rest of the page sees only this.
+import { isNumber } from "./page_parts.js";
+
+const CHANNEL = { r: 0, g: 1, b: 2 };
+
+// [{symbol, unit, flat: [{i, name, channel}]}] from parameter names such as "C_R.r", "beta_TT".
+export function parameterGroups(parameters) {
+  const groups = [];
+  parameters.forEach((p, i) => {
+    const [symbol, channel] = p.name.split(".");
+    let group = groups.find((g) => g.symbol === symbol);
+    if (!group) groups.push(group = { symbol, unit: p.unit ?? "", flat: [] });
+    group.flat.push({ i, name: p.name, channel: channel in CHANNEL ? CHANNEL[channel] : -1 });
+  });
+  return groups;
+}
+
+// Names of the fitted parameters while there is no result yet: the model's, in its order.
+const KNOWN = {
+  "two_lobe.": ["C_R.r", "C_R.g", "C_R.b", "C_TT.r", "C_TT.g", "C_TT.b", "beta_R", "beta_TT", "gamma_TT"],
+};
+export function parameterNames(job, n) {
+  if (job.parameters?.length === n) return job.parameters.map((p) => ({ name: p.name, unit: p.unit }));
+  const model = job.document?.fit?.model ?? "two_lobe.v1";
+  const known = Object.entries(KNOWN).find(([prefix]) => model.startsWith(prefix))?.[1];
+  if (known?.length === n) return known.map((name) => ({ name, unit: /^(beta|gamma)/.test(name) ? "deg" : "" }));
+  return Array.from({ length: n }, (_, i) => ({ name: `parameter ${i + 1}`, unit: "" }));
+}
+
+// The fitted parameters: [{name, unit, value, se, flags: [text]}]
+export function fitted(job) {
+  return (job.parameters ?? []).map((p) => ({ name: p.name, unit: p.unit ?? "", value: p.value, se: p.se, flags: p.flags ?? [], lower: p.lower, upper: p.upper }));
+}
+
+// Every configuration: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error}]
+export function configurations(job, urls) {
+  return (job.result?.configurations ?? []).map((c) => {
+    const measured = c.measured, rendered = c.rendered;
+    const mean = (v) => (v[0] + v[1] + v[2]) / 3;
+    const error = measured && rendered ? Math.hypot(...measured.map((m, i) => rendered[i] - m)) / Math.sqrt(3) / Math.max(mean(measured), 1e-9) : null;
+    return {
+      name: c.name, held: c.set === "held-out", angles: c, measured, rendered, error,
+      measuredPicture: urls.get(c.photograph_png) ?? null, renderedPicture: urls.get(c.rendering_png) ?? null,
+    };
+  });
+}
+
+// Pictures of slices and the fiber file among the results.
+export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
+export const fiberFile = (files) => files.find((f) => f.path.endsWith(".hair")) ?? null;
+export const residuals = (job) => ({ fit: job.result?.fit_rel_rms, held: job.result?.heldout_rel_rms, converged: job.result?.converged });
+export const finite = (x) => (isNumber(x) ? x : null);

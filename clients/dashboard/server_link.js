@@ -1,0 +1,99 @@
+// Talking to the daemon: JSON with ETags, problem documents as errors, polling that slows down when nobody looks.
+
+export class Problem extends Error {
+  constructor(status, body) {
+    const field = body?.field ? `${body.field}: ` : "";
+    const detail = body?.detail ?? body?.title ?? `the server answered with status ${status}`;
+    super(body?.field && detail.includes(body.field) ? detail : field + detail);
+    this.status = status;
+    this.body = body;
+  }
+}
+
+const cached = new Map(); // url -> {etag, value}; a page looks at a handful of addresses
+const KEEP = 40;
+
+let token = sessionStorage.getItem("selvedge-token");
+export function setToken(value) {
+  token = value || null;
+  if (token) sessionStorage.setItem("selvedge-token", token);
+  else sessionStorage.removeItem("selvedge-token");
+}
+
+export function headers(more = {}) {
+  return token ? { Authorization: `Bearer ${token}`, ...more } : more;
+}
+
+export async function raw(method, url, { body = null, header = {} } = {}) {
+  const answer = await fetch(url, { method, body, headers: headers(header), cache: "no-store", credentials: "omit" });
+  if (!answer.ok && answer.status !== 304) {
+    let problem = null;
+    try { problem = await answer.json(); } catch { /* not a problem document */ }
+    throw new Problem(answer.status, problem);
+  }
+  return answer;
+}
+
+export async function getJson(url) {
+  const known = cached.get(url);
+  const answer = await raw("GET", url, { header: known ? { "If-None-Match": known.etag } : {} });
+  if (answer.status === 304) return known.value;
+  const value = await answer.json();
+  const etag = answer.headers.get("ETag");
+  cached.delete(url);
+  if (etag) cached.set(url, { etag, value });
+  if (cached.size > KEEP) cached.delete(cached.keys().next().value);
+  return value;
+}
+
+export async function sendJson(method, url, value, header = {}) {
+  const answer = await raw(method, url, {
+    body: value === undefined ? null : JSON.stringify(value),
+    header: value === undefined ? header : { "Content-Type": "application/json", ...header },
+  });
+  return answer.status === 204 ? null : answer.json();
+}
+
+const connection = document.getElementById("connection");
+function showConnection(error) {
+  connection.textContent = error ? error : "";
+  connection.classList.toggle("lost", Boolean(error));
+}
+
+// Calls `work` again and again until stop() is called. work returns the seconds to wait; a hidden page waits ten times as long and
+// looks at once when it is shown again; after an error the pause grows.
+export function poll(work) {
+  let stopped = false, timer = null, failures = 0, busy = false;
+  const round = async () => {
+    if (stopped || busy) return;
+    busy = true;
+    let wait = 5;
+    try {
+      wait = await work();
+      failures = 0;
+      showConnection(null);
+    } catch (error) {
+      failures++;
+      wait = Math.min(30, 2 ** failures);
+      if (!stopped) showConnection(error instanceof Problem ? error.message : "The server does not answer; trying again.");
+      if (!(error instanceof Problem) && !(error instanceof TypeError)) console.error(error);
+    }
+    busy = false;
+    if (!stopped) timer = setTimeout(round, 1000 * wait * (document.hidden ? 10 : 1));
+  };
+  const wake = () => {
+    if (document.hidden || stopped) return;
+    clearTimeout(timer);
+    round();
+  };
+  document.addEventListener("visibilitychange", wake);
+  round();
+  return {
+    wake,
+    stop() {
+      stopped = true;
+      clearTimeout(timer);
+      document.removeEventListener("visibilitychange", wake);
+    },
+  };
+}

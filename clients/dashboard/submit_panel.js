@@ -1,0 +1,96 @@
+// Drag and drop: a job document (*.json) and the files that it names. Uploads go through tus and continue after a broken connection.
+import { el, size } from "./page_parts.js";
+import { raw, sendJson } from "./server_link.js";
+
+const PIECE = 8 << 20, MAX_HASHED = 512 << 20, MAX_TRY = 6;
+
+function filesOf(doc) {
+  const list = [];
+  const add = (name, role) => { if (typeof name === "string" && !list.some((f) => f.name === name)) list.push({ name, role }); };
+  for (const name of doc.volume?.files ?? []) add(name, "volume");
+  add(doc.fibers?.file, "fibers");
+  add(doc.measurements?.file, "measurements");
+  for (const p of doc.photographs ?? []) add(p?.file, "photograph");
+  return list;
+}
+
+// The browser's digest wants the whole file in memory; larger ones are sent without a checksum of ours.
+async function sha256(file) {
+  if (!globalThis.crypto?.subtle || file.size > MAX_HASHED) return null;
+  const digest = await crypto.subtle.digest("SHA-256", await file.arrayBuffer());
+  return [...new Uint8Array(digest)].map((b) => b.toString(16).padStart(2, "0")).join("");
+}
+
+async function upload(file, url, progress) {
+  const tus = { "Tus-Resumable": "1.0.0" };
+  let offset = null, tries = 0;
+  while (offset === null || offset < file.size) {
+    try {
+      if (offset === null) offset = Number((await raw("HEAD", url, { header: tus })).headers.get("Upload-Offset"));
+      else {
+        const answer = await raw("PATCH", url, {
+          body: file.slice(offset, offset + PIECE),
+          header: { ...tus, "Upload-Offset": String(offset), "Content-Type": "application/offset+octet-stream" },
+        });
+        offset = Number(answer.headers.get("Upload-Offset"));
+        tries = 0;
+      }
+      progress(offset);
+    } catch (error) {
+      if (error.status && error.status !== 409 && error.status !== 503) throw error;
+      if (++tries > MAX_TRY) throw error;
+      offset = null;
+      await new Promise((wake) => setTimeout(wake, 500 * 2 ** tries));
+    }
+  }
+}
+
+export function submitPanel() {
+  const dropped = new Map();
+  let doc = null;
+  const list = el("ul"), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
+  const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
+  const wanted = () => (doc ? filesOf(doc) : []);
+  const show = () => {
+    const missing = wanted().filter((f) => !dropped.has(f.name));
+    list.replaceChildren(...wanted().map((f) => el("li", {}, el("span", { class: "mono" }, f.name),
+      el("span", {}, dropped.has(f.name) ? size(dropped.get(f.name).size) : el("span", { class: "tag warn" }, "still missing")))));
+    go.disabled = doc === null || missing.length > 0;
+    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files still missing: drop them here.`);
+    else if (doc) say("Ready.");
+  };
+  const take = async (files) => {
+    for (const file of files) {
+      dropped.set(file.name, file);
+      if (!file.name.endsWith(".json")) continue;
+      try { doc = JSON.parse(await file.text()); } catch (error) { doc = null; say(`${file.name}: ${error.message}`, true); return; }
+    }
+    if (!doc) say("Drop the job document (.json) as well.");
+    show();
+  };
+  const input = el("input", { type: "file", multiple: true, onchange: () => take(input.files) });
+  const drop = el("div", { class: "drop" }, "Drop a job document (.json) and its files here, or ", el("label", {}, "choose them", input), list, message, go);
+  drop.addEventListener("dragover", (e) => { e.preventDefault(); drop.classList.add("over"); });
+  drop.addEventListener("dragleave", () => drop.classList.remove("over"));
+  drop.addEventListener("drop", (e) => { e.preventDefault(); drop.classList.remove("over"); take(e.dataTransfer.files); });
+  go.addEventListener("click", async () => {
+    go.disabled = true;
+    try {
+      const key = [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+      const job = await sendJson("POST", "/v1/jobs", doc, { "Idempotency-Key": key });
+      for (const [i, f] of wanted().entries()) {
+        const file = dropped.get(f.name);
+        const label = (n) => say(`${i + 1} of ${wanted().length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
+        label(0);
+        const state = await sendJson("POST", `/v1/jobs/${job.id}/files`, { name: f.name, role: f.role, size: file.size, sha256: await sha256(file) });
+        if (state.state !== "complete") await upload(file, state.upload_url, label);
+      }
+      await sendJson("POST", `/v1/jobs/${job.id}/start`);
+      location.hash = job.id;
+    } catch (error) {
+      say(error.message, true);
+      go.disabled = false;
+    }
+  });
+  return el("section", { class: "card", id: "submit" }, el("h2", {}, "New job"), drop);
+}
