@@ -15,7 +15,7 @@ MACHINE ?= -march=x86-64-v3
 endif
 
 PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt lapacke openblas zlib libzstd libarchive libpng libcurl
-PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) opencv4 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ')
+PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ') -isystem /usr/include/opencv4
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-format-truncation
 WARN_C := $(WARN) -Wconversion -Wstrict-prototypes
 WERROR ?= -Werror
