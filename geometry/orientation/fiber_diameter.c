@@ -1,0 +1,149 @@
+#include "geometry/orientation/fiber_diameter.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_SCALE = 20, MAX_BRICK = 12, EDGE = 64, MAX_REACH = 40 };
+
+static double scale_sigma(int i) { return 0.7 * pow(1.14, i); } /* 0.7 .. 8.4 voxels */
+
+struct brick {
+    size_t from[3], n[3];
+    double energy[N_SCALE];
+};
+
+struct job {
+    const struct volume *v;
+    struct brick brick[MAX_BRICK];
+    float *scratch; /* per thread: 2 bricks */
+    size_t scratch_per_thread;
+};
+
+/* Convolution along one axis, edge values repeated. stride: of that axis; the other two are walked by lines. */
+static void blur_axis(const float *in, float *out, const size_t n[3], int axis, const float *kernel, int reach)
+{
+    size_t stride = axis == 0 ? 1 : axis == 1 ? n[0] : n[0] * n[1];
+    ptrdiff_t last = (ptrdiff_t)n[axis] - 1;
+    size_t n_inner = axis == 0 ? 1 : stride, n_outer = n[0] * n[1] * n[2] / (n_inner * n[axis]);
+    for (size_t o = 0; o < n_outer; o++)
+        for (ptrdiff_t c = 0; c <= last; c++) {
+            float *restrict to = out + o * n_inner * n[axis] + (size_t)c * stride;
+            memset(to, 0, n_inner * sizeof *to);
+            for (int t = -reach; t <= reach; t++) {
+                ptrdiff_t s = c + t < 0 ? 0 : c + t > last ? last : c + t;
+                const float *restrict from = in + o * n_inner * n[axis] + (size_t)s * stride;
+                float w = kernel[t + reach];
+                for (size_t i = 0; i < n_inner; i++) to[i] += w * from[i];
+            }
+        }
+}
+
+static void blur(float *a, float *b, const size_t n[3], double sigma)
+{
+    float kernel[2 * MAX_REACH + 1];
+    int reach = (int)ceil(3.5 * sigma);
+    if (reach < 1) reach = 1;
+    double sum = 0.0;
+    for (int t = -reach; t <= reach; t++) sum += exp(-0.5 * t * t / (sigma * sigma));
+    for (int t = -reach; t <= reach; t++) kernel[t + reach] = (float)(exp(-0.5 * t * t / (sigma * sigma)) / sum);
+    blur_axis(a, b, n, 0, kernel, reach);
+    blur_axis(b, a, n, 1, kernel, reach);
+    blur_axis(a, b, n, 2, kernel, reach);
+    memcpy(a, b, n[0] * n[1] * n[2] * sizeof *a);
+}
+
+/* Mean over inner voxels of max(0, -sigma^2 lap)^3. */
+static double bright_energy(const float *a, const size_t n[3], double sigma)
+{
+    size_t sy = n[0], sz = n[0] * n[1], margin = EDGE / 8, count = 0;
+    double sum = 0.0;
+    float s2 = (float)(sigma * sigma);
+    for (size_t k = n[2] > 4 * margin ? margin : 1; k + 1 < n[2] - (n[2] > 4 * margin ? margin : 0); k++)
+        for (size_t j = 1; j + 1 < n[1]; j++)
+            for (size_t i = 1; i + 1 < n[0]; i++, count++) {
+                const float *p = a + k * sz + j * sy + i;
+                float lap = p[-1] + p[1] + p[-(ptrdiff_t)sy] + p[sy] + p[-(ptrdiff_t)sz] + p[sz] - 6.0f * p[0];
+                float bright = fmaxf(0.0f, -s2 * lap);
+                sum += (double)(bright * bright * bright);
+            }
+    return count > 0 ? sum / (double)count : 0.0;
+}
+
+static void measure_brick(void *context, size_t i_brick, size_t i_thread)
+{
+    struct job *job = context;
+    struct brick *b = &job->brick[i_brick];
+    float *a = job->scratch + i_thread * job->scratch_per_thread, *tmp = a + job->scratch_per_thread / 2;
+    for (size_t k = 0; k < b->n[2]; k++)
+        for (size_t j = 0; j < b->n[1]; j++)
+            memcpy(a + (k * b->n[1] + j) * b->n[0],
+                   job->v->density + volume_index(job->v->n, b->from[0], b->from[1] + j, b->from[2] + k),
+                   b->n[0] * sizeof *a);
+    double done = 0.0;
+    for (int s = 0; s < N_SCALE; s++) { /* cascade: variances add */
+        double sigma = scale_sigma(s);
+        blur(a, tmp, b->n, sqrt(sigma * sigma - done));
+        done = sigma * sigma;
+        b->energy[s] = bright_energy(a, b->n, sigma);
+    }
+}
+
+/* Bricks with the most material out of a lattice over the volume. */
+static size_t choose_bricks(const struct volume *v, struct brick *chosen)
+{
+    double share[MAX_BRICK];
+    size_t count = 0, n_cell[3];
+    for (int a = 0; a < 3; a++) n_cell[a] = v->n[a] <= EDGE ? 1 : (v->n[a] + EDGE - 1) / EDGE;
+    for (size_t c = 0; c < n_cell[0] * n_cell[1] * n_cell[2]; c++) {
+        struct brick b = {0};
+        size_t cell[3] = {c % n_cell[0], c / n_cell[0] % n_cell[1], c / (n_cell[0] * n_cell[1])};
+        for (int a = 0; a < 3; a++) {
+            b.n[a] = v->n[a] < EDGE ? v->n[a] : EDGE;
+            b.from[a] = n_cell[a] == 1 ? 0 : cell[a] * (v->n[a] - b.n[a]) / (n_cell[a] - 1);
+        }
+        double sum = 0.0;
+        for (size_t k = 0; k < b.n[2]; k += 3)
+            for (size_t j = 0; j < b.n[1]; j += 3)
+                for (size_t i = 0; i < b.n[0]; i += 3)
+                    sum += (double)v->density[volume_index(v->n, b.from[0] + i, b.from[1] + j, b.from[2] + k)];
+        size_t at = count < MAX_BRICK ? count++ : MAX_BRICK;
+        if (at == MAX_BRICK && sum <= share[MAX_BRICK - 1]) continue;
+        if (at == MAX_BRICK) at--;
+        for (; at > 0 && share[at - 1] < sum; at--) {
+            share[at] = share[at - 1];
+            chosen[at] = chosen[at - 1];
+        }
+        share[at] = sum;
+        chosen[at] = b;
+    }
+    return count;
+}
+
+status fiber_diameter_measure(const struct volume *v, struct thread_pool *pool, const struct progress *progress,
+                              double *diameter_voxel, struct error *err)
+{
+    struct job job = {.v = v, .scratch_per_thread = 2 * EDGE * EDGE * EDGE};
+    size_t n_brick = choose_bricks(v, job.brick);
+    job.scratch = malloc(thread_pool_n_thread(pool) * job.scratch_per_thread * sizeof *job.scratch);
+    if (job.scratch == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber diameter: out of memory");
+    status s = thread_pool_run(pool, n_brick, measure_brick, &job, progress);
+    free(job.scratch);
+    if (s != STATUS_OK) return error_set(err, s, "measuring the fiber diameter was cancelled");
+    double energy[N_SCALE] = {0.0};
+    int best = 0;
+    for (int i = 0; i < N_SCALE; i++) {
+        for (size_t b = 0; b < n_brick; b++) energy[i] += job.brick[b].energy[i];
+        if (energy[i] > energy[best]) best = i;
+        if (getenv("RECON_DEBUG")) fprintf(stderr, "scale %.2f energy %g\n", scale_sigma(i), energy[i]);
+    }
+    double shift = 0.0;
+    if (best > 0 && best < N_SCALE - 1) { /* parabola in log sigma */
+        double l = log(energy[best - 1]), c = log(energy[best]), r = log(energy[best + 1]);
+        shift = 0.5 * (l - r) / (l - 2.0 * c + r);
+    }
+    double sigma = scale_sigma(0) * pow(1.14, best + shift);
+    *diameter_voxel = fmin(24.0, fmax(2.0, 2.0 * M_SQRT2 * sigma));
+    return STATUS_OK;
+}

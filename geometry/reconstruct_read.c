@@ -1,0 +1,220 @@
+/* Step "volume": from files to a density volume in the cloth frame. */
+#include "geometry/reconstruct.h"
+
+#include "geometry/volume/density_map.h"
+#include "geometry/volume/volume_align.h"
+#include "geometry/volume/volume_source.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void reconstruct_option_default(struct reconstruct_option *o)
+{
+    *o = (struct reconstruct_option){
+        .voxel_size_m = {NAN, NAN, NAN},
+        .axes = "xyz",
+        .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
+        .density_low = NAN,
+        .density_high = NAN,
+        .s = NAN,
+        .t = NAN,
+        .eps_d = NAN,
+        .eps_j = NAN,
+        .link_sigma_voxel = 5.0,
+        .min_vertex = 10,
+        .smooth_alpha = 0.1,
+        .radius_m = {NAN, NAN, NAN},
+        .radius_per_axis = false,
+    };
+}
+
+/* What has to be done to the file's grid. "stored": after the axis permutation, before matrix and cubic resampling. */
+struct plan {
+    struct axis_map map;
+    size_t n_file[3], n_stored[3], n_all[3]; /* n_all: after resampling, before cropping */
+    double spacing_m[3];                     /* stored axes */
+    double voxel_m;                          /* cubic, of the result */
+    bool resample;
+    size_t box[6];                           /* of the result */
+    size_t box_stored[6];                    /* part of the stored grid that is kept in memory */
+};
+
+static bool is_identity(const double m[9])
+{
+    for (int i = 0; i < 9; i++)
+        if (m[i] != (i % 4 == 0 ? 1.0 : 0.0)) return false;
+    return true;
+}
+
+static status plan_voxel_size(const struct volume_source_info *info, struct reconstruct_option *o, struct plan *p,
+                              struct error *err)
+{
+    for (int a = 0; a < 3; a++)
+        if (isnan(o->voxel_size_m[a])) o->voxel_size_m[a] = info->voxel_size_m[a];
+    double least = INFINITY, most = 0.0;
+    for (int a = 0; a < 3; a++) {
+        double w = o->voxel_size_m[a];
+        if (isnan(w))
+            return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
+                                   "cannot use the volume: its voxel size is not given, and the file does not state it");
+        if (!(w >= 1e-9) || !(w <= 1e-2))
+            return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
+                                   "cannot use the volume: a voxel size of %g um makes no sense", w * 1e6);
+        p->spacing_m[a] = o->voxel_size_m[p->map.source[a]];
+        least = fmin(least, w);
+        most = fmax(most, w);
+    }
+    if (most > 20.0 * least)
+        return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
+                               "cannot use the volume: voxels of %g x %g x %g um are too far from cubes", o->voxel_size_m[0] * 1e6,
+                               o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
+    p->voxel_m = least;
+    p->resample = most > 1.0001 * least || !is_identity(o->matrix);
+    return STATUS_OK;
+}
+
+static status plan_crop(const struct reconstruct_option *o, struct plan *p, struct error *err)
+{
+    bool all = true;
+    for (int a = 0; a < 6; a++) all = all && o->crop_voxel[a] == 0;
+    for (size_t a = 0; a < 3; a++) {
+        p->box[a] = all ? 0 : o->crop_voxel[a];
+        p->box[3 + a] = all ? p->n_all[a] : o->crop_voxel[3 + a];
+        if (p->box[3 + a] > p->n_all[a] || p->box[a] >= p->box[3 + a])
+            return error_set_field(err, STATUS_INVALID, "volume.crop_voxel",
+                                   "cannot crop the volume: %c from %zu to %zu, the aligned volume has 0 to %zu", "xyz"[a],
+                                   p->box[a], p->box[3 + a], p->n_all[a]);
+        p->box_stored[a] = p->resample ? 0 : p->box[a];
+        p->box_stored[3 + a] = p->resample ? p->n_stored[a] : p->box[3 + a];
+    }
+    return STATUS_OK;
+}
+
+static status plan_read(const struct volume_source_info *info, struct reconstruct_option *o, size_t limit_bytes,
+                        struct plan *p, struct error *err)
+{
+    *p = (struct plan){0};
+    status s = axis_map_parse(o->axes, &p->map, err);
+    if (s == STATUS_OK) s = plan_voxel_size(info, o, p, err);
+    if (s != STATUS_OK) return s;
+    memcpy(p->n_file, info->n, sizeof p->n_file);
+    for (int a = 0; a < 3; a++) p->n_stored[a] = info->n[p->map.source[a]];
+    memcpy(p->n_all, p->n_stored, sizeof p->n_all);
+    if (p->resample) volume_resampled_shape(p->n_stored, p->spacing_m, p->voxel_m, p->n_all);
+    s = plan_crop(o, p, err);
+    if (s != STATUS_OK) return s;
+    double n_voxel = 0.0;
+    for (int pass = 0; pass < (p->resample ? 2 : 1); pass++) {
+        const size_t *box = pass == 0 ? p->box_stored : p->box;
+        n_voxel += (double)(box[3] - box[0]) * (double)(box[4] - box[1]) * (double)(box[5] - box[2]);
+    }
+    double bytes = sizeof(float) * (n_voxel + (double)info->n[0] * (double)info->n[1]);
+    if (limit_bytes > 0 && bytes > (double)limit_bytes)
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files",
+                               "cannot read the volume: its densities need %.0f MB, the limit is %.0f MB", bytes * 1e-6,
+                               (double)limit_bytes * 1e-6);
+    return STATUS_OK;
+}
+
+/* Puts slice i_slice of the file where it belongs in the stored grid; slice is n_file[1] x n_file[0]. */
+static void scatter_slice(const struct plan *p, const float *slice, size_t i_slice, struct volume *v)
+{
+    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, step[3];
+    ptrdiff_t sign[3], at = 0;
+    size_t from[3], to[3]; /* file indices that are kept */
+    for (int a = 0; a < 3; a++) {
+        int f = p->map.source[a];
+        size_t lo = p->box_stored[a], hi = p->box_stored[3 + a], n = p->n_file[f];
+        from[f] = p->map.flip[a] ? n - hi : lo;
+        to[f] = p->map.flip[a] ? n - lo : hi;
+        step[f] = stride[a];
+        sign[f] = p->map.flip[a] ? -1 : 1;
+        if (p->map.flip[a]) at += (ptrdiff_t)((hi - lo - 1) * stride[a]);
+    }
+    if (i_slice < from[2] || i_slice >= to[2]) return;
+    at += sign[2] * (ptrdiff_t)((i_slice - from[2]) * step[2]);
+    for (size_t j = from[1]; j < to[1]; j++) {
+        const float *row = slice + j * p->n_file[0];
+        ptrdiff_t out = at + sign[1] * (ptrdiff_t)((j - from[1]) * step[1]), x_step = sign[0] * (ptrdiff_t)step[0];
+        for (size_t i = from[0]; i < to[0]; i++, out += x_step) v->density[out] = row[i];
+    }
+}
+
+static status read_slices(struct volume_source *source, const struct plan *p, const struct progress *progress,
+                          struct volume *v, struct error *err)
+{
+    float *slice = malloc(p->n_file[0] * p->n_file[1] * sizeof *slice);
+    if (slice == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
+    status s = STATUS_OK;
+    for (size_t k = 0; k < p->n_file[2] && s == STATUS_OK; k++) {
+        if (progress_cancelled(progress)) {
+            s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
+            break;
+        }
+        s = volume_source_read(source, k, 1, slice, err);
+        if (s == STATUS_OK) scatter_slice(p, slice, k, v);
+        progress_report(progress, 0.8 * (double)(k + 1) / (double)p->n_file[2]);
+    }
+    free(slice);
+    return s;
+}
+
+static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
+                            struct reconstruct_report *report, struct error *err)
+{
+    struct density_modes m;
+    status s = density_modes_find(v, &m, err);
+    if (s != STATUS_OK) return s;
+    if (isnan(o->density_low)) o->density_low = m.low;
+    if (isnan(o->density_high)) o->density_high = m.high;
+    s = density_map_apply(v, o->density_low, o->density_high, pool, err);
+    if (s != STATUS_OK) return s;
+    double threshold = isnan(o->eps_d) ? 0.5 : o->eps_d;
+    size_t n = volume_n_voxel(v->n), n_above = 0;
+    for (size_t i = 0; i < n; i++) n_above += (double)v->density[i] >= threshold;
+    if (n_above == 0)
+        return error_set_field(err, STATUS_INVALID, "volume.files",
+                               "cannot use the volume: it is empty, no density reaches %g (scanner value %g)", threshold,
+                               o->density_low + threshold * (o->density_high - o->density_low));
+    report->density_low = o->density_low;
+    report->density_high = o->density_high;
+    report->noise_sd = density_noise_sd(v);
+    return STATUS_OK;
+}
+
+status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, size_t limit_bytes,
+                        struct thread_pool *pool, const struct progress *progress, struct volume *v,
+                        struct reconstruct_report *report, struct error *err)
+{
+    struct volume_source *source = NULL;
+    struct volume stored = {0};
+    struct plan p;
+    *v = (struct volume){0};
+    status s = volume_source_open(path, n_path, &source, err);
+    if (s != STATUS_OK) return s;
+    s = plan_read(volume_source_describe(source), o, limit_bytes, &p, err);
+    if (s != STATUS_OK) goto out;
+    size_t n[3];
+    for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
+    s = volume_init(&stored, n, p.spacing_m, err);
+    if (s == STATUS_OK) s = read_slices(source, &p, progress, &stored, err);
+    if (s != STATUS_OK) goto out;
+    if (p.resample) {
+        s = volume_resample(&stored, o->matrix, p.voxel_m, p.box, pool, NULL, v, err);
+        volume_release(&stored);
+    } else {
+        *v = stored;
+        stored = (struct volume){0};
+    }
+    if (s == STATUS_OK) s = map_densities(v, o, pool, report, err);
+    if (s != STATUS_OK) goto out;
+    memcpy(report->n, v->n, sizeof report->n);
+    memcpy(report->voxel_size_m, v->voxel_size_m, sizeof report->voxel_size_m);
+    progress_report(progress, 1.0);
+out:
+    volume_release(&stored);
+    if (s != STATUS_OK) volume_release(v);
+    volume_source_close(source);
+    return s;
+}

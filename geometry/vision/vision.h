@@ -1,0 +1,27 @@
+/* The only door to OpenCV (C++): image filters on single-channel float pictures, row-major, no padding.
+ * Every exception is caught inside; OpenCV's own threads are off, so results do not depend on them.
+ * Threads: functions may be called from several threads at once after vision_init.
+ */
+#ifndef SELVEDGE_GEOMETRY_VISION_H
+#define SELVEDGE_GEOMETRY_VISION_H
+
+#include "base/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Switches OpenCV's threads off. Call before threads use the functions below; calling again does no harm. */
+status vision_init(struct error *err);
+
+/* Scale-normalised Laplacian of Gaussian, sign such that bright blobs are maxima:
+ * response = -sigma^2 lap(G_sigma * image), sigma in pixels; the picture is mirrored at its borders. */
+status vision_blob_response(const float *image, size_t width, size_t height, double sigma, float *response,
+                            struct error *err);
+/* result = G_sigma * image. */
+status vision_gaussian(const float *image, size_t width, size_t height, double sigma, float *result, struct error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

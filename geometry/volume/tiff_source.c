@@ -1,0 +1,317 @@
+/* TIFF volumes: one multi-page file, or several files in order. libtiff decodes, so any compression it knows is read.
+ * Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our error text. */
+#include "geometry/volume/volume_reader.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <tiffio.h>
+
+enum { MAX_PAGE = 1 << 20, MAX_EXPANSION = 4096 }; /* deflate cannot expand more than 1032-fold; others less or so */
+
+struct page {
+    size_t i_path;
+    toff_t offset;
+};
+
+struct tiff_handle {
+    char **path;
+    size_t n_path;
+    struct page *page;
+    size_t n_page;
+    uint32_t width, height;
+    enum sample_type sample;
+    TIFF *tiff; /* the file open now */
+    size_t i_open;
+    void *block; /* one strip or tile */
+    size_t block_bytes;
+    char message[256]; /* libtiff's first words since the last clear */
+};
+
+static int keep_message(TIFF *tiff, void *user, const char *module, const char *format, va_list argument)
+{
+    (void)tiff;
+    (void)module;
+    struct tiff_handle *h = user;
+    if (h->message[0] == '\0') {
+        vsnprintf(h->message, sizeof h->message, format, argument);
+        size_t n = strlen(h->message);
+        if (n > 0 && h->message[n - 1] == '.') h->message[n - 1] = '\0';
+    }
+    return 1; /* handled: libtiff's global handlers, which print, are not called */
+}
+
+static int drop_message(TIFF *tiff, void *user, const char *module, const char *format, va_list argument)
+{
+    (void)tiff, (void)user, (void)module, (void)format, (void)argument;
+    return 1;
+}
+
+static const char *cause(const struct tiff_handle *h) { return h->message[0] != '\0' ? h->message : "damaged data"; }
+
+static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
+{
+    if (h->tiff != NULL && h->i_open == i_path) return STATUS_OK;
+    if (h->tiff != NULL) TIFFClose(h->tiff);
+    h->tiff = NULL;
+    h->message[0] = '\0';
+    const char *name = volume_file_name(h->path[i_path]);
+    struct stat st;
+    if (stat(h->path[i_path], &st) != 0) {
+        if (errno == ENOENT)
+            return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file", name);
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
+    }
+    if (st.st_size == 0)
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': the file is empty", name);
+    TIFFOpenOptions *option = TIFFOpenOptionsAlloc();
+    if (option == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", name);
+    TIFFOpenOptionsSetErrorHandlerExtR(option, keep_message, h);
+    TIFFOpenOptionsSetWarningHandlerExtR(option, drop_message, h);
+    h->tiff = TIFFOpenExt(h->path[i_path], "rm", option); /* m: no memory map, a file cut short must not be a SIGBUS */
+    TIFFOpenOptionsFree(option);
+    h->i_open = i_path;
+    if (h->tiff == NULL)
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s", name, cause(h));
+    return STATUS_OK;
+}
+
+static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
+{
+    if (format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID) {
+        if (bits != 8 && bits != 16) return false;
+        *t = bits == 8 ? SAMPLE_UINT8 : SAMPLE_UINT16;
+        return true;
+    }
+    if (format == SAMPLEFORMAT_INT && bits == 16) {
+        *t = SAMPLE_INT16;
+        return true;
+    }
+    *t = SAMPLE_FLOAT32;
+    return format == SAMPLEFORMAT_IEEEFP && bits == 32;
+}
+
+/* The stored bytes of a page must lie in the file and be enough for what the header promises, before we allocate. */
+static bool page_fits_file(TIFF *tiff, uint64_t page_bytes, uint64_t file_bytes)
+{
+    uint32_t n_block = TIFFIsTiled(tiff) ? TIFFNumberOfTiles(tiff) : TIFFNumberOfStrips(tiff);
+    if (n_block == 0 || n_block > file_bytes) return false;
+    uint64_t stored = 0;
+    for (uint32_t i = 0; i < n_block; i++) {
+        uint64_t n = TIFFGetStrileByteCount(tiff, i), at = TIFFGetStrileOffset(tiff, i);
+        if (at > file_bytes || n > file_bytes - at) return false;
+        stored += n;
+        if (stored > file_bytes * 2) return false;
+    }
+    uint16_t compression = COMPRESSION_NONE;
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &compression);
+    return page_bytes <= stored * (compression == COMPRESSION_NONE ? 1 : MAX_EXPANSION);
+}
+
+/* Reads the header of the current page: all must be alike. i_page counts from 0. */
+static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_bytes, struct error *err)
+{
+    const char *name = volume_file_name(h->path[h->i_open]);
+    uint32_t width = 0, height = 0;
+    uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK;
+    TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
+    TIFFGetField(h->tiff, TIFFTAG_IMAGELENGTH, &height);
+    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_BITSPERSAMPLE, &bits);
+    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_SAMPLEFORMAT, &format);
+    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_SAMPLESPERPIXEL, &per_pixel);
+    TIFFGetField(h->tiff, TIFFTAG_PHOTOMETRIC, &photometric);
+    if (width == 0 || height == 0)
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu has no pixels", name,
+                               i_page + 1);
+    if (per_pixel != 1 || photometric == PHOTOMETRIC_PALETTE)
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is a color image", name,
+                               i_page + 1);
+    enum sample_type t;
+    if (!page_sample(bits, format, &t))
+        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+                               "cannot read volume '%s': page %zu has %u-bit samples of an unsupported kind", name, i_page + 1,
+                               bits);
+    if (i_page == 0) {
+        h->width = width;
+        h->height = height;
+        h->sample = t;
+    }
+    if (width != h->width || height != h->height)
+        return error_set_field(err, STATUS_FORMAT, "volume.files",
+                               "cannot read volume '%s': page %zu has %u x %u pixels, page 1 has %u x %u", name, i_page + 1,
+                               width, height, h->width, h->height);
+    if (t != h->sample && sample_bytes(t) != sample_bytes(h->sample))
+        return error_set_field(err, STATUS_FORMAT, "volume.files",
+                               "cannot read volume '%s': page %zu is %u-bit, page 1 is %zu-bit", name, i_page + 1, bits,
+                               8 * sample_bytes(h->sample));
+    if (t != h->sample)
+        return error_set_field(err, STATUS_FORMAT, "volume.files",
+                               "cannot read volume '%s': page %zu is %s, page 1 is %s", name, i_page + 1, sample_name(t),
+                               sample_name(h->sample));
+    h->message[0] = '\0';
+    if (!page_fits_file(h->tiff, (uint64_t)width * height * sample_bytes(t), file_bytes))
+        return error_set_field(err, STATUS_FORMAT, "volume.files",
+                               "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them",
+                               name, i_page + 1, width, height);
+    return STATUS_OK;
+}
+
+static status add_page(struct tiff_handle *h, size_t *capacity, struct error *err)
+{
+    if (h->n_page == MAX_PAGE)
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': over %d pages",
+                               volume_file_name(h->path[0]), MAX_PAGE);
+    if (h->n_page == *capacity) {
+        size_t n = *capacity == 0 ? 256 : *capacity * 2;
+        struct page *bigger = realloc(h->page, n * sizeof *bigger);
+        if (bigger == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+        h->page = bigger;
+        *capacity = n;
+    }
+    h->page[h->n_page++] = (struct page){h->i_open, TIFFCurrentDirOffset(h->tiff)};
+    return STATUS_OK;
+}
+
+static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, struct error *err)
+{
+    status s = open_file(h, i_path, err);
+    if (s != STATUS_OK) return s;
+    struct stat st;
+    if (fstat(TIFFFileno(h->tiff), &st) != 0)
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", volume_file_name(h->path[i_path]));
+    for (;;) {
+        s = check_page(h, h->n_page, (uint64_t)st.st_size, err);
+        if (s == STATUS_OK) s = add_page(h, capacity, err);
+        if (s != STATUS_OK) return s;
+        if (TIFFLastDirectory(h->tiff)) return STATUS_OK;
+        h->message[0] = '\0';
+        if (!TIFFReadDirectory(h->tiff))
+            return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is unreadable: %s",
+                                   volume_file_name(h->path[i_path]), h->n_page + 1, cause(h));
+    }
+}
+
+static void tiff_close(void *handle)
+{
+    struct tiff_handle *h = handle;
+    if (h == NULL) return;
+    if (h->tiff != NULL) TIFFClose(h->tiff);
+    for (size_t i = 0; i < h->n_path; i++) free(h->path[i]);
+    free(h->path);
+    free(h->page);
+    free(h->block);
+    free(h);
+}
+
+static status tiff_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
+                        struct error *err)
+{
+    status s = STATUS_OK;
+    size_t capacity = 0;
+    struct tiff_handle *h = calloc(1, sizeof *h);
+    if (h != NULL) h->path = calloc(n_path, sizeof *h->path);
+    if (h == NULL || h->path == NULL) goto no_memory;
+    for (size_t i = 0; i < n_path; i++) {
+        h->path[i] = strdup(path[i]);
+        if (h->path[i] == NULL) goto no_memory;
+        h->n_path++;
+    }
+    for (size_t i = 0; i < n_path; i++) {
+        s = scan_file(h, i, &capacity, err);
+        if (s != STATUS_OK) goto fail;
+    }
+    *info = (struct volume_source_info){.n = {h->width, h->height, h->n_page},
+                                        .voxel_size_m = {NAN, NAN, NAN}, /* TIFF resolution tags are rarely meant */
+                                        .sample = sample_name(h->sample)};
+    *handle = h;
+    return STATUS_OK;
+no_memory:
+    s = error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+fail:
+    tiff_close(h);
+    return s;
+}
+
+static status reserve_block(struct tiff_handle *h, uint64_t n_byte, struct error *err)
+{
+    if (n_byte <= h->block_bytes) return STATUS_OK;
+    void *bigger = n_byte < (uint64_t)1 << 40 ? realloc(h->block, (size_t)n_byte) : NULL;
+    if (bigger == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+    h->block = bigger;
+    h->block_bytes = (size_t)n_byte;
+    return STATUS_OK;
+}
+
+static status block_error(struct tiff_handle *h, size_t i_page, struct error *err)
+{
+    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is damaged: %s",
+                           volume_file_name(h->path[h->i_open]), i_page + 1, cause(h));
+}
+
+static status read_strips(struct tiff_handle *h, size_t i_page, float *value, struct error *err)
+{
+    uint32_t rows = h->height;
+    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_ROWSPERSTRIP, &rows);
+    if (rows == 0 || rows > h->height) rows = h->height;
+    size_t row_bytes = h->width * sample_bytes(h->sample);
+    status s = reserve_block(h, (uint64_t)row_bytes * rows, err);
+    if (s != STATUS_OK) return s;
+    for (uint32_t y = 0; y < h->height; y += rows) {
+        uint32_t n_row = y + rows <= h->height ? rows : h->height - y;
+        tmsize_t want = (tmsize_t)(row_bytes * n_row);
+        if (TIFFReadEncodedStrip(h->tiff, y / rows, h->block, want) != want) return block_error(h, i_page, err);
+        sample_to_float(h->sample, false, (size_t)n_row * h->width, h->block, value + (size_t)y * h->width);
+    }
+    return STATUS_OK;
+}
+
+static status read_tiles(struct tiff_handle *h, size_t i_page, float *value, struct error *err)
+{
+    uint32_t tw = 0, th = 0;
+    TIFFGetField(h->tiff, TIFFTAG_TILEWIDTH, &tw);
+    TIFFGetField(h->tiff, TIFFTAG_TILELENGTH, &th);
+    if (tw == 0 || th == 0 || tw > h->width + 4096u || th > h->height + 4096u) return block_error(h, i_page, err);
+    size_t bytes = sample_bytes(h->sample);
+    status s = reserve_block(h, (uint64_t)tw * th * bytes, err);
+    if (s != STATUS_OK) return s;
+    for (uint32_t y = 0; y < h->height; y += th)
+        for (uint32_t x = 0; x < h->width; x += tw) {
+            uint32_t i_tile = TIFFComputeTile(h->tiff, x, y, 0, 0);
+            tmsize_t want = (tmsize_t)((size_t)tw * th * bytes);
+            if (TIFFReadEncodedTile(h->tiff, i_tile, h->block, want) != want) return block_error(h, i_page, err);
+            size_t n = x + tw <= h->width ? tw : h->width - x;
+            for (uint32_t r = 0; r < th && y + r < h->height; r++)
+                sample_to_float(h->sample, false, n, (uint8_t *)h->block + (size_t)r * tw * bytes,
+                                value + (size_t)(y + r) * h->width + x);
+        }
+    return STATUS_OK;
+}
+
+static status tiff_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err)
+{
+    struct tiff_handle *h = handle;
+    for (size_t i = i_slice; i < i_slice + n_slice; i++, value += (size_t)h->width * h->height) {
+        status s = open_file(h, h->page[i].i_path, err);
+        if (s != STATUS_OK) return s;
+        h->message[0] = '\0';
+        if (!TIFFSetSubDirectory(h->tiff, h->page[i].offset)) return block_error(h, i, err);
+        uint32_t width = 0, height = 0; /* the file may have changed since it was opened */
+        TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
+        TIFFGetField(h->tiff, TIFFTAG_IMAGELENGTH, &height);
+        if (width != h->width || height != h->height) return block_error(h, i, err);
+        s = TIFFIsTiled(h->tiff) ? read_tiles(h, i, value, err) : read_strips(h, i, value, err);
+        if (s != STATUS_OK) return s;
+    }
+    return STATUS_OK;
+}
+
+static bool tiff_recognise(const uint8_t b[16], const char *path)
+{
+    (void)path;
+    return memcmp(b, "II*\0", 4) == 0 || memcmp(b, "MM\0*", 4) == 0 || memcmp(b, "II+\0", 4) == 0 ||
+           memcmp(b, "MM\0+", 4) == 0;
+}
+
+const volume_reader tiff_reader = {"tiff.v1", tiff_recognise, tiff_open, tiff_read, tiff_close};

@@ -1,0 +1,93 @@
+#include "geometry/volume/volume.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static status check_shape(const size_t n[3], struct error *err)
+{
+    size_t total = 1;
+    for (int a = 0; a < 3; a++) {
+        if (n[a] == 0) return error_set(err, STATUS_INVALID, "cannot make volume: %zu x %zu x %zu voxels", n[0], n[1], n[2]);
+        if (__builtin_mul_overflow(total, n[a], &total) || total > SIZE_MAX / 16)
+            return error_set(err, STATUS_TOO_LARGE, "cannot make volume of %zu x %zu x %zu voxels: too large", n[0], n[1],
+                             n[2]);
+    }
+    return STATUS_OK;
+}
+
+status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err)
+{
+    *v = (struct volume){0};
+    status s = check_shape(n, err);
+    if (s != STATUS_OK) return s;
+    memcpy(v->n, n, sizeof v->n);
+    memcpy(v->voxel_size_m, voxel_size_m, sizeof v->voxel_size_m);
+    v->density = calloc(volume_n_voxel(n), sizeof *v->density);
+    if (v->density == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot make volume of %zu x %zu x %zu voxels: out of memory", n[0], n[1],
+                         n[2]);
+    return STATUS_OK;
+}
+
+void volume_release(struct volume *v)
+{
+    if (v == NULL) return;
+    free(v->density);
+    *v = (struct volume){0};
+}
+
+status direction_volume_init(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
+                             struct error *err)
+{
+    *v = (struct direction_volume){0};
+    status s = check_shape(n, err);
+    if (s != STATUS_OK) return s;
+    memcpy(v->n, n, sizeof v->n);
+    memcpy(v->voxel_size_m, voxel_size_m, sizeof v->voxel_size_m);
+    v->density = calloc(volume_n_voxel(n), sizeof *v->density);
+    v->octahedral = calloc(2 * volume_n_voxel(n), sizeof *v->octahedral);
+    if (v->density == NULL || v->octahedral == NULL) {
+        direction_volume_release(v);
+        return error_set(err, STATUS_NO_MEMORY, "cannot make direction volume of %zu x %zu x %zu voxels: out of memory",
+                         n[0], n[1], n[2]);
+    }
+    return STATUS_OK;
+}
+
+void direction_volume_release(struct direction_volume *v)
+{
+    if (v == NULL) return;
+    free(v->density);
+    free(v->octahedral);
+    *v = (struct direction_volume){0};
+}
+
+/* Octahedral map (Cigolle et al. 2014, "A survey of efficient representations for independent unit vectors"). */
+void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3])
+{
+    float u = (float)v->octahedral[2 * i_voxel] / 32767.0f, w = (float)v->octahedral[2 * i_voxel + 1] / 32767.0f;
+    float z = 1.0f - fabsf(u) - fabsf(w);
+    if (z < 0.0f) {
+        float u_folded = (1.0f - fabsf(w)) * copysignf(1.0f, u);
+        w = (1.0f - fabsf(u)) * copysignf(1.0f, w);
+        u = u_folded;
+    }
+    float scale = 1.0f / sqrtf(u * u + w * w + z * z);
+    d[0] = u * scale;
+    d[1] = w * scale;
+    d[2] = z * scale;
+}
+
+void direction_volume_set(struct direction_volume *v, size_t i_voxel, const float d[3])
+{
+    float scale = 1.0f / (fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]));
+    float u = d[0] * scale, w = d[1] * scale;
+    if (d[2] < 0.0f) {
+        float u_folded = (1.0f - fabsf(w)) * copysignf(1.0f, u);
+        w = (1.0f - fabsf(u)) * copysignf(1.0f, w);
+        u = u_folded;
+    }
+    v->octahedral[2 * i_voxel] = (int16_t)lrintf(u * 32767.0f);
+    v->octahedral[2 * i_voxel + 1] = (int16_t)lrintf(w * 32767.0f);
+}

@@ -1,0 +1,36 @@
+/* The table of volume readers. A new format is one file and one line in volume_source.c. */
+#ifndef SELVEDGE_GEOMETRY_VOLUME_READER_H
+#define SELVEDGE_GEOMETRY_VOLUME_READER_H
+
+#include "geometry/volume/volume_source.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+typedef struct volume_reader {
+    const char *id;
+    /* Does this reader take the files? Decided by the first bytes of the first file (at least 16, zero-padded). */
+    bool (*recognise)(const uint8_t first_byte[16], const char *path);
+    /* On success *handle is closed by close; info is complete but for reader_id. */
+    status (*open)(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
+                   struct error *err);
+    status (*read)(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);
+    void (*close)(void *handle);
+} volume_reader;
+
+extern const volume_reader tiff_reader, metaimage_reader, vol_reader;
+
+size_t volume_reader_count(void);
+const volume_reader *volume_reader_at(size_t i);
+
+/* Little helpers that readers share. */
+enum sample_type { SAMPLE_UINT8, SAMPLE_INT8, SAMPLE_UINT16, SAMPLE_INT16, SAMPLE_UINT32, SAMPLE_INT32, SAMPLE_FLOAT32, SAMPLE_FLOAT64, SAMPLE_COUNT };
+size_t sample_bytes(enum sample_type t);
+const char *sample_name(enum sample_type t);
+/* n samples of type t at data, byte order as the file's (swap: opposite to the machine's; data is changed), to floats. */
+void sample_to_float(enum sample_type t, bool swap, size_t n, void *data, float *value);
+/* Last component of a path: errors name files as the user knows them. */
+const char *volume_file_name(const char *path);
+
+#endif

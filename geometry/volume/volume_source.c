@@ -1,0 +1,135 @@
+#include "geometry/volume/volume_source.h"
+
+#include "geometry/volume/volume_reader.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const volume_reader *const reader[] = {&tiff_reader, &metaimage_reader, &vol_reader};
+
+struct volume_source {
+    const volume_reader *reader;
+    void *handle;
+    struct volume_source_info info;
+};
+
+size_t volume_reader_count(void) { return sizeof reader / sizeof *reader; }
+const volume_reader *volume_reader_at(size_t i) { return reader[i]; }
+
+static const struct {
+    const char *name;
+    size_t n_byte;
+} sample[SAMPLE_COUNT] = {
+    [SAMPLE_UINT8] = {"uint8", 1},   [SAMPLE_INT8] = {"int8", 1},       [SAMPLE_UINT16] = {"uint16", 2},
+    [SAMPLE_INT16] = {"int16", 2},   [SAMPLE_UINT32] = {"uint32", 4},   [SAMPLE_INT32] = {"int32", 4},
+    [SAMPLE_FLOAT32] = {"float32", 4}, [SAMPLE_FLOAT64] = {"float64", 8},
+};
+
+size_t sample_bytes(enum sample_type t) { return sample[t].n_byte; }
+const char *sample_name(enum sample_type t) { return sample[t].name; }
+
+const char *volume_file_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL && slash[1] != '\0' ? slash + 1 : path;
+}
+
+static void swap_bytes(size_t n_byte, size_t n, uint8_t *data)
+{
+    for (size_t i = 0; i < n; i++, data += n_byte)
+        for (size_t b = 0; b < n_byte / 2; b++) {
+            uint8_t t = data[b];
+            data[b] = data[n_byte - 1 - b];
+            data[n_byte - 1 - b] = t;
+        }
+}
+
+#define CONVERT(type)                                                                                                  \
+    for (size_t i = 0; i < n; i++) {                                                                                   \
+        type x;                                                                                                        \
+        memcpy(&x, (const uint8_t *)data + i * sizeof x, sizeof x);                                                    \
+        value[i] = (float)x;                                                                                           \
+    }                                                                                                                  \
+    break
+
+void sample_to_float(enum sample_type t, bool swap, size_t n, void *data, float *value)
+{
+    if (swap) swap_bytes(sample_bytes(t), n, data);
+    switch (t) {
+    case SAMPLE_UINT8: CONVERT(uint8_t);
+    case SAMPLE_INT8: CONVERT(int8_t);
+    case SAMPLE_UINT16: CONVERT(uint16_t);
+    case SAMPLE_INT16: CONVERT(int16_t);
+    case SAMPLE_UINT32: CONVERT(uint32_t);
+    case SAMPLE_INT32: CONVERT(int32_t);
+    case SAMPLE_FLOAT32: CONVERT(float);
+    case SAMPLE_FLOAT64: CONVERT(double);
+    case SAMPLE_COUNT: break;
+    }
+}
+
+static status read_first_bytes(const char *path, uint8_t first_byte[16], struct error *err)
+{
+    memset(first_byte, 0, 16);
+    FILE *file = fopen(path, "rbe");
+    if (file == NULL) {
+        if (errno == ENOENT)
+            return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file",
+                                   volume_file_name(path));
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", volume_file_name(path));
+    }
+    size_t n = fread(first_byte, 1, 16, file);
+    int failed = ferror(file);
+    fclose(file);
+    if (failed) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", volume_file_name(path));
+    if (n == 0)
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': the file is empty",
+                               volume_file_name(path));
+    return STATUS_OK;
+}
+
+status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err)
+{
+    *source = NULL;
+    if (n_path == 0) return error_set_field(err, STATUS_INVALID, "volume.files", "cannot read volume: no file named");
+    uint8_t first_byte[16];
+    status s = read_first_bytes(path[0], first_byte, err);
+    if (s != STATUS_OK) return s;
+    const volume_reader *found = NULL;
+    for (size_t i = 0; i < volume_reader_count() && found == NULL; i++)
+        if (reader[i]->recognise(first_byte, path[0])) found = reader[i];
+    if (found == NULL)
+        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+                               "cannot read volume '%s': neither TIFF nor MetaImage nor .vol", volume_file_name(path[0]));
+    struct volume_source *v = calloc(1, sizeof *v);
+    if (v == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", volume_file_name(path[0]));
+    v->reader = found;
+    s = found->open(path, n_path, &v->handle, &v->info, err);
+    if (s != STATUS_OK) {
+        free(v);
+        return s;
+    }
+    v->info.reader_id = found->id;
+    *source = v;
+    return STATUS_OK;
+}
+
+void volume_source_close(struct volume_source *source)
+{
+    if (source == NULL) return;
+    source->reader->close(source->handle);
+    free(source);
+}
+
+const struct volume_source_info *volume_source_describe(const struct volume_source *source) { return &source->info; }
+
+status volume_source_read(struct volume_source *source, size_t i_slice, size_t n_slice, float *value,
+                          struct error *err)
+{
+    if (i_slice > source->info.n[2] || n_slice > source->info.n[2] - i_slice)
+        return error_set(err, STATUS_INTERNAL, "cannot read slices %zu..%zu of %zu", i_slice, i_slice + n_slice,
+                         source->info.n[2]);
+    return source->reader->read(source->handle, i_slice, n_slice, value, err);
+}
