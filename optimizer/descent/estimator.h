@@ -1,0 +1,36 @@
+/* What a descent method asks for: mean radiances of every fitted configuration at given parameters. Production calls the path tracer (estimate.h)
+ * through a journal (estimate_journal.h); tests put an analytic function here.
+ */
+#ifndef SELVEDGE_OPTIMIZER_ESTIMATOR_H
+#define SELVEDGE_OPTIMIZER_ESTIMATOR_H
+
+#include "base/progress.h"
+#include "renderer/transport/estimate.h"
+
+/* Which replica numbers (rng.h) are used for what: streams of different uses never meet. */
+enum estimator_replica {
+    REPLICA_FIT_A = 0,
+    REPLICA_FIT_B = 1,
+    REPLICA_RESCALE = 2,
+    REPLICA_FINAL_A = 3,
+    REPLICA_FINAL_B = 4,
+    REPLICA_CERTIFICATE = 5,
+    REPLICA_PICTURE = 6
+};
+
+struct estimator_call {
+    const double *param;        /* internal units */
+    const size_t *n_path;       /* per configuration */
+    uint32_t iteration, replica;
+    bool want_jacobian;
+};
+
+struct estimator {
+    void *context;
+    size_t n_configuration, n_param;
+    /* out: n_configuration estimates; *wall_s: seconds that the call took (when it was first made). */
+    status (*run)(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
+                  double *wall_s, struct error *err);
+};
+
+#endif

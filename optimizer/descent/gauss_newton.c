@@ -1,0 +1,240 @@
+/* gauss_newton.v1: bounded, damped Gauss-Newton on the Monte-Carlo Jacobian.
+ *
+ * Each iteration traces new paths (two replicas) at the present point, adds them to the history, and pools all of it there
+ * (linear_model.h). The step minimises the pooled quadratic model in logit / log coordinates inside the bounds and the step limits:
+ *   gradient    mirrored product of the replicas, without bias;
+ *   curvature   2 J'J of the averaged replicas: too large by the noise of J, a damping that fades as paths add up;
+ *   damping     plus 2 noise / limit^2: moving by the whole step limit must gain more than one residual's Monte-Carlo variance.
+ * A step after which the objective is higher beyond doubt halves the limits and is taken back.
+ * Paths: few at first; doubled when the predicted gain is no longer clear of the noise; spread over configurations by the standard deviation of a path
+ * (Neyman allocation). Ends when the predicted gain is within the noise and the noise is small against what is left of the objective.
+ */
+#include "optimizer/descent/descent_methods.h"
+#include "optimizer/descent/method_names.h"
+#include "optimizer/objective/small_matrix.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { N = SCATTERING_MAX_PARAM, BLOCK = 256, MIN_PATH = 1024, FIRST_PATH = 2048, MAX_ITERATION = 80, DEFAULT_BUDGET = 6000000 };
+
+/* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of the objective that is. */
+static const double target_rel_rms = 0.004, target_share = 0.01;
+/* No iteration takes more than this share of the budget, so several large ones see the end point. */
+static const double largest_share = 0.2;
+
+struct gauss_newton {
+    struct descent_run run;
+    struct linear_history history;
+    struct linear_model model;
+    double x[N];            /* where the next estimate is made */
+    double best_x[N];       /* last point that was accepted */
+    double best_f, best_se; /* objective there, by the pooled model */
+    double limit_scale;     /* of the step limits, 1 or less */
+    double n_path_mean;     /* a configuration and replica, of the next iteration */
+    double gain, noise, damping, largest_step;
+    size_t n_free;
+};
+
+static void param_of(const struct gauss_newton *g, const double *x, double *param)
+{
+    for (size_t p = 0; p < g->model.n_param; p++)
+        param[p] = g->run.fixed[p] ? g->run.problem->param[p].start : coordinate_to_param(&g->run.coordinate[p], x[p]);
+}
+
+/* n_i ~ standard deviation of a path, between a quarter and four times the mean. */
+static void spread_paths(struct gauss_newton *g)
+{
+    size_t n = g->run.problem->observation->n;
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++) sum += sqrt(linear_history_path_variance(&g->history, i));
+    for (size_t i = 0; i < n; i++) {
+        double share = sum > 0.0 ? (double)n * sqrt(linear_history_path_variance(&g->history, i)) / sum : 1.0;
+        double paths = fmax(MIN_PATH, g->n_path_mean * fmin(fmax(share, 0.25), 4.0));
+        g->run.n_path[i] = ((size_t)ceil(paths / BLOCK)) * BLOCK;
+    }
+}
+
+/* The part of a matrix or vector that belongs to the free parameters. */
+static size_t free_index(const struct gauss_newton *g, size_t index[N])
+{
+    size_t n = 0;
+    for (size_t p = 0; p < g->model.n_param; p++)
+        if (!g->run.fixed[p]) index[n++] = p;
+    return n;
+}
+
+/* Best step from the pooled model; scaled by the step limits inside, so that all unknowns are of order one. */
+static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
+{
+    size_t index[N], n = free_index(g, index), n_param = g->model.n_param;
+    double h[N * N], gradient[N], hs[N * N], gs[N], lower[N], upper[N], y[N], trace = 0.0;
+    linear_model_hessian(&g->model, false, h);
+    linear_model_gradient(&g->model, gradient);
+    g->noise = linear_model_noise(&g->model);
+    g->damping = 2.0 * g->noise;
+    for (size_t a = 0; a < n; a++) {
+        const struct coordinate *k = &g->run.coordinate[index[a]];
+        double limit = k->step_limit;
+        for (size_t b = 0; b < n; b++) hs[a * n + b] = h[index[a] * n_param + index[b]] * limit * g->run.coordinate[index[b]].step_limit;
+        gs[a] = gradient[index[a]] * limit;
+        lower[a] = fmax(-g->limit_scale, (k->lower - g->model.x_ref[index[a]]) / limit);
+        upper[a] = fmin(g->limit_scale, (k->upper - g->model.x_ref[index[a]]) / limit);
+        trace += hs[a * n + a];
+    }
+    for (size_t a = 0; a < n; a++) hs[a * n + a] += g->damping + 1e-9 * trace;
+    status s = bounded_quadratic(hs, gs, lower, upper, n, y, err);
+    if (s != STATUS_OK) return s;
+    memset(dx, 0, n_param * sizeof *dx);
+    g->gain = 0.0;
+    g->largest_step = 0.0;
+    for (size_t a = 0; a < n; a++) {
+        double hy = 0.0;
+        for (size_t b = 0; b < n; b++) hy += hs[a * n + b] * y[b];
+        g->gain -= y[a] * (gs[a] + 0.5 * hy);
+        g->largest_step = fmax(g->largest_step, fabs(y[a]));
+        dx[index[a]] = y[a] * g->run.coordinate[index[a]].step_limit;
+    }
+    return STATUS_OK;
+}
+
+/* Gain that pure noise would promise: half the noise variance of each free direction, for f = r.r. */
+static double noise_gain(const struct gauss_newton *g) { return (double)g->n_free * g->noise; }
+
+static bool precise_enough(const struct gauss_newton *g, double f)
+{
+    double n_row = (double)g->model.n_row;
+    return noise_gain(g) <= fmax(target_share * f, target_rel_rms * target_rel_rms * n_row);
+}
+
+static status estimate_here(struct gauss_newton *g, struct error *err)
+{
+    double param[N];
+    param_of(g, g->x, param);
+    spread_paths(g);
+    status s = descent_estimate(&g->run, param, (uint32_t)g->run.n_step, true, err);
+    return s == STATUS_OK ? linear_history_append(&g->history, g->x, g->run.replica[0], g->run.replica[1], err) : s;
+}
+
+static status report_here(struct gauss_newton *g, const char *note, struct error *err)
+{
+    double param[N];
+    struct uncertainty u;
+    struct fit_step step = {.phase = "gauss_newton", .param = param, .damping = g->damping, .noise = g->noise, .note = note};
+    param_of(g, g->x, param);
+    uncertainty_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed, &u);
+    step.param_se = u.se_param;
+    return descent_report(&g->run, &step, err);
+}
+
+/* True when the last step made things worse beyond doubt: back to the best point, with half the limits. */
+static bool step_failed(struct gauss_newton *g)
+{
+    double se, f = linear_model_objective(&g->model, &se);
+    if (g->history.n_step > 1 && f - g->best_f > 3.0 * (se + g->best_se) && f > 1.1 * g->best_f && g->limit_scale > 0.1) {
+        g->limit_scale *= 0.5;
+        memcpy(g->x, g->best_x, sizeof g->x);
+        linear_model_pool(&g->model, &g->history, g->x);
+        return true;
+    }
+    g->limit_scale = fmin(1.0, g->limit_scale * 1.5);
+    memcpy(g->best_x, g->x, sizeof g->x);
+    g->best_f = f;
+    g->best_se = se;
+    return false;
+}
+
+/* Paths of the next iteration; false when the budget does not allow another one worth its name. */
+static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_observation)
+{
+    double per_mean = 2.0 * (double)n_observation;
+    if (!gain_is_clear) g->n_path_mean *= 2.0;
+    double left = (double)g->run.path_budget - (double)g->run.n_path_total;
+    double most = fmin(largest_share * (double)g->run.path_budget, left) / per_mean;
+    g->n_path_mean = fmin(g->n_path_mean, most);
+    return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
+}
+
+static status iterate(struct gauss_newton *g, struct fit_result *result, struct error *err)
+{
+    const struct fit_problem *problem = g->run.problem;
+    size_t max_iteration = problem->max_iteration > 0 ? problem->max_iteration : MAX_ITERATION;
+    double dx[N];
+    for (;;) {
+        status s = estimate_here(g, err);
+        if (s != STATUS_OK) return s;
+        linear_model_pool(&g->model, &g->history, g->x);
+        double se, f = linear_model_objective(&g->model, &se);
+        s = report_here(g, NULL, err);
+        if (s != STATUS_OK) return s;
+        bool failed = step_failed(g);
+        s = solve_step(g, dx, err);
+        if (s != STATUS_OK) return s;
+        for (size_t p = 0; p < g->model.n_param; p++) g->x[p] += dx[p];
+        bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
+        bool small = g->gain <= 4.0 * noise_gain(g) || g->gain <= 0.01 * fabs(f);
+        result->converged = small && !failed && g->history.n_step > 2;
+        if (result->converged && precise_enough(g, f)) {
+            snprintf(result->reason, sizeof result->reason, "the next step promises %.2g, the objective is %.3g with a noise of %.1g",
+                     g->gain, f, se);
+            return STATUS_OK;
+        }
+        bool paths_left = plan_paths(g, clear, problem->observation->n);
+        if (g->run.n_step < max_iteration && paths_left) continue;
+        const char *used = paths_left ? "the iterations" : "the path budget";
+        if (result->converged)
+            snprintf(result->reason, sizeof result->reason,
+                     "%s ended when the objective (%.3g) could no longer be told from its noise (%.1g); more paths would narrow the errors", used, f,
+                     se);
+        else
+            snprintf(result->reason, sizeof result->reason, "%s ended while a step still promised to lower the objective by %.2g from %.3g", used,
+                     g->gain, f);
+        return STATUS_OK;
+    }
+}
+
+static status finish(struct gauss_newton *g, struct fit_result *result)
+{
+    linear_model_pool(&g->model, &g->history, g->x);
+    param_of(g, g->x, result->param);
+    result->n_step = g->run.n_step;
+    result->n_path = g->run.n_path_total;
+    result->wall_s = g->run.wall_s;
+    result->objective.value = linear_model_objective(&g->model, &result->objective.se);
+    result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)g->model.n_row);
+    uncertainty_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed, &result->uncertainty);
+    return STATUS_OK;
+}
+
+static status run_gauss_newton(const struct fit_problem *problem, struct fit_result *result, struct error *err)
+{
+    struct gauss_newton g = {.limit_scale = 1.0};
+    memset(result, 0, sizeof *result);
+    status s = descent_run_init(&g.run, problem, &descent_gauss_newton, err);
+    if (s != STATUS_OK) goto out;
+    linear_history_init(&g.history, problem->observation, g.run.coordinate, problem->n_param);
+    s = linear_model_init(&g.model, 3 * problem->observation->n, problem->n_param, err);
+    if (s != STATUS_OK) goto out;
+    size_t index[N];
+    g.n_free = free_index(&g, index);
+    for (size_t p = 0; p < problem->n_param; p++) g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->param[p].start);
+    /* small budgets start smaller, so that there are iterations to speak of */
+    double first = (double)g.run.path_budget / (40.0 * 2.0 * (double)problem->observation->n);
+    g.n_path_mean = fmax(MIN_PATH, fmin(FIRST_PATH, first));
+    s = iterate(&g, result, err);
+    if (s == STATUS_OK) s = finish(&g, result);
+out:
+    linear_model_release(&g.model);
+    linear_history_release(&g.history);
+    descent_run_release(&g.run);
+    return s;
+}
+
+const struct descent_method descent_gauss_newton = {
+    .id = METHOD_GAUSS_NEWTON,
+    .title = "bounded Gauss-Newton on the Monte-Carlo Jacobian, all iterations pooled",
+    .default_path_budget = DEFAULT_BUDGET,
+    .default_max_iteration = MAX_ITERATION,
+    .run = run_gauss_newton,
+};

@@ -1,0 +1,26 @@
+/* Fit coordinates: the scale on which a parameter is moved. Colours and albedos strictly inside (0, 1) move in ln(p / (1 - p)), positive
+ * quantities (lobe widths) in ln p, all others linearly. The bounds are finite in all three, so a parameter can reach one and stay there.
+ */
+#ifndef SELVEDGE_OPTIMIZER_COORDINATE_H
+#define SELVEDGE_OPTIMIZER_COORDINATE_H
+
+#include "renderer/scattering/scattering.h"
+
+enum coordinate_kind { COORDINATE_LINEAR, COORDINATE_LOG, COORDINATE_LOGIT };
+
+struct coordinate {
+    enum coordinate_kind kind;
+    double param_lower, param_upper; /* internal unit */
+    double lower, upper;             /* the same in the coordinate */
+    double step_limit;               /* largest step of one iteration: 1 in logit, 0.25 in log, 1/8 of the range otherwise */
+};
+
+/* lower and upper: bounds of this fit, inside those of the model. */
+void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper);
+/* Values beyond a bound map to the bound; a coordinate at (or beyond) a bound gives exactly the bound. */
+double coordinate_from_param(const struct coordinate *k, double param);
+double coordinate_to_param(const struct coordinate *k, double x);
+/* d param / d coordinate at a parameter value. */
+double coordinate_slope(const struct coordinate *k, double param);
+
+#endif

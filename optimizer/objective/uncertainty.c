@@ -1,0 +1,125 @@
+#include "optimizer/objective/uncertainty.h"
+#include "optimizer/objective/objective.h"
+#include "optimizer/objective/small_matrix.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N = SCATTERING_MAX_PARAM };
+
+/* Squared residuals (without Monte-Carlo bias) beyond what the photographs' own noise explains, per degree of freedom. */
+static double misfit_variance(const struct linear_model *m, const struct observation_set *o, size_t n_free)
+{
+    double f = linear_model_objective(m, NULL), photograph = 0.0;
+    for (size_t i = 0; i < o->n; i++)
+        for (int c = 0; c < 3; c++) photograph += objective_weight(&o->item[i]) * o->item[i].se_rgb[c] * o->item[i].se_rgb[c];
+    double n = (double)m->n_row, freedom = fmax(1.0, n - (double)n_free);
+    return fmax(0.0, f / freedom - photograph / n);
+}
+
+/* V of one row, without the Jacobian's share. */
+static double row_variance(const struct linear_model *m, const struct observation_set *o, size_t row, double misfit)
+{
+    const struct observation *item = &o->item[row / 3];
+    double se = item->se_rgb[row % 3];
+    return objective_weight(item) * se * se + 0.25 * (m->r_var[0][row] + m->r_var[1][row]) + misfit * item->weight;
+}
+
+/* H and B of the parameters index[0..n-1]. */
+static void normal_matrices(const struct linear_model *m, const struct observation_set *o, const size_t *index, size_t n,
+                            double misfit, double *h, double *b, double *mean_variance)
+{
+    memset(h, 0, n * n * sizeof *h);
+    memset(b, 0, n * n * sizeof *b);
+    *mean_variance = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) {
+        const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
+        const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
+        double v = row_variance(m, o, row, misfit), r2 = fmax(0.0, m->r[0][row] * m->r[1][row]);
+        *mean_variance += v / (double)m->n_row;
+        for (size_t p = 0; p < n; p++) {
+            for (size_t q = 0; q < n; q++) {
+                double jj = 0.5 * (ja[index[p]] * jb[index[q]] + jb[index[p]] * ja[index[q]]);
+                h[p * n + q] += jj;
+                b[p * n + q] += v * jj;
+            }
+            b[p * n + p] += r2 * 0.25 * (va[index[p]] + vb[index[p]]);
+        }
+    }
+}
+
+/* Covariance of the parameters index[0..n-1], all others held. */
+static void covariance(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+                       const size_t *index, size_t n, double misfit, double *cov)
+{
+    double h[N * N], b[N * N], inverse[N * N], half[N * N], s2, scale[N];
+    normal_matrices(m, o, index, n, misfit, h, b, &s2);
+    s2 = fmax(s2, 1e-12);
+    for (size_t p = 0; p < n; p++) scale[p] = (k[index[p]].upper - k[index[p]].lower) / sqrt(12.0);
+    for (size_t p = 0; p < n; p++) {
+        for (size_t q = 0; q < n; q++) {
+            h[p * n + q] *= scale[p] * scale[q];
+            b[p * n + q] *= scale[p] * scale[q];
+        }
+    }
+    small_clip_eigenvalues(h, n, 0.0);
+    small_clip_eigenvalues(b, n, 0.0);
+    for (size_t p = 0; p < n; p++) {
+        h[p * n + p] += s2;
+        b[p * n + p] += s2 * s2;
+    }
+    if (!small_invert(h, n, inverse)) { /* cannot be: eigenvalues >= s2 > 0; the prior alone then */
+        memset(inverse, 0, n * n * sizeof *inverse);
+        for (size_t p = 0; p < n; p++) inverse[p * n + p] = 1.0 / s2;
+    }
+    small_multiply(inverse, b, n, half);
+    small_multiply(half, inverse, n, cov);
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) cov[p * n + q] *= scale[p] * scale[q];
+}
+
+static void scatter(const double *cov, const size_t *index, size_t n, size_t n_param, double *full)
+{
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) full[index[p] * n_param + index[q]] = cov[p * n + q];
+}
+
+void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k, const bool *fixed,
+                         struct uncertainty *u)
+{
+    size_t n = m->n_param, moving[N], inner[N], n_moving = 0, n_inner = 0;
+    double cov[N * N];
+    memset(u, 0, sizeof *u);
+    u->n_param = n;
+    for (size_t p = 0; p < n; p++) {
+        double value = coordinate_to_param(&k[p], m->x_ref[p]), margin = 1e-3 * (k[p].param_upper - k[p].param_lower);
+        u->at_bound[p] = !fixed[p] && (value <= k[p].param_lower + margin || value >= k[p].param_upper - margin);
+        if (!fixed[p]) moving[n_moving++] = p;
+        if (!fixed[p] && !u->at_bound[p]) inner[n_inner++] = p;
+    }
+    u->misfit_var = misfit_variance(m, o, n_inner);
+    u->noise_var = linear_model_noise(m);
+    if (n_moving > 0) {
+        covariance(m, o, k, moving, n_moving, u->misfit_var, cov);
+        scatter(cov, moving, n_moving, n, u->cov);
+    }
+    if (n_inner > 0 && n_inner < n_moving) {
+        covariance(m, o, k, inner, n_inner, u->misfit_var, cov);
+        scatter(cov, inner, n_inner, n, u->cov);
+    }
+    for (size_t p = 0; p < n; p++) {
+        double uniform = (k[p].param_upper - k[p].param_lower) / sqrt(12.0);
+        double slope = coordinate_slope(&k[p], coordinate_to_param(&k[p], m->x_ref[p]));
+        u->se_param[p] = fixed[p] ? 0.0 : fmin(slope * sqrt(u->cov[p * n + p]), uniform);
+        u->determined[p] = fixed[p] || u->se_param[p] < 0.5 * uniform;
+        u->correlation[p * n + p] = 1.0;
+    }
+    for (size_t a = 0; a < n_inner; a++) {
+        for (size_t c = 0; c < a; c++) {
+            size_t p = inner[a], q = inner[c];
+            double r = u->cov[p * n + q] / sqrt(u->cov[p * n + p] * u->cov[q * n + q]);
+            u->correlation[p * n + q] = u->correlation[q * n + p] = fmin(fmax(r, -1.0), 1.0);
+        }
+    }
+}
