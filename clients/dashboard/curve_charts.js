@@ -2,6 +2,9 @@
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
+// Its legend plugin sets an inline style, which the page's content security policy forbids; the legends here are our own.
+Dygraph.PLUGINS = Dygraph.PLUGINS.filter((plugin) => plugin !== Dygraph.Plugins.Legend);
+
 // A chart of one or more curves; data: rows [x, [low, mid, high] | null, ...] (dygraphs' custom bars).
 export class CurveChart {
   constructor(node, legend, labels, colours, { log = false, digits = 4 } = {}) {
