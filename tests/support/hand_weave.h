@@ -1,0 +1,23 @@
+/* Small fiber sets made by hand, so that renderer tests do not depend on the phantom generator. */
+#ifndef SELVEDGE_TESTS_HAND_WEAVE_H
+#define SELVEDGE_TESTS_HAND_WEAVE_H
+
+#include "geometry/fibers/fiber_set.h"
+
+struct hand_weave_option {
+    size_t n_yarn;    /* each way, even */
+    size_t n_strand;  /* a yarn */
+    size_t n_segment; /* a strand */
+    double tile_m, fiber_radius_m, twist_turns; /* a tile */
+};
+
+/* Plain weave; a periodic tile. Aborts the test without memory. */
+void hand_weave(struct fiber_set *f, const struct hand_weave_option *o);
+/* The bench cloth: 1,024 strands x 120 segments, radius 16 um, tile 4.45 mm. */
+void hand_weave_bench(struct fiber_set *f);
+/* A small one for tests: 2 x 2 yarns of 12 strands, radius 16 um, tile 0.55 mm. */
+void hand_weave_small(struct fiber_set *f);
+/* Straight fibers along x at given (y, z), spanning exactly one tile, so that they have no ends. */
+void hand_straight(struct fiber_set *f, size_t n, const double (*y_z_m)[2], double tile_m, double radius_m);
+
+#endif
