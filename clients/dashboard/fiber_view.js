@@ -82,7 +82,7 @@ function show(THREE, node, hair) {
   scene.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: THREE.VertexColors ?? true })));
   renderer.setClearColor(0x0d1116);
   node.replaceChildren(renderer.domElement);
-  const state = { theta: 0.75, phi: -0.9, distance: 2.9 * radius, panX: 0, panY: 0 };
+  const state = { theta: 0.75, phi: -0.9, distance: 3.2 * radius, panX: 0, panY: 0 };
   const draw = () => {
     const w = node.clientWidth, h = node.clientHeight;
     renderer.setPixelRatio(Math.min(2, devicePixelRatio));
