@@ -165,8 +165,8 @@ static int by_pair(const void *a, const void *b)
 }
 
 /* What found samples tell. Changes their order. */
-static status from_found(const struct fiber_set *truth, const struct fiber_set *found, struct walk *w, struct compare_report *r,
-                         struct error *err)
+static status from_found(const struct fiber_set *truth, const struct fiber_set *found, double voxel_size_m, struct walk *w,
+                         struct compare_report *r, struct error *err)
 {
     float *distance = calloc(w->n + 1, sizeof *distance), *angle = calloc(w->n + 1, sizeof *angle);
     size_t n = 0, n_second = 0;
@@ -183,9 +183,9 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
         if (s->other == NONE) continue;
         if (i == 0 || s[-1].other != s->other || s[-1].voxel != s->voxel) nearest = s->fiber;
         n_second += s->fiber != nearest;
-        distance[n] = s->distance_m;
+        distance[n] = (float)((double)s->distance_m / voxel_size_m);
         angle[n] = (float)(acos((double)s->cosine) * 180.0 / M_PI);
-        sum2 += (double)s->distance_m * (double)s->distance_m;
+        sum2 += (double)distance[n] * (double)distance[n];
         angle_sum += (double)angle[n];
         ratio_sum += (double)found->radius_m[s->fiber] / (double)truth->radius_m[s->other] - 1.0;
         n++;
@@ -299,7 +299,7 @@ status compare_fibers(const struct fiber_set *truth, const struct fiber_set *fou
     }
     r.orientation_frobenius = sqrt(frobenius2);
     from_truth(&of_truth, &r);
-    st = from_found(truth, found, &of_found, &r, err);
+    st = from_found(truth, found, o->voxel_size_m, &of_found, &r, err);
     if (st == STATUS_OK)
         st = count_fragments(truth, &of_found, (size_t)ceil(o->run_min_voxel > 0.0 ? o->run_min_voxel : 5.0), &r, err);
     if (st == STATUS_OK) *report = r;

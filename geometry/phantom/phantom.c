@@ -26,12 +26,18 @@ status phantom_weave_find(const char *name, enum phantom_weave *w, struct error 
     return error_set_field(err, STATUS_INVALID, "weave", "unknown weave '%s': plain, twill, twill31, satin, velvet, knit or felt", name);
 }
 
-void phantom_option_default(struct phantom_option *o)
+void phantom_option_default(struct phantom_option *o, enum phantom_weave weave)
 {
-    *o = (struct phantom_option){.weave = PHANTOM_TWILL_2_2, .seed = 1, .voxel_size_m = 2e-6,
+    *o = (struct phantom_option){.weave = weave, .seed = 1, .voxel_size_m = 2e-6,
                                  .fiber_radius_m = {7e-6, 7e-6, 7e-6}, .n_fiber_per_yarn = 19, .packing = 0.7,
                                  .flatness = 1.8, .cover = 1.05, .twist_turns = 1.0 / 3.0, .migration = 0.05,
                                  .pile_height_m = 2e-4, .felt_tile_m = 3.2e-4, .felt_thickness_m = 1.2e-4, .n_relax = 150};
+    if (weave == PHANTOM_VELVET) o->n_fiber_per_yarn = 7;
+    if (weave == PHANTOM_FELT) o->n_fiber_per_yarn = 60;
+    if (weave == PHANTOM_KNIT) {
+        o->flatness = 1.0;
+        o->cover = 1.0;
+    }
 }
 
 static status check_range(const char *field, double value, double lower, double upper, struct error *err)

@@ -54,8 +54,8 @@ struct phantom_option {
     double margin_m;           /* empty space below and above; 0: 4 voxels */
 };
 
-/* Twill 2/2, fiber diameter 7 voxels of 2 um, 19 fibers a yarn. */
-void phantom_option_default(struct phantom_option *o);
+/* Fiber diameter 7 voxels of 2 um; 19 fibers a yarn (velvet 7, felt 60 in all); yarns flattened by 1.8 (knit 1, round). */
+void phantom_option_default(struct phantom_option *o, enum phantom_weave weave);
 
 struct phantom_report {
     size_t n_voxel[3];            /* grid that holds one tile */
