@@ -6,11 +6,14 @@
  */
 #include "renderer/scattering/two_lobe_core.h"
 
+#include <string.h>
+
 enum { N = TWO_LOBE_N_TABLE / 2 + 1 }; /* nodes over [0, pi/2]; a is even */
 
 struct balance {
-    double kernel[N][N];  /* g folded to u >= 0, times cos^2 u du */
+    double kernel[N][N];  /* g folded to u >= 0: symmetric */
     double d_kernel[N][N];
+    double weight[N];     /* cos^2 u du */
     double a[N], d_ln_a[N], work[N];
 };
 
@@ -23,20 +26,23 @@ static void fill_kernel(struct balance *b, double beta)
         g[i] = exp(-0.5 * z * z) / (sqrt(2 * M_PI) * beta);
         d_g[i] = g[i] * (z * z - 1) / beta;
     }
-    for (int i = 0; i < N; i++)
+    for (int i = 0; i < N; i++) {
+        double c = cos(i * h);
+        b->weight[i] = c * c * h * (i == 0 ? 0.5 : 1); /* the weight of the pole is 0 */
         for (int j = 0; j < N; j++) {
-            double c = cos(j * h), w = c * c * h * (j == 0 ? 0.5 : 1); /* the weight of the pole is 0 */
-            b->kernel[i][j] = w * (g[abs(i - j)] + g[i + j]);
-            b->d_kernel[i][j] = w * (d_g[abs(i - j)] + d_g[i + j]);
+            b->kernel[i][j] = g[abs(i - j)] + g[i + j];
+            b->d_kernel[i][j] = d_g[abs(i - j)] + d_g[i + j];
         }
+    }
 }
 
-static void multiply(double (*m)[N], const double *x, double *y)
+/* y_i = sum of m_ij weight_j x_j, column by column so that it vectorises. */
+static void multiply(struct balance *b, double (*m)[N], const double *x, double *y)
 {
-    for (int i = 0; i < N; i++) {
-        double sum = 0;
-        for (int j = 0; j < N; j++) sum += m[i][j] * x[j];
-        y[i] = sum;
+    memset(y, 0, N * sizeof *y);
+    for (int j = 0; j < N; j++) {
+        double wx = b->weight[j] * x[j];
+        for (int i = 0; i < N; i++) y[i] += m[j][i] * wx;
     }
 }
 
@@ -44,7 +50,7 @@ static void solve(struct balance *b)
 {
     for (int i = 0; i < N; i++) b->a[i] = 1;
     for (int iteration = 0; iteration < 200; iteration++) {
-        multiply(b->kernel, b->a, b->work);
+        multiply(b, b->kernel, b->a, b->work);
         double worst = 0;
         for (int i = 0; i < N; i++) {
             worst = fmax(worst, fabs(b->a[i] * b->work[i] - 1));
@@ -54,14 +60,14 @@ static void solve(struct balance *b)
     }
     /* (I + P) x = -r with P = diag(a) K diag(a), rows summing to 1, and r = a * (dK a): half steps converge */
     double r[N], ax[N];
-    multiply(b->d_kernel, b->a, r);
+    multiply(b, b->d_kernel, b->a, r);
     for (int i = 0; i < N; i++) {
         r[i] *= b->a[i];
         b->d_ln_a[i] = -0.5 * r[i];
     }
     for (int iteration = 0; iteration < 200; iteration++) {
         for (int i = 0; i < N; i++) ax[i] = b->a[i] * b->d_ln_a[i];
-        multiply(b->kernel, ax, b->work);
+        multiply(b, b->kernel, ax, b->work);
         double worst = 0;
         for (int i = 0; i < N; i++) {
             double residual = b->d_ln_a[i] + b->a[i] * b->work[i] + r[i];

@@ -23,6 +23,7 @@ struct scattering_state *two_lobe_state_new(const double *param)
     if (s == NULL) return NULL;
     for (int c = 0; c < 3; c++) {
         s->c_r[c] = (float)param[TWO_LOBE_P_C_R + c];
+        s->not_c_r[c] = (float)(1 - param[TWO_LOBE_P_C_R + c]);
         s->c_tt[c] = (float)param[TWO_LOBE_P_C_TT + c];
     }
     for (int k = 0; k < 2; k++) {

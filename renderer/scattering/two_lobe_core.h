@@ -30,7 +30,7 @@ struct two_lobe_sampling_entry { /* by |th_o| */
 };
 
 struct scattering_state {
-    float c_r[3], c_tt[3];
+    float c_r[3], not_c_r[3], c_tt[3]; /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all */
     float beta[2];
     float peak[2];    /* 1 / (sqrt(2 pi) beta) */
     float inv_2var[2];
@@ -115,9 +115,9 @@ static inline void two_lobe_eval_terms(const struct scattering_state *s, bool ba
     float b = t->g[TWO_LOBE_TT] * scale[TWO_LOBE_TT] * t->von_mises;
     float part_r[3], part_tt[3];
     for (int c = 0; c < 3; c++) {
-        float fresnel = s->c_r[c] + (1 - s->c_r[c]) * k;
+        float fresnel = s->c_r[c] + s->not_c_r[c] * k;
         part_r[c] = fresnel * a;
-        part_tt[c] = s->c_tt[c] * (1 - fresnel) * b;
+        part_tt[c] = s->c_tt[c] * s->not_c_r[c] * (1 - k) * b;
         s_rgb[c] = part_r[c] + part_tt[c];
     }
     if (score == NULL) return;

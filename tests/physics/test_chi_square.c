@@ -1,0 +1,127 @@
+/* Sampling of every scattering model: the density integrates to 1 and samples follow it. */
+#include "base/rng.h"
+#include "renderer/scattering/scattering.h"
+#include "tests/support/statistics_test.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { N_THETA = 48, N_PHI = 48, SUB = 24, N_SAMPLE = 200000 };
+
+static size_t cell_of(const float w[3])
+{
+    double theta = atan2((double)w[0], hypot((double)w[1], (double)w[2])), phi = atan2((double)w[2], (double)w[1]);
+    size_t i = (size_t)fmin(N_THETA - 1, (theta / M_PI + 0.5) * N_THETA), j = (size_t)fmin(N_PHI - 1, (phi / (2 * M_PI) + 0.5) * N_PHI);
+    return i * N_PHI + j;
+}
+
+/* Integral of the density over each cell; returns its sum. */
+static double expected_counts(const struct scattering_model *m, const struct scattering_state *s, const float wo[3], double *expected)
+{
+    double total = 0, h_theta = M_PI / (N_THETA * SUB), h_phi = 2 * M_PI / (N_PHI * SUB);
+    memset(expected, 0, N_THETA * N_PHI * sizeof *expected);
+    for (size_t i = 0; i < N_THETA * SUB; i++) {
+        double theta = -M_PI_2 + ((double)i + 0.5) * h_theta;
+        for (size_t j = 0; j < N_PHI * SUB; j++) {
+            double phi = -M_PI + ((double)j + 0.5) * h_phi;
+            float wi[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
+            double p = (double)m->pdf(s, wi, wo) * cos(theta) * h_theta * h_phi;
+            expected[i / SUB * N_PHI + j / SUB] += p * N_SAMPLE;
+            total += p;
+        }
+    }
+    return total;
+}
+
+static void check(const struct scattering_model *m, const double *param, const float wo[3], struct rng *r, double least_p)
+{
+    static double expected[N_THETA * N_PHI], count[N_THETA * N_PHI];
+    struct scattering_state *s = NULL;
+    struct error err = {0};
+    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
+    double total = expected_counts(m, s, wo, expected), n_degree;
+    if (fabs(total - 1) > 2e-3) fail_msg("%s: density integrates to %.6f for wo = %g %g %g", m->id, total, (double)wo[0], (double)wo[1], (double)wo[2]);
+    for (size_t i = 0; i < N_THETA * N_PHI; i++) expected[i] /= total; /* what is left is the quadrature's */
+    memset(count, 0, sizeof count);
+    for (int i = 0; i < N_SAMPLE; i++) {
+        float u[3] = {rng_float(r), rng_float(r), rng_float(r)}, wi[3];
+        float pdf = m->sample(s, wo, u, wi);
+        assert_true(pdf == m->pdf(s, wi, wo));
+        count[cell_of(wi)]++;
+    }
+    m->release(s);
+    double x = chi_square_statistic(count, expected, N_THETA * N_PHI, &n_degree), p = chi_square_tail(x, n_degree);
+    if (p < least_p)
+        fail_msg("%s: chi-square %.1f at %.0f degrees of freedom (p = %.2g) for wo = %g %g %g", m->id, x, n_degree, p, (double)wo[0], (double)wo[1], (double)wo[2]);
+}
+
+static void samples_follow_the_density(void **state)
+{
+    (void)state;
+    static const double angle_deg[][2] = {{0, 90}, {-25, 200}, {50, 10}, {75, -60}, {-88, 33}, {90, 0}};
+    enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 3 };
+    size_t n_model = 0;
+    while (scattering_registry()[n_model] != NULL) n_model++;
+    double least_p = 0.01 / (double)(n_model * N_ANGLE * N_SET); /* 1 % for the whole family */
+    struct rng r;
+    rng_start(&r, &(struct rng_key){11, 0, 0, 0}, 0, 0);
+    for (size_t k = 0; k < n_model; k++)
+        for (int set = 0; set < N_SET; set++)
+            for (int a = 0; a < N_ANGLE; a++) {
+                const struct scattering_model *m = scattering_registry()[k];
+                double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * M_PI / 180, phi = angle_deg[a][1] * M_PI / 180;
+                for (size_t p = 0; p < m->n_param; p++) { /* start; everything widest; narrow lobes */
+                    const struct param_info *i = &m->param[p];
+                    bool angle = i->unit[0] != '\0';
+                    param[p] = set == 0 ? i->start : set == 1 ? i->upper : angle ? i->lower + 0.1 * (i->upper - i->lower) : 0.5;
+                }
+                float wo[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
+                check(m, param, wo, &r, least_p);
+            }
+}
+
+/* The narrowest lobes, where the grid above is too coarse: one-dimensional histograms of the angles. */
+static void narrowest_lobes(void **state)
+{
+    (void)state;
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    double param[9] = {0.5, 0.5, 0.5, 0.5, 0.5, 0.5, m->param[6].lower, m->param[7].lower, m->param[8].lower};
+    struct scattering_state *s = NULL;
+    struct rng r;
+    assert_int_equal(m->prepare(param, &s, NULL), STATUS_OK);
+    rng_start(&r, &(struct rng_key){12, 0, 0, 0}, 0, 0);
+    enum { N = 60, DRAWS = 400000 };
+    double count[N] = {0}, expected[N], n_degree, sd = param[8], n_tt = 0;
+    const float wo[3] = {0, -1, 0};
+    for (int i = 0; i < DRAWS; i++) { /* azimuth of the TT lobe: the half behind the fiber and |th| beyond the R lobe's reach */
+        float u[3] = {0.999f, rng_float(&r), rng_float(&r)}, wi[3];
+        m->sample(s, wo, u, wi);
+        double phi = atan2((double)wi[2], (double)wi[1]);
+        int cell = (int)floor((phi / (5 * sd) + 1) * 0.5 * N);
+        if (cell >= 0 && cell < N) count[cell]++;
+        n_tt++;
+    }
+    double norm = 0;
+    for (int i = 0; i < 20000; i++) norm += exp((cos((i + 0.5) * M_PI / 20000) - 1) / (sd * sd)) * 2 * M_PI / 20000;
+    for (int i = 0; i < N; i++) {
+        expected[i] = 0;
+        for (int j = 0; j < 50; j++) {
+            double phi = 5 * sd * (2 * (i + (j + 0.5) / 50) / N - 1);
+            expected[i] += n_tt * exp((cos(phi) - 1) / (sd * sd)) / norm * 10 * sd / N / 50;
+        }
+    }
+    double x = chi_square_statistic(count, expected, N, &n_degree);
+    m->release(s);
+    if (chi_square_tail(x, n_degree) < 1e-3) fail_msg("chi-square %.1f at %.0f", x, n_degree);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(samples_follow_the_density), cmocka_unit_test(narrowest_lobes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
