@@ -98,18 +98,17 @@ void report_job(const json_t *job, FILE *out)
     report_result(job, out);
 }
 
+/* What a reader must know beside the number. */
 static void print_flags(const json_t *parameter, FILE *out)
 {
-    size_t i;
-    const json_t *flag;
-    const char *between = "";
-    json_array_foreach(json_object_get(parameter, "flags"), i, flag) {
-        char clean[64];
-        if (!json_is_string(flag)) continue;
-        text_clean(json_string_value(flag), clean, sizeof clean);
-        fprintf(out, "%s%s", between, clean);
-        between = ", ";
+    const json_t *at_bound = json_object_get(parameter, "at_bound");
+    if (json_is_true(json_object_get(parameter, "fixed"))) {
+        fputs("fixed", out);
+        return;
     }
+    if (json_is_string(at_bound)) fprintf(out, "at %s bound  ", strcmp(json_string_value(at_bound), "lower") == 0 ? "lower" : "upper");
+    if (json_is_true(at_bound)) fputs("at a bound  ", out);
+    if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined", out);
 }
 
 static void print_parameter(const json_t *parameter, FILE *out)
@@ -117,7 +116,7 @@ static void print_parameter(const json_t *parameter, FILE *out)
     char name[64], unit[24], value[CLI_SHORT_TEXT];
     text_clean(member_text(parameter, "name"), name, sizeof name);
     text_clean(member_text(parameter, "unit"), unit, sizeof unit);
-    text_with_error(member_number(parameter, "value"), member_number(parameter, "se"), value);
+    text_with_error(member_number(parameter, "value"), member_number(parameter, "standard_error"), value);
     fprintf(out, "  %-12s %-24s %-4s ", name, value, unit);
     print_flags(parameter, out);
     fputc('\n', out);

@@ -27,14 +27,23 @@ export function parameterNames(job, n) {
   return Array.from({ length: n }, (_, i) => ({ name: `parameter ${i + 1}`, unit: "" }));
 }
 
-// The fitted parameters: [{name, unit, value, se, flags: [text]}]
+// The fitted parameters: [{name, unit, value, se, flags: [text], lower, upper}]
 export function fitted(job) {
-  return (job.parameters ?? []).map((p) => ({ name: p.name, unit: p.unit ?? "", value: p.value, se: p.se, flags: p.flags ?? [], lower: p.lower, upper: p.upper }));
+  return (job.parameters ?? []).map((p) => {
+    const flags = [];
+    if (p.fixed) flags.push("fixed");
+    else {
+      if (typeof p.at_bound === "string") flags.push(`at ${p.at_bound} bound`);
+      else if (p.at_bound) flags.push("at a bound");
+      if (p.determined === false) flags.push("not determined");
+    }
+    return { name: p.name, unit: p.unit ?? "", value: p.value, se: p.standard_error, flags, lower: p.lower, upper: p.upper };
+  });
 }
 
 // Every configuration: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error}]
 export function configurations(job, urls) {
-  return (job.result?.configurations ?? []).map((c) => {
+  return (job.result?.rows ?? []).map((c) => {
     const measured = c.measured, rendered = c.rendered;
     const mean = (v) => (v[0] + v[1] + v[2]) / 3;
     const error = measured && rendered ? Math.hypot(...measured.map((m, i) => rendered[i] - m)) / Math.sqrt(3) / Math.max(mean(measured), 1e-9) : null;
