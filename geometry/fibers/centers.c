@@ -1,0 +1,320 @@
+#include "geometry/fibers/centers.h"
+
+#include "geometry/vision/vision.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_SCALE = 4 };
+static const double scale_factor[N_SCALE] = {0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
+
+/* Lone disks answer 0.74, disks inside a dense bundle (neighbours fill the filter's surround) about 0.25. */
+static const float MIN_STRENGTH = 0.12f;
+/* Two centers are never nearer than this share of the diameter. */
+static const float MIN_SPACING = 0.55f;
+
+struct slice_result {
+    struct center *center;
+    size_t n, capacity;
+    status failed;
+};
+
+struct detect_job {
+    const struct volume *v;
+    const struct direction_volume *d;
+    const uint8_t *mask;
+    int axis, au, av;
+    size_t width, height, stride_u, stride_v, stride_slice;
+    double sigma[N_SCALE];
+    float min_distance;
+    float *scratch; /* per thread: image and N_SCALE responses */
+    size_t scratch_per_thread;
+    struct slice_result *slice;
+    struct error *error; /* per thread */
+};
+
+void center_list_release(struct center_list *l)
+{
+    if (l == NULL) return;
+    free(l->first);
+    free(l->center);
+    *l = (struct center_list){0};
+}
+
+struct mask_job {
+    const struct direction_volume *d;
+    uint8_t *mask;
+    size_t (*count)[3]; /* per slice */
+};
+
+static void mask_slice(void *context, size_t k, size_t i_thread)
+{
+    (void)i_thread;
+    const struct mask_job *job = context;
+    size_t n = job->d->n[0] * job->d->n[1];
+    for (size_t i = k * n; i < (k + 1) * n; i++) {
+        job->mask[i] = 0;
+        if (job->d->density[i] == 0) continue;
+        float d[3], most = 0.0f;
+        unsigned bits = 0;
+        int strict = 0;
+        direction_volume_get(job->d, i, d);
+        for (int a = 0; a < 3; a++)
+            if (fabsf(d[a]) > most) {
+                most = fabsf(d[a]);
+                strict = a;
+            }
+        for (unsigned a = 0; a < 3; a++)
+            if (fabsf(d[a]) >= CLASS_TOLERANCE * most) bits |= 1u << a;
+        job->mask[i] = (uint8_t)(bits | (16u << strict));
+        job->count[k][strict]++;
+    }
+}
+
+status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint8_t *mask, size_t n_class_voxel[3],
+                  struct error *err)
+{
+    struct mask_job job = {d, mask, calloc(d->n[2], sizeof(size_t[3]))};
+    if (job.count == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot separate the axes: out of memory");
+    status s = thread_pool_run(pool, d->n[2], mask_slice, &job, NULL);
+    for (int a = 0; a < 3; a++) {
+        n_class_voxel[a] = 0;
+        for (size_t k = 0; k < d->n[2]; k++) n_class_voxel[a] += job.count[k][a];
+    }
+    free(job.count);
+    return s;
+}
+
+/* An emptied voxel shows its density unless all its kept neighbours belong to other axes (it is then the rim of such a fiber). */
+static bool rim_of_others(const struct detect_job *job, size_t at, const size_t x[3])
+{
+    const size_t *n = job->v->n, stride[3] = {1, n[0], n[0] * n[1]};
+    bool others = false;
+    for (int a = 0; a < 3; a++)
+        for (int side = 0; side < 2; side++) {
+            if (side == 0 ? x[a] == 0 : x[a] + 1 == n[a]) continue;
+            uint8_t m = job->mask[side == 0 ? at - stride[a] : at + stride[a]];
+            if ((m >> job->axis & 1) != 0) return false;
+            others = others || m != 0;
+        }
+    return others;
+}
+
+/* The slice of the subvolume; false when nothing of the class is in it. */
+static bool fill_image(const struct detect_job *job, size_t i_slice, float *image)
+{
+    bool any = false;
+    size_t x[3];
+    x[job->axis] = i_slice;
+    for (size_t v = 0; v < job->height; v++)
+        for (size_t u = 0; u < job->width; u++, image++) {
+            size_t at = i_slice * job->stride_slice + u * job->stride_u + v * job->stride_v;
+            x[job->au] = u;
+            x[job->av] = v;
+            uint8_t m = job->mask[at];
+            bool own = (m >> job->axis & 1) != 0;
+            any = any || own;
+            *image = own || (m == 0 && !rim_of_others(job, at, x)) ? job->v->density[at] : 0.0f;
+        }
+    return any;
+}
+
+static bool is_peak(const struct detect_job *job, const float *response, size_t u, size_t v)
+{
+    float c = response[v * job->width + u];
+    for (size_t y = v > 0 ? v - 1 : 0; y <= v + 1 && y < job->height; y++)
+        for (size_t x = u > 0 ? u - 1 : 0; x <= u + 1 && x < job->width; x++) {
+            float r = response[y * job->width + x];
+            if (r > c || (r == c && (y < v || (y == v && x < u)))) return false;
+        }
+    return true;
+}
+
+/* Offset of the maximum of the paraboloid through a 3 x 3 neighbourhood (least squares), at most one pixel. */
+static void refine_position(const struct detect_job *job, const float *response, size_t u, size_t v, float offset[2])
+{
+    offset[0] = offset[1] = 0.0f;
+    if (u == 0 || v == 0 || u + 1 >= job->width || v + 1 >= job->height) return;
+    const float *p = response + v * job->width + u;
+    size_t w = job->width;
+    float gu = 0.0f, gv = 0.0f, uu = 0.0f, vv = 0.0f;
+    for (ptrdiff_t r = -1; r <= 1; r++) {
+        const float *q = p + r * (ptrdiff_t)w;
+        gu += (q[1] - q[-1]) / 6.0f;
+        uu += (q[1] - 2.0f * q[0] + q[-1]) / 3.0f;
+        gv += (p[w + (size_t)(r + 1) - 1] - p[-(ptrdiff_t)w + r]) / 6.0f;
+        vv += (p[(ptrdiff_t)w + r] - 2.0f * p[r] + p[-(ptrdiff_t)w + r]) / 3.0f;
+    }
+    float uv = (p[w + 1] - p[w - 1] - p[-(ptrdiff_t)w + 1] + p[-(ptrdiff_t)w - 1]) / 4.0f;
+    float det = uu * vv - uv * uv;
+    if (!(det > 0.0f) || !(uu < 0.0f)) return;
+    offset[0] = fminf(1.0f, fmaxf(-1.0f, (uv * gv - vv * gu) / det));
+    offset[1] = fminf(1.0f, fmaxf(-1.0f, (uv * gu - uu * gv) / det));
+}
+
+/* Mean direction of the class's voxels within one voxel of (u, v), as slopes. False when there is none. */
+static bool find_slope(const struct detect_job *job, size_t i_slice, struct center *c)
+{
+    float sum[3] = {0.0f, 0.0f, 0.0f};
+    long iu = (long)floorf(c->u), iv = (long)floorf(c->v);
+    for (long v = iv - 1; v <= iv + 1; v++)
+        for (long u = iu - 1; u <= iu + 1; u++) {
+            if (u < 0 || v < 0 || u >= (long)job->width || v >= (long)job->height) continue;
+            size_t at = i_slice * job->stride_slice + (size_t)u * job->stride_u + (size_t)v * job->stride_v;
+            if ((job->mask[at] >> job->axis & 1) == 0) continue;
+            float d[3];
+            direction_volume_get(job->d, at, d);
+            float sign = d[job->axis] < 0.0f ? -1.0f : 1.0f;
+            for (int a = 0; a < 3; a++) sum[a] += sign * d[a];
+        }
+    if (!(sum[job->axis] > 0.0f)) return false;
+    c->slope_u = sum[job->au] / sum[job->axis];
+    c->slope_v = sum[job->av] / sum[job->axis];
+    return true;
+}
+
+static bool push(struct slice_result *r, const struct center *c)
+{
+    if (r->n == r->capacity) {
+        size_t n = r->capacity == 0 ? 64 : 2 * r->capacity;
+        struct center *bigger = realloc(r->center, n * sizeof *bigger);
+        if (bigger == NULL) return false;
+        r->center = bigger;
+        r->capacity = n;
+    }
+    r->center[r->n++] = *c;
+    return true;
+}
+
+static bool collect_peaks(const struct detect_job *job, size_t i_slice, const float *response, struct slice_result *r)
+{
+    size_t n_pixel = job->width * job->height;
+    for (int s = 0; s < N_SCALE; s++)
+        for (size_t v = 0; v < job->height; v++)
+            for (size_t u = 0; u < job->width; u++) {
+                const float *map = response + (size_t)s * n_pixel;
+                size_t at = v * job->width + u;
+                if (map[at] < MIN_STRENGTH) continue;
+                if (!is_peak(job, map, u, v)) continue;
+                if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at])) continue;
+                float offset[2];
+                refine_position(job, map, u, v, offset);
+                struct center c = {.u = (float)u + 0.5f + offset[0],
+                                   .v = (float)v + 0.5f + offset[1],
+                                   .sigma = (float)job->sigma[s],
+                                   .strength = map[at]};
+                if (find_slope(job, i_slice, &c) && !push(r, &c)) return false;
+            }
+    return true;
+}
+
+static int stronger_first(const void *a, const void *b)
+{
+    const struct center *x = a, *y = b;
+    if (x->strength != y->strength) return x->strength < y->strength ? 1 : -1;
+    if (x->v != y->v) return x->v < y->v ? -1 : 1;
+    return (x->u > y->u) - (x->u < y->u);
+}
+
+static int lower_v_first(const void *a, const void *b)
+{
+    const struct center *x = a, *y = b;
+    if (x->v != y->v) return x->v < y->v ? -1 : 1;
+    return (x->u > y->u) - (x->u < y->u);
+}
+
+/* Of peaks nearer to each other than min_distance the strongest stays. Sorted by v at the end. */
+static void thin_out(const struct detect_job *job, struct slice_result *r)
+{
+    size_t kept = 0;
+    float limit = job->min_distance * job->min_distance;
+    if (r->n == 0) return;
+    qsort(r->center, r->n, sizeof *r->center, stronger_first);
+    for (size_t i = 0; i < r->n; i++) {
+        bool near = false;
+        for (size_t j = 0; j < kept && !near; j++) {
+            float du = r->center[i].u - r->center[j].u, dv = r->center[i].v - r->center[j].v;
+            near = du * du + dv * dv < limit;
+        }
+        if (!near) r->center[kept++] = r->center[i];
+    }
+    r->n = kept;
+    qsort(r->center, r->n, sizeof *r->center, lower_v_first);
+}
+
+static void detect_slice(void *context, size_t i_slice, size_t i_thread)
+{
+    struct detect_job *job = context;
+    struct slice_result *r = &job->slice[i_slice];
+    float *image = job->scratch + i_thread * job->scratch_per_thread;
+    size_t n_pixel = job->width * job->height;
+    float *response = image + n_pixel;
+    if (!fill_image(job, i_slice, image)) return;
+    for (int s = 0; s < N_SCALE && r->failed == STATUS_OK; s++)
+        r->failed = vision_blob_response(image, job->width, job->height, job->sigma[s], response + (size_t)s * n_pixel,
+                                         &job->error[i_thread]);
+    if (r->failed != STATUS_OK) return;
+    if (!collect_peaks(job, i_slice, response, r))
+        r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    thin_out(job, r);
+}
+
+static status gather(struct detect_job *job, size_t n_slice, struct center_list *list, struct error *err)
+{
+    size_t total = 0;
+    for (size_t k = 0; k < n_slice; k++) total += job->slice[k].n;
+    list->first = calloc(n_slice + 1, sizeof *list->first);
+    list->center = malloc((total + 1) * sizeof *list->center);
+    if (list->first == NULL || list->center == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    list->n_slice = n_slice;
+    for (size_t k = 0; k < n_slice; k++) {
+        if (job->slice[k].n > 0)
+            memcpy(list->center + list->first[k], job->slice[k].center, job->slice[k].n * sizeof *list->center);
+        list->first[k + 1] = list->first[k] + job->slice[k].n;
+    }
+    return STATUS_OK;
+}
+
+status centers_detect(const struct volume *v, const struct direction_volume *d, const uint8_t *mask, int axis,
+                      double diameter_voxel, struct thread_pool *pool, const struct progress *progress,
+                      struct center_list *list, struct error *err)
+{
+    const size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]};
+    struct detect_job job = {.v = v, .d = d, .mask = mask, .axis = axis, .au = slice_axis_u(axis), .av = slice_axis_v(axis)};
+    size_t n_slice = v->n[axis], n_thread = thread_pool_n_thread(pool);
+    *list = (struct center_list){0};
+    status s = vision_init(err);
+    if (s != STATUS_OK) return s;
+    job.width = v->n[job.au];
+    job.height = v->n[job.av];
+    job.stride_u = stride[job.au];
+    job.stride_v = stride[job.av];
+    job.stride_slice = stride[axis];
+    for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
+    job.min_distance = MIN_SPACING * (float)diameter_voxel;
+    job.scratch_per_thread = job.width * job.height * (N_SCALE + 1);
+    job.scratch = malloc(n_thread * job.scratch_per_thread * sizeof *job.scratch);
+    job.slice = calloc(n_slice, sizeof *job.slice);
+    job.error = calloc(n_thread, sizeof *job.error);
+    if (job.scratch == NULL || job.slice == NULL || job.error == NULL)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    if (s == STATUS_OK) {
+        s = thread_pool_run(pool, n_slice, detect_slice, &job, progress);
+        if (s != STATUS_OK) error_set(err, s, "finding fiber centers was cancelled");
+        for (size_t t = 0; t < n_thread && s == STATUS_OK; t++)
+            if (job.error[t].code != STATUS_OK) {
+                s = job.error[t].code;
+                if (err != NULL) *err = job.error[t];
+            }
+    }
+    if (s == STATUS_OK) s = gather(&job, n_slice, list, err);
+    for (size_t k = 0; job.slice != NULL && k < n_slice; k++) free(job.slice[k].center);
+    free(job.scratch);
+    free(job.slice);
+    free(job.error);
+    if (s != STATUS_OK) center_list_release(list);
+    return s;
+}

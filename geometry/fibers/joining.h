@@ -1,0 +1,28 @@
+/* What the paper leaves undone: pieces of one fiber become one polyline.
+ *
+ * 1. Duplicates: a fiber near 45 degrees is seen in two subvolumes; where two lines run side by side within a quarter of a
+ *    diameter, the vertices of the shorter are removed.
+ * 2. Joins: two free ends become one line when each lies ahead of the other along its tangent, the tangents agree, the
+ *    way between them is short and lies in material. Best pairs first. A join within one subvolume is a bridged gap
+ *    (a center missed in some slices), one between two subvolumes a fiber that turned from one to the other.
+ */
+#ifndef SELVEDGE_GEOMETRY_JOINING_H
+#define SELVEDGE_GEOMETRY_JOINING_H
+
+#include "geometry/fibers/polyline.h"
+#include "geometry/volume/volume.h"
+
+struct join_counts {
+    size_t n_duplicate; /* vertices removed */
+    size_t n_gap_bridged, n_joined;
+};
+
+/* lines in, result (initialised, empty) out. eps_d: density that counts as material. min_vertex: pieces shorter than this after
+ * duplicates have gone are dropped before joining. STATUS_NO_MEMORY. */
+status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
+                                   size_t min_vertex, struct polyline_set *result, struct join_counts *counts,
+                                   struct error *err);
+status polylines_join(const struct polyline_set *lines, const struct volume *v, double diameter_voxel, double eps_d,
+                      struct polyline_set *result, struct join_counts *counts, struct error *err);
+
+#endif

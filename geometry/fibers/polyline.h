@@ -1,0 +1,39 @@
+/* Growing sets of polylines while fibers are being traced. Positions are in voxels of the cloth frame: the centre of voxel
+ * (i, j, k) is (i + 1/2, j + 1/2, k + 1/2). */
+#ifndef SELVEDGE_GEOMETRY_POLYLINE_H
+#define SELVEDGE_GEOMETRY_POLYLINE_H
+
+#include "base/status.h"
+
+#include <stdint.h>
+
+struct polyline_set {
+    size_t n_line, n_vertex, line_capacity, vertex_capacity;
+    size_t *first;      /* n_line + 1 */
+    float (*vertex)[3];
+    uint8_t *axis;      /* n_line: subvolume that the line was found in */
+};
+
+void polyline_set_init(struct polyline_set *p);
+void polyline_set_release(struct polyline_set *p);
+/* Start a line; vertices added from now on are its. STATUS_NO_MEMORY. */
+status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err);
+status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
+static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
+
+/* Every vertex filed by cell of a grid, for neighbour searches. */
+struct vertex_grid {
+    float cell;        /* edge, voxels */
+    size_t n[3];
+    size_t *first;     /* n cells + 1 */
+    uint32_t *vertex;  /* index into polyline_set.vertex */
+    uint32_t *line_of; /* of each vertex */
+};
+
+status vertex_grid_init(struct vertex_grid *g, const struct polyline_set *p, const size_t n_voxel[3], float cell,
+                        struct error *err);
+void vertex_grid_release(struct vertex_grid *g);
+/* Cells from[a]..to[a] (inclusive) that a ball of radius r about x touches. */
+void vertex_grid_range(const struct vertex_grid *g, const float x[3], float r, size_t from[3], size_t to[3]);
+
+#endif

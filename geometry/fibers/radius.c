@@ -1,0 +1,122 @@
+#include "geometry/fibers/radius.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING };
+
+struct radius_job {
+    const struct volume *v;
+    const struct segment_bricks *bricks;
+    float eps_d;
+    struct distance_histogram *histogram; /* per thread */
+    float *distance2;                     /* per thread: FINE^3 */
+    uint32_t *nearest;
+};
+
+/* Density between voxel centres, trilinear, edge values repeated. */
+static float density_between_centres(const struct volume *v, const float x[3])
+{
+    size_t i[3], j[3];
+    float f[3];
+    for (int a = 0; a < 3; a++) {
+        float c = fminf(fmaxf(x[a] - 0.5f, 0.0f), (float)(v->n[a] - 1));
+        i[a] = (size_t)c;
+        j[a] = i[a] + 1 < v->n[a] ? i[a] + 1 : i[a];
+        f[a] = c - (float)i[a];
+    }
+    const float *r00 = v->density + volume_index(v->n, 0, i[1], i[2]), *r10 = v->density + volume_index(v->n, 0, j[1], i[2]);
+    const float *r01 = v->density + volume_index(v->n, 0, i[1], j[2]), *r11 = v->density + volume_index(v->n, 0, j[1], j[2]);
+    float a0 = (1.0f - f[1]) * r00[i[0]] + f[1] * r10[i[0]], a1 = (1.0f - f[1]) * r00[j[0]] + f[1] * r10[j[0]];
+    float b0 = (1.0f - f[1]) * r01[i[0]] + f[1] * r11[i[0]], b1 = (1.0f - f[1]) * r01[j[0]] + f[1] * r11[j[0]];
+    return (1.0f - f[2]) * ((1.0f - f[0]) * a0 + f[0] * a1) + f[2] * ((1.0f - f[0]) * b0 + f[0] * b1);
+}
+
+static void measure_brick(void *context, size_t i_brick, size_t i_thread)
+{
+    struct radius_job *job = context;
+    struct distance_histogram *h = &job->histogram[i_thread];
+    float *distance2 = job->distance2 + i_thread * FINE * FINE * FINE;
+    uint32_t *nearest = job->nearest + i_thread * FINE * FINE * FINE;
+    struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, RADIUS_UPSAMPLING);
+    segment_distances(job->bricks, i_brick, &l, distance2, nearest);
+    float inverse_bin = (float)(1.0 / h->bin_voxel);
+    size_t at = 0;
+    for (size_t k = 0; k < l.n[2]; k++)
+        for (size_t j = 0; j < l.n[1]; j++)
+            for (size_t i = 0; i < l.n[0]; i++, at++) {
+                const float x[3] = {l.origin[0] + ((float)i + 0.5f) * l.spacing, l.origin[1] + ((float)j + 0.5f) * l.spacing,
+                                    l.origin[2] + ((float)k + 0.5f) * l.spacing};
+                float density = density_between_centres(job->v, x);
+                size_t bin = (size_t)(sqrtf(distance2[at]) * inverse_bin);
+                if (nearest[at] == UINT32_MAX || bin >= RADIUS_BINS) {
+                    h->inside_far += density >= job->eps_d;
+                    continue;
+                }
+                uint8_t axis = job->bricks->segment[nearest[at]].axis;
+                (density >= job->eps_d ? h->inside : h->outside)[axis][bin]++;
+                h->density_sum[axis][bin] += (uint64_t)(255.0f * density + 0.5f);
+            }
+}
+
+static void add_histogram(struct distance_histogram *to, const struct distance_histogram *from)
+{
+    for (int a = 0; a < 3; a++)
+        for (size_t b = 0; b < RADIUS_BINS; b++) {
+            to->inside[a][b] += from->inside[a][b];
+            to->outside[a][b] += from->outside[a][b];
+            to->density_sum[a][b] += from->density_sum[a][b];
+        }
+    to->inside_far += from->inside_far;
+}
+
+status distance_histogram_measure(const struct volume *v, const struct polyline_set *lines, double eps_d,
+                                  double farthest_voxel, struct thread_pool *pool, const struct progress *progress,
+                                  struct distance_histogram *h, struct error *err)
+{
+    struct segment_bricks bricks = {0};
+    size_t n_thread = thread_pool_n_thread(pool);
+    *h = (struct distance_histogram){.bin_voxel = farthest_voxel / RADIUS_BINS};
+    struct radius_job job = {.v = v, .bricks = &bricks, .eps_d = (float)eps_d};
+    status s = segment_bricks_init(&bricks, lines, v->n, BRICK, (float)farthest_voxel, err);
+    job.histogram = calloc(n_thread, sizeof *job.histogram);
+    job.distance2 = malloc(n_thread * FINE * FINE * FINE * sizeof *job.distance2);
+    job.nearest = malloc(n_thread * FINE * FINE * FINE * sizeof *job.nearest);
+    if (s == STATUS_OK && (job.histogram == NULL || job.distance2 == NULL || job.nearest == NULL))
+        s = error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
+    if (s == STATUS_OK) {
+        for (size_t t = 0; t < n_thread; t++) job.histogram[t].bin_voxel = h->bin_voxel;
+        s = thread_pool_run(pool, segment_n_brick(&bricks), measure_brick, &job, progress);
+        if (s != STATUS_OK) error_set(err, s, "measuring the fiber radius was cancelled");
+        for (size_t t = 0; t < n_thread; t++) add_histogram(h, &job.histogram[t]);
+    }
+    free(job.histogram);
+    free(job.distance2);
+    free(job.nearest);
+    segment_bricks_release(&bricks);
+    return s;
+}
+
+double radius_best_score(const struct distance_histogram *h, unsigned classes, double *score, double *dice)
+{
+    double total = 0.0, in = 0.0, out = 0.0, best = -INFINITY, best_r = 0.0;
+    *score = *dice = 0.0;
+    for (unsigned a = 0; a < 3; a++)
+        for (size_t b = 0; (classes >> a & 1) != 0 && b < RADIUS_BINS; b++) total += (double)h->inside[a][b];
+    if (!(total > 0.0)) return 0.0;
+    for (size_t b = 0; b < RADIUS_BINS; b++) {
+        for (unsigned a = 0; a < 3; a++) {
+            if ((classes >> a & 1) == 0) continue;
+            in += (double)h->inside[a][b];
+            out += (double)h->outside[a][b];
+        }
+        double r = (double)(b + 1) * h->bin_voxel, s = in - (out + (total - in));
+        if (r < 0.25 || s <= best) continue;
+        best = s;
+        best_r = r;
+        *score = s / total;
+        *dice = 2.0 * in / (in + out + total);
+    }
+    return best_r;
+}

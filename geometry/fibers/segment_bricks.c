@@ -1,0 +1,185 @@
+#include "geometry/fibers/segment_bricks.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+void segment_bricks_release(struct segment_bricks *s)
+{
+    if (s == NULL) return;
+    free(s->segment);
+    free(s->first);
+    free(s->index);
+    *s = (struct segment_bricks){0};
+}
+
+static void brick_range(const struct segment_bricks *s, const struct segment *g, size_t from[3], size_t to[3])
+{
+    for (int a = 0; a < 3; a++) {
+        float lo = (fminf(g->a[a], g->b[a]) - s->reach) / (float)s->edge;
+        float hi = (fmaxf(g->a[a], g->b[a]) + s->reach) / (float)s->edge, last = (float)(s->n_brick[a] - 1);
+        from[a] = (size_t)fminf(fmaxf(floorf(lo), 0.0f), last);
+        to[a] = (size_t)fminf(fmaxf(floorf(hi), 0.0f), last);
+    }
+}
+
+/* Counting pass and filling pass of a compressed row list. */
+static void file_segments(struct segment_bricks *s, bool fill)
+{
+    for (size_t i = 0; i < s->n_segment; i++) {
+        size_t from[3], to[3], b[3];
+        brick_range(s, &s->segment[i], from, to);
+        for (b[2] = from[2]; b[2] <= to[2]; b[2]++)
+            for (b[1] = from[1]; b[1] <= to[1]; b[1]++)
+                for (b[0] = from[0]; b[0] <= to[0]; b[0]++) {
+                    size_t brick = (b[2] * s->n_brick[1] + b[1]) * s->n_brick[0] + b[0];
+                    if (fill)
+                        s->index[s->first[brick + 1]++] = (uint32_t)i;
+                    else
+                        s->first[brick + 2]++;
+                }
+    }
+}
+
+static status file_all(struct segment_bricks *s, struct error *err)
+{
+    size_t n = segment_n_brick(s);
+    s->first = calloc(n + 2, sizeof *s->first);
+    if (s->first == NULL) goto no_memory;
+    file_segments(s, false);
+    for (size_t b = 2; b <= n + 1; b++) s->first[b] += s->first[b - 1];
+    s->index = malloc((s->first[n + 1] + 1) * sizeof *s->index);
+    if (s->index == NULL) goto no_memory;
+    file_segments(s, true);
+    return STATUS_OK;
+no_memory:
+    segment_bricks_release(s);
+    return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+}
+
+static status start(struct segment_bricks *s, size_t n_segment, const size_t n_voxel[3], size_t edge, float reach,
+                    struct error *err)
+{
+    *s = (struct segment_bricks){.edge = edge, .reach = reach};
+    memcpy(s->n_voxel, n_voxel, sizeof s->n_voxel);
+    for (int a = 0; a < 3; a++) s->n_brick[a] = (n_voxel[a] + edge - 1) / edge;
+    s->segment = malloc((n_segment + 1) * sizeof *s->segment);
+    if (s->segment == NULL || n_segment >= UINT32_MAX)
+        return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+    return STATUS_OK;
+}
+
+status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3], size_t edge,
+                           float reach, struct error *err)
+{
+    status st = start(s, lines->n_vertex, n_voxel, edge, reach, err);
+    if (st != STATUS_OK) return st;
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++) {
+            struct segment *g = &s->segment[s->n_segment++];
+            memcpy(g->a, lines->vertex[i], sizeof g->a);
+            memcpy(g->b, lines->vertex[i + 1], sizeof g->b);
+            g->line = (uint32_t)l;
+            g->axis = lines->axis[l];
+        }
+    return file_all(s, err);
+}
+
+status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],
+                                  const double voxel_size_m[3], size_t edge, float reach, struct error *err)
+{
+    status st = start(s, f->n_vertex, n_voxel, edge, reach, err);
+    if (st != STATUS_OK) return st;
+    for (size_t l = 0; l < f->n_fiber; l++)
+        for (size_t i = f->first_vertex[l]; i + 1 < f->first_vertex[l + 1]; i++) {
+            struct segment *g = &s->segment[s->n_segment++];
+            for (size_t a = 0; a < 3; a++) {
+                g->a[a] = (float)((double)f->position_m[3 * i + a] / voxel_size_m[a]);
+                g->b[a] = (float)((double)f->position_m[3 * i + 3 + a] / voxel_size_m[a]);
+            }
+            g->line = (uint32_t)l;
+            g->axis = f->axis_class[l];
+        }
+    return file_all(s, err);
+}
+
+void segment_brick_box(const struct segment_bricks *s, size_t i_brick, size_t from[3], size_t n[3])
+{
+    size_t b[3] = {i_brick % s->n_brick[0], i_brick / s->n_brick[0] % s->n_brick[1],
+                   i_brick / (s->n_brick[0] * s->n_brick[1])};
+    for (int a = 0; a < 3; a++) {
+        from[a] = b[a] * s->edge;
+        n[a] = from[a] + s->edge <= s->n_voxel[a] ? s->edge : s->n_voxel[a] - from[a];
+    }
+}
+
+struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_t i_brick, size_t factor)
+{
+    struct point_lattice l = {.spacing = 1.0f / (float)factor};
+    size_t from[3], n[3];
+    segment_brick_box(s, i_brick, from, n);
+    for (int a = 0; a < 3; a++) {
+        l.origin[a] = (float)from[a];
+        l.n[a] = n[a] * factor;
+    }
+    return l;
+}
+
+/* Points of the lattice within reach of the segment, along each axis. False when there are none. */
+static bool lattice_range(const struct point_lattice *l, const struct segment *g, float reach, size_t from[3], size_t to[3])
+{
+    for (int a = 0; a < 3; a++) {
+        float lo = (fminf(g->a[a], g->b[a]) - reach - l->origin[a]) / l->spacing - 0.5f;
+        float hi = (fmaxf(g->a[a], g->b[a]) + reach - l->origin[a]) / l->spacing - 0.5f;
+        if (hi < 0.0f || lo > (float)(l->n[a] - 1)) return false;
+        from[a] = lo <= 0.0f ? 0 : (size_t)ceilf(lo);
+        to[a] = hi >= (float)(l->n[a] - 1) ? l->n[a] - 1 : (size_t)hi;
+        if (from[a] > to[a]) return false;
+    }
+    return true;
+}
+
+static void stamp_row(const struct segment *g, const float u[3], float inverse2, float x0, float spacing, float y, float z,
+                      size_t n, uint32_t id, float *restrict distance2, uint32_t *restrict nearest)
+{
+    float py = y - g->a[1], pz = z - g->a[2], fixed = py * u[1] + pz * u[2];
+    if (nearest == NULL) {
+        for (size_t i = 0; i < n; i++) {
+            float px = x0 + (float)(int)i * spacing - g->a[0];
+            float t = fminf(1.0f, fmaxf(0.0f, (px * u[0] + fixed) * inverse2));
+            float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2], d2 = dx * dx + dy * dy + dz * dz;
+            distance2[i] = fminf(distance2[i], d2);
+        }
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        float px = x0 + (float)(int)i * spacing - g->a[0];
+        float t = fminf(1.0f, fmaxf(0.0f, (px * u[0] + fixed) * inverse2));
+        float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2], d2 = dx * dx + dy * dy + dz * dz;
+        nearest[i] = d2 < distance2[i] ? id : nearest[i];
+        distance2[i] = fminf(distance2[i], d2);
+    }
+}
+
+void segment_distances(const struct segment_bricks *s, size_t i_brick, const struct point_lattice *l, float *distance2,
+                       uint32_t *nearest)
+{
+    size_t n_point = l->n[0] * l->n[1] * l->n[2];
+    for (size_t i = 0; i < n_point; i++) distance2[i] = s->reach * s->reach;
+    for (size_t i = 0; nearest != NULL && i < n_point; i++) nearest[i] = UINT32_MAX;
+    for (size_t e = s->first[i_brick]; e < s->first[i_brick + 1]; e++) {
+        const struct segment *g = &s->segment[s->index[e]];
+        size_t from[3], to[3];
+        if (!lattice_range(l, g, s->reach, from, to)) continue;
+        float u[3] = {g->b[0] - g->a[0], g->b[1] - g->a[1], g->b[2] - g->a[2]};
+        float length2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], inverse2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+        for (size_t k = from[2]; k <= to[2]; k++)
+            for (size_t j = from[1]; j <= to[1]; j++) {
+                size_t row = (k * l->n[1] + j) * l->n[0] + from[0];
+                stamp_row(g, u, inverse2, l->origin[0] + ((float)from[0] + 0.5f) * l->spacing, l->spacing,
+                          l->origin[1] + ((float)j + 0.5f) * l->spacing, l->origin[2] + ((float)k + 0.5f) * l->spacing,
+                          to[0] - from[0] + 1, s->index[e], distance2 + row, nearest == NULL ? NULL : nearest + row);
+            }
+    }
+}

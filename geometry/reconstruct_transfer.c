@@ -1,0 +1,108 @@
+/* Step "directions": voxels near a fiber take its direction (fabric thesis, 5.6.7), and the share of material explained. */
+#include "geometry/reconstruct.h"
+
+#include "geometry/fibers/segment_bricks.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { BRICK = 32 };
+
+struct transfer_job {
+    const struct segment_bricks *bricks;
+    const struct fiber_set *fibers;
+    struct direction_volume *d;
+    float *distance2; /* per thread: BRICK^3 */
+    uint32_t *nearest;
+    struct brick_sum {
+        double angle_deg;
+        size_t n_changed, n_both, n_fiber, n_kept;
+    } *sum; /* per brick */
+};
+
+static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size_t at, float distance2, uint32_t nearest)
+{
+    bool kept = job->d->density[at] > 0;
+    sum->n_kept += kept;
+    if (nearest == UINT32_MAX) return;
+    const struct segment *g = &job->bricks->segment[nearest];
+    float r = (float)((double)job->fibers->radius_m[g->line] / job->d->voxel_size_m[0]);
+    if (distance2 <= r * r) {
+        sum->n_fiber++;
+        sum->n_both += kept;
+    }
+    if (!kept || distance2 > 4.0f * r * r) return;
+    float t[3], d[3], norm = 0.0f, cosine = 0.0f;
+    for (int a = 0; a < 3; a++) {
+        t[a] = g->b[a] - g->a[a];
+        norm += t[a] * t[a];
+    }
+    if (!(norm > 0.0f)) return;
+    direction_volume_get(job->d, at, d);
+    for (int a = 0; a < 3; a++) {
+        t[a] /= sqrtf(norm);
+        cosine += t[a] * d[a];
+    }
+    sum->angle_deg += acos(fmin(1.0, fabs((double)cosine))) * 180.0 / M_PI;
+    sum->n_changed++;
+    direction_volume_set(job->d, at, t);
+}
+
+static void transfer_brick(void *context, size_t i_brick, size_t i_thread)
+{
+    struct transfer_job *job = context;
+    float *distance2 = job->distance2 + i_thread * BRICK * BRICK * BRICK;
+    uint32_t *nearest = job->nearest + i_thread * BRICK * BRICK * BRICK;
+    struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, 1);
+    size_t from[3], n[3], p = 0;
+    segment_brick_box(job->bricks, i_brick, from, n);
+    segment_distances(job->bricks, i_brick, &l, distance2, nearest);
+    for (size_t k = 0; k < n[2]; k++)
+        for (size_t j = 0; j < n[1]; j++)
+            for (size_t i = 0; i < n[0]; i++, p++)
+                transfer_voxel(job, &job->sum[i_brick], volume_index(job->d->n, from[0] + i, from[1] + j, from[2] + k),
+                               distance2[p], nearest[p]);
+}
+
+static void reduce(const struct transfer_job *job, size_t n_brick, struct reconstruct_report *report)
+{
+    struct brick_sum all = {0};
+    for (size_t b = 0; b < n_brick; b++) {
+        all.angle_deg += job->sum[b].angle_deg;
+        all.n_changed += job->sum[b].n_changed;
+        all.n_both += job->sum[b].n_both;
+        all.n_fiber += job->sum[b].n_fiber;
+        all.n_kept += job->sum[b].n_kept;
+    }
+    report->dice = all.n_fiber + all.n_kept > 0 ? 2.0 * (double)all.n_both / (double)(all.n_fiber + all.n_kept) : 0.0;
+    report->direction_change_mean_deg = all.n_changed > 0 ? all.angle_deg / (double)all.n_changed : 0.0;
+}
+
+status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
+                            const struct progress *progress, struct reconstruct_report *report, struct error *err)
+{
+    struct segment_bricks bricks = {0};
+    size_t n_thread = thread_pool_n_thread(pool);
+    float r_max = 0.0f;
+    for (size_t i = 0; i < f->n_fiber; i++) r_max = fmaxf(r_max, f->radius_m[i]);
+    float reach = (float)(2.0 * (double)r_max / d->voxel_size_m[0]);
+    status s = segment_bricks_from_fibers(&bricks, f, d->n, d->voxel_size_m, BRICK, reach, err);
+    if (s != STATUS_OK) return s;
+    size_t n_brick = segment_n_brick(&bricks);
+    struct transfer_job job = {.bricks = &bricks, .fibers = f, .d = d};
+    job.distance2 = malloc(n_thread * BRICK * BRICK * BRICK * sizeof *job.distance2);
+    job.nearest = malloc(n_thread * BRICK * BRICK * BRICK * sizeof *job.nearest);
+    job.sum = calloc(n_brick, sizeof *job.sum);
+    if (job.distance2 == NULL || job.nearest == NULL || job.sum == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot transfer directions: out of memory");
+    } else {
+        s = thread_pool_run(pool, n_brick, transfer_brick, &job, progress);
+        if (s != STATUS_OK) error_set(err, s, "transferring directions was cancelled");
+    }
+    if (s == STATUS_OK) reduce(&job, n_brick, report);
+    free(job.distance2);
+    free(job.nearest);
+    free(job.sum);
+    segment_bricks_release(&bricks);
+    return s;
+}
