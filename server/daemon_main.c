@@ -1,0 +1,203 @@
+/* selvedged: HTTP, the database of jobs, and supervision of workers. It never parses volumes or pictures and computes nothing. */
+#include "base/durable.h"
+#include "server/http/http_server.h"
+#include "server/http/static_files.h"
+#include "server/jobs/job_paths.h"
+#include "server/jobs/supervisor.h"
+#include "server/version.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <getopt.h>
+#include <signal.h>
+#include <sodium.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const char usage[] =
+    "usage: selvedged [options]\n"
+    "  --config FILE     settings (see config/selvedge.conf)\n"
+    "  --data DIR        folder of the database and of all jobs\n"
+    "  --port N          TCP port; 0 picks a free one\n"
+    "  --listen ADDRESS  a loopback address (default 127.0.0.1)\n"
+    "  --worker PATH     the worker program (default: selvedge-worker beside this program)\n"
+    "  --web DIR         the dashboard's folder\n"
+    "  --set KEY=VALUE   any setting, for example --set jobs.workers=2\n"
+    "  --print-config    print every setting with its default and an explanation\n"
+    "  --version, --help\n";
+
+static const struct {
+    const char *option, *key;
+} option_key[] = {{"data", "server.data"}, {"port", "server.port"}, {"listen", "server.listen"}, {"worker", "jobs.worker"}, {"web", "server.web"}};
+
+static status set_pair(struct settings *s, const char *pair, struct error *err)
+{
+    char key[128];
+    const char *equal = strchr(pair, '=');
+    if (equal == NULL || (size_t)(equal - pair) >= sizeof key) return error_set(err, STATUS_INVALID, "--set wants KEY=VALUE, not '%.100s'", pair);
+    snprintf(key, sizeof key, "%.*s", (int)(equal - pair), pair);
+    return settings_set(s, key, equal + 1, err);
+}
+
+/* Returns -1 to go on, or the exit code. The file is read first, whatever the order of the options. */
+static int read_options(int argc, char **argv, struct settings *s, struct error *err)
+{
+    static const struct option option[] = {{"config", 1, NULL, 'c'}, {"data", 1, NULL, 0},   {"port", 1, NULL, 1},       {"listen", 1, NULL, 2}, {"worker", 1, NULL, 3},
+                                           {"web", 1, NULL, 4},      {"set", 1, NULL, 's'}, {"print-config", 0, NULL, 'p'}, {"version", 0, NULL, 'v'}, {"help", 0, NULL, 'h'},
+                                           {NULL, 0, NULL, 0}};
+    for (int pass = 0; pass < 2; pass++) {
+        optind = 1;
+        for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
+            status r = STATUS_OK;
+            if (c == '?') return 2;
+            if (c == 'h') return printf("%s", usage) < 0;
+            if (c == 'v') return printf("selvedged %s\n", SELVEDGE_VERSION) < 0;
+            if (c == 'p') return settings_print(stdout), 0;
+            if (c == 'c' && pass == 0) r = settings_read_file(s, optarg, err);
+            if (c == 's' && pass == 1) r = set_pair(s, optarg, err);
+            if (c < 5 && pass == 1) r = settings_set(s, option_key[c].key, optarg, err);
+            if (r != STATUS_OK) return 2;
+        }
+        if (optind < argc) {
+            error_set(err, STATUS_INVALID, "unexpected argument '%s'", argv[optind]);
+            return 2;
+        }
+    }
+    return -1;
+}
+
+/* The worker beside this program, unless the settings name one. */
+static void worker_path(const struct settings *s, char out[PATH_BYTES])
+{
+    char program[PATH_BYTES];
+    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    program[n > 0 ? n : 0] = '\0';
+    char *slash = strrchr(program, '/');
+    if (slash != NULL) *slash = '\0';
+    if (s->worker[0] != '\0') snprintf(out, PATH_BYTES, "%s", s->worker);
+    else path_join(out, program, "selvedge-worker", NULL);
+}
+
+static status lock_data(const struct settings *s, int *fd, struct error *err)
+{
+    char path[PATH_BYTES];
+    status r = durable_make_folder(s->data, err);
+    if (r != STATUS_OK) return r;
+    path_join(path, s->data, "lock", NULL);
+    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (*fd < 0) return error_set_errno(err, "cannot open '%s'", path);
+    if (flock(*fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
+    return error_set(err, STATUS_CONFLICT, "cannot use data folder '%s': another selvedged has it", s->data);
+}
+
+/* Paths given on the command line must not depend on the folder that a worker runs in. */
+static status make_absolute(char path[SETTING_TEXT_BYTES], struct error *err)
+{
+    char full[PATH_BYTES];
+    if (path[0] == '\0' || path[0] == '/') return STATUS_OK;
+    if (getcwd(full, sizeof full) == NULL) return error_set_errno(err, "cannot find the present folder");
+    if (strlen(full) + strlen(path) + 2 > SETTING_TEXT_BYTES) return error_set(err, STATUS_INVALID, "path '%.200s' is too long", path);
+    size_t n = strlen(full);
+    snprintf(full + n, sizeof full - n, "/%s", path);
+    snprintf(path, SETTING_TEXT_BYTES, "%.*s", SETTING_TEXT_BYTES - 1, full);
+    return STATUS_OK;
+}
+
+static void raise_descriptor_limit(const struct settings *s)
+{
+    struct rlimit now;
+    rlim_t want = (rlim_t)s->max_connections * 2 + 256;
+    if (getrlimit(RLIMIT_NOFILE, &now) != 0 || now.rlim_cur >= want) return;
+    now.rlim_cur = now.rlim_max < want ? now.rlim_max : want;
+    setrlimit(RLIMIT_NOFILE, &now);
+}
+
+/* For clients on this machine: {"url","pid"}. */
+static status announce(const struct settings *s, unsigned port, struct log *log, struct error *err)
+{
+    char path[PATH_BYTES], text[256], url[160];
+    bool v6 = strchr(s->listen, ':') != NULL;
+    snprintf(url, sizeof url, "http://%s%.100s%s:%u", v6 ? "[" : "", s->listen, v6 ? "]" : "", port);
+    int n = snprintf(text, sizeof text, "{\"url\":\"%s\",\"pid\":%d}\n", url, (int)getpid());
+    path_join(path, s->data, "daemon.json", NULL);
+    status r = durable_replace_volatile(path, text, (size_t)n, err);
+    log_info(log, "selvedged %s listens on %s", SELVEDGE_VERSION, url);
+    printf("selvedged listens on %s\n", url);
+    fflush(stdout);
+    return r;
+}
+
+static void wait_for_signal(const sigset_t *signals, struct http_server *server, struct log *log)
+{
+    for (;;) {
+        struct timespec second = {1, 0};
+        int got = sigtimedwait(signals, NULL, &second);
+        http_server_reap(server);
+        if (got <= 0) continue;
+        log_info(log, "stopping: %s", strsignal(got));
+        return;
+    }
+}
+
+static status serve(struct settings *s, struct log *log, const sigset_t *signals, struct error *err)
+{
+    struct job_service *service = NULL;
+    struct supervisor *supervisor = NULL;
+    struct static_files *files = NULL;
+    struct http_server *server = NULL;
+    char worker[PATH_BYTES];
+    unsigned port = 0;
+    worker_path(s, worker);
+    status r = static_files_new(s->web, s->openapi, log, &files, err);
+    if (r == STATUS_OK) r = job_service_open(s, log, &service, err);
+    if (r != STATUS_OK) goto out;
+    r = supervisor_start(service, worker, &supervisor, err);
+    if (r == STATUS_OK) r = http_server_start(service, files, &server, &port, err);
+    if (r == STATUS_OK) r = announce(s, port, log, err);
+    if (r == STATUS_OK) wait_for_signal(signals, server, log);
+    if (service != NULL) atomic_store(&service->stopping, true);
+out:
+    http_server_stop(server); /* first: its threads wake the supervisor */
+    supervisor_stop(supervisor);
+    job_service_close(service);
+    static_files_free(files);
+    return r;
+}
+
+int main(int argc, char **argv)
+{
+    struct settings settings;
+    struct error err = {0};
+    struct log *log = NULL;
+    int lock_fd = -1;
+    sigset_t signals;
+    settings_init(&settings);
+    int code = read_options(argc, argv, &settings, &err);
+    if (code >= 0) {
+        if (code != 0) fprintf(stderr, "error: %s\n%s", err.text[0] ? err.text : "wrong options", usage);
+        return code;
+    }
+    umask(077);
+    signal(SIGPIPE, SIG_IGN);
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGHUP);
+    pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread: all of them inherit it */
+    raise_descriptor_limit(&settings);
+    status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
+    if (r == STATUS_OK) r = make_absolute(settings.data, &err);
+    if (r == STATUS_OK) r = make_absolute(settings.worker, &err);
+    if (r == STATUS_OK) r = lock_data(&settings, &lock_fd, &err);
+    if (r == STATUS_OK) r = log_open(NULL, stderr, LOG_LEVEL_INFO, &log, &err);
+    if (r == STATUS_OK) r = serve(&settings, log, &signals, &err);
+    if (r != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
+    log_close(log);
+    if (lock_fd >= 0) close(lock_fd);
+    return r == STATUS_OK ? 0 : 1;
+}

@@ -1,0 +1,136 @@
+#include "server/http/connection_table.h"
+#include "base/clock.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+
+enum { RATE_GRACE_S = 10 };
+static const char too_slow_body[] = "{\"type\":\"urn:selvedge:problem:too_slow\",\"title\":\"The request came too slowly\",\"status\":408,"
+                                    "\"code\":\"too_slow\",\"detail\":\"the head or the body of the request came too slowly\"}";
+
+enum phase { PHASE_HEAD, PHASE_BODY, PHASE_REPLY };
+
+struct connection_entry {
+    struct connection_entry *next, *before;
+    int fd;
+    enum phase phase;
+    double since_s;
+    bool served; /* a request was answered on it: a 408 could be taken for the answer to the next */
+    bool ended;
+    atomic_uint_least64_t n_received; /* of the present body */
+};
+
+struct connection_table {
+    pthread_mutex_t lock;
+    struct connection_entry *first;
+    size_t n;
+    double header_deadline_s;
+    double min_rate_bytes_per_s;
+};
+
+status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **out, struct error *err)
+{
+    struct connection_table *t = calloc(1, sizeof *t);
+    if (t == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the table of connections: out of memory");
+    pthread_mutex_init(&t->lock, NULL);
+    t->header_deadline_s = header_deadline_s;
+    t->min_rate_bytes_per_s = (double)min_rate_bytes_per_s;
+    *out = t;
+    return STATUS_OK;
+}
+
+void connection_table_free(struct connection_table *t)
+{
+    if (t == NULL) return;
+    pthread_mutex_destroy(&t->lock);
+    free(t);
+}
+
+size_t connection_table_count(struct connection_table *t)
+{
+    pthread_mutex_lock(&t->lock);
+    size_t n = t->n;
+    pthread_mutex_unlock(&t->lock);
+    return n;
+}
+
+struct connection_entry *connection_opened(struct connection_table *t, int fd)
+{
+    struct connection_entry *e = calloc(1, sizeof *e);
+    if (e == NULL) return NULL;
+    e->fd = fd;
+    e->since_s = clock_monotonic_s();
+    pthread_mutex_lock(&t->lock);
+    e->next = t->first;
+    if (e->next != NULL) e->next->before = e;
+    t->first = e;
+    t->n++;
+    pthread_mutex_unlock(&t->lock);
+    return e;
+}
+
+/* The library calls this before it closes the socket, so under the lock the descriptor is still that connection's. */
+void connection_closed(struct connection_table *t, struct connection_entry *e)
+{
+    if (e == NULL) return;
+    pthread_mutex_lock(&t->lock);
+    if (e->before != NULL) e->before->next = e->next;
+    else t->first = e->next;
+    if (e->next != NULL) e->next->before = e->before;
+    t->n--;
+    pthread_mutex_unlock(&t->lock);
+    free(e);
+}
+
+static void enter(struct connection_table *t, struct connection_entry *e, enum phase phase)
+{
+    if (e == NULL) return;
+    pthread_mutex_lock(&t->lock);
+    e->phase = phase;
+    e->since_s = clock_monotonic_s();
+    if (phase == PHASE_BODY) atomic_store(&e->n_received, 0);
+    if (phase == PHASE_REPLY) e->served = true;
+    pthread_mutex_unlock(&t->lock);
+}
+
+void connection_body_begins(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_BODY); }
+void connection_replying(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_REPLY); }
+void connection_idle(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_HEAD); }
+
+void connection_received(struct connection_entry *e, size_t n_bytes)
+{
+    if (e != NULL) atomic_fetch_add(&e->n_received, n_bytes);
+}
+
+static bool too_slow(const struct connection_table *t, const struct connection_entry *e, double now)
+{
+    double age_s = now - e->since_s;
+    /* between requests a connection may rest three times as long: it is the client's pool */
+    if (e->phase == PHASE_HEAD) return age_s > t->header_deadline_s * (e->served ? 3 : 1);
+    if (e->phase == PHASE_BODY) return age_s > RATE_GRACE_S && (double)atomic_load(&e->n_received) < t->min_rate_bytes_per_s * age_s;
+    return false;
+}
+
+void connection_table_reap(struct connection_table *t)
+{
+    char answer[512];
+    int n_answer = snprintf(answer, sizeof answer,
+                            "HTTP/1.1 408 Request Timeout\r\nContent-Type: application/problem+json\r\nConnection: close\r\nContent-Length: %zu\r\n\r\n%s",
+                            sizeof too_slow_body - 1, too_slow_body);
+    double now = clock_monotonic_s();
+    pthread_mutex_lock(&t->lock);
+    for (struct connection_entry *e = t->first; e != NULL; e = e->next) {
+        if (e->ended || !too_slow(t, e, now)) continue;
+        e->ended = true;
+        if (e->phase == PHASE_BODY || !e->served) {
+            ssize_t n = send(e->fd, answer, (size_t)n_answer, MSG_DONTWAIT | MSG_NOSIGNAL);
+            (void)n; /* whether it arrives is the client's business */
+        }
+        shutdown(e->fd, SHUT_RDWR);
+    }
+    pthread_mutex_unlock(&t->lock);
+}

@@ -1,0 +1,181 @@
+#include "server/http/handlers.h"
+#include "server/http/http_reply.h"
+#include "server/jobs/job_view.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LIST_MOST = 500, LIST_USUAL = 50 };
+
+static void reply_job(struct http_request *r, const char *id, unsigned status_code, bool created, bool replayed)
+{
+    struct job_row row;
+    struct error err = {0};
+    json_t *view = NULL;
+    char tag[40], location[80];
+    status s = job_get(r->service, id, &row, &err);
+    if (s == STATUS_OK) s = job_view(r->service, &row, true, &view, &err);
+    if (s != STATUS_OK) {
+        reply_problem(r, NULL, &err, NULL);
+        job_row_release(&row);
+        return;
+    }
+    json_tag(view, tag);
+    if (status_code == 0 && tag_matches(request_header(r, "If-None-Match"), tag)) {
+        reply_empty(r, MHD_HTTP_NOT_MODIFIED);
+        json_decref(view);
+    } else {
+        json_object_set_new(view, "heartbeat_age_s", job_view_heartbeat_age(r->service, &row));
+        reply_json(r, status_code == 0 ? MHD_HTTP_OK : status_code, view);
+    }
+    reply_header(r, "ETag", tag);
+    snprintf(location, sizeof location, "/v1/jobs/%s", row.id);
+    if (created) reply_header(r, "Location", location);
+    if (replayed) reply_header(r, "Idempotent-Replay", "true");
+    job_row_release(&row);
+}
+
+static void reply_refusal(struct http_request *r, const struct job_refusal *refusal, const struct error *err)
+{
+    json_t *extra = refusal->missing_files == NULL ? NULL : json_pack("{s:o}", "missing_files", refusal->missing_files);
+    reply_problem(r, refusal->code, err, extra);
+}
+
+/* 400 when the body is not JSON at all: what the document's own check would call invalid is another matter. */
+static bool body_is_json(struct http_request *r)
+{
+    json_error_t where;
+    json_t *j = json_loadb(r->body, r->n_body, JSON_REJECT_DUPLICATES, &where);
+    if (j != NULL) {
+        json_decref(j);
+        return true;
+    }
+    char text[256];
+    snprintf(text, sizeof text, "the body is not JSON: line %d, column %d: %s", where.line, where.column, where.text);
+    reply_code(r, "malformed", "", text);
+    return false;
+}
+
+void handle_create_job(struct http_request *r)
+{
+    char id[STORE_ID_BYTES];
+    bool replayed;
+    struct job_refusal refusal = {0};
+    struct error err = {0};
+    const char *key = request_header(r, "Idempotency-Key");
+    size_t n_key = key == NULL ? 1 : strlen(key);
+    for (size_t i = 0; key != NULL && i < n_key; i++)
+        if (key[i] < 33 || key[i] > 126) n_key = 0;
+    if (n_key < 1 || n_key > 128) {
+        error_set_field(&err, STATUS_INVALID, "Idempotency-Key", "the key has to have 1 to 128 printable characters");
+        reply_problem(r, NULL, &err, NULL);
+        return;
+    }
+    if (!body_is_json(r)) return;
+    if (job_create(r->service, r->body, r->n_body, key, id, &replayed, &refusal, &err) != STATUS_OK) reply_refusal(r, &refusal, &err);
+    else reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
+}
+
+void handle_get_job(struct http_request *r) { reply_job(r, r->param[0], 0, false, false); }
+
+void handle_put_document(struct http_request *r)
+{
+    struct error err = {0};
+    struct job_row row;
+    json_t *view = NULL;
+    char tag[40];
+    const char *wanted = request_header(r, "If-Match");
+    if (!body_is_json(r)) return;
+    status s = job_get(r->service, r->param[0], &row, &err);
+    if (s == STATUS_OK) s = job_view(r->service, &row, true, &view, &err);
+    if (s == STATUS_OK) json_tag(view, tag);
+    json_decref(view);
+    job_row_release(&row);
+    if (s == STATUS_OK && wanted != NULL && !tag_matches(wanted, tag)) {
+        reply_code(r, "precondition", "If-Match", "the job has changed since: get it again");
+        return;
+    }
+    if (s == STATUS_OK) s = job_replace_document(r->service, r->param[0], r->body, r->n_body, &err);
+    if (s != STATUS_OK) reply_problem(r, NULL, &err, NULL);
+    else reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
+}
+
+void handle_delete_job(struct http_request *r)
+{
+    struct error err = {0};
+    if (job_delete(r->service, r->param[0], &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
+    else reply_empty(r, MHD_HTTP_NO_CONTENT);
+}
+
+void handle_start_job(struct http_request *r)
+{
+    bool changed;
+    struct job_refusal refusal = {0};
+    struct error err = {0};
+    if (job_start(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK) reply_refusal(r, &refusal, &err);
+    else reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
+}
+
+void handle_retry_job(struct http_request *r)
+{
+    bool changed;
+    struct job_refusal refusal = {0};
+    struct error err = {0};
+    if (job_retry(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK) reply_refusal(r, &refusal, &err);
+    else reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
+}
+
+void handle_cancel_job(struct http_request *r)
+{
+    bool running;
+    struct error err = {0};
+    if (job_cancel(r->service, r->param[0], &running, &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
+    else reply_job(r, r->param[0], running ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
+}
+
+static bool read_query(struct http_request *r, struct job_query *q)
+{
+    long long limit, cursor;
+    enum job_state state;
+    const char *text = MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, "state");
+    *q = (struct job_query){.state = -1};
+    if (text != NULL && !job_state_parse(text, &state)) {
+        struct error err = {0};
+        error_set_field(&err, STATUS_INVALID, "state", "there is no state '%.40s'", text);
+        reply_problem(r, NULL, &err, NULL);
+        return false;
+    }
+    if (text != NULL) q->state = (int)state;
+    if (!query_integer(r, "limit", 1, LIST_MOST, LIST_USUAL, &limit) || !query_integer(r, "cursor", 1, INT64_MAX, 0, &cursor)) return false;
+    q->limit = (size_t)limit + 1; /* one more: is there another page? */
+    q->before_serial = cursor;
+    return true;
+}
+
+void handle_list_jobs(struct http_request *r)
+{
+    struct job_query q;
+    struct job_row *row = NULL;
+    size_t n = 0;
+    struct error err = {0};
+    char cursor[32] = "";
+    if (!read_query(r, &q)) return;
+    json_t *list = json_array();
+    status s = store_job_list(r->service->store, &q, &row, &n, &err);
+    for (size_t i = 0; s == STATUS_OK && i < n && i + 1 < q.limit; i++) {
+        json_t *view = NULL;
+        s = job_view(r->service, &row[i], false, &view, &err);
+        if (s != STATUS_OK) break;
+        json_array_append_new(list, view);
+        if (i + 2 == q.limit && n == q.limit) snprintf(cursor, sizeof cursor, "%lld", (long long)row[i].serial);
+    }
+    job_rows_free(row, n);
+    if (s != STATUS_OK) {
+        json_decref(list);
+        reply_problem(r, NULL, &err, NULL);
+        return;
+    }
+    reply_json_tagged(r, json_pack("{s:o,s:o}", "jobs", list, "next_cursor", cursor[0] ? json_string(cursor) : json_null()));
+}

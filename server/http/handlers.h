@@ -1,0 +1,43 @@
+/* The endpoints of http_route.c. Each decides exactly one reply. */
+#ifndef SELVEDGE_SERVER_HANDLERS_H
+#define SELVEDGE_SERVER_HANDLERS_H
+
+#include "server/http/http_server.h"
+
+/* handle_jobs.c */
+void handle_list_jobs(struct http_request *r);
+void handle_create_job(struct http_request *r);
+void handle_get_job(struct http_request *r);
+void handle_delete_job(struct http_request *r);
+void handle_put_document(struct http_request *r);
+void handle_start_job(struct http_request *r);
+void handle_cancel_job(struct http_request *r);
+void handle_retry_job(struct http_request *r);
+/* handle_files.c */
+void handle_list_files(struct http_request *r);
+void handle_declare_file(struct http_request *r);
+void handle_get_file(struct http_request *r);
+void handle_delete_file(struct http_request *r);
+/* handle_uploads.c */
+void handle_upload_offset(struct http_request *r);
+void handle_upload_begin(struct http_request *r);
+void handle_upload_end(struct http_request *r);
+void handle_upload_delete(struct http_request *r);
+void handle_upload_options(struct http_request *r);
+/* The connection broke: keep what has arrived. */
+void handle_upload_abandoned(struct http_request *r);
+/* handle_results.c */
+void handle_series(struct http_request *r);
+void handle_log(struct http_request *r);
+void handle_list_results(struct http_request *r);
+void handle_get_result(struct http_request *r);
+void handle_archive(struct http_request *r);
+/* handle_service.c */
+void handle_about(struct http_request *r);
+void handle_openapi(struct http_request *r);
+void handle_livez(struct http_request *r);
+void handle_readyz(struct http_request *r);
+void handle_metrics(struct http_request *r);
+void handle_static(struct http_request *r);
+
+#endif

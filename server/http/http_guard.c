@@ -1,0 +1,105 @@
+#include "server/http/http_guard.h"
+#include "server/http/http_reply.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const single[] = {"Content-Length", "Host", "Transfer-Encoding", "Content-Type", "Upload-Offset", "Tus-Resumable",
+                                     "Idempotency-Key", "Origin", "If-Match", "Range"};
+enum { N_SINGLE = sizeof single / sizeof single[0] };
+
+static enum MHD_Result count_header(void *context, enum MHD_ValueKind kind, const char *name, const char *value)
+{
+    unsigned *n = context;
+    (void)kind;
+    (void)value;
+    for (size_t i = 0; i < N_SINGLE; i++)
+        if (strcasecmp(name, single[i]) == 0) n[i]++;
+    return MHD_YES;
+}
+
+bool guard_framing(struct http_request *r)
+{
+    unsigned n[N_SINGLE] = {0};
+    MHD_get_connection_values(r->connection, MHD_HEADER_KIND, count_header, n);
+    if (n[0] > 0 && n[2] > 0) {
+        reply_code(r, "length_and_chunked", "Content-Length", "Content-Length and Transfer-Encoding together leave the end of the body open");
+        return false;
+    }
+    for (size_t i = 0; i < N_SINGLE; i++)
+        if (n[i] > 1) {
+            reply_code(r, "duplicate_header", single[i], "this header may appear once");
+            return false;
+        }
+    if (n[2] > 0) {
+        reply_code(r, "length_required", "Transfer-Encoding", "chunked requests are not taken: send a Content-Length");
+        return false;
+    }
+    const char *text = request_header(r, "Content-Length");
+    r->content_length = 0;
+    if (text == NULL) return true;
+    size_t digits = strspn(text, "0123456789");
+    if (digits == 0 || digits > 18 || text[digits] != '\0') {
+        reply_code(r, "malformed", "Content-Length", "Content-Length is not a number");
+        return false;
+    }
+    r->content_length = strtoll(text, NULL, 10);
+    return true;
+}
+
+/* host, with or without ":port" */
+static bool host_is_local(const char *host, const char *listen)
+{
+    const char *const known[] = {"localhost", "127.0.0.1", "[::1]", listen};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        size_t n = strlen(known[i]);
+        if (strncasecmp(host, known[i], n) != 0) continue;
+        const char *port = host + n;
+        if (*port == '\0') return true;
+        if (*port == ':' && strspn(port + 1, "0123456789") == strlen(port + 1)) return true;
+    }
+    return false;
+}
+
+bool guard_site(struct http_request *r, const char *method)
+{
+    const char *host = request_header(r, "Host"), *origin = request_header(r, "Origin");
+    if (host != NULL && !host_is_local(host, r->service->settings->listen)) {
+        reply_code(r, "host", "Host", "this service answers to localhost, 127.0.0.1 and [::1] only");
+        return false;
+    }
+    bool reads = strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0;
+    if (reads || origin == NULL) return true;
+    if (host != NULL && strncmp(origin, "http://", 7) == 0 && strcasecmp(origin + 7, host) == 0) return true;
+    reply_code(r, "origin", "Origin", "a page of another site may not change anything here");
+    return false;
+}
+
+/* "application/json", also with parameters. */
+static bool type_is(const char *header, const char *want)
+{
+    size_t n = strlen(want);
+    return header != NULL && strncasecmp(header, want, n) == 0 && (header[n] == '\0' || header[n] == ';' || header[n] == ' ');
+}
+
+static void too_large(struct http_request *r, long long most)
+{
+    struct error err = {0};
+    error_set_field(&err, STATUS_TOO_LARGE, "Content-Length", "the body has %lld bytes, at most %lld are taken at once", (long long)r->content_length, most);
+    reply_problem(r, NULL, &err, json_pack("{s:I}", "max_bytes", (json_int_t)most));
+}
+
+bool guard_body(struct http_request *r)
+{
+    if (r->route->body == HTTP_BODY_NONE) return true;
+    const struct settings *s = r->service->settings;
+    bool json = r->route->body == HTTP_BODY_JSON;
+    long long most = json ? s->max_document_bytes : s->max_patch_bytes;
+    if (request_header(r, "Content-Length") == NULL) reply_code(r, "length_required", "Content-Length", "a body with a Content-Length is required");
+    else if (!type_is(request_header(r, "Content-Type"), json ? "application/json" : "application/offset+octet-stream"))
+        reply_code(r, "content_type", "Content-Type", json ? "Content-Type has to be application/json" : "Content-Type has to be application/offset+octet-stream");
+    else if (r->content_length > most) too_large(r, most);
+    return r->reply == NULL;
+}

@@ -1,0 +1,71 @@
+#include "server/http/handlers.h"
+
+#include <stdio.h>
+#include <string.h>
+
+const struct http_route http_route_table[] = {
+    {"GET", "/v1/jobs", HTTP_BODY_NONE, handle_list_jobs, NULL},
+    {"POST", "/v1/jobs", HTTP_BODY_JSON, handle_create_job, NULL},
+    {"GET", "/v1/jobs/{id}", HTTP_BODY_NONE, handle_get_job, NULL},
+    {"DELETE", "/v1/jobs/{id}", HTTP_BODY_NONE, handle_delete_job, NULL},
+    {"PUT", "/v1/jobs/{id}/document", HTTP_BODY_JSON, handle_put_document, NULL},
+    {"POST", "/v1/jobs/{id}/start", HTTP_BODY_NONE, handle_start_job, NULL},
+    {"POST", "/v1/jobs/{id}/cancel", HTTP_BODY_NONE, handle_cancel_job, NULL},
+    {"POST", "/v1/jobs/{id}/retry", HTTP_BODY_NONE, handle_retry_job, NULL},
+    {"GET", "/v1/jobs/{id}/files", HTTP_BODY_NONE, handle_list_files, NULL},
+    {"POST", "/v1/jobs/{id}/files", HTTP_BODY_JSON, handle_declare_file, NULL},
+    {"GET", "/v1/jobs/{id}/files/{name}", HTTP_BODY_NONE, handle_get_file, NULL},
+    {"DELETE", "/v1/jobs/{id}/files/{name}", HTTP_BODY_NONE, handle_delete_file, NULL},
+    {"HEAD", "/v1/uploads/{upload}", HTTP_BODY_NONE, handle_upload_offset, NULL},
+    {"PATCH", "/v1/uploads/{upload}", HTTP_BODY_UPLOAD, handle_upload_end, handle_upload_begin},
+    {"DELETE", "/v1/uploads/{upload}", HTTP_BODY_NONE, handle_upload_delete, NULL},
+    {"OPTIONS", "/v1/uploads/{upload}", HTTP_BODY_NONE, handle_upload_options, NULL},
+    {"GET", "/v1/jobs/{id}/series", HTTP_BODY_NONE, handle_series, NULL},
+    {"GET", "/v1/jobs/{id}/log", HTTP_BODY_NONE, handle_log, NULL},
+    {"GET", "/v1/jobs/{id}/results", HTTP_BODY_NONE, handle_list_results, NULL},
+    {"GET", "/v1/jobs/{id}/results.tar", HTTP_BODY_NONE, handle_archive, NULL},
+    {"GET", "/v1/jobs/{id}/results/{path...}", HTTP_BODY_NONE, handle_get_result, NULL},
+    {"GET", "/v1/about", HTTP_BODY_NONE, handle_about, NULL},
+    {"GET", "/v1/openapi.json", HTTP_BODY_NONE, handle_openapi, NULL},
+    {"GET", "/livez", HTTP_BODY_NONE, handle_livez, NULL},
+    {"GET", "/readyz", HTTP_BODY_NONE, handle_readyz, NULL},
+    {"GET", "/metrics", HTTP_BODY_NONE, handle_metrics, NULL},
+    {"GET", "/", HTTP_BODY_NONE, handle_static, NULL},
+    {"GET", "/{path...}", HTTP_BODY_NONE, handle_static, NULL},
+};
+const size_t http_n_route = sizeof http_route_table / sizeof http_route_table[0];
+
+static bool match(const char *pattern, const char *url, char param[2][HTTP_PARAM_BYTES])
+{
+    size_t i_param = 0;
+    while (*pattern != '\0') {
+        if (*pattern != '{') {
+            if (*pattern++ != *url++) return false;
+            continue;
+        }
+        const char *end = strchr(pattern, '}');
+        bool rest = strncmp(end - 3, "...", 3) == 0;
+        size_t n = rest ? strlen(url) : strcspn(url, "/");
+        if (n == 0 || n >= HTTP_PARAM_BYTES || i_param == 2) return false;
+        memcpy(param[i_param], url, n);
+        param[i_param++][n] = '\0';
+        url += n;
+        pattern = end + 1;
+    }
+    return *url == '\0';
+}
+
+const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES], char *allow, size_t n_allow)
+{
+    size_t n = 0;
+    allow[0] = '\0';
+    bool head = strcmp(method, "HEAD") == 0;
+    for (size_t i = 0; i < http_n_route; i++) {
+        const struct http_route *r = &http_route_table[i];
+        if (r->handle == handle_static && strncmp(url, "/v1/", 4) == 0) continue;
+        if (!match(r->path, url, param)) continue;
+        if (strcmp(r->method, method) == 0 || (head && strcmp(r->method, "GET") == 0)) return r;
+        if (n < n_allow) n += (size_t)snprintf(allow + n, n_allow - n, "%s%s", n > 0 ? ", " : "", r->method);
+    }
+    return NULL;
+}

@@ -1,0 +1,258 @@
+#include "server/http/http_server.h"
+#include "server/http/connection_table.h"
+#include "server/http/handlers.h"
+#include "server/http/http_guard.h"
+#include "server/http/http_reply.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { CONNECTION_POOL_BYTES = 256 * 1024, DRAIN_LIMIT_BYTES = 64 << 20, LISTEN_BACKLOG = 1024 };
+
+struct http_server {
+    struct job_service *service;
+    const struct static_files *files;
+    struct MHD_Daemon *daemon;
+    struct connection_table *connection;
+    atomic_uint_least64_t n_reply[HTTP_MAX_STATUS];
+};
+
+const struct static_files *http_server_files(const struct http_server *s) { return s->files; }
+size_t http_server_n_connection(const struct http_server *s) { return connection_table_count(s->connection); }
+uint64_t http_server_n_reply(const struct http_server *s, unsigned status_code)
+{
+    return status_code < HTTP_MAX_STATUS ? atomic_load(&s->n_reply[status_code]) : 0;
+}
+
+void http_server_reap(struct http_server *s) { connection_table_reap(s->connection); }
+
+static enum MHD_Result queue_reply(struct http_request *r)
+{
+    if (r->reply == NULL) reply_code(r, "internal", "", "no answer was made");
+    if (r->reply == NULL) return MHD_NO; /* out of memory: the connection is closed */
+    connection_replying(r->server->connection, r->entry);
+    r->queued = true;
+    if (r->reply_status < HTTP_MAX_STATUS) atomic_fetch_add(&r->server->n_reply[r->reply_status], 1);
+    return MHD_queue_response(r->connection, r->reply_status, r->reply);
+}
+
+/* Decides what can be decided before the body. Returns true when the body must not be waited for. */
+static bool examine(struct http_request *r, const char *method)
+{
+    char allow[128];
+    bool framing_bad = !guard_framing(r);
+    if (framing_bad) return true;
+    bool skip_body = request_header(r, "Expect") != NULL || r->content_length > DRAIN_LIMIT_BYTES;
+    if (atomic_load(&r->service->stopping)) {
+        reply_code(r, "stopping", "", "the service is stopping: try again in a moment");
+        return skip_body;
+    }
+    if (!guard_site(r, method)) return skip_body;
+    r->route = http_route_find(method, r->url, r->param, allow, sizeof allow);
+    if (r->route == NULL && allow[0] == '\0') reply_code(r, "not_found", "", "there is nothing at this address");
+    else if (r->route == NULL) {
+        reply_code(r, "method", "", "this address takes other methods: see Allow");
+        reply_header(r, "Allow", allow);
+    } else if (guard_body(r) && r->route->begin != NULL) r->route->begin(r);
+    return r->reply != NULL && skip_body;
+}
+
+static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *c, const char *url, const char *method, void **context)
+{
+    struct http_request *r = calloc(1, sizeof *r);
+    if (r == NULL) return MHD_NO;
+    *context = r;
+    r->server = s;
+    r->service = s->service;
+    r->connection = c;
+    r->url = url;
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    r->entry = info == NULL ? NULL : info->socket_context;
+    connection_body_begins(s->connection, r->entry);
+    bool now = examine(r, method);
+    if (r->reply == NULL && r->route != NULL && r->route->body == HTTP_BODY_JSON) {
+        r->body = malloc((size_t)r->content_length + 1);
+        if (r->body == NULL) return MHD_NO;
+        r->body[0] = '\0';
+    }
+    if (!now) return MHD_YES;
+    reply_header(r, "Connection", "close");
+    return queue_reply(r);
+}
+
+/* false: the connection has to be closed */
+static bool consume(struct http_request *r, const char *data, size_t n)
+{
+    connection_received(r->entry, n);
+    if (r->reply != NULL) return true; /* decided already: swallowed */
+    if (r->upload != NULL) {
+        if (r->upload_status == STATUS_OK) r->upload_status = upload_write(r->upload, r->ticket, data, n, &r->upload_error);
+        return r->upload_status != STATUS_STALE;
+    }
+    if (r->body == NULL) return true;
+    if (n > (size_t)r->content_length - r->n_body) return false;
+    memcpy(r->body + r->n_body, data, n);
+    r->n_body += n;
+    r->body[r->n_body] = '\0';
+    return true;
+}
+
+static enum MHD_Result on_request(void *context, struct MHD_Connection *c, const char *url, const char *method, const char *version, const char *data,
+                                  size_t *n_data, void **request)
+{
+    struct http_request *r = *request;
+    (void)version;
+    if (r == NULL) return first_call(context, c, url, method, request);
+    if (*n_data > 0) {
+        bool go_on = consume(r, data, *n_data);
+        *n_data = 0;
+        return go_on ? MHD_YES : MHD_NO;
+    }
+    if (r->queued) return MHD_YES;
+    connection_replying(r->server->connection, r->entry);
+    if (r->reply == NULL) r->route->handle(r);
+    return queue_reply(r);
+}
+
+static void on_completed(void *context, struct MHD_Connection *c, void **request, enum MHD_RequestTerminationCode why)
+{
+    struct http_server *s = context;
+    struct http_request *r = *request;
+    (void)c;
+    (void)why;
+    if (r == NULL) return;
+    if (r->upload != NULL) handle_upload_abandoned(r);
+    if (r->reply != NULL) MHD_destroy_response(r->reply);
+    connection_idle(s->connection, r->entry);
+    free(r->body);
+    free(r);
+    *request = NULL;
+}
+
+static void on_connection(void *context, struct MHD_Connection *c, void **socket_context, enum MHD_ConnectionNotificationCode code)
+{
+    struct http_server *s = context;
+    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_CONNECTION_FD);
+        *socket_context = info == NULL ? NULL : connection_opened(s->connection, info->connect_fd);
+    } else {
+        connection_closed(s->connection, *socket_context);
+        *socket_context = NULL;
+    }
+}
+
+static int hex_value(char c)
+{
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+}
+
+/* Like the library's, but %00 stays as it is: a name must not end where the client did not end it. */
+static size_t unescape(void *context, struct MHD_Connection *c, char *text)
+{
+    (void)context;
+    (void)c;
+    char *out = text;
+    for (const char *in = text; *in != '\0'; out++) {
+        int high = *in == '%' ? hex_value(in[1]) : -1, low = high >= 0 ? hex_value(in[2]) : -1;
+        if (low >= 0 && high + low > 0) {
+            *out = (char)(high * 16 + low);
+            in += 3;
+        } else *out = *in++;
+    }
+    *out = '\0';
+    return (size_t)(out - text);
+}
+
+static void on_library_log(void *context, const char *format, va_list args) __attribute__((format(printf, 2, 0)));
+static void on_library_log(void *context, const char *format, va_list args)
+{
+    struct http_server *s = context;
+    char text[512];
+    vsnprintf(text, sizeof text, format, args);
+    log_write(s->service->log, LOG_LEVEL_DEBUG, "http: %s", text);
+}
+
+/* The library found itself in an impossible state: say so and end; the jobs' state is on disk. */
+static void on_panic(void *context, const char *file, unsigned line, const char *reason)
+{
+    log_error(context, "http library gave up at %s:%u: %s", file, line, reason == NULL ? "" : reason);
+    abort();
+}
+
+static status open_socket(const struct settings *settings, int *out, unsigned *port, struct error *err)
+{
+    struct sockaddr_storage address = {0};
+    struct sockaddr_in *v4 = (struct sockaddr_in *)(void *)&address;
+    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)(void *)&address;
+    socklen_t n = sizeof *v4;
+    bool loopback;
+    if (inet_pton(AF_INET, settings->listen, &v4->sin_addr) == 1) {
+        address.ss_family = AF_INET;
+        v4->sin_port = htons((uint16_t)settings->port);
+        loopback = (ntohl(v4->sin_addr.s_addr) >> 24) == 127;
+    } else if (inet_pton(AF_INET6, settings->listen, &v6->sin6_addr) == 1) {
+        address.ss_family = AF_INET6;
+        v6->sin6_port = htons((uint16_t)settings->port);
+        n = sizeof *v6;
+        loopback = IN6_IS_ADDR_LOOPBACK(&v6->sin6_addr);
+    } else return error_set_field(err, STATUS_INVALID, "server.listen", "cannot listen on '%s': not an IP address", settings->listen);
+    if (!loopback)
+        return error_set_field(err, STATUS_INVALID, "server.listen",
+                               "cannot listen on '%s': without access tokens only loopback addresses (127.0.0.1, ::1) are allowed; "
+                               "use an SSH tunnel or an authenticating proxy on this machine",
+                               settings->listen);
+    int on = 1, fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (fd < 0) return error_set_errno(err, "cannot open a socket");
+    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (bind(fd, (struct sockaddr *)&address, n) != 0 || listen(fd, LISTEN_BACKLOG) != 0 || getsockname(fd, (struct sockaddr *)&address, &n) != 0) {
+        status s = error_set_errno(err, "cannot listen on '%s', port %lld", settings->listen, (long long)settings->port);
+        close(fd);
+        return s;
+    }
+    *port = address.ss_family == AF_INET ? ntohs(v4->sin_port) : ntohs(v6->sin6_port);
+    *out = fd;
+    return STATUS_OK;
+}
+
+status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **out, unsigned *port, struct error *err)
+{
+    const struct settings *settings = service->settings;
+    int fd = -1;
+    struct http_server *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the server: out of memory");
+    s->service = service;
+    s->files = files;
+    status result = connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s, &s->connection, err);
+    if (result == STATUS_OK) result = open_socket(settings, &fd, port, err);
+    if (result != STATUS_OK) goto out;
+    MHD_set_panic_func(on_panic, service->log);
+    s->daemon = MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC, 0, NULL, NULL, on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s,
+        MHD_OPTION_LISTEN_SOCKET, fd, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)settings->threads, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)settings->max_connections, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s, MHD_OPTION_NOTIFY_CONNECTION, on_connection, s,
+        MHD_OPTION_UNESCAPE_CALLBACK, unescape, s, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    if (s->daemon == NULL) {
+        close(fd);
+        result = error_set_errno(err, "cannot start the HTTP server");
+    }
+out:
+    if (result != STATUS_OK) http_server_stop(s);
+    else *out = s;
+    return result;
+}
+
+void http_server_stop(struct http_server *s)
+{
+    if (s == NULL) return;
+    if (s->daemon != NULL) MHD_stop_daemon(s->daemon);
+    connection_table_free(s->connection);
+    free(s);
+}

@@ -1,0 +1,237 @@
+#include "server/jobs/attempt.h"
+#include "base/clock.h"
+#include "base/durable.h"
+#include "optimizer/job_folder.h"
+#include "server/jobs/job_paths.h"
+
+#include <math.h>
+#include <signal.h>
+#include <sodium.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { STATUS_FILE_LIMIT_BYTES = 1 << 20, CONSOLE_LIMIT_BYTES = 1 << 24 };
+
+json_t *attempt_read_status(const struct job_service *v, const char *job_id)
+{
+    char path[PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    path_join(path, v->settings->data, "jobs", job_id, JOB_FILE_STATUS, NULL);
+    if (file_read_all(path, STATUS_FILE_LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return NULL;
+    json_t *j = json_loadb(text, n, JSON_REJECT_DUPLICATES, NULL);
+    free(text);
+    if (json_is_object(j)) return j;
+    json_decref(j);
+    return NULL;
+}
+
+/* Results and checkpoints of the input as it was before an edit. */
+static status clear_folder(struct job_service *v, const char *job_id, struct error *err)
+{
+    static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES, JOB_FILE_LOG, JOB_FOLDER_WORK, JOB_FOLDER_RESULTS};
+    char path[PATH_BYTES];
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < sizeof stale / sizeof stale[0]; i++) {
+        path_join(path, v->settings->data, "jobs", job_id, stale[i], NULL);
+        s = path_remove_tree(path, err);
+    }
+    return s;
+}
+
+static status write_folder(struct job_service *v, const struct job_row *row, struct error *err)
+{
+    char path[PATH_BYTES], text[160];
+    path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_DOCUMENT, NULL);
+    status s = durable_replace(path, row->document, strlen(row->document), err);
+    if (s != STATUS_OK) return s;
+    int n = snprintf(text, sizeof text, "{\"attempt\":%lld,\"token\":\"%s\"}\n", (long long)row->attempt, row->token);
+    path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_ATTEMPT, NULL);
+    return durable_replace(path, text, (size_t)n, err);
+}
+
+static status prepare_locked(struct job_service *v, struct job_row *row, struct error *err)
+{
+    status s = STATUS_OK;
+    if (row->state != JOB_QUEUED) return error_set(err, STATUS_CONFLICT, "job %s is not queued any more", row->id);
+    if (row->dirty) s = clear_folder(v, row->id, err);
+    if (s != STATUS_OK) return s;
+    if (row->dirty || row->generation == 0) row->generation++;
+    row->dirty = false;
+    row->attempt++;
+    unsigned char random[16];
+    randombytes_buf(random, sizeof random);
+    sodium_bin2hex(row->token, sizeof row->token, random, sizeof random);
+    s = write_folder(v, row, err);
+    if (s != STATUS_OK) return s;
+    row->state = JOB_RUNNING;
+    if (row->started_unix_s <= 0) row->started_unix_s = clock_wall_s();
+    return store_job_update(v->store, row, err);
+}
+
+status attempt_prepare(struct job_service *v, const char *job_id, struct error *err)
+{
+    struct job_row row;
+    pthread_mutex_lock(&v->change);
+    status s = job_get(v, job_id, &row, err);
+    if (s == STATUS_NOT_FOUND) s = STATUS_CONFLICT;
+    if (s == STATUS_OK) s = prepare_locked(v, &row, err);
+    pthread_mutex_unlock(&v->change);
+    if (s == STATUS_OK) atomic_fetch_add(&v->n_attempt_total, 1);
+    job_row_release(&row);
+    return s;
+}
+
+void attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish)
+{
+    struct job_row row;
+    *wish = (struct attempt_wish){.heartbeat_age_s = INFINITY};
+    if (store_job_get(v->store, job_id, &row, NULL) != STATUS_OK) return;
+    wish->cancel = row.cancel_requested;
+    wish->deleted = row.deleted;
+    json_t *j = attempt_read_status(v, job_id);
+    if (json_integer_value(json_object_get(j, "attempt")) == row.attempt)
+        wish->heartbeat_age_s = clock_wall_s() - json_number_value(json_object_get(j, "heartbeat_unix_s"));
+    json_decref(j);
+    job_row_release(&row);
+}
+
+static void set_error(struct job_row *row, const char *code, const char *field, const char *text)
+{
+    snprintf(row->error_code, sizeof row->error_code, "%s", code);
+    snprintf(row->error_field, sizeof row->error_field, "%s", field);
+    snprintf(row->error_text, sizeof row->error_text, "%s", text);
+}
+
+/* The last words of a worker that died without saying why in status.json. */
+static void console_tail(struct job_service *v, const char *job_id, char *out, size_t n_out)
+{
+    char path[PATH_BYTES], *text = NULL;
+    size_t n = 0, keep = n_out - 1;
+    out[0] = '\0';
+    path_join(path, v->settings->data, "jobs", job_id, "console.txt", NULL);
+    if (file_read_all(path, CONSOLE_LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return;
+    while (n > 0 && (text[n - 1] == '\n' || text[n - 1] == ' ')) n--;
+    const char *from = n > keep ? text + n - keep : text;
+    snprintf(out, n_out, "%.*s", (int)(n > keep ? keep : n), from);
+    for (char *c = out; *c != '\0'; c++)
+        if ((unsigned char)*c < 32 || (unsigned char)*c > 126) *c = ' ';
+    free(text);
+}
+
+static void failed(struct job_service *v, struct job_row *row)
+{
+    json_t *j = attempt_read_status(v, row->id);
+    json_t *e = json_object_get(j, "error");
+    const char *code = json_string_value(json_object_get(e, "code")), *field = json_string_value(json_object_get(e, "field"));
+    const char *text = json_string_value(json_object_get(e, "text"));
+    char tail[400], made[640];
+    row->state = JOB_FAILED;
+    if (text != NULL && json_integer_value(json_object_get(j, "attempt")) == row->attempt)
+        set_error(row, code == NULL ? "internal" : code, field == NULL ? "" : field, text);
+    else {
+        console_tail(v, row->id, tail, sizeof tail);
+        snprintf(made, sizeof made, "the worker failed without saying why%s%s", tail[0] ? "; its last words: " : "", tail);
+        set_error(row, "internal", "", made);
+    }
+    json_decref(j);
+}
+
+static void describe_end(struct job_service *v, const struct job_row *row, const struct worker_end *end, enum attempt_stop stop, char *out, size_t n_out)
+{
+    char tail[300], how[120];
+    console_tail(v, row->id, tail, sizeof tail);
+    if (stop == STOP_SILENT) snprintf(how, sizeof how, "the worker gave no sign of life and was killed");
+    else if (end->by_signal && end->code == SIGKILL) snprintf(how, sizeof how, "the worker was killed (signal 9): out of memory or killed");
+    else if (end->by_signal) snprintf(how, sizeof how, "the worker crashed with signal %d (%s)", end->code, strsignal(end->code));
+    else if (end->code == 127) snprintf(how, sizeof how, "the worker could not be started");
+    else snprintf(how, sizeof how, "the worker ended with the unknown code %d", end->code);
+    snprintf(out, n_out, "%s; peak memory %.1f MB%s%s", how, (double)end->peak_rss_bytes / 1e6, tail[0] ? "; its last words: " : "", tail);
+}
+
+static void lost(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop, struct attempt_verdict *verdict)
+{
+    char how[512], text[640];
+    describe_end(v, row, end, stop, how, sizeof how);
+    row->lost_attempts++;
+    atomic_fetch_add(&v->n_lost_total, 1);
+    log_warning(v->log, "job %s: attempt %lld was lost: %s", row->id, (long long)row->attempt, how);
+    if (row->lost_attempts >= v->settings->max_lost_attempts) {
+        row->state = JOB_FAILED;
+        snprintf(text, sizeof text, "%lld attempts were lost, the last one so: %s", (long long)row->lost_attempts, how);
+        set_error(row, "worker_lost", "", text);
+        return;
+    }
+    row->state = JOB_QUEUED;
+    verdict->delay_s = 0.5 * (double)row->lost_attempts;
+}
+
+static void judge(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop, struct attempt_verdict *verdict)
+{
+    bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
+    if (!end->by_signal && end->code == WORKER_SUCCEEDED) row->state = JOB_SUCCEEDED;
+    else if (!end->by_signal && end->code == WORKER_FAILED) failed(v, row);
+    else if (asked || row->cancel_requested)
+        row->state = stop == STOP_PAUSE && !row->cancel_requested      ? JOB_PAUSED
+                     : stop == STOP_SHUTDOWN && !row->cancel_requested ? JOB_QUEUED
+                                                                       : JOB_CANCELLED;
+    else if (!end->by_signal && end->code == WORKER_USAGE) failed(v, row);
+    else if (!end->by_signal && end->code == WORKER_STALE) {
+        row->state = JOB_QUEUED;
+        verdict->busy = true;
+        verdict->delay_s = 1;
+    } else lost(v, row, end, stop, verdict);
+}
+
+status attempt_settle(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
+                      struct attempt_verdict *verdict, struct error *err)
+{
+    struct job_row row;
+    pthread_mutex_lock(&v->change);
+    status s = store_job_get(v->store, job_id, &row, err);
+    if (s != STATUS_OK) goto out;
+    judge(v, &row, end, stop, verdict);
+    if (end->peak_rss_bytes > row.peak_rss_bytes) row.peak_rss_bytes = end->peak_rss_bytes;
+    bool over = row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED;
+    if (over) row.finished_unix_s = clock_wall_s();
+    if (over) row.cancel_requested = false;
+    s = store_job_update(v->store, &row, err);
+    if (s == STATUS_OK && over) atomic_fetch_add(&v->n_finished_total[row.state], 1);
+    if (s == STATUS_OK) log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "", row.error_text);
+out:
+    pthread_mutex_unlock(&v->change);
+    job_row_release(&row);
+    return s == STATUS_NOT_FOUND ? STATUS_OK : s;
+}
+
+status attempt_give_up(struct job_service *v, const char *job_id, const char *why, struct error *err)
+{
+    struct job_row row;
+    pthread_mutex_lock(&v->change);
+    status s = job_get(v, job_id, &row, err);
+    if (s == STATUS_OK && row.state == JOB_QUEUED) {
+        row.state = JOB_FAILED;
+        row.finished_unix_s = clock_wall_s();
+        set_error(&row, "conflict", "", why);
+        s = store_job_update(v->store, &row, err);
+    }
+    pthread_mutex_unlock(&v->change);
+    job_row_release(&row);
+    return s;
+}
+
+void attempt_resume_paused(struct job_service *v)
+{
+    struct job_row *row = NULL;
+    size_t n = 0;
+    struct job_query q = {.state = JOB_PAUSED, .limit = 1000};
+    pthread_mutex_lock(&v->change);
+    if (store_job_list(v->store, &q, &row, &n, NULL) == STATUS_OK)
+        for (size_t i = 0; i < n; i++) {
+            row[i].state = JOB_QUEUED;
+            store_job_update(v->store, &row[i], NULL);
+        }
+    pthread_mutex_unlock(&v->change);
+    job_rows_free(row, n);
+}

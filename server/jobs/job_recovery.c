@@ -1,0 +1,163 @@
+/* Opening and closing the service: what a stopped or killed daemon left behind is brought into a known state. */
+#include "base/clock.h"
+#include "base/durable.h"
+#include "optimizer/job_folder.h"
+#include "server/jobs/job_paths.h"
+#include "server/jobs/job_service.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+/* An entry of jobs/ that the database does not know is kept, but out of the way. */
+static status quarantine(struct job_service *v, const char *name, struct error *err)
+{
+    char from[PATH_BYTES], to[PATH_BYTES], label[400];
+    snprintf(label, sizeof label, "%s-%.0f", name, clock_wall_s());
+    path_join(from, v->settings->data, "jobs", name, NULL);
+    path_join(to, v->settings->data, "quarantine", label, NULL);
+    if (rename(from, to) != 0) return error_set_errno(err, "cannot move unknown '%s' to quarantine", from);
+    log_warning(v->log, "'jobs/%s' belongs to no job: moved to 'quarantine/%s'", name, label);
+    return STATUS_OK;
+}
+
+static status sweep_unknown(struct job_service *v, struct error *err)
+{
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", NULL);
+    DIR *d = opendir(path);
+    if (d == NULL) return error_set_errno(err, "cannot list '%s'", path);
+    status s = STATUS_OK;
+    for (struct dirent *e; s == STATUS_OK && (e = readdir(d)) != NULL;) {
+        if (strcmp(e->d_name, ".") == 0 || strcmp(e->d_name, "..") == 0) continue;
+        struct job_row row = {0};
+        struct error why = {0};
+        status found = id_valid(e->d_name) ? store_job_get(v->store, e->d_name, &row, &why) : STATUS_NOT_FOUND;
+        if (found == STATUS_NOT_FOUND) s = quarantine(v, e->d_name, err);
+        else if (found != STATUS_OK) s = error_set(err, found, "%s", why.text);
+        job_row_release(&row);
+    }
+    closedir(d);
+    return s;
+}
+
+/* Tombstones whose folder is still there. */
+static status bury(struct job_service *v, struct error *err)
+{
+    struct job_row *row = NULL;
+    size_t n = 0;
+    struct job_query q = {.state = -1, .deleted = true, .limit = SIZE_MAX >> 1};
+    status s = store_job_list(v->store, &q, &row, &n, err);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        char path[PATH_BYTES];
+        path_join(path, v->settings->data, "jobs", row[i].id, NULL);
+        s = path_remove_tree(path, err);
+        if (s == STATUS_OK) s = store_job_erase(v->store, row[i].id, err);
+    }
+    job_rows_free(row, n);
+    return s;
+}
+
+/* Workers die with the daemon, so a job that the database calls running has none. */
+static status requeue(struct job_service *v, struct error *err)
+{
+    struct job_row *row = NULL;
+    size_t n = 0;
+    struct job_query q = {.state = JOB_RUNNING, .limit = SIZE_MAX >> 1};
+    status s = store_job_list(v->store, &q, &row, &n, err);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        row[i].state = row[i].cancel_requested ? JOB_CANCELLED : JOB_QUEUED;
+        if (row[i].cancel_requested) row[i].finished_unix_s = clock_wall_s();
+        row[i].cancel_requested = false;
+        s = store_job_update(v->store, &row[i], err);
+        if (s == STATUS_OK) log_info(v->log, "job %s was running when the daemon stopped: %s", row[i].id, job_state_name(row[i].state));
+    }
+    job_rows_free(row, n);
+    return s;
+}
+
+/* Removes bytes of uploads that have no row any more. */
+static void sweep_parts(struct job_service *v, const char *job_id)
+{
+    char path[PATH_BYTES], part[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", job_id, "upload", NULL);
+    DIR *d = opendir(path);
+    if (d == NULL) return;
+    for (struct dirent *e; (e = readdir(d)) != NULL;) {
+        struct file_row row;
+        if (!id_valid(e->d_name) || store_file_get(v->store, e->d_name, &row, NULL) != STATUS_NOT_FOUND) continue;
+        path_join(part, path, e->d_name, NULL);
+        remove(part);
+    }
+    closedir(d);
+}
+
+/* Every job has its folders; a job whose folder is gone keeps its row and says so. */
+static status restore_folders(struct job_service *v, struct error *err)
+{
+    struct job_row *row = NULL;
+    size_t n = 0;
+    struct job_query q = {.state = -1, .limit = SIZE_MAX >> 1};
+    status s = store_job_list(v->store, &q, &row, &n, err);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
+        for (size_t k = 0; s == STATUS_OK && k < 2; k++) {
+            char path[PATH_BYTES];
+            path_join(path, v->settings->data, "jobs", row[i].id, part[k], NULL);
+            s = durable_make_folder(path, err);
+        }
+        sweep_parts(v, row[i].id);
+    }
+    job_rows_free(row, n);
+    return s;
+}
+
+static status make_data_folders(const char *data, struct error *err)
+{
+    static const char *const part[] = {"jobs", "quarantine"};
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < 2; i++) {
+        char path[PATH_BYTES];
+        path_join(path, data, part[i], NULL);
+        s = durable_make_folder(path, err);
+        if (s == STATUS_OK) s = durable_sync_folder_of(path, err);
+    }
+    return s;
+}
+
+status job_service_open(const struct settings *settings, struct log *log, struct job_service **out, struct error *err)
+{
+    char path[PATH_BYTES];
+    struct job_service *v = calloc(1, sizeof *v);
+    if (v == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
+    v->settings = settings;
+    v->log = log;
+    pthread_mutex_init(&v->change, NULL);
+    status s = make_data_folders(settings->data, err);
+    path_join(path, settings->data, "selvedge.db", NULL);
+    if (s == STATUS_OK) s = store_open(path, &v->store, err);
+    if (s == STATUS_OK) s = upload_set_new(v->store, settings->data, settings->commit_bytes, log, &v->upload, err);
+    if (s == STATUS_OK) s = bury(v, err);
+    if (s == STATUS_OK) s = sweep_unknown(v, err);
+    if (s == STATUS_OK) s = requeue(v, err);
+    if (s == STATUS_OK) s = restore_folders(v, err);
+    if (s == STATUS_OK) s = upload_recover(v->upload, err);
+    if (s != STATUS_OK) {
+        job_service_close(v);
+        return error_prefix(err, "cannot open data folder '%s'", settings->data);
+    }
+    *out = v;
+    return STATUS_OK;
+}
+
+void job_service_close(struct job_service *v)
+{
+    if (v == NULL) return;
+    upload_set_free(v->upload);
+    store_close(v->store);
+    pthread_mutex_destroy(&v->change);
+    free(v);
+}

@@ -1,0 +1,305 @@
+#include "server/jobs/supervisor.h"
+#include "base/clock.h"
+#include "server/jobs/attempt.h"
+#include "server/jobs/job_paths.h"
+#include "server/jobs/worker_process.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { MAX_WORKER = 64, MAX_WAITING = 256 };
+
+struct slot {
+    bool used;
+    char job_id[STORE_ID_BYTES];
+    pid_t pid;
+    enum attempt_stop stop;   /* why it was asked to stop */
+    double started_s, asked_s; /* monotonic; asked_s 0: not asked */
+    bool killed, ended;
+    struct worker_end end;
+};
+
+/* A job that is queued but must not start before a time (after a lost attempt, or while another process holds its folder). */
+struct waiting {
+    char job_id[STORE_ID_BYTES];
+    double until_s;
+    int n_busy;
+};
+
+struct supervisor {
+    struct job_service *v;
+    char worker[PATH_BYTES];
+    pthread_t thread;
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+    bool woken, stop; /* under lock */
+    struct slot slot[MAX_WORKER];
+    struct waiting waiting[MAX_WAITING];
+    bool below_floor;
+    double disk_seen_s, trash_seen_s;
+};
+
+static struct waiting *waiting_of(struct supervisor *u, const char *job_id, bool make)
+{
+    struct waiting *oldest = &u->waiting[0];
+    for (size_t i = 0; i < MAX_WAITING; i++) {
+        if (strcmp(u->waiting[i].job_id, job_id) == 0) return &u->waiting[i];
+        if (u->waiting[i].until_s < oldest->until_s) oldest = &u->waiting[i];
+    }
+    if (!make) return NULL;
+    *oldest = (struct waiting){0};
+    snprintf(oldest->job_id, sizeof oldest->job_id, "%s", job_id);
+    return oldest;
+}
+
+static void ask_to_stop(struct slot *slot, enum attempt_stop why)
+{
+    if (slot->stop == STOP_NONE || why < slot->stop) slot->stop = why;
+    if (slot->asked_s > 0) return;
+    slot->asked_s = clock_monotonic_s();
+    worker_signal(slot->pid, SIGTERM);
+}
+
+static void kill_now(struct slot *slot, enum attempt_stop why)
+{
+    if (slot->stop == STOP_NONE) slot->stop = why;
+    if (slot->asked_s <= 0) slot->asked_s = clock_monotonic_s();
+    slot->killed = true;
+    worker_signal(slot->pid, SIGKILL);
+}
+
+static void end_of(struct supervisor *u, struct slot *slot)
+{
+    struct error err = {0};
+    struct attempt_verdict verdict = {0};
+    if (attempt_settle(u->v, slot->job_id, &slot->end, slot->stop, &verdict, &err) != STATUS_OK) {
+        /* the row still says running: the database could not be written. Keep the slot and try again. */
+        log_error(u->v->log, "job %s: %s", slot->job_id, err.text);
+        return;
+    }
+    slot->used = false;
+    struct waiting *w = waiting_of(u, slot->job_id, verdict.delay_s > 0);
+    if (w == NULL) return;
+    w->until_s = clock_monotonic_s() + verdict.delay_s;
+    if (!verdict.busy) w->n_busy = 0;
+    else if (++w->n_busy >= 60) {
+        w->n_busy = 0;
+        attempt_give_up(u->v, slot->job_id, "another process holds the job's folder", NULL);
+    }
+}
+
+static void watch(struct supervisor *u, struct slot *slot)
+{
+    if (!slot->ended) slot->ended = worker_ended(slot->pid, &slot->end);
+    if (slot->ended) {
+        end_of(u, slot);
+        return;
+    }
+    double now = clock_monotonic_s();
+    struct attempt_wish wish;
+    attempt_look(u->v, slot->job_id, &wish);
+    if (wish.deleted) kill_now(slot, STOP_CANCEL);
+    else if (wish.cancel) ask_to_stop(slot, STOP_CANCEL);
+    else if (u->below_floor) ask_to_stop(slot, STOP_PAUSE);
+    double silent_s = wish.heartbeat_age_s < now - slot->started_s ? wish.heartbeat_age_s : now - slot->started_s;
+    if (silent_s > (double)u->v->settings->heartbeat_timeout_s && !slot->killed) {
+        log_warning(u->v->log, "job %s: the worker was silent for %.0f s and is killed", slot->job_id, silent_s);
+        kill_now(slot, STOP_SILENT);
+    }
+    if (slot->asked_s > 0 && !slot->killed && now - slot->asked_s > (double)u->v->settings->cancel_grace_s) {
+        slot->killed = true;
+        worker_signal(slot->pid, SIGKILL);
+    }
+}
+
+static bool is_running(const struct supervisor *u, const char *job_id)
+{
+    for (size_t i = 0; i < MAX_WORKER; i++)
+        if (u->slot[i].used && strcmp(u->slot[i].job_id, job_id) == 0) return true;
+    return false;
+}
+
+static size_t n_running(const struct supervisor *u)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < MAX_WORKER; i++) n += u->slot[i].used;
+    return n;
+}
+
+static void launch(struct supervisor *u, const char *job_id)
+{
+    struct error err = {0};
+    char folder[PATH_BYTES], console[PATH_BYTES];
+    path_join(folder, u->v->settings->data, "jobs", job_id, NULL);
+    path_join(console, folder, "console.txt", NULL);
+    status s = attempt_prepare(u->v, job_id, &err);
+    if (s == STATUS_CONFLICT) return; /* cancelled or deleted meanwhile */
+    if (s != STATUS_OK) {
+        log_error(u->v->log, "job %s cannot be prepared, next try in 5 s: %s", job_id, err.text);
+        waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 5;
+        return;
+    }
+    struct slot *slot = u->slot;
+    while (slot->used) slot++;
+    pid_t pid = 0;
+    struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes};
+    s = worker_launch(u->worker, folder, console, &limits, &pid, &err);
+    if (s != STATUS_OK) {
+        log_error(u->v->log, "job %s: %s", job_id, err.text);
+        struct attempt_verdict verdict = {0};
+        struct worker_end end = {.by_signal = false, .code = 127};
+        attempt_settle(u->v, job_id, &end, STOP_NONE, &verdict, NULL);
+        waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
+        return;
+    }
+    *slot = (struct slot){.used = true, .pid = pid, .started_s = clock_monotonic_s()};
+    snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
+    log_info(u->v->log, "job %s: worker %d started", job_id, (int)pid);
+}
+
+static void fill_slots(struct supervisor *u)
+{
+    struct job_row *row = NULL;
+    size_t n = 0, free_slots = (size_t)u->v->settings->workers;
+    free_slots -= n_running(u) < free_slots ? n_running(u) : free_slots;
+    if (free_slots == 0 || u->below_floor) return;
+    struct job_query q = {.state = JOB_QUEUED, .queue_order = true, .limit = MAX_WAITING + free_slots};
+    if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
+    for (size_t i = 0; i < n && free_slots > 0; i++) {
+        const struct waiting *w = waiting_of(u, row[i].id, false);
+        if (is_running(u, row[i].id) || (w != NULL && w->until_s > clock_monotonic_s())) continue;
+        launch(u, row[i].id);
+        free_slots--;
+    }
+    job_rows_free(row, n);
+}
+
+static void bury(struct supervisor *u)
+{
+    struct job_row *row = NULL;
+    size_t n = 0;
+    struct job_query q = {.state = -1, .deleted = true, .limit = 64};
+    if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
+    for (size_t i = 0; i < n; i++) {
+        if (is_running(u, row[i].id)) continue;
+        char path[PATH_BYTES];
+        struct error err = {0};
+        path_join(path, u->v->settings->data, "jobs", row[i].id, NULL);
+        status s = path_remove_tree(path, &err);
+        if (s == STATUS_OK) s = store_job_erase(u->v->store, row[i].id, &err);
+        if (s != STATUS_OK) log_warning(u->v->log, "job %s: %s", row[i].id, err.text);
+    }
+    job_rows_free(row, n);
+}
+
+static void look_at_disk(struct supervisor *u)
+{
+    long long free_bytes = 0;
+    if (path_free_bytes(u->v->settings->data, &free_bytes, NULL) != STATUS_OK) return;
+    int64_t floor_bytes = u->v->settings->floor_bytes;
+    bool was = u->below_floor;
+    /* a little hysteresis, so that a job does not stop and go */
+    u->below_floor = free_bytes < (was ? floor_bytes + floor_bytes / 10 : floor_bytes);
+    if (u->below_floor && !was) log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve: running jobs pause", free_bytes, (long long)floor_bytes);
+    if (!u->below_floor) attempt_resume_paused(u->v);
+}
+
+static void tick(struct supervisor *u)
+{
+    double now = clock_monotonic_s();
+    if (now - u->disk_seen_s > 2) {
+        u->disk_seen_s = now;
+        look_at_disk(u);
+    }
+    for (size_t i = 0; i < MAX_WORKER; i++)
+        if (u->slot[i].used) watch(u, &u->slot[i]);
+    bury(u);
+    fill_slots(u);
+}
+
+static void stop_all(struct supervisor *u)
+{
+    for (size_t i = 0; i < MAX_WORKER; i++)
+        if (u->slot[i].used) ask_to_stop(&u->slot[i], STOP_SHUTDOWN);
+    double give_up_s = clock_monotonic_s() + (double)u->v->settings->cancel_grace_s + 10;
+    while (n_running(u) > 0 && clock_monotonic_s() < give_up_s) {
+        for (size_t i = 0; i < MAX_WORKER; i++)
+            if (u->slot[i].used) watch(u, &u->slot[i]);
+        usleep(20000);
+    }
+}
+
+static void *run(void *context)
+{
+    struct supervisor *u = context;
+    pthread_mutex_lock(&u->lock);
+    while (!u->stop) {
+        u->woken = false;
+        pthread_mutex_unlock(&u->lock);
+        tick(u);
+        bool busy = n_running(u) > 0;
+        struct timespec until;
+        clock_gettime(CLOCK_MONOTONIC, &until);
+        until.tv_nsec += busy ? 100000000 : 0;
+        until.tv_sec += busy ? until.tv_nsec / 1000000000 : 1;
+        until.tv_nsec %= 1000000000;
+        pthread_mutex_lock(&u->lock);
+        while (!u->woken && !u->stop && pthread_cond_timedwait(&u->changed, &u->lock, &until) == 0) {}
+    }
+    pthread_mutex_unlock(&u->lock);
+    stop_all(u);
+    return NULL;
+}
+
+status supervisor_start(struct job_service *v, const char *worker_program, struct supervisor **out, struct error *err)
+{
+    if (access(worker_program, X_OK) != 0) return error_set_errno(err, "cannot execute worker program '%s'", worker_program);
+    struct supervisor *u = calloc(1, sizeof *u);
+    if (u == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the supervisor: out of memory");
+    u->v = v;
+    u->disk_seen_s = -1e9;
+    snprintf(u->worker, sizeof u->worker, "%s", worker_program);
+    pthread_mutex_init(&u->lock, NULL);
+    pthread_condattr_t attr;
+    pthread_condattr_init(&attr);
+    pthread_condattr_setclock(&attr, CLOCK_MONOTONIC);
+    pthread_cond_init(&u->changed, &attr);
+    pthread_condattr_destroy(&attr);
+    v->supervisor = u;
+    int e = pthread_create(&u->thread, NULL, run, u);
+    if (e != 0) {
+        v->supervisor = NULL;
+        free(u);
+        errno = e;
+        return error_set_errno(err, "cannot start the supervisor");
+    }
+    *out = u;
+    return STATUS_OK;
+}
+
+void supervisor_wake(struct supervisor *u)
+{
+    pthread_mutex_lock(&u->lock);
+    u->woken = true;
+    pthread_cond_signal(&u->changed);
+    pthread_mutex_unlock(&u->lock);
+}
+
+void supervisor_stop(struct supervisor *u)
+{
+    if (u == NULL) return;
+    pthread_mutex_lock(&u->lock);
+    u->stop = true;
+    pthread_cond_signal(&u->changed);
+    pthread_mutex_unlock(&u->lock);
+    pthread_join(u->thread, NULL);
+    u->v->supervisor = NULL;
+    pthread_cond_destroy(&u->changed);
+    pthread_mutex_destroy(&u->lock);
+    free(u);
+}

@@ -1,0 +1,31 @@
+/* One worker process: own session, lower priority, bounded memory, killed by the kernel when the daemon dies (PR_SET_PDEATHSIG),
+ * so after any crash of the daemon no worker is left that could write beside a new one. */
+#ifndef SELVEDGE_SERVER_WORKER_PROCESS_H
+#define SELVEDGE_SERVER_WORKER_PROCESS_H
+
+#include "base/status.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+struct worker_limits {
+    int nice;
+    int64_t memory_bytes; /* address space; 0: not limited */
+};
+
+struct worker_end {
+    bool by_signal;
+    int code; /* exit code or signal number */
+    int64_t peak_rss_bytes;
+};
+
+/* stdout and stderr go to console_path (made anew). Call from a thread that lives as long as the daemon. */
+status worker_launch(const char *program, const char *job_folder, const char *console_path, const struct worker_limits *limits, pid_t *pid,
+                     struct error *err);
+/* false while it still runs */
+bool worker_ended(pid_t pid, struct worker_end *end);
+/* To the worker and everything that it started. */
+void worker_signal(pid_t pid, int signal_number);
+
+#endif

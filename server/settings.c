@@ -1,0 +1,142 @@
+#include "server/settings.h"
+
+#include <errno.h>
+#include <ini.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct setting {
+    const char *section, *name;
+    size_t offset;
+    const char *text;          /* default of a text setting; NULL: a number */
+    int64_t value, least, most; /* of a number */
+    const char *help;
+};
+
+#define TEXT(section, name, member, text, help)                                                                        \
+    {                                                                                                                  \
+        section, name, offsetof(struct settings, member), text, 0, 0, 0, help                                          \
+    }
+#define NUMBER(section, name, member, value, least, most, help)                                                        \
+    {                                                                                                                  \
+        section, name, offsetof(struct settings, member), NULL, value, least, most, help                               \
+    }
+
+#define MIB (INT64_C(1) << 20)
+#define GIB (INT64_C(1) << 30)
+
+static const struct setting table[] = {
+    TEXT("server", "listen", listen, "127.0.0.1", "address to listen on; without tokens only 127.0.0.1 or ::1"),
+    NUMBER("server", "port", port, 7878, 0, 65535, "TCP port; 0 picks a free one and prints it"),
+    TEXT("server", "data", data, "selvedge-data", "folder of the database and of all jobs (a local file system)"),
+    TEXT("server", "web", web, "", "folder of the dashboard; empty: found beside the program"),
+    TEXT("server", "openapi", openapi, "", "file served at /v1/openapi.json; empty: found beside the program"),
+    NUMBER("server", "threads", threads, 4, 1, 64, "threads that answer requests"),
+    NUMBER("server", "max_connections", max_connections, 2048, 8, 60000, "open connections; more have to wait"),
+    NUMBER("server", "idle_timeout_s", idle_timeout_s, 60, 1, 3600, "a silent connection is closed after this time"),
+    NUMBER("server", "header_deadline_s", header_deadline_s, 20, 1, 3600, "the head of a request must be complete after this time"),
+    NUMBER("server", "min_rate_bytes_per_s", min_rate_bytes_per_s, 1024, 0, GIB, "a body that comes slower than this for 10 s is cut off"),
+    NUMBER("server", "max_document_bytes", max_document_bytes, MIB, 1024, MIB, "largest JSON body"),
+    NUMBER("upload", "max_file_bytes", max_file_bytes, 1024 * GIB, 1, INT64_MAX / 2, "largest input file"),
+    NUMBER("upload", "max_patch_bytes", max_patch_bytes, 64 * MIB, MIB, GIB, "largest piece of an upload"),
+    NUMBER("upload", "max_files_per_job", max_files_per_job, 8192, 1, 1000000, "input files of one job"),
+    NUMBER("upload", "commit_bytes", commit_bytes, 8 * MIB, 65536, GIB, "an upload is made durable at least this often"),
+    NUMBER("jobs", "max_jobs", max_jobs, 10000, 1, 10000000, "jobs kept; more are refused until some are deleted"),
+    NUMBER("jobs", "workers", workers, 1, 1, 64, "jobs that run at the same time"),
+    TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside this program"),
+    NUMBER("jobs", "nice", nice, 10, 0, 19, "scheduling priority of workers"),
+    NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2, "address space of a worker; 0: not limited"),
+    NUMBER("jobs", "cancel_grace_s", cancel_grace_s, 10, 0, 3600, "from SIGTERM to SIGKILL when a worker has to stop"),
+    NUMBER("jobs", "max_lost_attempts", max_lost_attempts, 3, 1, 100, "a job whose worker died this often has failed"),
+    NUMBER("jobs", "heartbeat_timeout_s", heartbeat_timeout_s, 300, 2, 86400, "a worker that is silent this long is killed (a lost attempt)"),
+    NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2, "free space under which new work is refused and running jobs pause"),
+};
+enum { N_SETTING = sizeof table / sizeof table[0] };
+
+static char *text_of(struct settings *s, const struct setting *t) { return (char *)s + t->offset; }
+static int64_t *number_of(struct settings *s, const struct setting *t)
+{
+    return (int64_t *)(void *)((char *)s + t->offset);
+}
+
+void settings_init(struct settings *s)
+{
+    memset(s, 0, sizeof *s);
+    for (size_t i = 0; i < N_SETTING; i++) {
+        if (table[i].text != NULL) snprintf(text_of(s, &table[i]), SETTING_TEXT_BYTES, "%s", table[i].text);
+        else *number_of(s, &table[i]) = table[i].value;
+    }
+}
+
+static status set_one(struct settings *s, const struct setting *t, const char *value, struct error *err)
+{
+    char key[96];
+    snprintf(key, sizeof key, "%s.%s", t->section, t->name);
+    if (t->text != NULL) {
+        if (strlen(value) >= SETTING_TEXT_BYTES)
+            return error_set_field(err, STATUS_INVALID, key, "setting '%s' is longer than %d bytes", key, SETTING_TEXT_BYTES - 1);
+        snprintf(text_of(s, t), SETTING_TEXT_BYTES, "%s", value);
+        return STATUS_OK;
+    }
+    char *end;
+    errno = 0;
+    long long v = strtoll(value, &end, 10);
+    if (*value == '\0' || *end != '\0' || errno != 0)
+        return error_set_field(err, STATUS_INVALID, key, "setting '%s' is '%.80s': not a whole number", key, value);
+    if (v < t->least || v > t->most)
+        return error_set_field(err, STATUS_INVALID, key, "setting '%s' is %lld: outside %lld..%lld", key, v,
+                               (long long)t->least, (long long)t->most);
+    *number_of(s, t) = v;
+    return STATUS_OK;
+}
+
+status settings_set(struct settings *s, const char *key, const char *value, struct error *err)
+{
+    for (size_t i = 0; i < N_SETTING; i++) {
+        size_t n = strlen(table[i].section);
+        if (strncmp(key, table[i].section, n) == 0 && key[n] == '.' && strcmp(key + n + 1, table[i].name) == 0)
+            return set_one(s, &table[i], value, err);
+    }
+    return error_set_field(err, STATUS_INVALID, key, "setting '%.100s' does not exist", key);
+}
+
+struct reading {
+    struct settings *s;
+    struct error *err;
+    status result;
+};
+
+static int on_entry(void *context, const char *section, const char *name, const char *value)
+{
+    struct reading *r = context;
+    char key[160];
+    snprintf(key, sizeof key, "%s.%s", section, name);
+    if (r->result == STATUS_OK) r->result = settings_set(r->s, key, value, r->err);
+    return r->result == STATUS_OK;
+}
+
+status settings_read_file(struct settings *s, const char *path, struct error *err)
+{
+    struct reading r = {s, err, STATUS_OK};
+    int line = ini_parse(path, on_entry, &r);
+    if (r.result != STATUS_OK) return error_prefix(err, "cannot use '%s', line %d", path, line);
+    if (line == -1) return error_set_errno(err, "cannot read configuration '%s'", path);
+    if (line != 0) return error_set(err, STATUS_INVALID, "cannot read configuration '%s': line %d is not 'name = value'", path, line);
+    return STATUS_OK;
+}
+
+void settings_print(FILE *out)
+{
+    const char *section = "";
+    fprintf(out, "; Every setting of selvedged with its default. Options of the command line win over this file.\n");
+    for (size_t i = 0; i < N_SETTING; i++) {
+        const struct setting *t = &table[i];
+        if (strcmp(section, t->section) != 0) fprintf(out, "\n[%s]\n", t->section);
+        section = t->section;
+        fprintf(out, "; %s", t->help);
+        if (t->text == NULL && t->most < INT64_MAX / 2) fprintf(out, " (%lld..%lld)", (long long)t->least, (long long)t->most);
+        if (t->text != NULL) fprintf(out, "\n%s =%s%s\n", t->name, *t->text ? " " : "", t->text);
+        else fprintf(out, "\n%s = %lld\n", t->name, (long long)t->value);
+    }
+}

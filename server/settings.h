@@ -1,0 +1,35 @@
+/* Every setting of the daemon: one table with name, kind, default, range and one line of explanation.
+ * config/selvedge.conf is that table printed (`selvedged --print-config`); a test holds the two together. */
+#ifndef SELVEDGE_SERVER_SETTINGS_H
+#define SELVEDGE_SERVER_SETTINGS_H
+
+#include "base/status.h"
+
+#include <stdint.h>
+#include <stdio.h>
+
+enum { SETTING_TEXT_BYTES = 512 };
+
+struct settings {
+    /* [server] */
+    char listen[SETTING_TEXT_BYTES], data[SETTING_TEXT_BYTES], web[SETTING_TEXT_BYTES], openapi[SETTING_TEXT_BYTES];
+    int64_t port, threads, max_connections, idle_timeout_s, header_deadline_s, min_rate_bytes_per_s, max_document_bytes;
+    /* [upload] */
+    int64_t max_file_bytes, max_patch_bytes, max_files_per_job, commit_bytes;
+    /* [jobs] */
+    int64_t max_jobs, workers;
+    char worker[SETTING_TEXT_BYTES];
+    int64_t nice, memory_limit_bytes, cancel_grace_s, max_lost_attempts, heartbeat_timeout_s;
+    /* [disk] */
+    int64_t floor_bytes;
+};
+
+void settings_init(struct settings *s);
+/* STATUS_INVALID names an unknown key (err->field) or a value outside its range; STATUS_IO when unreadable. */
+status settings_read_file(struct settings *s, const char *path, struct error *err);
+/* key is "section.name". */
+status settings_set(struct settings *s, const char *key, const char *value, struct error *err);
+/* The table with the defaults as a configuration file. */
+void settings_print(FILE *out);
+
+#endif

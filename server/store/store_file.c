@@ -1,0 +1,115 @@
+#include "server/store/store_sql.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define COLUMNS "id, job_id, name, role, size, offset, sha256, state, hash_state"
+
+static void read_row(sqlite3_stmt *q, struct file_row *row)
+{
+    memset(row, 0, sizeof *row);
+    store_text(q, 0, row->id, sizeof row->id);
+    store_text(q, 1, row->job_id, sizeof row->job_id);
+    store_text(q, 2, row->name, sizeof row->name);
+    store_text(q, 3, row->role, sizeof row->role);
+    row->size_bytes = sqlite3_column_int64(q, 4);
+    row->offset_bytes = sqlite3_column_int64(q, 5);
+    store_text(q, 6, row->sha256, sizeof row->sha256);
+    row->state = (enum file_state)sqlite3_column_int(q, 7);
+    const void *blob = sqlite3_column_blob(q, 8);
+    int n = sqlite3_column_bytes(q, 8);
+    if (blob != NULL && n == STORE_HASH_STATE_BYTES) memcpy(row->hash_state, blob, STORE_HASH_STATE_BYTES);
+}
+
+status store_file_insert(struct store *store, const struct file_row *r, struct error *err)
+{
+    pthread_mutex_lock(&store->lock);
+    status s = store_run(store, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)", "ssssiisib", r->id, r->job_id, r->name, r->role,
+                         r->size_bytes, r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+static status get_one(struct store *store, sqlite3_stmt *q, const char *what, struct file_row *row, struct error *err)
+{
+    int rc = sqlite3_step(q);
+    if (rc == SQLITE_ROW) {
+        read_row(q, row);
+        return STATUS_OK;
+    }
+    return rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "file '%.127s' does not exist", what) : store_error(store, "cannot read file", err);
+}
+
+status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    pthread_mutex_lock(&store->lock);
+    status s = store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE id = ?", "s", id);
+    if (s == STATUS_OK) s = get_one(store, q, id, row, err);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    pthread_mutex_lock(&store->lock);
+    status s = store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? AND name = ?", "ss", job_id, name);
+    if (s == STATUS_OK) s = get_one(store, q, name, row, err);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+status store_file_update(struct store *store, const struct file_row *r, struct error *err)
+{
+    int n = 0;
+    pthread_mutex_lock(&store->lock);
+    status s = store_run(store, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs", r->offset_bytes, r->sha256,
+                         (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
+    pthread_mutex_unlock(&store->lock);
+    if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' does not exist any more", r->name);
+    return s;
+}
+
+status store_file_erase(struct store *store, const char *id, struct error *err)
+{
+    pthread_mutex_lock(&store->lock);
+    status s = store_run(store, NULL, err, "DELETE FROM file WHERE id = ?", "s", id);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+status store_file_list(struct store *store, const char *job_id, struct file_row **out, size_t *n_out, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    struct file_row *row = NULL;
+    size_t n = 0, capacity = 0;
+    int rc = SQLITE_DONE;
+    pthread_mutex_lock(&store->lock);
+    status s = job_id != NULL ? store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? ORDER BY serial", "s", job_id)
+                              : store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE state <> 2 ORDER BY serial", "");
+    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+        if (n == capacity) {
+            capacity = capacity == 0 ? 64 : capacity * 2;
+            struct file_row *more = realloc(row, capacity * sizeof *more);
+            if (more == NULL) {
+                s = error_set(err, STATUS_NO_MEMORY, "cannot list files: out of memory");
+                break;
+            }
+            row = more;
+        }
+        read_row(q, &row[n++]);
+    }
+    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(store, "cannot list files", err);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    if (s != STATUS_OK) {
+        free(row);
+        return s;
+    }
+    *out = row;
+    *n_out = n;
+    return STATUS_OK;
+}

@@ -1,0 +1,202 @@
+#include "base/clock.h"
+#include "server/store/store_sql.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define COLUMNS                                                                                                        \
+    "serial, id, sample, document, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "      \
+    "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss"
+
+void job_row_release(struct job_row *row)
+{
+    free(row->document);
+    row->document = NULL;
+}
+
+void job_rows_free(struct job_row *row, size_t n)
+{
+    for (size_t i = 0; row != NULL && i < n; i++) job_row_release(&row[i]);
+    free(row);
+}
+
+static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
+{
+    memset(row, 0, sizeof *row);
+    row->serial = sqlite3_column_int64(q, 0);
+    store_text(q, 1, row->id, sizeof row->id);
+    store_text(q, 2, row->sample, sizeof row->sample);
+    const char *document = (const char *)sqlite3_column_text(q, 3);
+    row->document = strdup(document == NULL ? "" : document);
+    if (row->document == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read job: out of memory");
+    row->state = (enum job_state)sqlite3_column_int(q, 4);
+    row->cancel_requested = sqlite3_column_int(q, 5) != 0;
+    row->dirty = sqlite3_column_int(q, 6) != 0;
+    row->deleted = sqlite3_column_int(q, 7) != 0;
+    row->attempt = sqlite3_column_int64(q, 8);
+    row->lost_attempts = sqlite3_column_int64(q, 9);
+    row->generation = sqlite3_column_int64(q, 10);
+    store_text(q, 11, row->token, sizeof row->token);
+    row->created_unix_s = sqlite3_column_double(q, 12);
+    row->updated_unix_s = sqlite3_column_double(q, 13);
+    row->queued_unix_s = sqlite3_column_double(q, 14);
+    row->started_unix_s = sqlite3_column_double(q, 15);
+    row->finished_unix_s = sqlite3_column_double(q, 16);
+    store_text(q, 17, row->error_code, sizeof row->error_code);
+    store_text(q, 18, row->error_field, sizeof row->error_field);
+    store_text(q, 19, row->error_text, sizeof row->error_text);
+    row->peak_rss_bytes = sqlite3_column_int64(q, 20);
+    return STATUS_OK;
+}
+
+static status insert(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
+{
+    status s = store_run(store, NULL, err, "BEGIN IMMEDIATE", "");
+    if (s != STATUS_OK) return s;
+    s = store_run(store, NULL, err,
+                  "INSERT INTO job (id, sample, document, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, token, created, "
+                  "updated, queued, started, finished, error_code, error_field, error_text, peak_rss) VALUES (?,?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0)",
+                  "sssidd", r->id, r->sample, r->document, (int64_t)r->state, r->created_unix_s, r->created_unix_s);
+    if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->db);
+    if (s == STATUS_OK && key != NULL)
+        s = store_run(store, NULL, err, "INSERT INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd", key, r->id, body_hash,
+                      r->created_unix_s);
+    if (s == STATUS_OK) s = store_run(store, NULL, err, "COMMIT", "");
+    if (s != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
+    return s;
+}
+
+status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash, struct error *err)
+{
+    pthread_mutex_lock(&store->lock);
+    status s = insert(store, row, idempotency_key, body_hash, err);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES], char body_hash[STORE_HASH_TEXT_BYTES],
+                              struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    pthread_mutex_lock(&store->lock);
+    status s = store_prepare(store, &q, err, "SELECT job_id, body_hash FROM idempotency WHERE key = ?", "s", key);
+    if (s != STATUS_OK) goto out;
+    int rc = sqlite3_step(q);
+    if (rc == SQLITE_ROW) {
+        store_text(q, 0, job_id, STORE_ID_BYTES);
+        store_text(q, 1, body_hash, STORE_HASH_TEXT_BYTES);
+    } else s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "key is new") : store_error(store, "cannot look up a key", err);
+out:
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+status store_job_get(struct store *store, const char *id, struct job_row *row, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    memset(row, 0, sizeof *row);
+    pthread_mutex_lock(&store->lock);
+    status s = store_prepare(store, &q, err, "SELECT " COLUMNS " FROM job WHERE id = ?", "s", id);
+    if (s != STATUS_OK) goto out;
+    int rc = sqlite3_step(q);
+    if (rc == SQLITE_ROW) s = read_row(q, row, err);
+    else s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id) : store_error(store, "cannot read job", err);
+out:
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+status store_job_update(struct store *store, struct job_row *r, struct error *err)
+{
+    int n = 0;
+    r->updated_unix_s = clock_wall_s();
+    pthread_mutex_lock(&store->lock);
+    status s = store_run(store, &n, err,
+                         "UPDATE job SET sample=?, document=?, state=?, cancel_requested=?, dirty=?, deleted=?, attempt=?, lost_attempts=?, "
+                         "generation=?, token=?, updated=?, queued=?, started=?, finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
+                         "ssiiiiiiisddddsssis", r->sample, r->document, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
+                         (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
+                         r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes, r->id);
+    pthread_mutex_unlock(&store->lock);
+    if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
+    return s;
+}
+
+static status erase(struct store *store, const char *id, struct error *err)
+{
+    status s = store_run(store, NULL, err, "BEGIN IMMEDIATE", "");
+    if (s != STATUS_OK) return s;
+    s = store_run(store, NULL, err, "DELETE FROM file WHERE job_id = ?", "s", id);
+    if (s == STATUS_OK) s = store_run(store, NULL, err, "DELETE FROM idempotency WHERE job_id = ?", "s", id);
+    if (s == STATUS_OK) s = store_run(store, NULL, err, "DELETE FROM job WHERE id = ?", "s", id);
+    if (s == STATUS_OK) s = store_run(store, NULL, err, "COMMIT", "");
+    if (s != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
+    return s;
+}
+
+status store_job_erase(struct store *store, const char *id, struct error *err)
+{
+    pthread_mutex_lock(&store->lock);
+    status s = erase(store, id, err);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
+
+static status grow(struct job_row **row, size_t n, size_t *capacity, struct error *err)
+{
+    if (n < *capacity) return STATUS_OK;
+    size_t more = *capacity == 0 ? 16 : *capacity * 2;
+    struct job_row *p = realloc(*row, more * sizeof *p);
+    if (p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list jobs: out of memory");
+    *row = p;
+    *capacity = more;
+    return STATUS_OK;
+}
+
+status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out, struct error *err)
+{
+    const char *sql = query->queue_order ? "SELECT " COLUMNS " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
+                                           "ORDER BY queued, serial LIMIT ?4"
+                                         : "SELECT " COLUMNS " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
+                                           "ORDER BY serial DESC LIMIT ?4";
+    sqlite3_stmt *q = NULL;
+    struct job_row *row = NULL;
+    size_t n = 0, capacity = 0;
+    pthread_mutex_lock(&store->lock);
+    status s = store_prepare(store, &q, err, sql, "iiii", (int64_t)query->deleted, (int64_t)query->state, query->before_serial, (int64_t)query->limit);
+    int rc = SQLITE_DONE;
+    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+        s = grow(&row, n, &capacity, err);
+        if (s == STATUS_OK) s = read_row(q, &row[n], err);
+        if (s == STATUS_OK) n++;
+    }
+    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(store, "cannot list jobs", err);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    if (s != STATUS_OK) {
+        job_rows_free(row, n);
+        return s;
+    }
+    *out = row;
+    *n_out = n;
+    return STATUS_OK;
+}
+
+status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    for (int i = 0; i < JOB_N_STATE; i++) n[i] = 0;
+    pthread_mutex_lock(&store->lock);
+    status s = store_prepare(store, &q, err, "SELECT state, count(*) FROM job WHERE deleted = 0 GROUP BY state", "");
+    int rc = SQLITE_DONE;
+    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+        int state = sqlite3_column_int(q, 0);
+        if (state >= 0 && state < JOB_N_STATE) n[state] = sqlite3_column_int64(q, 1);
+    }
+    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(store, "cannot count jobs", err);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->lock);
+    return s;
+}
