@@ -1,0 +1,160 @@
+#!/usr/bin/env bash
+# The main job end to end on a made sample: `make demo`, or clients/demo.sh [--fresh] after a build.
+# Environment: DEMO_PORT (a fixed port), DEMO_DIR (folder, default ./demo), SELVEDGE_BUILD (default ./build).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+fresh=no
+case "${1:-}" in
+--fresh) fresh=yes ;;
+"") ;;
+*) echo "usage: $0 [--fresh]    --fresh: make the sample anew and run the fit again" >&2; exit 2 ;;
+esac
+
+here=$PWD
+build=${SELVEDGE_BUILD:-build}
+[[ $build = /* ]] || build=$here/$build
+bin=$build/bin
+demo=${DEMO_DIR:-$here/demo}
+sample=$demo/sample
+mkdir -p "$demo"
+demo=$(cd "$demo" && pwd)
+started=$(date +%s.%N)
+
+# What the sample is made with; the fit does not see it.
+truth=(--param C_R=0.06,0.05,0.08 --param C_TT=0.72,0.55,0.35 --param beta_R=4 --param beta_TT=20 --param gamma_TT=18)
+title="twill phantom"
+
+say() { printf '\n== %s\n' "$*"; }
+fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
+
+for program in selvedged selvedge selvedge-worker selvedge-phantom; do
+    [ -x "$bin/$program" ] || fail "$bin/$program is missing: run make first"
+done
+command -v python3 >/dev/null || fail "python3 is missing: run make deps"
+
+# ---- the daemon: the one that an earlier demo left running, or one of our own ----
+daemon_pid=
+keep_daemon=no
+stop_daemon() {
+    if [ -n "$daemon_pid" ] && [ "$keep_daemon" = no ]; then
+        kill "$daemon_pid" 2>/dev/null || true
+        wait "$daemon_pid" 2>/dev/null || true
+        rm -f "$demo/daemon.pid" "$demo/daemon.url"
+    fi
+}
+trap stop_daemon EXIT
+trap 'echo; echo "Stopped. What is done is kept: run the demo again to go on."; exit 130' INT TERM
+
+port_is_free() { ! (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null; }
+
+find_port() {
+    if [ -n "${DEMO_PORT:-}" ]; then
+        port_is_free "$DEMO_PORT" || fail "port $DEMO_PORT (DEMO_PORT) is in use"
+        echo "$DEMO_PORT"
+        return
+    fi
+    for port in $(seq 8590 8689); do
+        if port_is_free "$port"; then echo "$port"; return; fi
+    done
+    fail "no free port in 8590..8689; set DEMO_PORT"
+}
+
+start_daemon() {
+    local pid url
+    if [ -s "$demo/daemon.pid" ] && [ -s "$demo/daemon.url" ]; then
+        pid=$(cat "$demo/daemon.pid")
+        url=$(cat "$demo/daemon.url")
+        if kill -0 "$pid" 2>/dev/null && "$bin/selvedge" --server "$url" list >/dev/null 2>&1; then
+            export SELVEDGE_SERVER=$url
+            echo "selvedged is still running at $url (process $pid)"
+            return
+        fi
+    fi
+    local port
+    port=$(find_port) || exit 1
+    export SELVEDGE_SERVER=http://127.0.0.1:$port
+    # its own session: Ctrl-C here must not cut it off in the middle of an answer
+    setsid "$bin/selvedged" --data "$demo/daemon" --port "$port" >>"$demo/daemon.log" 2>&1 </dev/null &
+    daemon_pid=$!
+    for _ in $(seq 100); do
+        if "$bin/selvedge" list >/dev/null 2>&1; then
+            echo "$daemon_pid" >"$demo/daemon.pid"
+            echo "$SELVEDGE_SERVER" >"$demo/daemon.url"
+            echo "selvedged listens at $SELVEDGE_SERVER, data in $demo/daemon"
+            return
+        fi
+        kill -0 "$daemon_pid" 2>/dev/null || break
+        sleep 0.1
+    done
+    tail -n 20 "$demo/daemon.log" >&2
+    fail "selvedged did not start; its last words are above"
+}
+
+# ---- the sample ----
+make_sample() {
+    if [ "$fresh" = yes ]; then rm -rf "$sample" "$demo/job-id" "$demo/results" "$demo/summary.json"; fi
+    if [ -s "$sample/job.json" ]; then
+        echo "using the sample in $sample (--fresh makes a new one)"
+        return
+    fi
+    rm -rf "$sample"
+    mkdir -p "$sample"
+    echo "cloth: a twill of 152 fibers, scanned at 2 um with noise"
+    "$bin/selvedge-phantom" cloth --weave twill --seed 7 --out "$sample" >/dev/null
+    echo "photographs: 16 to fit and 24 held out, rendered with known parameters (half a minute)"
+    "$bin/selvedge-phantom" photograph --fibers "$sample/truth.hair" --out "$sample" --seed 11 --noise 0.005 --paths 131072 --px 64 \
+        "${truth[@]}" >/dev/null
+    python3 clients/demo_report.py document "$sample" "$title"
+}
+
+# ---- the job ----
+run_job() {
+    local id state=
+    if [ -s "$demo/job-id" ]; then
+        id=$(cat "$demo/job-id")
+        state=$("$bin/selvedge" status "$id" --json 2>/dev/null | python3 -c 'import json,sys; print(json.load(sys.stdin)["state"])' 2>/dev/null) || state=
+    fi
+    case "$state" in
+    succeeded) echo "the job of an earlier run, $id, has succeeded: showing its result (--fresh runs it again)" ;;
+    queued | running | paused) echo "the job of an earlier run, $id, goes on"; "$bin/selvedge" watch "$id" ;;
+    failed | cancelled) echo "the job of an earlier run, $id, has ended as $state: trying again"; "$bin/selvedge" retry "$id"; "$bin/selvedge" watch "$id" ;;
+    draft) "$bin/selvedge" submit --resume "$id" "$sample/job.json" --watch ;;
+    *)
+        # the id is noted before the upload, so that an interrupted demo finds its job again
+        "$bin/selvedge" submit "$sample/job.json" --draft >"$demo/job-id.new"
+        mv "$demo/job-id.new" "$demo/job-id"
+        id=$(cat "$demo/job-id")
+        "$bin/selvedge" submit --resume "$id" "$sample/job.json" --watch
+        ;;
+    esac
+    job=$id
+    "$bin/selvedge" results "$id" --out "$demo/results" >/dev/null
+    [ "$state" = succeeded ] && [ -s "$demo/summary.json" ] && new=no || new=yes
+}
+
+say "1. Daemon"
+start_daemon
+say "2. Sample"
+make_sample
+say "3. Upload, reconstruction, fit"
+run_job
+say "4. Result"
+wall=$(python3 -c "import sys,time; print(round(time.time() - float(sys.argv[1]), 1))" "$started")
+[ "$new" = yes ] || wall=
+python3 clients/demo_report.py summary "$sample/truth.json" "$demo/results/result.json" "$demo/summary.json" "$wall"
+
+cat <<END
+
+results    $demo/results (result.json, fibers, volumes, renderings)
+summary    $demo/summary.json
+dashboard  $SELVEDGE_SERVER/#$job
+END
+if [ -z "$daemon_pid" ]; then
+    echo "selvedged goes on running; stop it with: kill $(cat "$demo/daemon.pid")"
+elif [ -t 0 ]; then
+    keep_daemon=yes
+    echo "selvedged goes on running for the dashboard; stop it with: kill $daemon_pid"
+else
+    echo "selvedged is stopped now; start it again with: $bin/selvedged --data $demo/daemon --port ${SELVEDGE_SERVER##*:}"
+fi

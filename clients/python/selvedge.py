@@ -1,0 +1,218 @@
+"""A thin client of the Selvedge HTTP API (docs/api.md). Needs `requests` only.
+
+    import selvedge
+    server = selvedge.Server("http://127.0.0.1:7878")
+    job = server.submit("my-sample/job.json")           # uploads every file that the document names, and starts
+    job.wait(print)                                      # prints progress until the job ends
+    for p in job.parameters():
+        print(p["name"], p["value"], "+-", p["standard_error"])
+    job.download("results")
+
+Every failed request raises `Problem`, whose text is "field: detail".
+"""
+import hashlib
+import json
+import os
+import time
+import uuid
+
+import requests
+
+PIECE = 16 << 20
+ENDED = ("succeeded", "failed", "cancelled")
+
+
+class Problem(Exception):
+    """A problem document (RFC 9457). `code` is stable; `field` names what is at fault, "" when nothing in particular."""
+
+    def __init__(self, status, body):
+        self.status, self.body = status, body
+        self.code, self.field = body.get("code", ""), body.get("field", "")
+        detail = body.get("detail") or body.get("title") or f"HTTP status {status}"
+        super().__init__(f"{self.field}: {detail}" if self.field and self.field not in detail else detail)
+
+
+class JobFailed(Exception):
+    """The job ended as "failed" or "cancelled". `job` is its last state."""
+
+    def __init__(self, job):
+        self.job = job
+        error = job.get("error") or {}
+        super().__init__(f"job {job['id']} {job['state']}: {error.get('field') or ''} {error.get('text') or ''}".rstrip())
+
+
+def files_of(document):
+    """The input files that a job document names: [(name, role), ...], each once."""
+    names = [(n, "volume") for n in document.get("volume", {}).get("files", [])]
+    for key, role in (("fibers", "fibers"), ("measurements", "measurements")):
+        if key in document:
+            names.append((document[key]["file"], role))
+    names += [(p["file"], "photograph") for p in document.get("photographs", [])]
+    return list(dict.fromkeys(names))
+
+
+class Server:
+    """One daemon. `token`: access token, default from SELVEDGE_TOKEN. Not to be shared between threads."""
+
+    def __init__(self, url=None, token=None, timeout_s=60):
+        self.url = (url or os.environ.get("SELVEDGE_SERVER") or "http://127.0.0.1:7878").rstrip("/")
+        self.timeout_s = timeout_s
+        self.session = requests.Session()
+        self.session.trust_env = False
+        token = token or os.environ.get("SELVEDGE_TOKEN")
+        if token:
+            self.session.headers["Authorization"] = f"Bearer {token}"
+
+    def request(self, method, path, **arguments):
+        """A request that must succeed; returns requests.Response. Raises Problem, or requests.ConnectionError."""
+        answer = self.session.request(method, self.url + path, timeout=self.timeout_s, **arguments)
+        if answer.status_code >= 400:
+            try:
+                body = answer.json()
+            except ValueError:
+                body = {}
+            raise Problem(answer.status_code, body)
+        return answer
+
+    def jobs(self):
+        """Summaries of all jobs, newest first."""
+        cursor = ""
+        while True:
+            page = self.request("GET", f"/v1/jobs?limit=100&cursor={cursor}" if cursor else "/v1/jobs?limit=100").json()
+            yield from page["jobs"]
+            cursor = page["next_cursor"]
+            if not cursor:
+                return
+
+    def job(self, job_id):
+        """An existing job."""
+        return Job(self, job_id)
+
+    def create(self, document):
+        """A draft from a job document (a dict). Safe to repeat within one call: an idempotency key goes with it."""
+        answer = self.request("POST", "/v1/jobs", json=document, headers={"Idempotency-Key": uuid.uuid4().hex})
+        return Job(self, answer.json()["id"])
+
+    def submit(self, document, folder=None):
+        """Create, upload, start. document: a dict, or the path of a JSON file (whose folder is then the default of `folder`)."""
+        if not isinstance(document, dict):
+            folder = folder or os.path.dirname(os.path.abspath(document))
+            with open(document, encoding="utf-8") as f:
+                document = json.load(f)
+        job = self.create(document)
+        for name, role in files_of(document):
+            job.upload(os.path.join(folder or ".", name), role)
+        job.start()
+        return job
+
+
+class Job:
+    """One job of a server. Methods ask the server every time; nothing is kept but the id."""
+
+    def __init__(self, server, job_id):
+        self.server, self.id = server, job_id
+        self.path = f"/v1/jobs/{job_id}"
+
+    def state(self):
+        """The whole job object of docs/api.md."""
+        return self.server.request("GET", self.path).json()
+
+    def upload(self, path, role, name=None):
+        """Declare one file and send it (tus): continues where an earlier upload stopped, checks the SHA-256 at the end."""
+        digest = hashlib.sha256()
+        with open(path, "rb") as f:
+            while chunk := f.read(1 << 20):
+                digest.update(chunk)
+            size = f.tell()
+            declared = {"name": name or os.path.basename(path), "role": role, "size": size, "sha256": digest.hexdigest()}
+            state = self.server.request("POST", self.path + "/files", json=declared).json()
+            if state["state"] != "complete":
+                self._send(f, size, state["upload_url"])
+
+    def _send(self, f, size, url):
+        tus, failures, offset = {"Tus-Resumable": "1.0.0"}, 0, None
+        while offset is None or offset < size:
+            try:
+                if offset is None:
+                    answer = self.server.request("HEAD", url, headers=tus)
+                else:
+                    f.seek(offset)
+                    header = dict(tus, **{"Upload-Offset": str(offset), "Content-Type": "application/offset+octet-stream"})
+                    answer = self.server.request("PATCH", url, headers=header, data=f.read(PIECE))
+                    failures = 0
+                offset = int(answer.headers["Upload-Offset"])
+            except (requests.ConnectionError, requests.Timeout, Problem) as problem:
+                if isinstance(problem, Problem) and problem.status not in (408, 409, 503):
+                    raise
+                failures += 1
+                if failures > 6:
+                    raise
+                offset = None
+                time.sleep(0.25 * 2 ** failures)
+
+    def start(self):
+        """Queue the job. Problem "files_missing" when inputs are not complete."""
+        return self.server.request("POST", self.path + "/start").json()
+
+    def cancel(self):
+        """Ask the worker to stop; what it has computed is kept."""
+        return self.server.request("POST", self.path + "/cancel").json()
+
+    def retry(self):
+        """Failed or cancelled: go on from the last checkpoint."""
+        return self.server.request("POST", self.path + "/retry").json()
+
+    def delete(self):
+        """Remove the job and its files."""
+        self.server.request("DELETE", self.path)
+
+    def wait(self, report=None, interval_s=1.0):
+        """Until the job has ended; returns its state, raises JobFailed unless it succeeded. report(text) gets a line whenever something changed."""
+        shown = None
+        while True:
+            job = self.state()
+            line = f"{job['state']} {job['stage'] or ''} {100 * job['fraction']:.0f} %"
+            if job["objective"] is not None:
+                line += f"  objective {job['objective']:.5g} +- {job['objective_se'] or 0:.2g}"
+            if report is not None and line != shown:
+                report(line)
+            shown = line
+            if job["state"] in ENDED:
+                if job["state"] != "succeeded":
+                    raise JobFailed(job)
+                return job
+            time.sleep(interval_s)
+
+    def parameters(self):
+        """Fitted parameters: dicts with name, unit, value, standard_error, lower, upper, determined ... None before the end."""
+        return self.state()["parameters"]
+
+    def series(self):
+        """All points of the fit's curve, oldest first (more than 5000 are thinned by the server)."""
+        points, after = [], -1
+        while True:
+            page = self.server.request("GET", f"{self.path}/series?after_step={after}&max_points=5000").json()
+            if not page["points"]:
+                return points
+            points += page["points"]
+            after = page["next_after_step"]
+
+    def log(self, offset=0):
+        """The log as text from a byte offset on (negative: from the end)."""
+        return self.server.request("GET", f"{self.path}/log?offset={offset}&max_bytes=1048576").text
+
+    def download(self, folder):
+        """All results into a folder; returns their paths."""
+        paths = []
+        for entry in self.server.request("GET", self.path + "/results").json()["files"]:
+            parts = entry["path"].split("/")
+            if any(p in ("", ".", "..") for p in parts):
+                raise ValueError(f"the server lists an unusable name: {entry['path']!r}")
+            path = os.path.join(folder, *parts)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with self.server.request("GET", entry["url"], stream=True) as answer, open(path + ".part", "wb") as f:
+                for chunk in answer.iter_content(1 << 20):
+                    f.write(chunk)
+            os.replace(path + ".part", path)
+            paths.append(path)
+        return paths

@@ -1,0 +1,26 @@
+"""Example: fit one scan to every table of a folder, and print held-out errors.
+
+    python3 clients/python/submit_table.py scan.tif 2.0 measured/*.csv
+"""
+import os
+import sys
+
+import selvedge
+
+
+def main(scan, voxel_um, *tables):
+    server = selvedge.Server()
+    for table in tables:
+        job = server.create({"sample": os.path.basename(table), "volume": {"files": [os.path.basename(scan)], "voxel_size_um": float(voxel_um)},
+                             "measurements": {"file": os.path.basename(table)}})
+        job.upload(scan, "volume")
+        job.upload(table, "measurements")
+        job.start()
+        result = job.wait()["result"]
+        print(f"{os.path.basename(table)}: fitted {100 * result['fit_rel_rms']:.1f} %, held out {100 * result['heldout_rel_rms']:.1f} %")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
+    main(*sys.argv[1:])
