@@ -155,12 +155,9 @@ out:
 static bool record_valid(const char *line, size_t n)
 {
     if (n < 10 || line[8] != ' ') return false;
-    char hex[9];
-    memcpy(hex, line, 8);
-    hex[8] = '\0';
-    char *end;
-    unsigned long stated = strtoul(hex, &end, 16);
-    return *end == '\0' && stated == crc32(0, (const unsigned char *)line + 9, (unsigned)(n - 9));
+    char want[16]; /* compared as text: strtoul would take blanks, signs and capitals as well */
+    snprintf(want, sizeof want, "%08lx", crc32(0, (const unsigned char *)line + 9, (unsigned)(n - 9)));
+    return memcmp(line, want, 8) == 0;
 }
 
 status record_read(const char *path, uint64_t from, record_visitor visit, void *context, uint64_t *next,

@@ -1,0 +1,103 @@
+/* Status names and error records. */
+#include "base/status.h"
+
+#include <errno.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void test_every_code_has_its_own_name(void **state)
+{
+    (void)state;
+    for (int i = 0; i < STATUS_COUNT; i++) {
+        assert_string_not_equal(status_name((status)i), "");
+        assert_string_not_equal(status_name((status)i), "unknown");
+        for (int j = 0; j < i; j++) assert_string_not_equal(status_name((status)i), status_name((status)j));
+    }
+    assert_string_equal(status_name(STATUS_CHECKSUM), "checksum");
+    assert_string_equal(status_name(STATUS_DISK_FULL), "disk_full");
+    assert_string_equal(status_name((status)999), "unknown");
+    assert_string_equal(status_name((status)-1), "unknown");
+}
+
+static status fails(struct error *err) { return error_set(err, STATUS_FORMAT, "page %d is %s", 211, "8-bit"); }
+
+static void test_error_says_where(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    assert_int_equal(fails(&err), STATUS_FORMAT);
+    assert_int_equal(err.code, STATUS_FORMAT);
+    assert_string_equal(err.where, "fails");
+    assert_string_equal(err.text, "page 211 is 8-bit");
+    assert_string_equal(err.field, "");
+    assert_int_equal(fails(NULL), STATUS_FORMAT);
+    assert_int_equal(error_set_field(&err, STATUS_INVALID, "lamp.side_cm", "too large"), STATUS_INVALID);
+    assert_string_equal(err.field, "lamp.side_cm");
+    error_clear(&err);
+    assert_int_equal(err.code, STATUS_OK);
+    error_clear(NULL);
+}
+
+static void test_error_may_quote_itself(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    error_set(&err, STATUS_IO, "inner");
+    error_set_field(&err, STATUS_IO, "f", "outer (%s)", err.text);
+    assert_string_equal(err.text, "outer (inner)");
+    assert_int_equal(error_prefix(&err, "file %d", 7), STATUS_IO);
+    assert_string_equal(err.text, "file 7: outer (inner)");
+    error_set_field(&err, STATUS_IO, err.field, "again");
+    assert_string_equal(err.field, "f");
+}
+
+static void test_errno_becomes_a_code(void **state)
+{
+    (void)state;
+    static const struct {
+        int value;
+        status code;
+    } golden[] = {{ENOSPC, STATUS_DISK_FULL}, {EDQUOT, STATUS_DISK_FULL}, {ENOMEM, STATUS_NO_MEMORY},
+                  {ENOENT, STATUS_NOT_FOUND}, {EIO, STATUS_IO},           {EACCES, STATUS_IO}};
+    for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
+        struct error err = {0};
+        errno = golden[i].value;
+        assert_int_equal(error_set_errno(&err, "cannot write '%s'", "a"), golden[i].code);
+        assert_int_equal(err.errno_value, golden[i].value);
+        assert_memory_equal(err.text, "cannot write 'a': ", 18);
+        assert_non_null(strstr(err.text, strerror(golden[i].value)));
+    }
+    errno = ENOSPC;
+    assert_int_equal(error_set_errno(NULL, "x"), STATUS_DISK_FULL);
+}
+
+static void test_long_texts_are_cut(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    char longer[2000];
+    memset(longer, 'x', sizeof longer - 1);
+    longer[sizeof longer - 1] = '\0';
+    error_set_field(&err, STATUS_INVALID, longer, "%s", longer);
+    assert_int_equal(strlen(err.text), sizeof err.text - 1);
+    assert_int_equal(strlen(err.field), sizeof err.field - 1);
+    error_prefix(&err, "%s", longer);
+    assert_int_equal(strlen(err.text), sizeof err.text - 1);
+    errno = EIO;
+    error_set_errno(&err, "%s", longer);
+    assert_int_equal(strlen(err.text), sizeof err.text - 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_every_code_has_its_own_name), cmocka_unit_test(test_error_says_where),
+        cmocka_unit_test(test_error_may_quote_itself),      cmocka_unit_test(test_errno_becomes_a_code),
+        cmocka_unit_test(test_long_texts_are_cut),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,198 @@
+/* Whole-file replacement and record files: what survives, what is noticed. */
+#include "base/durable.h"
+#include "tests/support/scratch_folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static void check_content(const char *path, const char *want)
+{
+    char *text = scratch_read(path, NULL);
+    assert_string_equal(text, want);
+    free(text);
+}
+
+static void test_replace(void **state)
+{
+    assert_int_equal(durable_make_folder(scratch_path(state, "replace"), NULL), STATUS_OK);
+    const char *path = scratch_path(state, "replace/file");
+    assert_int_equal(durable_replace(path, "first", 5, NULL), STATUS_OK);
+    check_content(path, "first");
+    assert_int_equal(durable_replace(path, "second, longer", 14, NULL), STATUS_OK);
+    check_content(path, "second, longer");
+    assert_int_equal(durable_replace_volatile(path, "", 0, NULL), STATUS_OK);
+    check_content(path, "");
+    assert_int_equal(scratch_count_entries(scratch_path(state, "replace")), 1);
+}
+
+static void test_failed_replace_leaves_nothing_behind(void **state)
+{
+    struct error err;
+    assert_int_equal(durable_replace(scratch_path(state, "none/file"), "x", 1, &err), STATUS_NOT_FOUND);
+    assert_non_null(strstr(err.text, "none/file"));
+    /* the target is a folder: written beside it, then the rename fails */
+    const char *inner = scratch_path(state, "outer/inner");
+    assert_int_equal(durable_make_folder(inner, NULL), STATUS_OK);
+    assert_int_equal(durable_replace(inner, "x", 1, &err), STATUS_IO);
+    assert_int_equal(scratch_count_entries(scratch_path(state, "outer")), 1);
+    char longer[5000];
+    memset(longer, 'x', sizeof longer - 1);
+    longer[sizeof longer - 1] = '\0';
+    assert_int_equal(durable_replace(longer, "x", 1, &err), STATUS_INVALID);
+}
+
+static void test_make_folder(void **state)
+{
+    struct stat st;
+    const char *path = scratch_path(state, "a/b//c/d");
+    assert_int_equal(durable_make_folder(path, NULL), STATUS_OK);
+    assert_int_equal(stat(path, &st), 0);
+    assert_true(S_ISDIR(st.st_mode));
+    assert_int_equal(st.st_mode & 0777, 0700);
+    assert_int_equal(durable_make_folder(path, NULL), STATUS_OK);
+    assert_int_equal(durable_make_folder(scratch_path(state, "a/"), NULL), STATUS_OK);
+    scratch_write(scratch_path(state, "a/file"), "x", 1);
+    assert_int_not_equal(durable_make_folder(scratch_path(state, "a/file/under"), NULL), STATUS_OK);
+}
+
+static void test_read_all(void **state)
+{
+    const char *path = scratch_path(state, "read");
+    char *data;
+    size_t n;
+    struct error err;
+    scratch_write(path, "a\0b", 3);
+    assert_int_equal(file_read_all(path, 3, &data, &n, NULL), STATUS_OK);
+    assert_int_equal(n, 3);
+    assert_memory_equal(data, "a\0b\0", 4);
+    free(data);
+    assert_int_equal(file_read_all(path, 2, &data, &n, &err), STATUS_TOO_LARGE);
+    scratch_write(path, "", 0);
+    assert_int_equal(file_read_all(path, 0, &data, NULL, NULL), STATUS_OK);
+    assert_string_equal(data, "");
+    free(data);
+    assert_int_equal(file_read_all(scratch_path(state, "absent"), 9, &data, &n, &err), STATUS_NOT_FOUND);
+    assert_int_equal(file_read_all(*state, 9, &data, &n, &err), STATUS_INVALID);
+}
+
+struct seen {
+    size_t n, stop_after;
+    char last[64];
+};
+
+static bool visit(void *context, const char *json, size_t n_json)
+{
+    struct seen *s = context;
+    assert_int_equal(strlen(json), n_json);
+    snprintf(s->last, sizeof s->last, "%s", json);
+    return ++s->n != s->stop_after;
+}
+
+/* Three records; offset[i] is where record i begins, offset[3] the length. */
+static const char *three_records(void **state, const char *name, uint64_t offset[4])
+{
+    static const char *const json[] = {"{\"step\":0}", "{\"step\":1,\"text\":\"\u00e9\"}", "{}"};
+    const char *path = scratch_path(state, name);
+    struct stat st;
+    offset[0] = 0;
+    for (size_t i = 0; i < 3; i++) {
+        assert_int_equal(record_append(path, json[i], i == 1, NULL), STATUS_OK);
+        assert_int_equal(stat(path, &st), 0);
+        offset[i + 1] = (uint64_t)st.st_size;
+    }
+    return path;
+}
+
+static void test_records_come_back(void **state)
+{
+    uint64_t offset[4], next = 99;
+    const char *path = three_records(state, "whole.rec", offset);
+    struct seen seen = {0};
+    assert_int_equal(record_read(path, 0, visit, &seen, &next, NULL), STATUS_OK);
+    assert_int_equal(seen.n, 3);
+    assert_string_equal(seen.last, "{}");
+    assert_int_equal(next, offset[3]);
+    seen = (struct seen){0};
+    assert_int_equal(record_read(path, offset[2], visit, &seen, &next, NULL), STATUS_OK);
+    assert_int_equal(seen.n, 1);
+    seen = (struct seen){.stop_after = 1};
+    assert_int_equal(record_read(path, 0, visit, &seen, &next, NULL), STATUS_OK);
+    assert_int_equal(next, offset[1]);
+    assert_int_equal(record_read(path, offset[3], visit, &seen, &next, NULL), STATUS_OK);
+    assert_int_equal(next, offset[3]);
+    assert_int_equal(record_read(scratch_path(state, "absent.rec"), 0, visit, &seen, &next, NULL), STATUS_NOT_FOUND);
+}
+
+static void test_every_torn_tail_is_noticed(void **state)
+{
+    uint64_t offset[4], next;
+    const char *path = three_records(state, "torn.rec", offset);
+    size_t n;
+    char *whole = scratch_read(path, &n);
+    for (size_t keep = 0; keep < n; keep++) {
+        scratch_write(path, whole, keep);
+        struct seen seen = {0};
+        size_t n_good = keep >= offset[2] ? 2 : keep >= offset[1] ? 1 : 0;
+        assert_int_equal(record_read(path, 0, visit, &seen, &next, NULL), STATUS_OK);
+        assert_int_equal(seen.n, n_good);
+        assert_int_equal(next, offset[n_good]);
+        /* cut, go on */
+        assert_int_equal(record_truncate(path, next, NULL), STATUS_OK);
+        assert_int_equal(record_append(path, "{\"again\":true}", false, NULL), STATUS_OK);
+        seen.n = 0;
+        assert_int_equal(record_read(path, 0, visit, &seen, &next, NULL), STATUS_OK);
+        assert_int_equal(seen.n, n_good + 1);
+        assert_string_equal(seen.last, "{\"again\":true}");
+    }
+    free(whole);
+}
+
+static void test_every_flipped_bit_is_noticed(void **state)
+{
+    uint64_t offset[4], next;
+    const char *path = three_records(state, "flipped.rec", offset);
+    size_t n;
+    char *whole = scratch_read(path, &n);
+    for (size_t bit = 0; bit < 8 * n; bit++) {
+        whole[bit / 8] = (char)(whole[bit / 8] ^ (1 << bit % 8));
+        scratch_write(path, whole, n);
+        whole[bit / 8] = (char)(whole[bit / 8] ^ (1 << bit % 8));
+        struct seen seen = {0};
+        size_t i_record = bit / 8 >= offset[2] ? 2 : bit / 8 >= offset[1] ? 1 : 0;
+        assert_int_equal(record_read(path, 0, visit, &seen, &next, NULL), STATUS_OK);
+        assert_int_equal(seen.n, i_record);
+        assert_int_equal(next, offset[i_record]);
+    }
+    free(whole);
+}
+
+static void test_full_disk_is_told(void **state)
+{
+    (void)state;
+    struct error err;
+    if (access("/dev/full", W_OK) != 0) skip();
+    assert_int_equal(record_append("/dev/full", "{}", false, &err), STATUS_DISK_FULL);
+    assert_int_equal(record_truncate(scratch_path(state, "absent.rec"), 0, NULL), STATUS_OK);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_replace),
+        cmocka_unit_test(test_failed_replace_leaves_nothing_behind),
+        cmocka_unit_test(test_make_folder),
+        cmocka_unit_test(test_read_all),
+        cmocka_unit_test(test_records_come_back),
+        cmocka_unit_test(test_every_torn_tail_is_noticed),
+        cmocka_unit_test(test_every_flipped_bit_is_noticed),
+        cmocka_unit_test(test_full_disk_is_told),
+    };
+    return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
+}
