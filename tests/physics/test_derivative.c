@@ -1,0 +1,218 @@
+/* Derivatives of rendered radiance on a woven cloth, all parameters of all models, lamp at a grazing angle included:
+ * (a) recorded paths evaluated again at shifted parameters (tight: the same paths, no tracing),
+ * (b) traced again with common random numbers, judged by the standard error of paired batches.
+ */
+#include "renderer/transport/camera.h"
+#include "renderer/transport/estimate.h"
+#include "renderer/transport/path_tracer.h"
+#include "tests/support/hand_weave.h"
+#include "tests/support/statistics_test.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define DEG (M_PI / 180)
+
+static const struct configuration view[3] = {
+    {30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 0.10, 1.0, 0.01},
+    {60 * DEG, 150 * DEG, 45 * DEG, 0, 90 * DEG, 0.61, 0.10, 1.0, 0.01},
+    {82 * DEG, 200 * DEG, 30 * DEG, 10 * DEG, 30 * DEG, 0.61, 0.10, 1.0, 0.01}, /* lamp at a grazing angle */
+};
+
+static struct scene *cloth(void)
+{
+    struct fiber_set f;
+    struct scene *scene = NULL;
+    struct error err = {0};
+    hand_weave_small(&f);
+    if (scene_new(&f, &(struct scene_option){true}, &scene, &err) != STATUS_OK) fail_msg("%s", err.text);
+    fiber_set_release(&f);
+    return scene;
+}
+
+static void mid_parameters(const struct scattering_model *m, double *param)
+{
+    static const double colour[3] = {0.7, 0.45, 0.85};
+    for (size_t p = 0; p < m->n_param; p++) {
+        const struct param_info *i = &m->param[p];
+        param[p] = i->channel >= 0 ? (strcmp(i->symbol, "C_R") == 0 ? 0.3 : 1) * colour[i->channel] : i->lower + 0.4 * (i->upper - i->lower);
+    }
+}
+
+/* ---- (a) ---- */
+
+enum { N_PATH = 3000, STEP_CAPACITY = 4000 };
+
+/* Radiance of recorded paths at other parameters, exactly as path_tracer.h states it. */
+static void evaluate(const struct scattering_model *m, const double *param, const struct path_record *record, size_t n_record, double out[3])
+{
+    struct scattering_state *s = NULL;
+    assert_int_equal(m->prepare(param, &s, NULL), STATUS_OK);
+    memset(out, 0, 3 * sizeof *out);
+    for (size_t i = 0; i < n_record; i++) {
+        double t[3] = {1, 1, 1};
+        for (size_t k = 0; k < record[i].n_step; k++) {
+            const struct path_step *p = &record[i].step[k];
+            float rgb[3];
+            if (p->light > 0) {
+                m->eval(s, p->light_wi, p->wo, rgb, NULL);
+                for (int c = 0; c < 3; c++) out[c] += t[c] * (double)rgb[c] * (double)p->light;
+            }
+            m->eval(s, p->wi, p->wo, rgb, NULL);
+            for (int c = 0; c < 3; c++) {
+                t[c] *= (double)rgb[c] * (double)p->weight;
+                out[c] += t[c] * (double)p->escape[c];
+            }
+        }
+    }
+    m->release(s);
+}
+
+static void check_recorded(const struct scene *scene, const struct scattering_model *m, const struct configuration *c)
+{
+    static struct path_record record[N_PATH];
+    struct path_step *steps = malloc(N_PATH * 64 * sizeof *steps), *next = steps, *end = steps + N_PATH * 64;
+    struct scattering_state *s = NULL;
+    struct path_setting setting;
+    struct camera camera;
+    double param[SCATTERING_MAX_PARAM], value[3] = {0}, jac[PATH_N_DERIVATIVE] = {0}, again[3];
+    size_t n_record = 0;
+    mid_parameters(m, param);
+    assert_int_equal(m->prepare(param, &s, NULL), STATUS_OK);
+    path_setting_init(&setting, scene, m, s, c, true);
+    camera_init(&camera, c);
+    for (uint32_t i = 0; i < N_PATH && next < end; i++) {
+        struct rng r;
+        struct scene_ray ray;
+        struct path_result path;
+        struct path_record rec = {0, (size_t)(end - next), next};
+        rng_start(&r, &(struct rng_key){21, 0, 0, 0}, i, 0);
+        double x = rng_double(&r), y = rng_double(&r);
+        assert_true(camera_ray(&camera, scene, x, y, &ray));
+        path_trace(&setting, &ray, &r, &path, &rec);
+        if (rec.n_step > rec.capacity) break;
+        for (int k = 0; k < 3; k++) value[k] += (double)path.radiance[k];
+        for (size_t k = 0; k < 3 * m->n_param; k++) jac[k] += (double)path.jac[k];
+        record[n_record++] = rec;
+        next += rec.n_step;
+    }
+    m->release(s);
+    assert_true(n_record > N_PATH / 2);
+    evaluate(m, param, record, n_record, again);
+    for (int k = 0; k < 3; k++) assert_true(fabs(again[k] / value[k] - 1) < 1e-4);
+    for (size_t p = 0; p < m->n_param; p++) {
+        double moved[SCATTERING_MAX_PARAM], up[3], down[3], h = 3e-3 * param[p];
+        memcpy(moved, param, sizeof moved);
+        moved[p] = param[p] + h;
+        evaluate(m, moved, record, n_record, up);
+        moved[p] = param[p] - h;
+        evaluate(m, moved, record, n_record, down);
+        for (size_t k = 0; k < 3; k++) {
+            double fd = (up[k] - down[k]) / (2 * h), got = jac[k * m->n_param + p], scale = value[k] / param[p];
+            if (fabs(fd - got) > 1e-3 * fabs(got) + 1e-4 * scale)
+                fail_msg("%s, %s, channel %zu: %.6g, difference %.6g (value %.4g)", m->id, m->param[p].name, k, got, fd, value[k]);
+        }
+    }
+    free(steps);
+}
+
+static void recorded_paths(void **state)
+{
+    (void)state;
+    struct scene *scene = cloth();
+    for (size_t k = 0; scattering_registry()[k] != NULL; k++)
+        for (int v = 0; v < 3; v++) check_recorded(scene, scattering_registry()[k], &view[v]);
+    scene_free(scene);
+}
+
+/* ---- (b) ---- */
+
+enum { N_BATCH = 24, BATCH_PATHS = 3072 };
+
+static void run(const struct scene *scene, const struct scattering_model *m, const double *param, struct thread_pool *pool, uint32_t batch,
+                struct estimate e[3])
+{
+    const size_t n_path[3] = {BATCH_PATHS, BATCH_PATHS, BATCH_PATHS};
+    struct error err = {0};
+    struct estimate_request q = {scene, m, param, view, 3, n_path, 31, batch, 0, true};
+    if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+}
+
+/* Moves every slot of one symbol (all channels of a colour) together: each channel sees only its own. The mean slope over
+ * [p - h, p + h] is compared with the derivatives' mean over it by Simpson's rule, so that steps can be wide. */
+static void check_symbol(const struct scene *scene, const struct scattering_model *m, const double *param, const char *symbol,
+                         struct thread_pool *pool, int *n_check, int *n_beyond_2se)
+{
+    struct sample_mean difference[3][3] = {{{0}}}, slope[3][3] = {{{0}}}, mean_difference[3] = {{0}};
+    double at[3][SCATTERING_MAX_PARAM];
+    size_t slot[3] = {0};
+    double h = 0;
+    for (int j = 0; j < 3; j++) memcpy(at[j], param, sizeof at[j]);
+    for (size_t p = 0; p < m->n_param; p++) {
+        const struct param_info *i = &m->param[p];
+        if (strcmp(i->symbol, symbol) != 0) continue;
+        h = i->channel >= 0 ? 0.03 : 0.15 * param[p];
+        at[0][p] -= h;
+        at[2][p] += h;
+        for (int c = 0; c < 3; c++)
+            if (i->channel < 0 || i->channel == c) slot[c] = p;
+    }
+    for (uint32_t b = 0; b < N_BATCH; b++) {
+        struct estimate e[3][3];
+        for (int j = 0; j < 3; j++) run(scene, m, at[j], pool, b, e[j]);
+        for (int v = 0; v < 3; v++) {
+            double sum = 0;
+            for (size_t c = 0; c < 3; c++) {
+                size_t k = c * m->n_param + slot[c];
+                double fd = (e[2][v].mean[c] - e[0][v].mean[c]) / (2 * h);
+                double jac = (e[0][v].jac[k] + 4 * e[1][v].jac[k] + e[2][v].jac[k]) / 6;
+                sample_mean_add(&difference[v][c], fd - jac);
+                sample_mean_add(&slope[v][c], jac);
+                sum += fd - jac;
+            }
+            sample_mean_add(&mean_difference[v], sum);
+        }
+    }
+    for (int v = 0; v < 3; v++) {
+        double total = fabs(slope[v][0].mean + slope[v][1].mean + slope[v][2].mean);
+        ++*n_check;
+        if (fabs(mean_difference[v].mean) > fmax(2 * sample_mean_se(&mean_difference[v]), 0.02 * total)) ++*n_beyond_2se;
+        for (int c = 0; c < 3; c++) {
+            double d = fabs(difference[v][c].mean), se = sample_mean_se(&difference[v][c]), j = fabs(slope[v][c].mean);
+            if (d > fmax(4 * se, 0.02 * j))
+                fail_msg("%s, %s, view %d, channel %d: derivative %.5g, difference off by %.3g (%.1f standard errors)", m->id, symbol, v, c,
+                         slope[v][c].mean, difference[v][c].mean, d / se);
+        }
+    }
+}
+
+/* Channels share their paths, so the sum over channels counts: of fifteen comparisons 4.6 % each are beyond two standard errors by
+ * chance; four or more are with probability 0.4 %. Every channel by itself has to stay within four. */
+static void traced_again(void **state)
+{
+    (void)state;
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    static const char *const symbol[5] = {"C_R", "C_TT", "beta_R", "beta_TT", "gamma_TT"};
+    struct scene *scene = cloth();
+    struct thread_pool *pool = NULL;
+    double param[SCATTERING_MAX_PARAM];
+    int n_check = 0, n_beyond = 0;
+    mid_parameters(m, param);
+    assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
+    for (int k = 0; k < 5; k++) check_symbol(scene, m, param, symbol[k], pool, &n_check, &n_beyond);
+    print_message("%d of %d comparisons beyond 2 standard errors and 2 %%\n", n_beyond, n_check);
+    assert_true(n_beyond < 4);
+    thread_pool_free(pool);
+    scene_free(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(recorded_paths), cmocka_unit_test(traced_again)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
