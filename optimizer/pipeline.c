@@ -1,0 +1,164 @@
+/* The stage table's computing side: runs what is not done, loads what is. */
+#include "optimizer/pipeline.h"
+#include "base/clock.h"
+#include "base/durable.h"
+#include "optimizer/job_folder.h"
+#include "optimizer/pipeline_context.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+
+struct stage_code {
+    const char *name;
+    status (*run)(struct pipeline_context *c, struct error *err);
+    status (*load)(struct pipeline_context *c, struct error *err); /* NULL: the stage is cheap, or always runs */
+    bool of_volume;                                                /* skipped when the job gives fibers */
+};
+
+/* In the order of pipeline_stage_table (a test compares the names). */
+static const struct stage_code stage_code[] = {
+    {"volume", stage_volume, stage_volume_load, true},
+    {"orientation", stage_orientation, stage_orientation_load, true},
+    {"fibers", stage_fibers, stage_fibers_load, false},
+    {"directions", stage_directions, stage_directions_load, true},
+    {"scene", stage_scene, NULL, false},
+    {"fit", stage_fit, stage_fit_load, false},
+    {"validation", stage_validation, stage_validation_load, false},
+    {"report", stage_report, NULL, false},
+};
+
+void pipeline_context_init(struct pipeline_context *c)
+{
+    memset(c, 0, sizeof *c);
+    observation_set_init(&c->observation);
+    observation_set_init(&c->fitted);
+    fiber_set_init(&c->fiber);
+    for (size_t i = 0; i < sizeof c->stage_wall_s / sizeof c->stage_wall_s[0]; i++) c->stage_wall_s[i] = NAN;
+}
+
+void pipeline_context_release(struct pipeline_context *c)
+{
+    job_document_free(c->doc);
+    observation_set_release(&c->observation);
+    observation_set_release(&c->fitted);
+    volume_release(&c->volume);
+    direction_volume_release(&c->direction);
+    fiber_set_release(&c->fiber);
+    scene_free(c->scene);
+    free(c->validation.replica[0]);
+    free(c->validation.replica[1]);
+}
+
+status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name, char path[WORKER_PATH_BYTES],
+                          struct error *err)
+{
+    char relative[256];
+    snprintf(relative, sizeof relative, "%s/%s", JOB_FOLDER_WORK, stage);
+    worker_folder_path(c->folder, relative, NULL, path);
+    status s = durable_make_folder(path, err);
+    if (s == STATUS_OK) worker_folder_path(c->folder, relative, name, path);
+    return s;
+}
+
+/* ---- inputs ---- */
+
+static void warn_observation(void *context, const char *text)
+{
+    struct pipeline_context *c = context;
+    worker_status_warn(c->status, text);
+}
+
+static status set_parameters(struct pipeline_context *c, struct error *err)
+{
+    c->model = scattering_find(c->doc->model);
+    if (c->model == NULL) return error_set_field(err, STATUS_INVALID, "fit.model", "unknown model '%s'", c->doc->model);
+    for (size_t p = 0; p < c->model->n_param; p++) {
+        const struct param_info *info = &c->model->param[p];
+        struct fit_parameter *k = &c->parameter[p];
+        double fixed = c->doc->fixed[p], start = c->doc->start[p];
+        k->lower = info->lower;
+        k->upper = info->upper;
+        k->fixed = !isnan(fixed);
+        k->start = k->fixed ? param_from_file_unit(info, fixed) : isnan(start) ? info->start : param_from_file_unit(info, start);
+        k->start = fmin(fmax(k->start, k->lower), k->upper); /* degrees to radians may step over a bound by one rounding */
+    }
+    return STATUS_OK;
+}
+
+status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    worker_folder_path(c->folder, JOB_FILE_DOCUMENT, NULL, path);
+    status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
+    if (s != STATUS_OK) return s;
+    s = job_document_parse(text, n, &c->doc, err);
+    c->fingerprint = crc32(0, (const unsigned char *)text, (unsigned)n);
+    free(text);
+    if (s == STATUS_OK) s = set_parameters(c, err);
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
+    if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
+    if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
+    if (s == STATUS_OK && 3 * c->fitted.n < c->model->n_param) {
+        char warning[200];
+        snprintf(warning, sizeof warning, "%zu fitted rows give %zu numbers for %zu parameters: some will stay undetermined", c->fitted.n,
+                 3 * c->fitted.n, c->model->n_param);
+        worker_status_warn(c->status, warning);
+    }
+    return s;
+}
+
+/* ---- running ---- */
+
+static void report_fraction(void *context, double fraction)
+{
+    struct pipeline_context *c = context;
+    worker_status_fraction(c->status, fraction);
+}
+
+/* A finished stage is loaded; if its checkpoint cannot be read it runs again, and so do all later ones. */
+static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, struct error *err)
+{
+    const struct stage_code *code = &stage_code[i];
+    double start_s = clock_monotonic_s();
+    if (code->load != NULL && !*earlier_ran && worker_folder_stage_done(c->folder, code->name)) {
+        struct error why = {0};
+        if (code->load(c, &why) == STATUS_OK) {
+            log_info(c->log, "stage %s: done by an earlier attempt", code->name);
+            worker_status_fraction(c->status, 1.0);
+            worker_status_restart_eta(c->status);
+            return STATUS_OK;
+        }
+        log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
+    }
+    if (code->load != NULL) *earlier_ran = true;
+    log_info(c->log, "stage %s", code->name);
+    status s = code->run(c, err);
+    if (s != STATUS_OK) return s;
+    c->stage_wall_s[i] = clock_monotonic_s() - start_s;
+    log_info(c->log, "stage %s: %.1f s", code->name, c->stage_wall_s[i]);
+    return worker_folder_mark_stage(c->folder, code->name, err);
+}
+
+status pipeline_run(struct pipeline_context *c, struct error *err)
+{
+    size_t n_stage;
+    const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
+    double total = 0.0, done = 0.0;
+    bool earlier_ran = false;
+    c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
+    for (size_t i = 0; i < n_stage; i++)
+        if (c->doc->has_volume || !stage_code[i].of_volume) total += info[i].weight;
+    for (size_t i = 0; i < n_stage; i++) {
+        if (!c->doc->has_volume && stage_code[i].of_volume) continue;
+        worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage, done / total, info[i].weight / total);
+        status s = do_stage(c, i, &earlier_ran, err);
+        if (s == STATUS_OK && progress_cancelled(&c->progress)) s = error_set(err, STATUS_CANCELLED, "cancelled");
+        if (s != STATUS_OK) return s;
+        done += info[i].weight;
+    }
+    return STATUS_OK;
+}

@@ -1,0 +1,94 @@
+/* What the stages of a job share: inputs, products, and the way to the outside. One thread runs the stages; each stage uses the pool.
+ * Ownership: pipeline_context_init/release; everything in it is owned unless said otherwise.
+ */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
+
+#include "base/log.h"
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "geometry/fibers/fiber_set.h"
+#include "geometry/reconstruct.h"
+#include "geometry/volume/volume.h"
+#include "optimizer/descent/descent.h"
+#include "optimizer/job_document.h"
+#include "optimizer/photographs/observation.h"
+#include "optimizer/pipeline.h"
+#include "optimizer/worker_folder.h"
+#include "optimizer/worker_status.h"
+#include "renderer/scene/scene.h"
+
+/* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */
+struct validation {
+    struct estimate *replica[2];
+    struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
+    double worst_rel_se;                  /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
+};
+
+struct pipeline_context {
+    const struct worker_folder *folder; /* not owned, as the next three */
+    struct worker_status *status;
+    struct log *log;
+    struct thread_pool *pool;
+    size_t memory_limit_bytes;
+    struct progress progress;           /* of the running stage */
+
+    struct job_document *doc;
+    uint64_t fingerprint;               /* of the job document's text */
+    struct observation_set observation; /* all */
+    struct observation_set fitted;      /* those of the set "fit" */
+    const struct scattering_model *model;
+    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+
+    struct reconstruct_option option;
+    struct reconstruct_report geometry;
+    struct volume volume;               /* empty when not in memory: pipeline_need_volume */
+    struct direction_volume direction;
+    struct fiber_set fiber;
+    struct scene *scene;
+    struct fit_result fit;
+    struct validation validation;
+    double stage_wall_s[16];            /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
+};
+
+void pipeline_context_init(struct pipeline_context *c);
+void pipeline_context_release(struct pipeline_context *c);
+
+/* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. */
+status pipeline_read_inputs(struct pipeline_context *c, struct error *err);
+
+/* Runs all stages that are not done. memory: context of the caller with folder, status, log, pool filled in. */
+status pipeline_run(struct pipeline_context *c, struct error *err);
+
+/* ---- the stages (pipeline_geometry.c, pipeline_fit.c, pipeline_report.c): run does the work and stores it under work/<stage>/;
+ * load brings back what a finished stage stored ---- */
+status stage_volume(struct pipeline_context *c, struct error *err);
+status stage_volume_load(struct pipeline_context *c, struct error *err);
+status stage_orientation(struct pipeline_context *c, struct error *err);
+status stage_orientation_load(struct pipeline_context *c, struct error *err);
+status stage_fibers(struct pipeline_context *c, struct error *err);
+status stage_fibers_load(struct pipeline_context *c, struct error *err);
+status stage_directions(struct pipeline_context *c, struct error *err);
+status stage_directions_load(struct pipeline_context *c, struct error *err);
+status stage_scene(struct pipeline_context *c, struct error *err);
+status stage_fit(struct pipeline_context *c, struct error *err);
+status stage_fit_load(struct pipeline_context *c, struct error *err);
+status stage_validation(struct pipeline_context *c, struct error *err);
+status stage_validation_load(struct pipeline_context *c, struct error *err);
+status stage_report(struct pipeline_context *c, struct error *err);
+
+/* The mapped volume in memory, from its checkpoint when it was let go. */
+status pipeline_need_volume(struct pipeline_context *c, struct error *err);
+/* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
+status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name, char path[WORKER_PATH_BYTES],
+                          struct error *err);
+/* The path tracer as an estimator over a set of observations. The scene, model and pool are those of c. */
+struct trace_context {
+    struct pipeline_context *pipeline;
+    struct configuration *configuration; /* owned by the user of this struct: free() */
+    size_t n_configuration;
+};
+status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o, struct error *err);
+struct estimator trace_estimator(struct trace_context *t);
+
+#endif

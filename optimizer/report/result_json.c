@@ -1,0 +1,228 @@
+#include "optimizer/report/result_json.h"
+#include "optimizer/job_folder.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(); }
+static json_t *count(size_t n) { return json_integer((json_int_t)n); }
+
+static json_t *number_list(const double *v, size_t n, double factor)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < n; i++) json_array_append_new(list, number(v[i] * factor));
+    return list;
+}
+
+static json_t *count_list(const size_t *v, size_t n)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < n; i++) json_array_append_new(list, count(v[i]));
+    return list;
+}
+
+/* ---- names and exposure ---- */
+
+status result_picture_names(const struct observation_set *o, picture_name **name, struct error *err)
+{
+    picture_name *list = calloc(o->n > 0 ? o->n : 1, sizeof *list);
+    if (list == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot name pictures: out of memory");
+    for (size_t i = 0; i < o->n; i++) {
+        const char *from = o->item[i].name, *dot = strrchr(from, '.');
+        int n = dot != NULL && dot > from ? (int)(dot - from) : (int)strlen(from);
+        snprintf(list[i], sizeof list[i], "%.*s", n, from);
+        for (size_t j = 0; j < i; j++)
+            if (strcmp(list[i], list[j]) == 0) snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, i);
+    }
+    *name = list;
+    return STATUS_OK;
+}
+
+static int compare_double(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+double result_png_exposure(const struct observation_set *o)
+{
+    double *v = malloc((o->n > 0 ? o->n : 1) * sizeof *v), exposure = 1.0;
+    if (v == NULL || o->n == 0) {
+        free(v);
+        return exposure;
+    }
+    for (size_t i = 0; i < o->n; i++) v[i] = fmax(fmax(o->item[i].mean_rgb[0], o->item[i].mean_rgb[1]), o->item[i].mean_rgb[2]);
+    qsort(v, o->n, sizeof *v, compare_double);
+    double bright = v[(o->n - 1) * 9 / 10];
+    if (bright > 0.0) exposure = 0.8 / bright;
+    free(v);
+    return exposure;
+}
+
+/* ---- parts ---- */
+
+static json_t *at_bound(const struct pipeline_context *c, size_t p)
+{
+    if (!c->fit.uncertainty.at_bound[p]) return json_null();
+    const struct fit_parameter *k = &c->parameter[p];
+    return json_string(c->fit.param[p] - k->lower < k->upper - c->fit.param[p] ? "lower" : "upper");
+}
+
+static json_t *parameters_json(const struct pipeline_context *c)
+{
+    json_t *list = json_array();
+    for (size_t p = 0; p < c->model->n_param; p++) {
+        const struct param_info *info = &c->model->param[p];
+        const struct fit_parameter *k = &c->parameter[p];
+        json_array_append_new(
+            list, json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit", info->unit, "value",
+                            number(param_to_file_unit(info, c->fit.param[p])), "standard_error",
+                            number(param_to_file_unit(info, c->fit.uncertainty.se_param[p])), "lower", param_to_file_unit(info, k->lower),
+                            "upper", param_to_file_unit(info, k->upper), "start", param_to_file_unit(info, k->start), "at_bound",
+                            at_bound(c, p), "determined", (int)c->fit.uncertainty.determined[p], "fixed", (int)k->fixed));
+    }
+    return list;
+}
+
+static json_t *correlation_json(const struct pipeline_context *c)
+{
+    size_t n = c->model->n_param;
+    json_t *list = json_array();
+    for (size_t p = 0; p < n; p++) json_array_append_new(list, number_list(c->fit.uncertainty.correlation + p * n, n, 1.0));
+    return list;
+}
+
+static json_t *row_json(const struct pipeline_context *c, size_t i, const char *picture)
+{
+    const struct observation *o = &c->observation.item[i];
+    const struct configuration *k = &o->configuration;
+    const struct estimate *a = &c->validation.replica[0][i], *b = &c->validation.replica[1][i];
+    const double deg = 180.0 / M_PI;
+    double rendered[3], se[3];
+    char png[200], exr[200], photograph[200];
+    for (int q = 0; q < 3; q++) {
+        rendered[q] = 0.5 * (a->mean[q] + b->mean[q]);
+        se[q] = 0.5 * sqrt(a->var[q] + b->var[q]);
+    }
+    snprintf(png, sizeof png, "renderings/%s.png", picture);
+    snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
+    snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
+    json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "name", o->name, "set", o->set == JOB_SET_FIT ? "fit" : "held-out",
+                            "light_theta_deg", k->light_theta_rad * deg, "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg",
+                            k->camera_theta_rad * deg, "camera_phi_deg", k->camera_phi_rad * deg, "cloth_rotation_deg",
+                            k->cloth_rotation_rad * deg, "weight", o->weight);
+    json_object_set_new(row, "measured", number_list(o->mean_rgb, 3, 1.0));
+    json_object_set_new(row, "measured_se", number_list(o->se_rgb, 3, 1.0));
+    json_object_set_new(row, "rendered", number_list(rendered, 3, 1.0));
+    json_object_set_new(row, "rendered_se", number_list(se, 3, 1.0));
+    json_object_set_new(row, "rendering_png", json_string(png));
+    json_object_set_new(row, "rendering_exr", json_string(exr));
+    json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
+    return row;
+}
+
+static json_t *geometry_json(const struct pipeline_context *c)
+{
+    const struct reconstruct_report *g = &c->geometry;
+    const double um = 1e6, mm = 1e3;
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input", c->doc->has_volume ? "volume" : "fibers", "n_fiber", count(c->fiber.n_fiber),
+                             "n_vertex", count(c->fiber.n_vertex), "tile_mm", number_list(c->fiber.tile_size_m, 2, mm));
+    json_object_set_new(json, "total_length_mm", number(g->total_length_m * mm));
+    double radius = 0.0;
+    for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
+    json_object_set_new(json, "mean_radius_um", number(radius * um));
+    if (!c->doc->has_volume) return json;
+    const struct reconstruct_option *o = &c->option;
+    json_object_set_new(json, "n_voxel", count_list(g->n, 3));
+    json_object_set_new(json, "voxel_size_um", number_list(g->voxel_size_m, 3, um));
+    json_object_set_new(json, "density_low", number(g->density_low));
+    json_object_set_new(json, "density_high", number(g->density_high));
+    json_object_set_new(json, "noise_sd", number(g->noise_sd));
+    json_object_set_new(json, "fiber_diameter_voxel", number(g->fiber_diameter_voxel));
+    json_object_set_new(json, "n_material_voxel", count(g->n_material_voxel));
+    json_object_set_new(json, "n_kept_voxel", count(g->n_kept_voxel));
+    json_object_set_new(json, "n_class_voxel", count_list(g->n_class_voxel, 3));
+    json_object_set_new(json, "n_center", count_list(g->n_center, 3));
+    json_object_set_new(json, "n_chain", count_list(g->n_chain, 3));
+    json_object_set_new(json, "n_short_dropped", count_list(g->n_short_dropped, 3));
+    json_object_set_new(json, "n_gap_bridged", count(g->n_gap_bridged));
+    json_object_set_new(json, "n_joined", count(g->n_joined));
+    json_object_set_new(json, "radius_um", number_list(g->radius_m, 3, um));
+    json_object_set_new(json, "radius_score", number_list(g->radius_score, 3, 1.0));
+    json_object_set_new(json, "dice", number(g->dice));
+    json_object_set_new(json, "direction_change_mean_deg", number(g->direction_change_mean_deg));
+    json_object_set_new(json, "options",
+                        json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", number(o->s), "t", number(o->t), "h",
+                                  count(o->h), "eps_d", number(o->eps_d), "eps_J", number(o->eps_j), "link_sigma_voxel",
+                                  number(o->link_sigma_voxel), "min_vertices", count(o->min_vertex), "smooth_alpha", number(o->smooth_alpha)));
+    return json;
+}
+
+static json_t *warnings_json(struct pipeline_context *c)
+{
+    json_t *list = json_array();
+    char text[600];
+    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) json_array_append_new(list, json_string(text));
+    return list;
+}
+
+static json_t *stages_json(const struct pipeline_context *c)
+{
+    size_t n_stage;
+    const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
+    json_t *list = json_array();
+    for (size_t i = 0; i < n_stage; i++)
+        json_array_append_new(list, json_pack("{s:s, s:o}", "name", info[i].name, "wall_s", number(c->stage_wall_s[i])));
+    return list;
+}
+
+static json_t *result_json(struct pipeline_context *c, picture_name *picture)
+{
+    uint64_t n_path = 0;
+    json_t *rows = json_array();
+    for (size_t i = 0; i < c->observation.n; i++) {
+        json_array_append_new(rows, row_json(c, i, picture[i]));
+        n_path += c->validation.replica[0][i].n_path + c->validation.replica[1][i].n_path;
+    }
+    json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I, s:b, s:s}", "format", 1, "sample", c->doc->sample, "model", c->model->id, "method",
+                             c->doc->method, "seed", (json_int_t)c->doc->seed, "converged", (int)c->fit.converged, "reason", c->fit.reason);
+    json_object_set_new(json, "parameters", parameters_json(c));
+    json_object_set_new(json, "correlation", correlation_json(c));
+    json_object_set_new(json, "objective", number(c->validation.fit.value));
+    json_object_set_new(json, "objective_se", number(c->validation.fit.se));
+    json_object_set_new(json, "fit_rel_rms", number(c->validation.fit.rel_rms));
+    json_object_set_new(json, "heldout_rel_rms", number(c->validation.held_out.rel_rms));
+    json_object_set_new(json, "misfit_rel_rms", number(sqrt(c->fit.uncertainty.misfit_var)));
+    json_object_set_new(json, "validation_worst_rel_se", number(c->validation.worst_rel_se));
+    json_object_set_new(json, "rows", rows);
+    json_object_set_new(json, "geometry", geometry_json(c));
+    json_object_set_new(json, "png_exposure", number(result_png_exposure(&c->observation)));
+    json_object_set_new(json, "n_path_fit", json_integer((json_int_t)c->fit.n_path));
+    json_object_set_new(json, "n_step", count(c->fit.n_step));
+    json_object_set_new(json, "fit_wall_s", number(c->fit.wall_s));
+    json_object_set_new(json, "n_path_validation", json_integer((json_int_t)n_path));
+    json_object_set_new(json, "stages", stages_json(c));
+    json_object_set_new(json, "warnings", warnings_json(c));
+    json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
+    return json;
+}
+
+status result_json_write(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    picture_name *picture = NULL;
+    status s = result_picture_names(&c->observation, &picture, err);
+    if (s != STATUS_OK) return s;
+    json_t *json = result_json(c, picture);
+    char *text = json_dumps(json, JSON_REAL_PRECISION(17) | JSON_INDENT(1));
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "result.json", path);
+    s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
+                     : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    free(text);
+    json_decref(json);
+    free(picture);
+    return s;
+}

@@ -1,0 +1,32 @@
+/* A worker's hold on its job folder: the lock, the attempt that may write, paths. Layout: job_folder.h. */
+#ifndef SELVEDGE_OPTIMIZER_WORKER_FOLDER_H
+#define SELVEDGE_OPTIMIZER_WORKER_FOLDER_H
+
+#include "base/status.h"
+
+#include <stdbool.h>
+
+enum { WORKER_PATH_BYTES = 4096 };
+
+struct worker_folder {
+    char path[2048];
+    int lock_fd;
+    long long attempt;   /* 0 when run by hand */
+    char token[256];     /* "" when run by hand */
+};
+
+/* Takes the lock and notes the attempt; makes work/ and results/. STATUS_NOT_FOUND: no such folder; STATUS_STALE: another worker holds it. */
+status worker_folder_open(struct worker_folder *f, const char *path, struct error *err);
+void worker_folder_close(struct worker_folder *f);
+/* STATUS_STALE when attempt.json names another attempt by now. Called before every durable write. */
+status worker_folder_check(const struct worker_folder *f, struct error *err);
+/* "JOB/a/b"; b may be NULL. */
+void worker_folder_path(const struct worker_folder *f, const char *a, const char *b, char path[WORKER_PATH_BYTES]);
+/* Check, then durable_replace. */
+status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes, struct error *err);
+
+/* Marks of stages whose outputs are whole: work/<stage>.done. */
+bool worker_folder_stage_done(const struct worker_folder *f, const char *stage);
+status worker_folder_mark_stage(const struct worker_folder *f, const char *stage, struct error *err);
+
+#endif
