@@ -117,7 +117,7 @@ static void print_parameter(const json_t *parameter, FILE *out)
     text_clean(member_text(parameter, "name"), name, sizeof name);
     text_clean(member_text(parameter, "unit"), unit, sizeof unit);
     text_with_error(member_number(parameter, "value"), member_number(parameter, "standard_error"), value);
-    fprintf(out, "  %-12s %-24s %-4s ", name, value, unit);
+    fprintf(out, "  %-12s %-24s %-5s", name, value, unit);
     print_flags(parameter, out);
     fputc('\n', out);
 }

@@ -3,6 +3,8 @@
 
 #include "base/durable.h"
 
+#include <fcntl.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -55,11 +57,15 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
     status s = durable_make_folder(parent, err);
     if (s != STATUS_OK) return s;
     double modified = json_number_value(json_object_get(file, "modified_unix_s"));
-    bool whole = stat(target, &info) == 0 && (uint64_t)info.st_size == n_bytes && (double)info.st_mtim.tv_sec >= modified;
+    bool whole = stat(target, &info) == 0 && (uint64_t)info.st_size == n_bytes &&
+                 fabs((double)info.st_mtim.tv_sec + 1e-9 * (double)info.st_mtim.tv_nsec - modified) < 0.01;
     text_clean(path, t->name, sizeof t->name);
     if (!whole) {
         s = http_download(t->cli->http, url, target, got, t, err);
         if (s != STATUS_OK) return error_prefix(err, "cannot download '%s'", path);
+        /* the server's time of change, so that the next download knows the file whatever the clocks say */
+        struct timespec times[2] = {{.tv_nsec = UTIME_OMIT}, {.tv_sec = (time_t)modified, .tv_nsec = (long)(1e9 * (modified - floor(modified)))}};
+        (void)utimensat(AT_FDCWD, target, times, 0);
         (*n_fetched)++;
     }
     t->n_before += n_bytes;

@@ -17,8 +17,8 @@ export function commonExposure(list) {
   return peak.length ? 0.8 / Math.max(peak[Math.floor(0.9 * (peak.length - 1))], 1e-6) : 1;
 }
 
-export function gallery(list) {
-  const exposure = commonExposure(list);
+export function gallery(list, pngExposure) {
+  const exposure = pngExposure ?? commonExposure(list);
   const cards = list.map((c) => el("div", { class: c.held ? "pair held" : "pair" },
     el("div", { class: "pictures" }, picture(c.measuredPicture, c.measured, exposure, "measured"), picture(c.renderedPicture, c.rendered, exposure, "rendered")),
     el("div", { class: "label" },
@@ -28,7 +28,7 @@ export function gallery(list) {
       el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, degrees(c.angles.cloth_rotation_deg))),
       el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percent(c.error))))));
   return [
-    el("p", { class: "hint" }, "Left measured, right rendered with the fitted parameters; dashed frames were held out of the fit. Plain squares show mean colours, all at one exposure."),
+    el("p", { class: "hint" }, "Left measured, right rendered with the fitted parameters; dashed frames were held out of the fit. Plain squares show mean colours; everything is at one exposure."),
     el("div", { class: "gallery" }, cards),
   ];
 }

@@ -50,7 +50,7 @@ function notesOf(job) {
     notes.push(el("p", { class: "note bad" }, field + job.error.text));
   }
   if (job.missing_files?.length && job.state === "draft") notes.push(el("p", { class: "note" }, `Files still missing: ${job.missing_files.join(", ")}`));
-  if (residuals(job).converged === false) notes.push(el("p", { class: "note" }, "The fit has not converged; the parameters are the best point found."));
+  if (residuals(job).converged === false) notes.push(el("p", { class: "note" }, `The fit has not converged: ${job.result.reason ?? "the parameters are the best point found"}`));
   return notes;
 }
 
@@ -105,7 +105,7 @@ export function jobPage(page, id) {
     closeFibers = fibers?.close ?? null;
     results.append(
       el("div", { class: "columns" }, card("Fitted parameters", parameterTable(job)), card("Measured against rendered", scatterPlot(compared))),
-      compared.length ? card("Measured beside rendered", gallery(compared)) : "",
+      compared.length ? card("Measured beside rendered", gallery(compared, job.result?.png_exposure)) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",
       card("Downloads", downloads(job, list)));

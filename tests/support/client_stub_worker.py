@@ -1,0 +1,88 @@
+#!/usr/bin/python3
+"""Stands in for selvedge-worker where clients are tested: walks through the stages and writes made-up curves and results, computes nothing.
+
+The sample's name says how it behaves: "slow ..." takes seconds a stage, "failing ..." fails in the first stage with a field,
+anything else succeeds within a second or two.
+"""
+import json
+import math
+import os
+import signal
+import sys
+import time
+import zlib
+
+FOLDER = sys.argv[1]
+STAGES = ["volume", "orientation", "fibers", "directions", "scene", "fit", "validation", "report"]
+NAMES = ["C_R.r", "C_R.g", "C_R.b", "C_TT.r", "C_TT.g", "C_TT.b", "beta_R", "beta_TT", "gamma_TT"]
+STARTED = time.time()
+
+
+def path(*parts):
+    return os.path.join(FOLDER, *parts)
+
+
+def status(**changes):
+    with open(path("attempt.json"), encoding="utf-8") as f:
+        attempt = json.load(f)["attempt"]
+    value = {"state": "running", "attempt": attempt, "stage": "volume", "i_stage": 0, "n_stage": len(STAGES), "stage_fraction": 0.0,
+             "fraction": 0.0, "eta_s": None, "heartbeat_unix_s": time.time(), "started_unix_s": STARTED, "message": "", "objective": None,
+             "objective_se": None, "step": None, "warnings": [], "error": None, "peak_rss_bytes": 1 << 20}
+    value.update(changes)
+    with open(path("status.json.new"), "w", encoding="utf-8") as f:
+        json.dump(value, f)
+    os.replace(path("status.json.new"), path("status.json"))
+
+
+def log(text):
+    with open(path("log.txt"), "a", encoding="utf-8") as f:
+        f.write(time.strftime("%Y-%m-%dT%H:%M:%S.000Z INFO ", time.gmtime()) + text + "\n")
+
+
+def series(step):
+    objective = 0.02 + 2 * math.exp(-step)
+    text = json.dumps({"step": step, "phase": "gauss_newton", "wall_s": 0.1 * step, "n_path": 1000, "n_path_total": 1000 * (step + 1),
+                       "objective": objective, "objective_se": 0.02 * objective, "parameter": [0.1] * 3 + [0.85 - 0.02 * step] * 3 + [5, 20, 18],
+                       "parameter_se": [0.01] * 6 + [0.5, 1, 1], "rel_rms": math.sqrt(objective / 3), "rendered": [], "note": ""})
+    with open(path("series.rec"), "a", encoding="utf-8") as f:
+        f.write(f"{zlib.crc32(text.encode()):08x} {text}\n")
+    return objective
+
+
+def results():
+    os.makedirs(path("results", "renderings"), exist_ok=True)
+    parameters = [{"name": n, "unit": "" if n[0] == "C" else "deg", "value": 0.1 + i, "standard_error": 0.01, "lower": 0.001, "upper": 45.0,
+                   "determined": n != "beta_R", "at_bound": False, "fixed": False} for i, n in enumerate(NAMES)]
+    with open(path("results", "result.json"), "w", encoding="utf-8") as f:
+        json.dump({"fit_rel_rms": 0.02, "heldout_rel_rms": 0.03, "converged": True, "parameters": parameters, "rows": []}, f)
+    with open(path("results", "renderings", "fit-00.bin"), "wb") as f:
+        f.write(bytes(range(256)) * 400)
+
+
+def cancelled(*_):
+    status(state="cancelled", message="stopped")
+    os._exit(3)
+
+
+def main():
+    signal.signal(signal.SIGTERM, cancelled)
+    with open(path("job.json"), encoding="utf-8") as f:
+        sample = json.load(f)["sample"]
+    if sample.startswith("failing"):
+        status(state="failed", error={"code": "format", "field": "volume.files", "text": "cannot read volume 'scan.tif': page 2 is 8-bit, page 1 is 16-bit"})
+        return 1
+    pause = 0.5 if sample.startswith("slow") else 0.01
+    for i, stage in enumerate(STAGES):
+        log(f"stage {stage}")
+        for k in range(10):
+            objective = series(k) if stage == "fit" else None
+            status(stage=stage, i_stage=i, stage_fraction=k / 10, fraction=(10 * i + k) / 80, eta_s=(80 - 10 * i - k) * pause, objective=objective,
+                   objective_se=None if objective is None else 0.02 * objective, step=None if objective is None else k)
+            time.sleep(15 * pause if stage == "fit" and pause < 0.1 else pause)  # the fit must be seen by a poll a second
+    results()
+    status(state="succeeded", stage="report", i_stage=len(STAGES) - 1, stage_fraction=1.0, fraction=1.0, eta_s=0.0)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
