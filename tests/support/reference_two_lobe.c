@@ -26,10 +26,10 @@ double reference_gbar(double theta_o, double m, double s) { return gauss(theta_o
 /* The normaliser 2 pi I0 by the trapezoid rule, which is exact for periodic functions. */
 double reference_von_mises(double phi, double s)
 {
-    enum { N = 2048 };
+    int n = 32 + (int)(40 / s);
     double kappa = 1 / (s * s), sum = 0;
-    for (int i = 0; i < N; i++) sum += exp(kappa * (cos(2 * M_PI * i / N) - 1));
-    return exp(kappa * (cos(phi) - 1)) / (sum * 2 * M_PI / N);
+    for (int i = 0; i < n; i++) sum += exp(kappa * (cos(2 * M_PI * i / n) - 1));
+    return exp(kappa * (cos(phi) - 1)) / (sum * 2 * M_PI / n);
 }
 
 double reference_s(const double param[9], const double wi[3], const double wo[3], int c)

@@ -1,0 +1,81 @@
+/* The renderer against the naive tracer of tests/support on a small woven cloth: two implementations that must agree. The lamp is
+ * large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
+ */
+#include "renderer/transport/estimate.h"
+#include "tests/support/hand_weave.h"
+#include "tests/support/naive_tracer.h"
+#include "tests/support/statistics_test.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define DEG (M_PI / 180)
+
+enum { N_TASK = 64, TASK_PATHS = 700 };
+
+struct job {
+    struct fiber_set f;
+    struct configuration c;
+    double param[9];
+    struct sample_mean mean[N_TASK];
+};
+
+static void run_task(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    struct job *j = context;
+    for (uint32_t i = 0; i < TASK_PATHS; i++) {
+        struct rng r;
+        rng_start(&r, &(struct rng_key){77, 0, 0, 0}, (uint32_t)i_task, i);
+        sample_mean_add(&j->mean[i_task], naive_path(&j->f, &j->c, j->param, &r));
+    }
+}
+
+static void agree(const struct configuration *c, const double *param, struct thread_pool *pool)
+{
+    static struct job j;
+    struct scene *scene = NULL;
+    struct error err = {0};
+    struct estimate e;
+    const size_t n_path = 200000;
+    memset(&j, 0, sizeof j);
+    hand_weave(&j.f, &(struct hand_weave_option){2, 6, 12, 0.4e-3, 16e-6, 1});
+    j.c = *c;
+    memcpy(j.param, param, sizeof j.param);
+    assert_int_equal(thread_pool_run(pool, N_TASK, run_task, &j, NULL), STATUS_OK);
+    struct sample_mean batch = {0};
+    for (int i = 0; i < N_TASK; i++) sample_mean_add(&batch, j.mean[i].mean);
+
+    if (scene_new(&j.f, &(struct scene_option){true}, &scene, &err) != STATUS_OK) fail_msg("%s", err.text);
+    struct estimate_request q = {scene, scattering_find("two_lobe.v1"), param, c, 1, &n_path, 5, 0, 0, false};
+    if (estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    double se = sqrt(sample_mean_se(&batch) * sample_mean_se(&batch) + e.var[0]), z = (batch.mean - e.mean[0]) / se;
+    print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se, 100 * se / e.mean[0]);
+    if (fabs(z) > 3.5 || se > 0.03 * e.mean[0]) fail_msg("%.1f standard errors apart", z);
+    scene_free(scene);
+    fiber_set_release(&j.f);
+}
+
+static void two_tracers_agree(void **state)
+{
+    (void)state;
+    struct thread_pool *pool = NULL;
+    assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
+    const double wide[9] = {0.12, 0.12, 0.12, 0.4, 0.4, 0.4, 10 * DEG, 45 * DEG, 45 * DEG};
+    const double narrower[9] = {0.2, 0.2, 0.2, 0.35, 0.35, 0.35, 10 * DEG, 38 * DEG, 40 * DEG};
+    agree(&(struct configuration){30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, wide, pool);
+    agree(&(struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, wide, pool);
+    agree(&(struct configuration){45 * DEG, 250 * DEG, 40 * DEG, 90 * DEG, 90 * DEG, 0.61, 1.2, 1.0, 0.02}, narrower, pool);
+    thread_pool_free(pool);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(two_tracers_agree)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
