@@ -33,19 +33,42 @@ struct scan {
 
 struct capsule {
     double a[3], d[3], length2; /* voxels */
-    bool first, last;
-    double r_ramp;
+    double r, r_ramp;
+    double end[2][3], outward[2][3]; /* of the fiber: its ends are flat, so that what goes on in the next tile joins without a bulge */
 };
 
-/* Distance to the axis; infinite behind the flat ends of the fiber. */
 static double axis_distance(const struct capsule *c, const double p[3])
 {
     double q[3] = {p[0] - c->a[0], p[1] - c->a[1], p[2] - c->a[2]};
     double t = (q[0] * c->d[0] + q[1] * c->d[1] + q[2] * c->d[2]) / c->length2;
-    if ((t < 0.0 && c->first) || (t >= 1.0 && c->last)) return INFINITY;
     t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
     for (int a = 0; a < 3; a++) q[a] -= t * c->d[a];
     return sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+}
+
+static bool behind_an_end(const struct capsule *c, const double p[3])
+{
+    for (int e = 0; e < 2; e++) {
+        double along = 0.0, distance2 = 0.0;
+        for (int a = 0; a < 3; a++) {
+            double q = p[a] - c->end[e][a];
+            along += q * c->outward[e][a];
+            distance2 += q * q;
+        }
+        if (distance2 < 2.0 * (c->r + 1.0) * (c->r + 1.0) && (e == 0 ? along > 0.0 : along >= 0.0)) return true;
+    }
+    return false;
+}
+
+static void fiber_ends(struct capsule *c, const struct fiber_set *f, size_t i, double per_m)
+{
+    size_t first = f->first_vertex[i], last = f->first_vertex[i + 1] - 1;
+    const size_t at[2] = {first, last}, inner[2] = {first + 1, last - 1};
+    for (int e = 0; e < 2; e++)
+        for (size_t a = 0; a < 3; a++) {
+            c->end[e][a] = (double)f->position_m[3 * at[e] + a] * per_m;
+            c->outward[e][a] = c->end[e][a] - (double)f->position_m[3 * inner[e] + a] * per_m;
+        }
 }
 
 static void add_share(struct scan *s, size_t at, uint32_t fiber, float share)
@@ -74,7 +97,7 @@ static void draw_capsule(struct scan *s, const struct capsule *c, uint32_t fiber
             for (long i = low[0]; i <= high[0]; i++) {
                 double p[3] = {(double)i + 0.5, (double)j + 0.5, (double)k + 0.5};
                 double share = 0.5 + c->r_ramp - axis_distance(c, p);
-                if (!(share > 0.0)) continue;
+                if (!(share > 0.0) || behind_an_end(c, p)) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
                 add_share(s, volume_index(s->v->n, x, y, (size_t)k), fiber, (float)fmin(share, 1.0));
             }
@@ -89,7 +112,8 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     (void)i_thread;
     for (size_t i = 0; i < f->n_fiber; i++) {
         double r = (double)f->radius_m[i] * per_m;
-        struct capsule c = {.r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0))};
+        struct capsule c = {.r = r, .r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0))};
+        fiber_ends(&c, f, i, per_m);
         for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
             const float *p = f->position_m + 3 * k;
             double z0 = (double)p[2] * per_m, z1 = (double)p[5] * per_m;
@@ -101,8 +125,6 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
                 c.length2 += c.d[a] * c.d[a];
             }
             if (c.length2 <= 0.0) continue;
-            c.first = k == f->first_vertex[i];
-            c.last = k + 2 == f->first_vertex[i + 1];
             draw_capsule(s, &c, (uint32_t)i + 1, z_from, z_to);
         }
     }

@@ -13,7 +13,7 @@ struct relax {
     uint32_t *strand_of; /* node -> strand */
     double (*move)[3];
     double *depth; /* deepest overlap of a node, over the sum of radii */
-    double r_max;
+    double r_max, per_tile[2];
     size_t n_cell[3];
     double cell_m[3], z_low_m;
     size_t *cell_first; /* counting sort by cell */
@@ -46,7 +46,7 @@ static size_t clamp_cell(double x, double cell_m, size_t n_cell)
 
 static status relax_init(struct relax *r, struct strand_set *s, struct error *err)
 {
-    *r = (struct relax){.s = s};
+    *r = (struct relax){.s = s, .per_tile = {1.0 / s->tile_m[0], 1.0 / s->tile_m[1]}};
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < s->n_strand; i++) r->r_max = fmax(r->r_max, s->strand[i].radius_m);
     for (size_t k = 0; k < s->n_node; k++) {
@@ -120,15 +120,13 @@ struct push {
 static void push_from(const struct relax *r, size_t i, size_t j, struct push *push)
 {
     const struct strand_set *s = r->s;
-    if (same_fiber(s, r->strand_of, i, j)) return;
-    double want = s->strand[r->strand_of[i]].radius_m + s->strand[r->strand_of[j]].radius_m;
-    double d[3];
+    double want = s->strand[r->strand_of[i]].radius_m + s->strand[r->strand_of[j]].radius_m, d[3];
     for (int a = 0; a < 3; a++) {
         d[a] = s->p[i][a] - s->p[j][a];
-        if (a < 2) d[a] -= s->tile_m[a] * round(d[a] / s->tile_m[a]);
+        if (a < 2) d[a] -= s->tile_m[a] * rint(d[a] * r->per_tile[a]);
     }
     double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    if (d2 >= want * want) return;
+    if (d2 >= want * want || same_fiber(s, r->strand_of, i, j)) return;
     double distance = sqrt(d2), depth = want - distance;
     if (distance < 1e-9 * want) { /* on top of each other: the lower number goes down */
         d[0] = d[1] = 0.0;

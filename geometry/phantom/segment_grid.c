@@ -113,7 +113,7 @@ static void look_at(const struct segment_grid *g, size_t v, const double p[3], s
         d[k] = (double)b[k] - a[k];
         q[k] = p[k] - (double)a[k];
         middle = q[k] - 0.5 * d[k];
-        if (k < 2) q[k] -= g->tile_m[k] * round(middle / g->tile_m[k]);
+        if (k < 2) q[k] -= g->tile_m[k] * rint(middle / g->tile_m[k]);
         length2 += d[k] * d[k];
         dot += d[k] * q[k];
     }
