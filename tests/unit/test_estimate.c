@@ -1,0 +1,191 @@
+/* estimate_run: the same bits for any number of threads, honest variances, cancellation, bad requests. */
+#include "base/clock.h"
+#include "renderer/transport/estimate.h"
+#include "tests/support/hand_weave.h"
+#include "tests/support/orbit_configurations.h"
+#include "tests/support/statistics_test.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static struct scene *scene;
+static double start[SCATTERING_MAX_PARAM];
+static struct configuration configuration[16];
+
+static int set_up(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    for (size_t p = 0; p < m->n_param; p++) start[p] = m->param[p].start;
+    orbit_configurations_16(configuration);
+    hand_weave_small(&f);
+    status st = scene_new(&f, &(struct scene_option){true}, &scene, NULL);
+    fiber_set_release(&f);
+    return st != STATUS_OK;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scene_free(scene);
+    return 0;
+}
+
+static struct estimate_request request(const size_t *n_path, size_t n_configuration)
+{
+    return (struct estimate_request){scene, scattering_find("two_lobe.v1"), start, configuration, n_configuration, n_path, 17, 3, 1, true};
+}
+
+static void run(const struct estimate_request *q, size_t n_thread, struct estimate *e)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
+    if (estimate_run(q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    thread_pool_free(pool);
+}
+
+static void same_bits_for_any_threads(void **state)
+{
+    (void)state;
+    const size_t n_path[4] = {1000, 256, 0, 2500};
+    struct estimate_request q = request(n_path, 4);
+    struct estimate one[4], more[4];
+    run(&q, 1, one);
+    assert_int_equal(one[0].n_path, 1024);
+    assert_int_equal(one[2].n_path, 0);
+    assert_true(one[2].mean[0] == 0 && one[0].mean[0] > 0 && one[0].n_vertex > 1024);
+    for (size_t t = 2; t <= 3; t++) {
+        run(&q, t, more);
+        assert_memory_equal(one, more, sizeof one);
+    }
+    /* configurations are independent of what else is asked for; other keys give other numbers */
+    const size_t only_last[4] = {0, 0, 0, 2500};
+    struct estimate_request alone = request(only_last, 4);
+    run(&alone, 2, more);
+    assert_memory_equal(&one[3], &more[3], sizeof one[3]);
+    alone.replica = 2;
+    run(&alone, 2, more);
+    assert_true(more[3].mean[0] != one[3].mean[0]);
+    /* without derivatives the same radiance */
+    q.want_jacobian = false;
+    run(&q, 1, more);
+    for (int c = 0; c < 3; c++) assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
+}
+
+/* The stated variance of the mean against the scatter of repeated estimates. */
+static void variances_are_honest(void **state)
+{
+    (void)state;
+    enum { N = 60 };
+    const size_t n_path[1] = {2048};
+    struct sample_mean mean = {0}, jac = {0};
+    double var = 0, jac_var = 0;
+    for (uint32_t i = 0; i < N; i++) {
+        struct estimate e;
+        struct estimate_request q = request(n_path, 1);
+        q.iteration = i;
+        run(&q, 1, &e);
+        sample_mean_add(&mean, e.mean[0]);
+        sample_mean_add(&jac, e.jac[3]); /* C_TT.r on r */
+        var += e.var[0] / N;
+        jac_var += e.jac_var[3] / N;
+    }
+    /* a sample variance of 60 has a relative standard error of 0.18 for normal deviates, a little more for these */
+    double ratio = mean.m2 / (N - 1) / var, jac_ratio = jac.m2 / (N - 1) / jac_var;
+    if (fabs(ratio - 1) > 0.65 || fabs(jac_ratio - 1) > 0.65) fail_msg("variance ratios %g, %g", ratio, jac_ratio);
+}
+
+static void *cancel_soon(void *flag)
+{
+    usleep(100000);
+    atomic_store((atomic_bool *)flag, true);
+    return NULL;
+}
+
+static void cancels_quickly(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {200000000};
+    struct estimate_request q = request(n_path, 1);
+    struct estimate e;
+    struct error err = {0};
+    struct thread_pool *pool = NULL;
+    atomic_bool flag = false;
+    struct progress progress = {NULL, NULL, &flag};
+    pthread_t thread;
+    assert_int_equal(thread_pool_new(2, &pool, &err), STATUS_OK);
+    pthread_create(&thread, NULL, cancel_soon, &flag);
+    double t0 = clock_monotonic_s();
+    assert_int_equal(estimate_run(&q, pool, &progress, &e, &err), STATUS_CANCELLED);
+    double wall = clock_monotonic_s() - t0;
+    pthread_join(thread, NULL);
+    thread_pool_free(pool);
+    if (wall > 0.1 + 0.1 + 0.3) fail_msg("took %.3f s after the flag", wall - 0.1); /* 0.3: a loaded machine, sanitizers */
+}
+
+static void bad_requests(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {256};
+    struct estimate e;
+    struct error err = {0};
+    struct estimate_request q = request(n_path, 1);
+    double param[SCATTERING_MAX_PARAM];
+    memcpy(param, start, sizeof param);
+    param[6] = NAN;
+    q.param = param;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "beta_R");
+    q = request(n_path, 1);
+    struct configuration c = configuration[0];
+    c.camera_theta_rad = M_PI_2;
+    q.configuration = &c;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
+    q = request(n_path, 1);
+    q.iteration = 70000;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
+}
+
+/* A model that fails in one direction in a thousand: found and named. */
+static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], float rgb[3], float *score)
+{
+    float pdf = scattering_find("isotropic.v1")->eval_pdf(s, wi, wo, rgb, score);
+    if (score != NULL && fabsf(wi[0]) > 0.99f) score[1] = NAN;
+    return pdf;
+}
+
+static void nan_is_named(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {4096};
+    struct scattering_model broken = *scattering_find("isotropic.v1");
+    broken.id = "broken.v1";
+    broken.eval_pdf = broken_eval_pdf;
+    const double param[3] = {0.5, 0.5, 0.5};
+    struct estimate e;
+    struct error err = {0};
+    struct estimate_request q = request(n_path, 1);
+    q.model = &broken;
+    q.param = param;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_NUMERIC);
+    assert_non_null(strstr(err.text, "broken.v1"));
+    assert_string_equal(err.field, "C.g");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(same_bits_for_any_threads), cmocka_unit_test(variances_are_honest), cmocka_unit_test(cancels_quickly),
+        cmocka_unit_test(bad_requests),              cmocka_unit_test(nan_is_named),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
