@@ -63,7 +63,7 @@ void store_close(struct store *store);
 /* idempotency_key NULL: none. body_hash is kept beside the key. One transaction. Sets row->serial. */
 status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash,
                         struct error *err);
-/* STATUS_NOT_FOUND when the key is new. */
+/* STATUS_NOT_FOUND when the key is new, or its job was deleted. */
 status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES],
                               char body_hash[STORE_HASH_TEXT_BYTES], struct error *err);
 /* Tombstones are found too (row->deleted). STATUS_NOT_FOUND. Release the row. */

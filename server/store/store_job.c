@@ -59,7 +59,7 @@ static status insert(struct store *store, struct job_row *r, const char *key, co
                   "sssidd", r->id, r->sample, r->document, (int64_t)r->state, r->created_unix_s, r->created_unix_s);
     if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->db);
     if (s == STATUS_OK && key != NULL)
-        s = store_run(store, NULL, err, "INSERT INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd", key, r->id, body_hash,
+        s = store_run(store, NULL, err, "INSERT OR REPLACE INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd", key, r->id, body_hash,
                       r->created_unix_s);
     if (s == STATUS_OK) s = store_run(store, NULL, err, "COMMIT", "");
     if (s != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
@@ -79,7 +79,7 @@ status store_idempotency_find(struct store *store, const char *key, char job_id[
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, "SELECT job_id, body_hash FROM idempotency WHERE key = ?", "s", key);
+    status s = store_prepare(store, &q, err, "SELECT i.job_id, i.body_hash FROM idempotency i JOIN job j ON j.id = i.job_id WHERE i.key = ? AND j.deleted = 0", "s", key);
     if (s != STATUS_OK) goto out;
     int rc = sqlite3_step(q);
     if (rc == SQLITE_ROW) {

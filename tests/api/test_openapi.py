@@ -1,0 +1,146 @@
+"""config/openapi.json is valid, is what the daemon serves, and tells the truth. (conftest.py holds every reply of every API test against it.)"""
+import json
+import os
+import re
+
+import hypothesis
+import jsonschema
+import pytest
+import requests
+from daemon_under_test import DOCUMENT, ROOT, TUS
+from hypothesis import strategies as st
+from openapi_check import METHODS, OpenApiCheck, load
+
+API = load()
+OPERATIONS = [(path, method, item[method]) for path, item in API["paths"].items() for method in METHODS if method in item]
+
+
+def test_the_document_is_sound():
+    assert API["openapi"].startswith("3.1.")
+    ids = [o["operationId"] for _, _, o in OPERATIONS]
+    assert len(ids) == len(set(ids)) >= 26
+    for schema in API["components"]["schemas"].values():
+        jsonschema.Draft202012Validator.check_schema(schema)
+    text = json.dumps(API)
+    for name in re.findall(r'"#/components/schemas/(\w+)"', text):
+        assert name in API["components"]["schemas"]
+    for path, method, operation in OPERATIONS:
+        parameters = operation.get("parameters", []) + API["paths"][path].get("parameters", [])
+        assert {p["name"] for p in parameters if p["in"] == "path"} == set(re.findall(r"\{(\w+)\}", path)), path
+        assert operation["summary"] and all(r["description"] for r in operation["responses"].values())
+
+
+def test_the_daemon_serves_it(daemon):
+    assert daemon.get("/v1/openapi.json").json() == API
+
+
+def test_the_route_table_and_the_document_agree():
+    with open(os.path.join(ROOT, "server", "http", "http_route.c")) as f:
+        routes = {(m.lower(), p.replace("...", "")) for m, p in re.findall(r'\{"([A-Z]+)", "([^"]+)", HTTP_BODY', f.read())}
+    assert routes - {("get", "/"), ("get", "/{path}")} == {(m, p) for p, m, _ in OPERATIONS}
+
+
+def test_api_md_names_every_path():
+    with open(os.path.join(ROOT, "docs", "api.md")) as f:
+        text = f.read()
+    for path, _, _ in OPERATIONS:
+        assert path in text, path
+
+
+def test_problem_codes_are_documented():
+    with open(os.path.join(ROOT, "server", "http", "http_problem.c")) as f:
+        source = f.read()
+    with open(os.path.join(ROOT, "docs", "api.md")) as f:
+        table = f.read().split("## Errors")[1]
+    for code, status in re.findall(r'\{"(\w+)", (\d+), "', source):
+        assert f"`{code}`" in table and status in table, code
+
+
+def test_every_operation_answers_as_documented(daemon):
+    """The happy path through all of them; the check in the fixture does the comparing."""
+    job = daemon.start_job("series 20")
+    daemon.wait_state(job, "succeeded")
+    draft = daemon.create()
+    upload = daemon.declare(draft, "scan.tif", b"0123456789")["upload_url"]
+    done = set()
+
+    def call(operation, method, path, **more):
+        r = daemon.request(method, path, **more)
+        assert r.status_code < 400, (operation, r.status_code, r.text)
+        done.add(operation)
+        return r
+
+    call("uploadOptions", "OPTIONS", upload)
+    call("uploadOffset", "HEAD", upload, headers=TUS)
+    assert daemon.patch(upload, 0, b"0123456789").status_code == 204
+    done.add("uploadBytes")
+    call("listFiles", "GET", f"/v1/jobs/{draft}/files")
+    call("getFile", "GET", f"/v1/jobs/{draft}/files/scan.tif")
+    call("deleteFile", "DELETE", f"/v1/jobs/{draft}/files/scan.tif")
+    call("declareFile", "POST", f"/v1/jobs/{draft}/files", json={"name": "a.tif", "role": "volume", "size": 4})
+    upload = daemon.job(draft)["files"][0]["upload_url"]
+    call("terminateUpload", "DELETE", upload, headers=TUS)
+    call("replaceDocument", "PUT", f"/v1/jobs/{draft}/document", json=DOCUMENT)
+    call("listJobs", "GET", "/v1/jobs")
+    call("createJob", "POST", "/v1/jobs", json=DOCUMENT)
+    call("getJob", "GET", f"/v1/jobs/{job}")
+    call("getSeries", "GET", f"/v1/jobs/{job}/series?max_points=5")
+    call("getLog", "GET", f"/v1/jobs/{job}/log")
+    call("listResults", "GET", f"/v1/jobs/{job}/results")
+    call("getResult", "GET", f"/v1/jobs/{job}/results/result.json")
+    call("getArchive", "GET", f"/v1/jobs/{job}/results.tar")
+    call("startJob", "POST", f"/v1/jobs/{job}/start")
+    call("cancelJob", "POST", f"/v1/jobs/{draft}/cancel")
+    other = daemon.start_job("fail")
+    daemon.wait_state(other, "failed")
+    call("retryJob", "POST", f"/v1/jobs/{other}/retry")
+    call("deleteJob", "DELETE", f"/v1/jobs/{draft}")
+    for operation, path in [("about", "/v1/about"), ("openapi", "/v1/openapi.json"), ("livez", "/livez"), ("readyz", "/readyz"), ("metrics", "/metrics")]:
+        call(operation, "GET", path)
+    assert done == {o["operationId"] for _, _, o in OPERATIONS}
+
+
+JSON = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=20),
+                    lambda x: st.lists(x, max_size=4) | st.dictionaries(st.text(max_size=12), x, max_size=4), max_leaves=12)
+NEAR_JOB = st.fixed_dictionaries({}, optional={
+    "sample": st.text(max_size=30) | JSON, "volume": st.fixed_dictionaries({}, optional={
+        "files": st.lists(st.sampled_from(["scan.tif", "../x", ""]), max_size=3) | JSON, "voxel_size_um": st.floats(-1, 5) | JSON, "axes": st.sampled_from(["xyz", "xxy"]) | JSON}),
+    "measurements": JSON, "photographs": JSON, "fit": JSON, "lamp": JSON, "camera": JSON, "fibers": JSON})
+NEAR_FILE = st.fixed_dictionaries({}, optional={"name": st.sampled_from(["a.tif", "../b", ""]) | JSON, "role": st.sampled_from(["volume", "poem"]) | JSON,
+                                                "size": st.integers(-1, 3000) | JSON, "sha256": st.just("0" * 64) | JSON})
+WORD = st.text(st.characters(min_codepoint=33, max_codepoint=126, blacklist_characters="#?/%\\"), min_size=1, max_size=40).filter(lambda w: w not in (".", ".."))
+
+
+@hypothesis.settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(hypothesis.HealthCheck))
+@hypothesis.given(data=st.data())
+def test_random_requests_get_documented_answers(daemon, data):
+    """Near-valid and random requests: always a documented status, never a 5xx but for a full disk."""
+    path, method, operation = data.draw(st.sampled_from(OPERATIONS))
+    if not hasattr(daemon, "fuzz_job"):
+        daemon.fuzz_job = daemon.create()
+    url = path.replace("{id}", data.draw(st.just(daemon.fuzz_job) | WORD)) if "{id}" in path else path
+    for name in re.findall(r"\{(\w+)\}", url):
+        url = url.replace("{%s}" % name, requests.utils.quote(data.draw(WORD), safe=""))
+    if url.endswith(daemon.fuzz_job) and method == "delete":
+        return
+    query, headers = {}, {}
+    for p in operation.get("parameters", []):
+        value = data.draw(st.integers(-3, 10**20).map(str) | WORD | st.sampled_from(["all", "last", "draft", "bytes=0-5", "*", "1.0.0", "0"]))
+        if p["in"] == "query" and data.draw(st.booleans()):
+            query[p["name"]] = value
+        if p["in"] == "header" and data.draw(st.booleans()):
+            headers[p["name"]] = value
+    body = None
+    if "requestBody" in operation:
+        kind = next(iter(operation["requestBody"]["content"]))
+        headers["Content-Type"] = data.draw(st.sampled_from([kind] * 4 + ["text/plain"]))
+        near = NEAR_FILE if path.endswith("/files") else NEAR_JOB
+        body = data.draw((near | JSON).map(lambda j: json.dumps(j).encode()) | st.binary(max_size=60))
+    r = daemon.request(method.upper(), url, params=query, headers=headers, data=body)
+    assert r.status_code < 500 or r.status_code == 507, r.text
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coverage_of_the_check(daemon):
+    yield
+    assert isinstance(daemon.check, OpenApiCheck) and len(daemon.check.seen) > 40

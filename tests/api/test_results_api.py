@@ -1,0 +1,164 @@
+"""Series, log, results, archive, input files: what comes back."""
+import io
+import json
+import os
+import tarfile
+import zlib
+
+import pytest
+from daemon_under_test import FILES, problem
+
+
+@pytest.fixture(scope="module")
+def done(daemon):
+    job = daemon.start_job("series 1000")
+    daemon.wait_state(job, "succeeded")
+    return job
+
+
+def test_series_whole_and_incremental(daemon, done):
+    whole = daemon.get(f"/v1/jobs/{done}/series?max_points=5000&rendered=all").json()
+    assert [p["step"] for p in whole["points"]] == list(range(1000))
+    assert whole["next_after_step"] == 999 and whole["n_step"] == 1000 and whole["generation"] == 1
+    assert all("rendered" in p and "n_merged" not in p for p in whole["points"])
+    some = daemon.get(f"/v1/jobs/{done}/series?after_step=989").json()
+    assert [p["step"] for p in some["points"]] == list(range(990, 1000))
+    assert ["rendered" in p for p in some["points"]] == [False] * 9 + [True]
+    none = daemon.get(f"/v1/jobs/{done}/series?after_step=999").json()
+    assert none["points"] == [] and none["next_after_step"] == 999
+    r = daemon.get(f"/v1/jobs/{done}/series")
+    assert daemon.get(f"/v1/jobs/{done}/series", headers={"If-None-Match": r.headers["ETag"]}).status_code == 304
+
+
+@pytest.mark.parametrize("most", [2, 7, 100, 999])
+def test_series_is_merged_with_extremes_kept(daemon, done, most):
+    points = daemon.get(f"/v1/jobs/{done}/series?max_points={most}").json()["points"]
+    truth = [(s * 37) % 101 + 0.5 for s in range(1000)]
+    assert len(points) == most and points[-1]["step"] == 999
+    assert min(p.get("objective_min", p["objective"]) for p in points) == min(truth)
+    assert max(p.get("objective_max", p["objective"]) for p in points) == max(truth)
+    assert sum(p.get("n_merged", 1) for p in points) == 1000
+    third = [(s * 17) % 23 for s in range(1000)]
+    assert max(p.get("parameter_max", p["parameter"])[2] for p in points) == max(third)
+    first = -1
+    for p in points:
+        steps = range(first + 1, p["step"] + 1)
+        if "n_merged" in p:
+            assert p["n_merged"] == len(steps)
+            assert p["objective_min"] == min(truth[s] for s in steps) and p["objective_max"] == max(truth[s] for s in steps)
+        first = p["step"]
+
+
+def test_series_with_a_torn_tail_and_bad_queries(daemon, done):
+    path = os.path.join(daemon.data, "jobs", done, "series.rec")
+    with open(path, "a") as f:
+        f.write("deadbeef {\"step\":10")
+    assert daemon.get(f"/v1/jobs/{done}/series").json()["n_step"] == 1000
+    text = json.dumps({"step": "x"})
+    with open(path, "r+") as f:
+        f.seek(0, 2)
+        f.truncate(f.tell() - len("deadbeef {\"step\":10"))
+        f.seek(0, 2)
+        f.write(f"{zlib.crc32(text.encode()):08x} {text}\n")
+    assert daemon.get(f"/v1/jobs/{done}/series").json()["n_step"] == 1000
+    for bad in ["after_step=-2", "max_points=1", "max_points=5001", "rendered=some", "after_step=x"]:
+        problem(daemon.get(f"/v1/jobs/{done}/series?{bad}"), 422, "invalid", bad.split("=")[0])
+
+
+def test_a_job_without_output_has_empty_answers(daemon):
+    job = daemon.create()
+    assert daemon.get(f"/v1/jobs/{job}/series").json()["points"] == []
+    assert daemon.get(f"/v1/jobs/{job}/results").json()["files"] == []
+    log = daemon.get(f"/v1/jobs/{job}/log?offset=77")
+    assert log.text == "" and log.headers["Selvedge-Next-Offset"] == "0"
+    archive = daemon.get(f"/v1/jobs/{job}/results.tar")
+    assert archive.status_code == 200 and tarfile.open(fileobj=io.BytesIO(archive.content)).getnames() == []
+
+
+def test_log_by_offset(daemon, done):
+    path = os.path.join(daemon.data, "jobs", done, "log.txt")
+    with open(path, "a") as f:
+        f.write("".join(f"line {i}\n" for i in range(1000)))
+    whole = open(path).read()
+    seen, offset = "", 0
+    while True:
+        r = daemon.get(f"/v1/jobs/{done}/log?offset={offset}&max_bytes=1000")
+        assert r.headers["Content-Type"].startswith("text/plain") and int(r.headers["Selvedge-Log-Size"]) == len(whole)
+        if not r.text:
+            break
+        seen += r.text
+        offset = int(r.headers["Selvedge-Next-Offset"])
+    assert seen == whole
+    assert daemon.get(f"/v1/jobs/{done}/log?offset=-9").text == whole[-9:]
+    assert daemon.get(f"/v1/jobs/{done}/log?offset=999999999&max_bytes=5").text == whole[:5]
+    for bad in ["offset=x", "max_bytes=0", "max_bytes=1048577"]:
+        problem(daemon.get(f"/v1/jobs/{done}/log?{bad}"), 422, "invalid", bad.split("=")[0])
+
+
+def test_result_list_and_files(daemon, done):
+    folder = os.path.join(daemon.data, "jobs", done, "results")
+    os.symlink("/etc/passwd", os.path.join(folder, "link.txt"))
+    os.symlink("/etc", os.path.join(folder, "linked"))
+    open(os.path.join(folder, "x.tmp-AbCdEf"), "w").close()
+    open(os.path.join(folder, "odd name"), "w").close()
+    listing = daemon.get(f"/v1/jobs/{done}/results").json()
+    assert [f["path"] for f in listing["files"]] == ["empty.txt", "pictures/view.png", "result.json"]
+    for f in listing["files"]:
+        r = daemon.get(f["url"])
+        assert r.status_code == 200 and len(r.content) == f["size"] and r.headers["Content-Type"] == f["content_type"]
+    archive = tarfile.open(fileobj=io.BytesIO(daemon.get(listing["archive"]).content))
+    assert archive.getnames() == ["empty.txt", "pictures/view.png", "result.json"]
+    assert archive.extractfile("pictures/view.png").read() == b"not really a picture " * 100
+
+
+def test_big_archive_is_streamed_whole(daemon, done):
+    folder = os.path.join(daemon.data, "jobs", done, "results")
+    big = os.urandom(20_000_000)
+    with open(os.path.join(folder, "volume.vol"), "wb") as f:
+        f.write(big)
+    archive = tarfile.open(fileobj=io.BytesIO(daemon.get(f"/v1/jobs/{done}/results.tar").content))
+    assert archive.extractfile("volume.vol").read() == big
+    os.remove(os.path.join(folder, "volume.vol"))
+
+
+@pytest.mark.parametrize("path", ["../job.json", "..%2fjob.json", "%2e%2e/job.json", "pictures/../../job.json", "pictures//view.png", "/etc/passwd",
+                                  "pictures", "pictures/", "link.txt", "linked/passwd", ".", "..", "result.json%00", "result.json%00.png", "x.tmp-AbCdEf",
+                                  "result.json/x", "a" * 600, "a/" * 50 + "b"])
+def test_only_listed_paths_are_served(daemon, done, path):
+    # requests would tidy the path up: send it as it is
+    import http.client
+    c = http.client.HTTPConnection("127.0.0.1", daemon.port)
+    c.request("GET", f"/v1/jobs/{done}/results/{path}")
+    assert c.getresponse().status == 404
+    for base in (f"/v1/jobs/{done}/files/", "/", "/vendor/"):
+        if base == "/" and path in (".", ".."):
+            continue
+        c = http.client.HTTPConnection("127.0.0.1", daemon.port)
+        c.request("GET", base + path)
+        assert c.getresponse().status == 404, base + path
+
+
+@pytest.mark.parametrize("which", ["result", "input"])
+def test_ranges(daemon, done, which):
+    url = f"/v1/jobs/{done}/results/pictures/view.png" if which == "result" else f"/v1/jobs/{done}/files/scan.tif"
+    whole = b"not really a picture " * 100 if which == "result" else FILES["scan.tif"][1]
+    n = len(whole)
+    r = daemon.get(url)
+    tag = r.headers["ETag"]
+    assert r.status_code == 200 and r.content == whole and r.headers["Accept-Ranges"] == "bytes" and not tag.startswith("W/")
+    for header, start, end in [("bytes=0-0", 0, 1), ("bytes=10-19", 10, 20), ("bytes=5-", 5, n), ("bytes=-7", n - 7, n), (f"bytes=0-{n * 9}", 0, n),
+                               (f"bytes=-{n * 9}", 0, n), (f"bytes={n - 1}-", n - 1, n)]:
+        r = daemon.get(url, headers={"Range": header})
+        assert r.status_code == 206 and r.content == whole[start:end], header
+        assert r.headers["Content-Range"] == f"bytes {start}-{end - 1}/{n}"
+    for header in [f"bytes={n}-", "bytes=-0"]:
+        r = daemon.get(url, headers={"Range": header})
+        problem(r, 416, "range")
+        assert r.headers["Content-Range"] == f"bytes */{n}"
+    for header in ["bytes=a-b", "bytes=5-4", "lines=1-2", "bytes=0-1,3-4", "bytes=", "bytes=--5", "bytes=1-2-3", "bytes=99999999999999999999-"]:
+        assert daemon.get(url, headers={"Range": header}).status_code == 200, header
+    assert daemon.get(url, headers={"Range": "bytes=0-4", "If-Range": tag}).status_code == 206
+    assert daemon.get(url, headers={"Range": "bytes=0-4", "If-Range": '"other"'}).status_code == 200
+    assert daemon.get(url, headers={"If-None-Match": tag}).status_code == 304
+    head = daemon.request("HEAD", url)
+    assert head.headers["Content-Length"] == str(n) and head.content == b""

@@ -1,0 +1,28 @@
+import os
+import sys
+
+import pytest
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
+from daemon_under_test import Daemon  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory):
+    """One daemon for the tests of a file; its worker is tests/support/fake_worker.py."""
+    with Daemon(tmp_path_factory.mktemp("daemon") / "data") as d:
+        yield d
+
+
+@pytest.fixture
+def daemon_maker(tmp_path):
+    """Daemons with their own settings; stopped at the end when they still run."""
+    made = []
+
+    def make(name="data", **more):
+        made.append(Daemon(tmp_path / name, **more))
+        return made[-1].start()
+
+    yield make
+    for d in made:
+        d.stop()

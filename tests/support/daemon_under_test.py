@@ -1,0 +1,194 @@
+"""A daemon for tests: on a free loopback port, with a data folder of its own, and small helpers around the API.
+
+with Daemon(folder) as d: d.post("/v1/jobs", json=document)
+Programs come from SELVEDGE_BUILD (default: build/ of this tree)."""
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import requests
+
+from openapi_check import OpenApiCheck
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.path.join(ROOT, os.environ.get("SELVEDGE_BUILD") or "build")
+FAKE_WORKER = os.path.join(ROOT, "tests", "support", "fake_worker.py")
+TUS = {"Tus-Resumable": "1.0.0"}
+DOCUMENT = {"sample": "fake: succeed", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
+            "measurements": {"file": "rows.csv"}}
+FILES = {"scan.tif": ("volume", b"II*\0 not really a scan" * 100), "rows.csv": ("measurements", b"set,r,g,b\n" * 20)}
+# what a sanitizer or valgrind would say must not be mistaken for an ordinary start
+TIMEOUT_S = float(os.environ.get("SELVEDGE_TEST_PATIENCE", "1"))
+
+
+def program(name):
+    return os.path.join(BUILD, "bin", name)
+
+
+def document(behaviour="succeed", **more):
+    return dict(DOCUMENT, sample=f"fake: {behaviour}", **more)
+
+
+def sha256(data):
+    return hashlib.sha256(data).hexdigest()
+
+
+def wait_until(condition, timeout_s=20, what="the condition"):
+    end = time.monotonic() + timeout_s * TIMEOUT_S
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.03)
+    raise AssertionError(f"{what} did not come true within {timeout_s * TIMEOUT_S} s")
+
+
+class Daemon:
+    def __init__(self, folder, worker=FAKE_WORKER, options=None, environment=None, wrapper=None):
+        self.data = str(folder)
+        self.worker = worker
+        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, **(options or {})}
+        self.environment = environment or {}
+        self.wrapper = wrapper if wrapper is not None else os.environ.get("SELVEDGE_TEST_WRAPPER", "").split()
+        self.process = None
+        self.log = None
+        self.check = OpenApiCheck()  # every reply is held against the API's description
+
+    def __enter__(self):
+        return self.start()
+
+    def __exit__(self, *unused):
+        self.stop()
+
+    def command(self):
+        command = [*self.wrapper, program("selvedged"), "--data", self.data, "--port", "0"]
+        if self.worker:
+            command += ["--worker", self.worker]
+        for key, value in self.options.items():
+            command += ["--set", f"{key}={value}"]
+        return command
+
+    def start(self):
+        os.makedirs(os.path.dirname(self.data), exist_ok=True)
+        self.log = open(self.data + ".log", "ab")
+        self.process = subprocess.Popen(self.command(), stdout=subprocess.PIPE, stderr=self.log, text=True,
+                                        env=dict(os.environ, PYTHON=sys.executable, **self.environment))
+        line = self.process.stdout.readline()
+        if not line.startswith("selvedged listens on "):
+            self.process.wait()
+            raise AssertionError(f"the daemon did not start: {self.log_text()[-2000:]}")
+        self.url = line.split()[-1]
+        self.port = int(self.url.rsplit(":", 1)[1])
+        self.session = requests.Session()
+        return self
+
+    def log_text(self):
+        with open(self.data + ".log", errors="replace") as f:
+            return f.read()
+
+    def stop(self, expect=0):
+        if self.process is None:
+            return
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            code = self.process.wait(30 * TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise AssertionError("the daemon did not stop")
+        finally:
+            self.close()
+        assert code == expect, f"the daemon ended with {code}: {self.log_text()[-3000:]}"
+
+    def kill(self):
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+        self.close()
+
+    def close(self):
+        self.process.stdout.close()
+        self.log.close()
+        self.session.close()
+        self.process = None
+
+    # HTTP
+    def request(self, method, path, **more):
+        more.setdefault("timeout", 30 * TIMEOUT_S)
+        reply = self.session.request(method, self.url + path, **more)
+        self.check(method, path, reply)
+        return reply
+
+    def get(self, path, **more):
+        return self.request("GET", path, **more)
+
+    def post(self, path, **more):
+        return self.request("POST", path, **more)
+
+    def put(self, path, **more):
+        return self.request("PUT", path, **more)
+
+    def delete(self, path, **more):
+        return self.request("DELETE", path, **more)
+
+    # the API in one call each; they assert success
+    def create(self, doc=None, **headers):
+        r = self.post("/v1/jobs", json=doc if doc is not None else DOCUMENT, headers=headers)
+        assert r.status_code == 201, r.text
+        return r.json()["id"]
+
+    def declare(self, job, name, data, role="volume", checked=True):
+        r = self.post(f"/v1/jobs/{job}/files", json={"name": name, "role": role, "size": len(data),
+                                                      "sha256": sha256(data) if checked else None})
+        assert r.status_code in (200, 201), r.text
+        return r.json()
+
+    def patch(self, upload_url, offset, data, **headers):
+        return self.request("PATCH", upload_url, data=data, headers={
+            **TUS, "Upload-Offset": str(offset), "Content-Type": "application/offset+octet-stream", **headers})
+
+    def offset(self, upload_url):
+        r = self.request("HEAD", upload_url, headers=TUS)
+        assert r.status_code == 200
+        return int(r.headers["Upload-Offset"])
+
+    def upload(self, job, name, data, role="volume"):
+        url = self.declare(job, name, data, role)["upload_url"]
+        r = self.patch(url, 0, data)
+        assert r.status_code == 204, r.text
+        return url
+
+    def ready_job(self, behaviour="succeed", **more):
+        job = self.create(document(behaviour, **more))
+        for name, (role, data) in FILES.items():
+            self.upload(job, name, data, role)
+        return job
+
+    def start_job(self, behaviour="succeed", **more):
+        job = self.ready_job(behaviour, **more)
+        r = self.post(f"/v1/jobs/{job}/start")
+        assert r.status_code == 202, r.text
+        return job
+
+    def job(self, job):
+        r = self.get(f"/v1/jobs/{job}")
+        assert r.status_code == 200, r.text
+        return r.json()
+
+    def wait_state(self, job, *states, timeout_s=20):
+        return wait_until(lambda: (lambda j: j if j["state"] in states else None)(self.job(job)), timeout_s,
+                          f"state {' or '.join(states)}")
+
+
+def problem(reply, status, code, field=None):
+    """The reply is a problem document with this status, code and field."""
+    assert reply.status_code == status, f"{reply.status_code}: {reply.text}"
+    assert reply.headers["Content-Type"] == "application/problem+json"
+    body = reply.json()
+    assert body["status"] == status and body["code"] == code, body
+    assert body["type"] == f"urn:selvedge:problem:{code}" and body["title"] and body["detail"]
+    if field is not None:
+        assert body.get("field") == field, body
+    return body

@@ -1,0 +1,120 @@
+#!/usr/bin/python3
+"""A worker for tests of the daemon: does what the job's sample name says ("fake: crash_once"), in the real layout.
+It keeps count of its runs in work/runs, so "once" and "always" can be told apart."""
+import fcntl
+import json
+import os
+import signal
+import sys
+import time
+import zlib
+
+job = sys.argv[1]
+os.makedirs(os.path.join(job, "work"), exist_ok=True)
+os.makedirs(os.path.join(job, "results", "pictures"), exist_ok=True)
+lock = open(os.path.join(job, "lock"), "w")
+try:
+    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+except OSError:
+    sys.exit(4)
+with open(os.path.join(job, "attempt.json")) as f:
+    attempt = json.load(f)["attempt"]
+with open(os.path.join(job, "job.json")) as f:
+    document = json.load(f)
+behaviour, _, argument = document["sample"].removeprefix("fake: ").partition(" ")
+with open(os.path.join(job, "work", "runs"), "a+") as f:
+    f.seek(0)
+    run = len(f.read()) + 1
+    f.write("x")
+
+
+def put(path, text):
+    temporary = os.path.join(job, path + ".tmp-fake00")
+    with open(temporary, "w") as f:
+        f.write(text)
+    os.rename(temporary, os.path.join(job, path))
+
+
+def say(state, fraction, error=None):
+    put("status.json", json.dumps({
+        "state": state, "attempt": attempt, "stage": "fit", "i_stage": 5, "n_stage": 8, "stage_fraction": fraction,
+        "fraction": fraction, "eta_s": 10 * (1 - fraction), "heartbeat_unix_s": time.time(), "started_unix_s": time.time(),
+        "message": f"run {run}", "objective": 1 - fraction, "objective_se": 0.01, "step": int(10 * fraction),
+        "warnings": ["a warning"] if fraction > 0 else [], "error": error, "peak_rss_bytes": 1000000}))
+
+
+def record(step):
+    text = json.dumps({"step": step, "phase": "fake", "wall_s": step, "n_path": 10, "n_path_total": 10 * step,
+                       "objective": (step * 37) % 101 + 0.5, "objective_se": 0.1, "parameter": [step, -step, (step * 17) % 23],
+                       "parameter_se": None, "rel_rms": 0.1, "rendered": [[0.1, 0.2, 0.3]], "note": ""})
+    with open(os.path.join(job, "series.rec"), "a") as f:
+        f.write(f"{zlib.crc32(text.encode()):08x} {text}\n")
+
+
+def log(text):
+    with open(os.path.join(job, "log.txt"), "a") as f:
+        f.write(text + "\n")
+
+
+def finish():
+    put("results/result.json", json.dumps({"parameters": [{"name": "beta_R", "value": 5.0, "standard_error": 0.1}],
+                                           "objective": 0.01, "run": run}))
+    put("results/pictures/view.png", "not really a picture " * 100)
+    put("results/empty.txt", "")
+    say("succeeded", 1.0)
+    sys.exit(0)
+
+
+def cancelled(*unused):
+    say("cancelled", 0.5)
+    sys.exit(3)
+
+
+def work(seconds):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        say("running", 0.5)
+        time.sleep(0.05)
+
+
+signal.signal(signal.SIGTERM, cancelled)
+log(f"run {run}, attempt {attempt}")
+say("running", 0.1)
+if behaviour == "succeed":
+    finish()
+elif behaviour == "series":
+    for step in range(int(argument)):
+        record(step)
+    finish()
+elif behaviour == "fail":
+    say("failed", 0.3, {"code": "format", "field": "volume.files", "text": "cannot read volume 'scan.tif': page 2 is cut off"})
+    sys.exit(1)
+elif behaviour == "mute":  # fails and says so on stderr only
+    os.remove(os.path.join(job, "status.json"))
+    print("something terrible happened", file=sys.stderr)
+    sys.exit(1)
+elif behaviour == "work":
+    work(float(argument or 3600))
+    finish()
+elif behaviour == "work_once":  # until it is ended; the next run succeeds
+    if run == 1:
+        work(3600)
+    finish()
+elif behaviour == "ignore_term":
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    work(3600)
+elif behaviour == "kill_once":
+    if run == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    finish()
+elif behaviour == "kill":
+    os.kill(os.getpid(), signal.SIGKILL)
+elif behaviour == "segfault":
+    print("a last word", file=sys.stderr, flush=True)
+    os.kill(os.getpid(), signal.SIGSEGV)
+elif behaviour == "exit":
+    sys.exit(int(argument))
+elif behaviour == "silent_once":
+    if run == 1:
+        time.sleep(3600)
+    finish()
