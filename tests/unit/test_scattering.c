@@ -202,7 +202,7 @@ static void scores_against_differences(void **state)
     rng_start(&r, &(struct rng_key){2, 0, 0, 0}, 0, 0);
     for (size_t k = 0; scattering_registry()[k] != NULL; k++) {
         const struct scattering_model *m = scattering_registry()[k];
-        for (unsigned b = 0; b < 16; b++) {
+        for (unsigned b = 0; b < 16; b += k == 0 ? 1 : 4) {
             double param[SCATTERING_MAX_PARAM];
             box_point(m, b, &r, param);
             check_scores(m, param, &r);
