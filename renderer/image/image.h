@@ -17,7 +17,7 @@ struct image {
 status image_init(struct image *im, size_t width, size_t height, size_t n_channel, struct error *err);
 void image_release(struct image *im);
 
-/* OpenEXR scan-line file, 32-bit float, ZIP, through OpenEXRCore. */
+/* OpenEXR scan-line file, 32-bit float, uncompressed, through OpenEXRCore. */
 status image_write_exr(const struct image *im, const char *path, struct error *err);
 /* Reads R, G, B (or Y, copied to all three) of half or float, scan-line or single-level tiled, into n_channel = 3. STATUS_FORMAT naming file and
  * reason for missing channels, deep data, truncation; at most limit_pixel pixels (STATUS_TOO_LARGE). */

@@ -39,11 +39,13 @@ static const char *reason(const struct exr_note *note, exr_result_t code)
 
 /* ---- writing ---- */
 
+/* Uncompressed: the library's ZIP encoder (3.1.5 of Debian 12) damages a chunk whose compressed size happens to equal its plain
+ * size (AcademySoftwareFoundation/openexr issue 2306), and path-traced floats hardly shrink anyway. */
 static exr_result_t declare(exr_context_t file, const struct image *im, int *part)
 {
     exr_result_t r = exr_add_part(file, "image", EXR_STORAGE_SCANLINE, part);
     if (r == EXR_ERR_SUCCESS)
-        r = exr_initialize_required_attr_simple(file, *part, (int32_t)im->width, (int32_t)im->height, EXR_COMPRESSION_ZIP);
+        r = exr_initialize_required_attr_simple(file, *part, (int32_t)im->width, (int32_t)im->height, EXR_COMPRESSION_NONE);
     for (size_t c = 0; c < im->n_channel && r == EXR_ERR_SUCCESS; c++)
         r = exr_add_channel(file, *part, im->channel_name[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1);
     if (r == EXR_ERR_SUCCESS) r = exr_write_header(file);
