@@ -128,21 +128,22 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
     return descent_report(&g->run, &step, err);
 }
 
-/* True when the last step made things worse beyond doubt: back to the best point, with half the limits. */
-static bool step_failed(struct gauss_newton *g)
+/* failed: the last step made things worse beyond doubt: back to the best point, with half the limits. */
+static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
 {
     double se, f = linear_model_objective(&g->model, &se);
     if (g->history.n_step > 1 && f - g->best_f > 3.0 * (se + g->best_se) && f > 1.1 * g->best_f && g->limit_scale > 0.1) {
         g->limit_scale *= 0.5;
         memcpy(g->x, g->best_x, sizeof g->x);
-        linear_model_pool(&g->model, &g->history, g->x);
-        return true;
+        *failed = true;
+        return linear_model_pool(&g->model, &g->history, g->x, err);
     }
+    *failed = false;
     g->limit_scale = fmin(1.0, g->limit_scale * 1.5);
     memcpy(g->best_x, g->x, sizeof g->x);
     g->best_f = f;
     g->best_se = se;
-    return false;
+    return STATUS_OK;
 }
 
 /* Paths of the next iteration; false when the budget does not allow another one worth its name. */
@@ -164,12 +165,14 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
     for (;;) {
         status s = estimate_here(g, err);
         if (s != STATUS_OK) return s;
-        linear_model_pool(&g->model, &g->history, g->x);
+        s = linear_model_pool(&g->model, &g->history, g->x, err);
+        if (s != STATUS_OK) return s;
         double se, f = linear_model_objective(&g->model, &se);
         s = report_here(g, NULL, err);
         if (s != STATUS_OK) return s;
-        bool failed = step_failed(g);
-        s = solve_step(g, dx, err);
+        bool failed;
+        s = judge_step(g, &failed, err);
+        if (s == STATUS_OK) s = solve_step(g, dx, err);
         if (s != STATUS_OK) return s;
         for (size_t p = 0; p < g->model.n_param; p++) g->x[p] += dx[p];
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
@@ -194,9 +197,10 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
     }
 }
 
-static status finish(struct gauss_newton *g, struct fit_result *result)
+static status finish(struct gauss_newton *g, struct fit_result *result, struct error *err)
 {
-    linear_model_pool(&g->model, &g->history, g->x);
+    status s = linear_model_pool(&g->model, &g->history, g->x, err);
+    if (s != STATUS_OK) return s;
     param_of(g, g->x, result->param);
     result->n_step = g->run.n_step;
     result->n_path = g->run.n_path_total;
@@ -223,7 +227,7 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     double first = (double)g.run.path_budget / (40.0 * 2.0 * (double)problem->observation->n);
     g.n_path_mean = fmax(MIN_PATH, fmin(FIRST_PATH, first));
     s = iterate(&g, result, err);
-    if (s == STATUS_OK) s = finish(&g, result);
+    if (s == STATUS_OK) s = finish(&g, result, err);
 out:
     linear_model_release(&g.model);
     linear_history_release(&g.history);

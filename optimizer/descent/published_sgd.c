@@ -159,8 +159,8 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
         if (s == STATUS_OK) s = descent_report(&g->run, &step, err);
         if (s == STATUS_OK) s = linear_history_append(&history, x, g->run.replica[0], g->run.replica[1], err);
     }
+    if (s == STATUS_OK) s = linear_model_pool(&model, &history, x, err);
     if (s == STATUS_OK) {
-        linear_model_pool(&model, &history, x);
         memcpy(result->param, g->param, sizeof g->param);
         result->n_step = g->run.n_step;
         result->n_path = g->run.n_path_total;

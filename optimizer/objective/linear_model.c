@@ -86,42 +86,68 @@ void linear_model_release(struct linear_model *m)
 
 /* ---- pooling ---- */
 
-/* Predicted mean squared change of a residual between step s and x_ref, by the derivatives of both replicas there. */
-static double squared_change(const struct linear_history *h, const struct history_step *s, const double *dx)
+/* Mean derivatives by coordinates over all steps, weighted by paths: n_row x n_param. One set for all steps: measured with its own
+ * derivatives, a step that happens to hold a rare bright path would seem farther away, count less, and the mean would come out too dark. */
+static void mean_derivatives(const struct linear_history *h, double *mean)
 {
-    double sum = 0.0;
-    for (size_t i = 0; i < h->observation->n; i++) {
-        double w = objective_weight(&h->observation->item[i]);
-        for (size_t c = 0; c < 3; c++) {
-            double change = 0.0;
-            for (size_t p = 0; p < h->n_param; p++) {
-                double slope = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], s->x[p]));
-                for (int q = 0; q < 2; q++) change += 0.5 * s->replica[q][i].jac[c * h->n_param + p] * slope * dx[p];
+    size_t n = h->n_param, n_row = 3 * h->observation->n;
+    memset(mean, 0, n_row * n * sizeof *mean);
+    for (size_t row = 0; row < n_row; row++) {
+        double root_w = sqrt(objective_weight(&h->observation->item[row / 3])), n_path = 0.0;
+        for (size_t k = 0; k < h->n_step; k++) {
+            for (int q = 0; q < 2; q++) {
+                const struct estimate *e = &h->step[k].replica[q][row / 3];
+                n_path += (double)e->n_path;
+                for (size_t p = 0; p < n; p++) {
+                    double slope = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
+                    mean[row * n + p] += (double)e->n_path * e->jac[(row % 3) * n + p] * slope;
+                }
             }
-            sum += w * change * change;
         }
+        for (size_t p = 0; p < n; p++) mean[row * n + p] *= n_path > 0.0 ? root_w / n_path : 0.0;
     }
-    return sum / (3.0 * (double)h->observation->n);
 }
 
-static void accumulate(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q, size_t i,
-                       const double *dx, const double *slope, double weight_r, double weight_j)
+/* Predicted squared change of configuration i over dx, largest channel. */
+static double squared_change(const double *mean, size_t i, const double *dx, size_t n)
+{
+    double largest = 0.0;
+    for (size_t row = 3 * i; row < 3 * i + 3; row++) {
+        double change = 0.0;
+        for (size_t p = 0; p < n; p++) change += mean[row * n + p] * dx[p];
+        largest = fmax(largest, change * change);
+    }
+    return largest;
+}
+
+static void add_derivatives(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q, size_t i,
+                            const double *slope, double weight)
+{
+    const struct estimate *e = &s->replica[q][i];
+    double root_w = sqrt(objective_weight(&h->observation->item[i]));
+    for (size_t c = 0; c < 3; c++) {
+        double *j = m->j[q] + (3 * i + c) * m->n_param, *j_var = m->j_var[q] + (3 * i + c) * m->n_param;
+        for (size_t p = 0; p < m->n_param; p++) {
+            double factor = weight * root_w * slope[p];
+            j[p] += factor * e->jac[c * m->n_param + p];
+            j_var[p] += factor * factor * e->jac_var[c * m->n_param + p];
+        }
+    }
+}
+
+/* Carried to x_ref by the averaged derivatives: those of the step itself are noisier, and by the same rare paths as its mean. */
+static void add_residuals(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q, size_t i,
+                          const double *dx, double weight)
 {
     const struct estimate *e = &s->replica[q][i];
     const struct observation *o = &h->observation->item[i];
     double root_w = sqrt(objective_weight(o));
     for (size_t c = 0; c < 3; c++) {
-        size_t row = 3 * i + c;
-        double r = e->mean[c] - o->mean_rgb[c], var = e->var[c];
-        for (size_t p = 0; p < m->n_param; p++) {
-            double j = e->jac[c * m->n_param + p] * slope[p], j_var = e->jac_var[c * m->n_param + p] * slope[p] * slope[p];
-            r += j * dx[p];
-            var += j_var * dx[p] * dx[p];
-            m->j[q][row * m->n_param + p] += weight_j * root_w * j;
-            m->j_var[q][row * m->n_param + p] += weight_j * weight_j * root_w * root_w * j_var;
-        }
-        m->r[q][row] += weight_r * root_w * r;
-        m->r_var[q][row] += weight_r * weight_r * root_w * root_w * var;
+        const double *j = m->j[q] + (3 * i + c) * m->n_param;
+        double r = root_w * (e->mean[c] - o->mean_rgb[c]);
+        for (size_t p = 0; p < m->n_param; p++) r += j[p] * dx[p];
+        m->r[q][3 * i + c] += weight * r;
+        m->r_var[q][3 * i + c] += weight * weight * root_w * root_w * e->var[c];
     }
 }
 
@@ -129,17 +155,18 @@ struct pool_weight {
     double r, j;
 };
 
-/* Weights of all steps for configuration i, summing to 1. Derivatives are noisier by about j_noise and bend to first order. */
+/* Weights of all steps for configuration i, summing to 1. Derivatives are noisier by about j_noise and bend to first order, means to second;
+ * how much was chosen by trial on analytic cloth (from 16 to 256 made little difference). */
 static void pool_weights(const struct linear_history *h, size_t i, const double *change2, struct pool_weight *weight,
                          double *n_effective)
 {
-    const double j_noise = 9.0;
+    const double j_noise = 4.0, bend = 64.0;
     double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0;
     for (size_t k = 0; k < h->n_step; k++) {
         double n = (double)h->step[k].replica[0][i].n_path;
         double noise = n > 0.0 ? path_variance / n + 1e-12 : INFINITY;
-        weight[k].r = 1.0 / (noise + change2[k] * change2[k]);
-        weight[k].j = 1.0 / (j_noise * noise + change2[k]);
+        weight[k].r = 1.0 / (noise * (1.0 + j_noise * change2[k]) + bend * change2[k] * change2[k]);
+        weight[k].j = 1.0 / (j_noise * noise + bend * change2[k]);
         sum_r += weight[k].r;
         sum_j += weight[k].j;
     }
@@ -152,36 +179,46 @@ static void pool_weights(const struct linear_history *h, size_t i, const double 
     *n_effective += sum_square > 0.0 ? 1.0 / sum_square : 0.0;
 }
 
-void linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref)
+static void pool_configuration(struct linear_model *m, const struct linear_history *h, const double *mean, size_t i,
+                               double *change2, struct pool_weight *weight)
 {
-    enum { MAX_STEP = 4096 };
-    size_t first = h->n_step > MAX_STEP ? h->n_step - MAX_STEP : 0;
-    struct linear_history recent = *h;
-    recent.step += first;
-    recent.n_step -= first;
-    double change2[MAX_STEP];
-    struct pool_weight weight[MAX_STEP];
-    size_t n_block = 2 * (2 * m->n_row + 2 * m->n_row * m->n_param);
-    memset(m->r[0], 0, n_block * sizeof(double));
+    double dx[SCATTERING_MAX_PARAM], slope[SCATTERING_MAX_PARAM];
+    for (size_t k = 0; k < h->n_step; k++) {
+        for (size_t p = 0; p < m->n_param; p++) dx[p] = m->x_ref[p] - h->step[k].x[p];
+        change2[k] = squared_change(mean, i, dx, m->n_param);
+    }
+    pool_weights(h, i, change2, weight, &m->n_effective);
+    for (size_t k = 0; k < h->n_step; k++) {
+        for (size_t p = 0; p < m->n_param; p++)
+            slope[p] = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
+        for (int q = 0; q < 2; q++) add_derivatives(m, h, &h->step[k], q, i, slope, weight[k].j);
+    }
+    for (size_t k = 0; k < h->n_step; k++) {
+        for (size_t p = 0; p < m->n_param; p++) dx[p] = m->x_ref[p] - h->step[k].x[p];
+        for (int q = 0; q < 2; q++) add_residuals(m, h, &h->step[k], q, i, dx, weight[k].r);
+    }
+}
+
+status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)
+{
+    status s = STATUS_OK;
+    double *mean = malloc((m->n_row * m->n_param + h->n_step) * sizeof *mean);
+    struct pool_weight *weight = malloc(h->n_step * sizeof *weight);
+    if (mean == NULL || weight == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot average estimates: out of memory");
+        goto out;
+    }
+    memset(m->r[0], 0, 4 * (m->n_row + m->n_row * m->n_param) * sizeof(double)); /* all eight arrays: one block */
     memcpy(m->x_ref, x_ref, m->n_param * sizeof *x_ref);
-    for (size_t k = 0; k < recent.n_step; k++) {
-        double dx[SCATTERING_MAX_PARAM];
-        for (size_t p = 0; p < m->n_param; p++) dx[p] = x_ref[p] - recent.step[k].x[p];
-        change2[k] = squared_change(&recent, &recent.step[k], dx);
-    }
+    mean_derivatives(h, mean);
     m->n_effective = 0.0;
-    for (size_t i = 0; i < h->observation->n; i++) {
-        pool_weights(&recent, i, change2, weight, &m->n_effective);
-        for (size_t k = 0; k < recent.n_step; k++) {
-            double dx[SCATTERING_MAX_PARAM], slope[SCATTERING_MAX_PARAM];
-            for (size_t p = 0; p < m->n_param; p++) {
-                dx[p] = x_ref[p] - recent.step[k].x[p];
-                slope[p] = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], recent.step[k].x[p]));
-            }
-            for (int q = 0; q < 2; q++) accumulate(m, &recent, &recent.step[k], q, i, dx, slope, weight[k].r, weight[k].j);
-        }
-    }
+    for (size_t i = 0; i < h->observation->n; i++)
+        pool_configuration(m, h, mean, i, mean + m->n_row * m->n_param, weight);
     m->n_effective /= (double)h->observation->n;
+out:
+    free(mean);
+    free(weight);
+    return s;
 }
 
 /* ---- what follows from the model ---- */

@@ -46,8 +46,8 @@ double linear_history_path_variance(const struct linear_history *h, size_t i);
 
 status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, struct error *err);
 void linear_model_release(struct linear_model *m);
-/* Averages the history at x_ref. At least one step. */
-void linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref);
+/* Averages the history at x_ref. At least one step. STATUS_NO_MEMORY. */
+status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err);
 
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);

@@ -18,12 +18,29 @@ static double misfit_variance(const struct linear_model *m, const struct observa
     return fmax(0.0, f / freedom - photograph / n);
 }
 
-/* V of one row, without the Jacobian's share. */
-static double row_variance(const struct linear_model *m, const struct observation_set *o, size_t row, double misfit)
+/* V of one row, without Monte-Carlo noise. */
+static double row_variance(const struct observation_set *o, size_t row, double misfit)
 {
     const struct observation *item = &o->item[row / 3];
     double se = item->se_rgb[row % 3];
-    return objective_weight(item) * se * se + 0.25 * (m->r_var[0][row] + m->r_var[1][row]) + misfit * item->weight;
+    return objective_weight(item) * se * se + misfit * item->weight;
+}
+
+static double row_noise(const struct linear_model *m, size_t row) { return 0.25 * (m->r_var[0][row] + m->r_var[1][row]); }
+
+/* The three channels of a configuration come from the same paths: their Monte-Carlo noise moves together. */
+static void add_path_noise(const struct linear_model *m, size_t i, const size_t *index, size_t n, double *b)
+{
+    double va[N] = {0}, vb[N] = {0};
+    for (size_t row = 3 * i; row < 3 * i + 3; row++) {
+        double sd = sqrt(row_noise(m, row));
+        for (size_t p = 0; p < n; p++) {
+            va[p] += sd * m->j[0][row * m->n_param + index[p]];
+            vb[p] += sd * m->j[1][row * m->n_param + index[p]];
+        }
+    }
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) b[p * n + q] += 0.5 * (va[p] * vb[q] + vb[p] * va[q]);
 }
 
 /* H and B of the parameters index[0..n-1]. */
@@ -36,8 +53,8 @@ static void normal_matrices(const struct linear_model *m, const struct observati
     for (size_t row = 0; row < m->n_row; row++) {
         const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
         const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
-        double v = row_variance(m, o, row, misfit), r2 = fmax(0.0, m->r[0][row] * m->r[1][row]);
-        *mean_variance += v / (double)m->n_row;
+        double v = row_variance(o, row, misfit), r2 = fmax(0.0, m->r[0][row] * m->r[1][row]);
+        *mean_variance += (v + row_noise(m, row)) / (double)m->n_row;
         for (size_t p = 0; p < n; p++) {
             for (size_t q = 0; q < n; q++) {
                 double jj = 0.5 * (ja[index[p]] * jb[index[q]] + jb[index[p]] * ja[index[q]]);
@@ -47,6 +64,7 @@ static void normal_matrices(const struct linear_model *m, const struct observati
             b[p * n + p] += r2 * 0.25 * (va[index[p]] + vb[index[p]]);
         }
     }
+    for (size_t i = 0; i < m->n_row / 3; i++) add_path_noise(m, i, index, n, b);
 }
 
 /* Covariance of the parameters index[0..n-1], all others held. */

@@ -3,7 +3,7 @@
  * Sandwich covariance in fit coordinates, on the parameters that are neither fixed nor at a bound:
  *   cov = (H + L)^-1 (B + s2 L) (H + L)^-1,   H = J'J,  B = J' V J + D,
  * all three from the mirrored product of two independent replicas, so that the noise of J does not make H look larger (one set of paths alone
- * understates the errors). V: per residual, photograph variance + Monte-Carlo variance of the pooled mean + misfit variance
+ * understates the errors). V: per residual, photograph variance + misfit variance + Monte-Carlo variance of the pooled mean (fully correlated between channels, which share their paths)
  * (what is left of f per degree of freedom, for residuals that no noise explains). D: Monte-Carlo noise of J times the residuals.
  * L = s2 / (prior sd)^2: the allowed range as a weak prior, so that an undetermined parameter gets an error as large as its range
  * and not infinity. s2: mean of V. A parameter at a bound gets the error that it would have if it could move.
