@@ -281,3 +281,14 @@ def test_python_client(daemon, sample, tmp_path):
     with pytest.raises(selvedge.JobFailed, match="page 2 is 8-bit"):
         server.submit(str(sample / "job.json")).wait(interval_s=0.1)
     shutil.rmtree(tmp_path / "out")
+
+
+def test_example_documents_are_accepted(daemon):
+    folder = os.path.join(ROOT, "config", "examples")
+    names = [n for n in sorted(os.listdir(folder)) if n.endswith(".json")]
+    assert len(names) >= 4
+    for name in names:
+        with open(os.path.join(folder, name), encoding="utf-8") as f:
+            job = selvedge.Server(daemon.url).create(json.load(f))
+        assert job.state()["state"] == "draft", name
+        job.delete()

@@ -1,0 +1,239 @@
+"""The dashboard in a real browser, against a real daemon: a small real job while it runs and at its end; the rest with a stub worker.
+
+SELVEDGE_SCREENSHOTS=DIR keeps pictures of what was seen.
+"""
+import glob
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+import pytest
+
+webdriver = pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
+from selenium.webdriver.chrome.options import Options  # noqa: E402
+from selenium.webdriver.chrome.service import Service  # noqa: E402
+from selenium.webdriver.common.by import By  # noqa: E402
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
+BIN = os.path.join(BUILD, "bin")
+DRIVER = shutil.which("chromedriver") or "/usr/bin/chromedriver"
+FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+         "--disable-component-update", "--disable-sync", "--window-size=1280,900", "--enable-unsafe-swiftshader"]
+sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
+import selvedge  # noqa: E402
+
+if not os.path.exists(DRIVER):
+    pytest.skip("chromedriver is not installed", allow_module_level=True)
+
+
+def start_daemon(folder, *more):
+    process = subprocess.Popen([os.path.join(BIN, "selvedged"), "--data", str(folder), "--port", "0", "--set", "disk.floor_bytes=0", *more],
+                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    line = process.stdout.readline()
+    assert "listens on http://" in line, line
+    return process, line.split()[-1]
+
+
+def stop_daemon(process):
+    process.terminate()
+    process.wait(30)
+    process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    """A daemon with the real worker, and a small real job in it: volume, 9 + 4 photographs, few paths."""
+    folder = tmp_path_factory.mktemp("real")
+    sample = folder / "sample"
+    subprocess.run([os.path.join(BIN, "selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "6",
+                    "--out", str(sample)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([os.path.join(BIN, "selvedge-phantom"), "photograph", "--fibers", str(sample / "truth.hair"), "--out", str(sample),
+                    "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
+    photographs = json.loads((sample / "photographs.json").read_text())
+    document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
+                "photographs": photographs[:9] + photographs[16:20], "fit": {"path_budget": 300000, "render_px": 24, "render_samples": 4}}
+    (sample / "job.json").write_text(json.dumps(document))
+    process, url = start_daemon(folder / "data")
+    yield url, selvedge.Server(url).submit(str(sample / "job.json"))
+    stop_daemon(process)
+
+
+@pytest.fixture(scope="module")
+def stub(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stub")
+    process, url = start_daemon(folder, "--worker", os.path.join(ROOT, "tests", "support", "client_stub_worker.py"))
+    yield url, folder
+    stop_daemon(process)
+
+
+@pytest.fixture
+def browser(tmp_path):
+    options = Options()
+    for flag in [*FLAGS, f"--user-data-dir={tmp_path / 'profile'}"]:
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(service=Service(DRIVER), options=options)
+    driver.set_script_timeout(30)
+    yield driver
+    driver.quit()
+
+
+def wait_for(browser, condition, seconds=30):
+    """Until the JavaScript expression is true."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if browser.execute_script(f"return Boolean({condition})"):
+            return
+        time.sleep(0.2)
+    keep(browser, "timeout")
+    raise AssertionError(f"never true: {condition}\n{browser.find_element(By.TAG_NAME, 'body').text[:2000]}")
+
+
+def keep(browser, name):
+    folder = os.environ.get("SELVEDGE_SCREENSHOTS")
+    if folder:
+        os.makedirs(folder, exist_ok=True)
+        height = browser.execute_script("return document.documentElement.scrollHeight")
+        browser.set_window_size(1280, min(height + 150, 6000))
+        time.sleep(0.5)
+        browser.save_screenshot(os.path.join(folder, name + ".png"))
+        browser.set_window_size(1280, 900)
+
+
+def complaints(browser):
+    """Errors of the console: scripts, content security policy, missing files."""
+    return [e["message"] for e in browser.get_log("browser") if e["level"] == "SEVERE"]
+
+
+def submit(url, folder, name):
+    sample = folder / name.replace(" ", "-")
+    sample.mkdir()
+    (sample / "scan.tif").write_bytes(b"scan")
+    (sample / "cloth.csv").write_text("set\n")
+    document = {"sample": name, "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "cloth.csv"}}
+    (sample / "job.json").write_text(json.dumps(document))
+    return selvedge.Server(url).submit(str(sample / "job.json")), sample
+
+
+def test_real_job_live_and_finished(real, browser):
+    url, job = real
+    browser.get(url + "/")
+    wait_for(browser, "document.querySelector('#jobs tbody tr')")
+    assert "small plain weave" in browser.find_element(By.ID, "jobs").text
+    keep(browser, "list")
+    browser.find_element(By.CSS_SELECTOR, "#jobs tbody tr a").click()
+    wait_for(browser, "document.querySelectorAll('.stage').length === 8")
+    # live: curves appear while the fit runs
+    wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 14", 240)
+    titles = [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
+    assert any(t.startswith("Objective") for t in titles) and any(t.startswith("beta_TT (°)") for t in titles)
+    keep(browser, "running")
+    # finished
+    wait_for(browser, "document.querySelector('.state.succeeded')", 400)
+    wait_for(browser, "document.querySelector('#parameters')")
+    result = job.state()["result"]
+    rows = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#parameters tbody tr")]
+    assert len(rows) == 9 and rows[0].startswith("C_R.r") and "±" in rows[3]
+    n_positive = sum(m > 0 and r > 0 for row in result["rows"] for m, r in zip(row["measured"], row["rendered"]))
+    assert len(browser.find_elements(By.CSS_SELECTOR, "svg.scatter circle")) == n_positive
+    pairs = browser.find_elements(By.CSS_SELECTOR, ".pair")
+    assert len(pairs) == 13 and sum("held" in p.get_attribute("class") for p in pairs) == 4
+    browser.execute_script("for (const i of document.images) i.loading = 'eager'")
+    wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".pair img")) == 26
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".slices img")) == 3
+    listed = browser.find_element(By.ID, "files").text
+    assert "result.json" in listed and "fibers.hair" in listed and "density.vol" in listed
+    assert "stage" in browser.find_element(By.CSS_SELECTOR, "pre.log").text
+    # fibers in 3D, or a sentence that says why not (a machine without WebGL)
+    browser.execute_script("document.querySelector('.view3d button').click()")
+    wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")
+    keep(browser, "finished")
+    assert complaints(browser) == []
+
+
+def test_failed_job_and_hostile_name(stub, browser):
+    url, folder = stub
+    job, _ = submit(url, folder, "failing <img src=x onerror=alert(1)>")
+    with pytest.raises(selvedge.JobFailed):
+        job.wait(interval_s=0.2)
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('.note.bad')")
+    assert "volume.files" in browser.find_element(By.CSS_SELECTOR, ".note.bad").text
+    assert browser.find_element(By.TAG_NAME, "h1").text == "failing <img src=x onerror=alert(1)>"
+    assert browser.find_elements(By.CSS_SELECTOR, "main img") == []
+    assert "Retry from checkpoint" in browser.find_element(By.ID, "state").text
+    keep(browser, "failed")
+    assert complaints(browser) == []
+
+
+def test_unknown_job(stub, browser):
+    browser.get(f"{stub[0]}/#00000000-0000-0000-0000-000000000000")
+    wait_for(browser, "document.getElementById('connection').textContent.includes('does not exist')")
+
+
+def test_submit_by_choosing_files(stub, browser):
+    url, folder = stub
+    _, sample = submit(url, folder, "dropped twill")
+    browser.get(url + "/")
+    chooser = browser.find_element(By.CSS_SELECTOR, ".drop input")
+    browser.execute_script("arguments[0].style.display = 'block'", chooser)
+    chooser.send_keys(str(sample / "job.json"))
+    wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files still missing')")
+    assert not browser.find_element(By.CSS_SELECTOR, ".drop button").is_enabled()
+    chooser.send_keys("\n".join(str(sample / n) for n in ("scan.tif", "cloth.csv")))
+    wait_for(browser, "!document.querySelector('.drop button').disabled")
+    browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+    wait_for(browser, "location.hash.length > 10")
+    wait_for(browser, "document.querySelector('.state.succeeded')", 60)
+    assert browser.find_element(By.TAG_NAME, "h1").text == "dropped twill"
+    files = {f["name"]: f for f in selvedge.Server(url).job(browser.execute_script("return location.hash.slice(1)")).state()["files"]}
+    assert files["scan.tif"]["state"] == "complete" and files["scan.tif"]["sha256"]
+    assert complaints(browser) == []
+
+
+def test_long_log_does_not_freeze(stub, browser):
+    url, folder = stub
+    job, _ = submit(url, folder, "chatty twill")
+    job.wait(interval_s=0.2)
+    log = glob.glob(os.path.join(str(folder), "**", job.id, "log.txt"), recursive=True)
+    assert len(log) == 1
+    with open(log[0], "a", encoding="utf-8") as f:
+        for block in range(200):
+            f.write("".join(f"2026-01-01T00:00:00.000Z INFO line {1000 * block + i} of a very long log\n" for i in range(1000)))
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('pre.log').textContent.includes('line 199999 ')")
+    with open(log[0], "a", encoding="utf-8") as f:
+        f.write("2026-01-01T00:00:00.000Z INFO the end\n")
+    wait_for(browser, "document.querySelector('pre.log').textContent.endsWith('the end')", 30)
+    assert browser.execute_script("return document.querySelector('pre.log').textContent.split('\\n').length") <= 1000
+    # the page answers at once
+    longest = browser.execute_async_script("""
+        const done = arguments[0], start = performance.now(); let last = start, longest = 0;
+        const tick = () => { const now = performance.now(); longest = Math.max(longest, now - last); last = now;
+                             if (now - start < 3000) setTimeout(tick, 10); else done(longest); };
+        tick();""")
+    assert longest < 1000
+
+
+def test_hidden_page_asks_less_often(stub, browser):
+    url, folder = stub
+    job, _ = submit(url, folder, "slow twill")
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('.state.running')")
+    count = "return performance.getEntriesByType('resource').filter((e) => e.name.includes('/v1/jobs/')).length"
+    browser.execute_script("performance.setResourceTimingBufferSize(10000)")
+    before = browser.execute_script(count)
+    time.sleep(6)
+    shown = browser.execute_script(count) - before
+    browser.execute_script("Object.defineProperty(document, 'hidden', {get: () => true})")
+    time.sleep(2)
+    before = browser.execute_script(count)
+    time.sleep(6)
+    hidden = browser.execute_script(count) - before
+    job.cancel()
+    assert shown >= 9 and hidden <= shown / 2
