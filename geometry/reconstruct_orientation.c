@@ -1,9 +1,10 @@
 /* Step "orientation": the direction of the fiber through every voxel of material.
  *
- * For each block of 2 x 2 x 2 voxels the densest voxel is tried against a coarse set of directions over the half
- * sphere; every voxel then walks downhill on a fine set from its block's answer and ends on the paraboloid through J at
- * the best node and its neighbours. This finds the minimum over all directions without a structure tensor, which mixes
- * the two directions where yarns cross. Both passes depend on the densities alone, not on how work is divided. */
+ * J(x, d) is sharp only on the axis of a fiber: off the axis a line that leans across the fiber stays inside for longer. So every voxel
+ * first climbs to its ridge (the densest place of the blurred volume within about one radius), J is minimised there, and the
+ * voxel takes the ridge's direction and J. At a ridge a coarse set of directions over the half sphere is tried in full; from the best of
+ * them a descent over a fine set ends on the paraboloid through J at the best node and its neighbours. That is the minimum over all
+ * directions, so no structure tensor is needed to start from. Nothing depends on how the work is divided. */
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/fiber_diameter.h"
@@ -13,62 +14,67 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_FINE = 900, NO_SEED = UINT16_MAX, J_BINS = 512, MAX_STEP = 24 };
+enum { N_FINE = 900, J_BINS = 512, MAX_STEP = 24 };
+#define J_UNIT (1.0 / 40000.0) /* J at ridges is kept as a share of J in solid material in 16 bits */
 
 struct orientation_job {
     const struct volume *v;
+    struct volume blurred;
     struct direction_volume *d;
     struct direction_set fine, coarse;
     uint16_t *coarse_node; /* node of the fine set nearest to each coarse direction */
     struct line_filter *filter;
     float eps_d, eps_j;
     double j_full;         /* J in solid material */
-    size_t n_block[3];
-    uint16_t *seed;        /* per block: node of the fine set */
-    size_t (*j_histogram)[J_BINS]; /* per thread; of J / j_full of the seeds */
+    int n_climb;           /* steps to the ridge */
+    uint32_t *ridge;       /* per voxel of material: index of its ridge voxel */
+    _Atomic uint8_t *is_ridge;
+    uint16_t *j_ridge;     /* per ridge voxel, in J_UNIT * j_full */
+    size_t (*j_histogram)[J_BINS]; /* per slice; of J / j_full at ridges */
     float *scratch;        /* per thread */
     size_t scratch_per_thread;
-    size_t *n_material, *n_kept; /* per slab */
+    size_t *n_material, *n_kept; /* per slice */
 };
 
-static bool densest_of_block(const struct orientation_job *o, size_t bi, size_t bj, size_t bk, size_t at[3])
+/* The highest of the 26 neighbours of x in the blurred volume; x itself at a peak. */
+static void step_up(const struct volume *l, size_t x[3])
 {
-    float most = o->eps_d;
-    bool found = false;
-    const size_t *n = o->v->n;
-    for (size_t k = 2 * bk; k < 2 * bk + 2 && k < n[2]; k++)
-        for (size_t j = 2 * bj; j < 2 * bj + 2 && j < n[1]; j++)
-            for (size_t i = 2 * bi; i < 2 * bi + 2 && i < n[0]; i++)
-                if (o->v->density[volume_index(n, i, j, k)] >= most) {
-                    most = o->v->density[volume_index(n, i, j, k)];
-                    at[0] = i, at[1] = j, at[2] = k;
-                    found = true;
-                }
-    return found;
-}
-
-static void seed_slab(void *context, size_t bk, size_t i_thread)
-{
-    struct orientation_job *o = context;
-    float *scratch = o->scratch + i_thread * o->scratch_per_thread;
-    uint16_t *seed = o->seed + bk * o->n_block[0] * o->n_block[1];
-    for (size_t bj = 0; bj < o->n_block[1]; bj++)
-        for (size_t bi = 0; bi < o->n_block[0]; bi++, seed++) {
-            size_t at[3];
-            *seed = NO_SEED;
-            if (!densest_of_block(o, bi, bj, bk, at)) continue;
-            struct line_filter_site site = line_filter_at(o->filter, o->v, at[0], at[1], at[2], scratch);
-            float least = INFINITY;
-            for (size_t c = 0; c < o->coarse.n; c++) {
-                float j = line_filter_j(o->filter, &site, o->coarse_node[c]);
-                if (j < least) {
-                    least = j;
-                    *seed = o->coarse_node[c];
+    size_t best[3] = {x[0], x[1], x[2]}, at[3];
+    float most = l->density[volume_index(l->n, x[0], x[1], x[2])];
+    size_t from[3], to[3];
+    for (int a = 0; a < 3; a++) {
+        from[a] = x[a] > 0 ? x[a] - 1 : 0;
+        to[a] = x[a] + 1 < l->n[a] ? x[a] + 1 : x[a];
+    }
+    for (at[2] = from[2]; at[2] <= to[2]; at[2]++)
+        for (at[1] = from[1]; at[1] <= to[1]; at[1]++)
+            for (at[0] = from[0]; at[0] <= to[0]; at[0]++) {
+                float value = l->density[volume_index(l->n, at[0], at[1], at[2])];
+                if (value > most) {
+                    most = value;
+                    memcpy(best, at, sizeof best);
                 }
             }
-            double share = (double)least / o->j_full * J_BINS;
-            o->j_histogram[i_thread][share < 0.0 ? 0 : share >= J_BINS ? J_BINS - 1 : (size_t)share]++;
+    memcpy(x, best, sizeof best);
+}
+
+static void climb_slice(void *context, size_t k, size_t i_thread)
+{
+    (void)i_thread;
+    struct orientation_job *o = context;
+    const size_t *n = o->v->n;
+    size_t material = 0;
+    for (size_t j = 0; j < n[1]; j++)
+        for (size_t i = 0; i < n[0]; i++) {
+            size_t at = volume_index(n, i, j, k), x[3] = {i, j, k};
+            if (o->v->density[at] < o->eps_d) continue;
+            material++;
+            for (int step = 0; step < o->n_climb; step++) step_up(&o->blurred, x);
+            size_t top = volume_index(n, x[0], x[1], x[2]);
+            o->ridge[at] = (uint32_t)top;
+            atomic_store_explicit(&o->is_ridge[top], 1, memory_order_relaxed);
         }
+    o->n_material[k] = material;
 }
 
 /* Values of J already known at a voxel. */
@@ -114,102 +120,133 @@ static float descend(const struct orientation_job *o, const struct line_filter_s
     return value;
 }
 
-static void refine_slab(void *context, size_t k, size_t i_thread)
+static uint16_t coarse_minimum(const struct orientation_job *o, const struct line_filter_site *site)
+{
+    float least = INFINITY;
+    uint16_t best = 0;
+    for (size_t c = 0; c < o->coarse.n; c++) {
+        float j = line_filter_j(o->filter, site, o->coarse_node[c]);
+        if (j < least) {
+            least = j;
+            best = o->coarse_node[c];
+        }
+    }
+    return best;
+}
+
+static void ridge_slice(void *context, size_t k, size_t i_thread)
 {
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
-    size_t material = 0, kept = 0;
     for (size_t j = 0; j < n[1]; j++)
         for (size_t i = 0; i < n[0]; i++) {
             size_t at = volume_index(n, i, j, k);
-            float density = o->v->density[at];
-            o->d->density[at] = 0;
-            if (density < o->eps_d) continue;
-            material++;
-            uint16_t seed = o->seed[(k / 2 * o->n_block[1] + j / 2) * o->n_block[0] + i / 2];
-            struct line_filter_site site = line_filter_at(o->filter, o->v, i, j, k, scratch);
-            float d[3], least = descend(o, &site, seed, d);
-            if (least > o->eps_j) continue;
-            kept++;
-            long byte = lrintf(255.0f * density);
-            o->d->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
+            if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
+            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
+            float d[3], least = descend(o, &site, coarse_minimum(o, &site), d);
+            double share = fmax(0.0, (double)least / o->j_full);
+            o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
+            o->j_histogram[k][share * J_BINS >= J_BINS ? J_BINS - 1 : (size_t)(share * J_BINS)]++;
             direction_volume_set(o->d, at, d);
         }
-    o->n_material[k] = material;
+}
+
+static void assign_slice(void *context, size_t k, size_t i_thread)
+{
+    (void)i_thread;
+    struct orientation_job *o = context;
+    size_t n = o->v->n[0] * o->v->n[1], kept = 0;
+    for (size_t at = k * n; at < (k + 1) * n; at++) {
+        float density = o->v->density[at];
+        o->d->density[at] = 0;
+        if (density < o->eps_d) continue;
+        if ((double)o->j_ridge[o->ridge[at]] * J_UNIT * o->j_full > (double)o->eps_j) continue;
+        kept++;
+        long byte = lrintf(255.0f * density);
+        o->d->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
+        if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0)
+            memcpy(o->d->octahedral + 2 * at, o->d->octahedral + 2 * (size_t)o->ridge[at], 2 * sizeof *o->d->octahedral);
+    }
     o->n_kept[k] = kept;
 }
 
 /* Filter parameters from the fiber diameter. Over the six fabrics of thesis Table 5.2 s times the squared radius in voxels is
- * between 0.7 and 11, about 4 in the (geometric) mean; t is twice s for most; h is about three radii, 11 at least. */
+ * between 0.7 and 11, about 4 in the (geometric) mean; t is twice s for most. A line must be
+ * some diameters long, or it fits into one fiber in many directions: h is about 2.8 diameters. */
 static void choose_parameters(struct reconstruct_option *o, double diameter_voxel)
 {
     double radius = 0.5 * diameter_voxel;
     if (isnan(o->s)) o->s = fmin(2.0, 4.0 / (radius * radius));
     if (isnan(o->t)) o->t = 2.0 * o->s;
     if (o->h == 0) {
-        size_t h = 2 * (size_t)lrint(1.6 * radius) + 1;
-        o->h = h < 11 ? 11 : h > 31 ? 31 : h;
+        size_t h = 2 * (size_t)lrint(1.4 * diameter_voxel) + 1;
+        o->h = h < 9 ? 9 : h > 41 ? 41 : h;
     }
     if (isnan(o->eps_d)) o->eps_d = 0.5; /* half way between the modes of void and material */
 }
 
-/* 30 % of the J that the upper fifth of the material reaches: fiber surfaces have about 45 %, noise in void near 0. */
-static void choose_eps_j(struct orientation_job *o, struct reconstruct_option *option, size_t n_thread)
+/* Half of the J that the upper fifth of the ridges reaches; noise in void has near 0. */
+static void choose_eps_j(struct orientation_job *o, struct reconstruct_option *option)
 {
     if (isnan(option->eps_j)) {
-        size_t total = 0, above = 0, bin = J_BINS;
-        for (size_t t = 0; t < n_thread; t++)
-            for (size_t b = 0; b < J_BINS; b++) total += o->j_histogram[t][b];
+        size_t total = 0, above = 0, bin = J_BINS, n_slice = o->v->n[2];
+        for (size_t k = 0; k < n_slice; k++)
+            for (size_t b = 0; b < J_BINS; b++) total += o->j_histogram[k][b];
         while (bin > 0 && above * 5 <= total) {
             bin--;
-            for (size_t t = 0; t < n_thread; t++) above += o->j_histogram[t][bin];
+            for (size_t k = 0; k < n_slice; k++) above += o->j_histogram[k][bin];
         }
-        option->eps_j = 0.30 * o->j_full * ((double)bin + 0.5) / J_BINS;
+        option->eps_j = 0.5 * o->j_full * ((double)bin + 0.5) / J_BINS;
     }
     o->eps_j = (float)option->eps_j;
 }
 
-static double solid_j(double s, double t, size_t h)
-{
-    return (-2.0 * M_PI / s + M_PI / t) * (double)h;
-}
+static double solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
 
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
                       size_t n_thread, struct error *err)
 {
     const size_t *n = o->v->n;
+    size_t n_voxel = volume_n_voxel(n);
+    if (n_voxel > UINT32_MAX)
+        return error_set(err, STATUS_TOO_LARGE, "cannot filter directions of %zu x %zu x %zu voxels", n[0], n[1], n[2]);
     /* Half-width of the dip of J over angle is about radius / (h / 2); a coarse node must fall into it. */
     double dip = fmin(0.5, diameter_voxel / (double)option->h), n_coarse = 2.0 * M_PI / (0.7 * dip * dip);
     status s = direction_set_init(&o->fine, N_FINE, err);
-    if (s == STATUS_OK) s = direction_set_init(&o->coarse, (size_t)fmin(fmax(n_coarse, 40.0), 300.0), err);
-    if (s == STATUS_OK) s = line_filter_new(&o->fine, option->s, option->t, option->h, n, &o->filter, err);
+    if (s == STATUS_OK) s = direction_set_init(&o->coarse, (size_t)fmin(fmax(n_coarse, 40.0), 400.0), err);
+    if (s == STATUS_OK) s = line_filter_new(&o->fine, option->h, n, &o->filter, err);
     if (s != STATUS_OK) return s;
-    for (int a = 0; a < 3; a++) o->n_block[a] = (n[a] + 1) / 2;
     o->scratch_per_thread = line_filter_scratch(o->filter);
     o->coarse_node = malloc(o->coarse.n * sizeof *o->coarse_node);
-    o->seed = malloc(volume_n_voxel(o->n_block) * sizeof *o->seed);
-    o->j_histogram = calloc(n_thread, sizeof *o->j_histogram);
+    o->ridge = malloc(n_voxel * sizeof *o->ridge);
+    o->is_ridge = calloc(n_voxel, sizeof *o->is_ridge);
+    o->j_ridge = malloc(n_voxel * sizeof *o->j_ridge);
+    o->j_histogram = calloc(n[2], sizeof *o->j_histogram);
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
     o->n_material = calloc(n[2], sizeof *o->n_material);
     o->n_kept = calloc(n[2], sizeof *o->n_kept);
-    if (o->coarse_node == NULL || o->seed == NULL || o->j_histogram == NULL || o->scratch == NULL || o->n_material == NULL ||
-        o->n_kept == NULL)
+    if (o->coarse_node == NULL || o->ridge == NULL || o->is_ridge == NULL || o->j_ridge == NULL || o->j_histogram == NULL ||
+        o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     for (size_t c = 0; c < o->coarse.n; c++)
         o->coarse_node[c] = (uint16_t)direction_set_nearest(&o->fine, o->coarse.node[c].d);
     o->eps_d = (float)option->eps_d;
     o->j_full = solid_j(option->s, option->t, option->h);
+    o->n_climb = (int)ceil(0.5 * diameter_voxel);
     return STATUS_OK;
 }
 
 static void release(struct orientation_job *o)
 {
+    volume_release(&o->blurred);
     direction_set_release(&o->fine);
     direction_set_release(&o->coarse);
     line_filter_free(o->filter);
     free(o->coarse_node);
-    free(o->seed);
+    free(o->ridge);
+    free(o->is_ridge);
+    free(o->j_ridge);
     free(o->j_histogram);
     free(o->scratch);
     free(o->n_material);
@@ -241,12 +278,16 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     s = prepare(&o, option, report->fiber_diameter_voxel, thread_pool_n_thread(pool), err);
     if (s == STATUS_OK) s = direction_volume_init(d, v->n, v->voxel_size_m, err);
     if (s != STATUS_OK) goto out;
-    part = (struct part_progress){progress, 0.1, 0.3};
-    s = thread_pool_run(pool, o.n_block[2], seed_slab, &o, &inner);
+    part = (struct part_progress){progress, 0.1, 0.2};
+    s = line_filter_blur(v, option->s, option->t, pool, &inner, &o.blurred, err);
+    if (s != STATUS_OK) goto out;
+    part = (struct part_progress){progress, 0.3, 0.2};
+    s = thread_pool_run(pool, v->n[2], climb_slice, &o, &inner);
+    part = (struct part_progress){progress, 0.5, 0.5};
+    if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], ridge_slice, &o, &inner);
     if (s == STATUS_OK) {
-        choose_eps_j(&o, option, thread_pool_n_thread(pool));
-        part = (struct part_progress){progress, 0.4, 0.6};
-        s = thread_pool_run(pool, v->n[2], refine_slab, &o, &inner);
+        choose_eps_j(&o, option);
+        s = thread_pool_run(pool, v->n[2], assign_slice, &o, NULL);
     }
     if (s != STATUS_OK) {
         s = error_set(err, s, "finding fiber directions was cancelled");

@@ -29,72 +29,100 @@ void line_filter_free(struct line_filter *f)
     free(f);
 }
 
-struct tap_shape {
-    double s, t;
-    bool even;
-};
-
-static double tap(const struct tap_shape *q, int half, const float d[3], int x, int y, int z)
+/* Adds the eight taps of the interpolated sample at x (voxels from the centre of the cube). */
+static void splat(const struct line_filter *f, const double x[3], double weight, float *cube)
 {
-    double along = x * (double)d[0] + y * (double)d[1] + z * (double)d[2];
-    double r2 = (double)(x * x + y * y + z * z) - along * along, w = 1.0;
-    if (q->even) w = (abs(x) == half ? 0.5 : 1.0) * (abs(y) == half ? 0.5 : 1.0) * (abs(z) == half ? 0.5 : 1.0);
-    return w * (-2.0 * exp(-q->s * r2) + exp(-q->t * r2));
+    int i[3];
+    double w[3];
+    for (int a = 0; a < 3; a++) {
+        i[a] = (int)floor(x[a]);
+        w[a] = x[a] - (double)i[a];
+    }
+    for (int c = 0; c < 8; c++) {
+        size_t at = 0;
+        double share = weight;
+        for (int a = 2; a >= 0; a--) {
+            int bit = c >> a & 1;
+            at = at * f->edge + (size_t)(i[a] + bit + (int)f->half);
+            share *= bit ? w[a] : 1.0 - w[a];
+        }
+        if (share > 1e-6) cube[at] -= (float)share;
+    }
 }
 
-/* Runs of one direction: written if the tables exist, counted in any case. Taps below 1/500 of the central one are dropped. */
-static size_t make_runs(struct line_filter *f, const struct tap_shape *q, const float d[3], size_t at)
+/* Taps of one direction in a cube of edge^3: whole steps, and what is left of h / 2 at either end. */
+static void make_taps(const struct line_filter *f, const float d[3], double half_length, float *cube)
 {
-    int half = (int)f->half;
+    memset(cube, 0, f->edge * f->edge * f->edge * sizeof *cube);
+    int steps = (int)floor(half_length + 0.5);
+    for (int k = -steps; k <= steps; k++) {
+        double weight = abs(k) < steps ? 1.0 : half_length + 0.5 - (double)steps;
+        double x[3] = {k * (double)d[0], k * (double)d[1], k * (double)d[2]};
+        if (weight > 0.0) splat(f, x, weight, cube);
+    }
+}
+
+/* Runs of one direction: written if the tables exist, counted in any case. */
+static size_t make_runs(struct line_filter *f, const float *cube, size_t at)
+{
     size_t count = 0;
-    for (int z = -half; z <= half; z++)
-        for (int y = -half; y <= half; y++) {
-            int first = half + 1, last = -half - 1;
-            for (int x = -half; x <= half; x++)
-                if (fabs(tap(q, half, d, x, y, z)) > 2e-3) {
-                    if (first > x) first = x;
-                    last = x;
+    for (size_t z = 0; z < f->edge; z++)
+        for (size_t y = 0; y < f->edge; y++) {
+            const float *row = cube + (z * f->edge + y) * f->edge;
+            for (size_t x = 0; x < f->edge; x++) {
+                if (row[x] >= 0.0f) continue;
+                ptrdiff_t dx = (ptrdiff_t)x - (ptrdiff_t)f->half, dy = (ptrdiff_t)y - (ptrdiff_t)f->half;
+                ptrdiff_t dz = (ptrdiff_t)z - (ptrdiff_t)f->half;
+                for (size_t l = 0; f->weight != NULL && l < LANES; l++)
+                    f->weight[(at + count) * LANES + l] = x + l < f->edge ? row[x + l] : 0.0f;
+                if (f->weight != NULL) {
+                    f->offset[at + count] = (int32_t)((dz * (ptrdiff_t)f->n[1] + dy) * (ptrdiff_t)f->n[0] + dx);
+                    f->offset_local[at + count] =
+                        (int32_t)((dz * (ptrdiff_t)f->edge + dy) * (ptrdiff_t)f->edge_x + dx);
                 }
-            for (int x = first; x <= last; x += LANES, count++) {
-                if (f->weight == NULL) continue;
-                size_t run = at + count;
-                f->offset[run] = (int32_t)((z * (ptrdiff_t)f->n[1] + y) * (ptrdiff_t)f->n[0] + x);
-                f->offset_local[run] = (int32_t)((z * (ptrdiff_t)f->edge + y) * (ptrdiff_t)f->edge_x + x);
-                for (int l = 0; l < LANES; l++)
-                    f->weight[run * LANES + (size_t)l] = x + l <= last ? (float)tap(q, half, d, x + l, y, z) : 0.0f;
+                count++;
+                x += LANES - 1;
             }
         }
     return count;
 }
 
-status line_filter_new(const struct direction_set *set, double s, double t, size_t h, const size_t n[3],
-                       struct line_filter **filter, struct error *err)
+status line_filter_new(const struct direction_set *set, size_t h, const size_t n[3], struct line_filter **filter,
+                       struct error *err)
 {
     *filter = NULL;
-    if (!(s > 0.0) || !(t > 0.0) || h < 3 || h > 63)
-        return error_set(err, STATUS_INVALID, "cannot make the direction filter with s %g, t %g, h %zu", s, t, h);
+    if (h < 3 || h > 63) return error_set(err, STATUS_INVALID, "cannot make the direction filter with h %zu", h);
     if (n[0] * n[1] * 64 > INT32_MAX)
         return error_set(err, STATUS_TOO_LARGE, "cannot filter slices of %zu x %zu voxels", n[0], n[1]);
+    float *cube = NULL;
     struct line_filter *f = calloc(1, sizeof *f);
     if (f == NULL) goto no_memory;
-    f->half = h / 2;
+    f->half = h / 2 + 2;
     f->edge = 2 * f->half + 1;
     f->edge_x = f->edge + LANES;
     f->n_direction = set->n;
     memcpy(f->n, n, sizeof f->n);
+    cube = malloc(f->edge * f->edge * f->edge * sizeof *cube);
     f->first_run = calloc(set->n + 1, sizeof *f->first_run);
-    if (f->first_run == NULL) goto no_memory;
-    const struct tap_shape q = {s, t, h % 2 == 0};
-    for (size_t i = 0; i < set->n; i++) f->first_run[i + 1] = f->first_run[i] + make_runs(f, &q, set->node[i].d, 0);
+    if (f->first_run == NULL || cube == NULL) goto no_memory;
+    for (size_t i = 0; i < set->n; i++) {
+        make_taps(f, set->node[i].d, 0.5 * (double)h, cube);
+        f->first_run[i + 1] = f->first_run[i] + make_runs(f, cube, 0);
+    }
     size_t n_run = f->first_run[set->n];
     f->offset = malloc(n_run * sizeof *f->offset);
     f->offset_local = malloc(n_run * sizeof *f->offset_local);
     f->weight = malloc(n_run * LANES * sizeof *f->weight);
     if (f->offset == NULL || f->offset_local == NULL || f->weight == NULL) goto no_memory;
-    for (size_t i = 0; i < set->n; i++) make_runs(f, &q, set->node[i].d, f->first_run[i]);
+    for (size_t i = 0; i < set->n; i++) {
+        make_taps(f, set->node[i].d, 0.5 * (double)h, cube);
+        make_runs(f, cube, f->first_run[i]);
+    }
+    free(cube);
     *filter = f;
     return STATUS_OK;
 no_memory:
+    free(cube);
     line_filter_free(f);
     return error_set(err, STATUS_NO_MEMORY, "cannot make the direction filter: out of memory");
 }

@@ -5,11 +5,11 @@
 #ifndef SELVEDGE_GEOMETRY_VISION_H
 #define SELVEDGE_GEOMETRY_VISION_H
 
-#include "base/status.h"
-
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+#include "base/status.h"
 
 /* Switches OpenCV's threads off. Call before threads use the functions below; calling again does no harm. */
 status vision_init(struct error *err);
