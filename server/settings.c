@@ -51,6 +51,7 @@ static const struct setting table[] = {
     NUMBER("jobs", "max_lost_attempts", max_lost_attempts, 3, 1, 100, "a job whose worker died this often has failed"),
     NUMBER("jobs", "heartbeat_timeout_s", heartbeat_timeout_s, 300, 2, 86400, "a worker that is silent this long is killed (a lost attempt)"),
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2, "free space under which new work is refused and running jobs pause"),
+    NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB, "space kept in a file and given up on a full disk, so that deleting still works"),
 };
 enum { N_SETTING = sizeof table / sizeof table[0] };
 

@@ -21,7 +21,7 @@ struct settings {
     char worker[SETTING_TEXT_BYTES];
     int64_t nice, memory_limit_bytes, cancel_grace_s, max_lost_attempts, heartbeat_timeout_s;
     /* [disk] */
-    int64_t floor_bytes;
+    int64_t floor_bytes, ballast_bytes;
 };
 
 void settings_init(struct settings *s);

@@ -196,7 +196,7 @@ status attempt_settle(struct job_service *v, const char *job_id, const struct wo
     bool over = row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED;
     if (over) row.finished_unix_s = clock_wall_s();
     if (over) row.cancel_requested = false;
-    s = store_job_update(v->store, &row, err);
+    s = job_update_surely(v, &row, err);
     if (s == STATUS_OK && over) atomic_fetch_add(&v->n_finished_total[row.state], 1);
     if (s == STATUS_OK) log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "", row.error_text);
 out:

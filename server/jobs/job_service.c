@@ -3,6 +3,7 @@
 #include "base/durable.h"
 #include "optimizer/job_document.h"
 #include "optimizer/job_folder.h"
+#include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/supervisor.h"
 
@@ -34,6 +35,12 @@ status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err)
         return error_set(err, STATUS_DISK_FULL, "cannot take new work: %lld bytes are free, %lld are kept in reserve; delete jobs or free space", free_bytes,
                          (long long)v->settings->floor_bytes);
     return STATUS_OK;
+}
+
+status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
+{
+    status s = store_job_update(v->store, row, err);
+    return s == STATUS_DISK_FULL && ballast_release(v->settings->data) ? store_job_update(v->store, row, err) : s;
 }
 
 static status check_document(const char *document, size_t n_bytes, char sample[256], struct error *err)
@@ -148,7 +155,7 @@ static status edit(struct job_service *v, struct job_row *row, struct error *err
         return error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first", job_state_name(row->state));
     row->state = JOB_DRAFT;
     row->dirty = row->dirty || row->attempt > 0;
-    return store_job_update(v->store, row, err);
+    return job_update_surely(v, row, err);
 }
 
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes, struct error *err)
@@ -283,7 +290,7 @@ status job_cancel(struct job_service *v, const char *id, bool *changed, struct e
         row.finished_unix_s = clock_wall_s();
         atomic_fetch_add(&v->n_finished_total[JOB_CANCELLED], 1);
     }
-    s = store_job_update(v->store, &row, err);
+    s = job_update_surely(v, &row, err);
     if (s == STATUS_OK) log_info(v->log, "job %s: cancel requested", row.id);
 out:
     pthread_mutex_unlock(&v->change);
@@ -299,7 +306,7 @@ status job_delete(struct job_service *v, const char *id, struct error *err)
     status s = job_get(v, id, &row, err);
     if (s == STATUS_OK) {
         row.deleted = true;
-        s = store_job_update(v->store, &row, err);
+        s = job_update_surely(v, &row, err);
     }
     pthread_mutex_unlock(&v->change);
     if (s == STATUS_OK) {
@@ -400,6 +407,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     if (s == STATUS_OK) s = edit(v, &job, err);
     /* the row first: bytes without a row are swept away, a row without bytes would be a lie */
     if (s == STATUS_OK) s = store_file_erase(v->store, file.id, err);
+    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, err);
     if (s == STATUS_OK) upload_discard(v->upload, &file);
     pthread_mutex_unlock(&v->change);
     job_row_release(&job);

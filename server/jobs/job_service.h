@@ -46,6 +46,9 @@ status job_retry(struct job_service *v, const char *id, bool *changed, struct jo
 status job_cancel(struct job_service *v, const char *id, bool *changed, struct error *err);
 status job_delete(struct job_service *v, const char *id, struct error *err);
 
+/* store_job_update for changes that free space or end work: on a full disk the ballast is given up for them. */
+status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);
+
 /* A job that exists and is not a tombstone. Release the row. */
 status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err);
 

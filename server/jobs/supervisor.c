@@ -1,6 +1,7 @@
 #include "server/jobs/supervisor.h"
 #include "base/clock.h"
 #include "server/jobs/attempt.h"
+#include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/worker_process.h"
 
@@ -207,6 +208,7 @@ static void look_at_disk(struct supervisor *u)
     u->below_floor = free_bytes < (was ? floor_bytes + floor_bytes / 10 : floor_bytes);
     if (u->below_floor && !was) log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve: running jobs pause", free_bytes, (long long)floor_bytes);
     if (!u->below_floor) attempt_resume_paused(u->v);
+    if (!u->below_floor) ballast_keep(u->v->settings->data, u->v->settings->ballast_bytes);
 }
 
 static void tick(struct supervisor *u)

@@ -235,13 +235,26 @@ static status finish(struct upload *u, struct error *err)
     return s;
 }
 
+/* After a failed sync the kernel may have dropped the pages and a second sync would claim success: what is not committed has to
+ * come again. u->lock is held. */
+static status roll_back(struct upload *u, struct error *err)
+{
+    status s = error_set_errno(err, "cannot write file '%s'", u->row.name);
+    u->offset_bytes = u->row.offset_bytes;
+    memcpy(&u->hash, u->row.hash_state, sizeof u->hash);
+    atomic_store(&u->offset_seen, u->offset_bytes);
+    close(u->fd);
+    u->fd = -1;
+    return s;
+}
+
 /* u->lock is held. */
 static status commit(struct upload *u, struct error *err)
 {
     if (u->discarded) return error_set(err, STATUS_NOT_FOUND, "file '%s' was removed", u->row.name);
     if (u->row.state == FILE_COMPLETE) return STATUS_OK;
     if (u->offset_bytes != u->row.offset_bytes) {
-        if (u->fd >= 0 && fdatasync(u->fd) != 0) return error_set_errno(err, "cannot write file '%s'", u->row.name);
+        if (u->fd >= 0 && fdatasync(u->fd) != 0) return roll_back(u, err);
         int64_t before = u->row.offset_bytes;
         u->row.offset_bytes = u->offset_bytes;
         memcpy(u->row.hash_state, &u->hash, sizeof u->hash);

@@ -55,6 +55,7 @@ class Daemon:
         self.wrapper = wrapper if wrapper is not None else os.environ.get("SELVEDGE_TEST_WRAPPER", "").split()
         self.process = None
         self.log = None
+        self.session = requests.Session()
         self.check = OpenApiCheck()  # every reply is held against the API's description
 
     def __enter__(self):
@@ -79,6 +80,7 @@ class Daemon:
         line = self.process.stdout.readline()
         if not line.startswith("selvedged listens on "):
             self.process.wait()
+            self.close()
             raise AssertionError(f"the daemon did not start: {self.log_text()[-2000:]}")
         self.url = line.split()[-1]
         self.port = int(self.url.rsplit(":", 1)[1])

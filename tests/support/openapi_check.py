@@ -7,8 +7,8 @@ import jsonschema
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 METHODS = ("get", "put", "post", "delete", "head", "patch", "options")
-# what any request can get before its endpoint sees it (framing, Host, Origin)
-GENERAL = {"400", "403"}
+# what any request can get (docs/api.md, Errors): bad framing, Host, Origin; troubles of the machine
+GENERAL = {"400", "403", "500", "503", "507"}
 
 
 def load():

@@ -1,0 +1,84 @@
+/* LD_PRELOAD: makes one system call fail, for tests. Environment: FAULT_CALL (write, sync, fallocate), FAULT_AT (1: the first call that
+ * fits), FAULT_ERRNO (0: a short write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file made when it fired). */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static atomic_int n_seen;
+
+/* the programs that this one starts work normally */
+__attribute__((constructor)) static void only_here(void) { unsetenv("LD_PRELOAD"); }
+
+/* true: this is the call that has to fail */
+static int fires(const char *call, int fd)
+{
+    const char *wanted = getenv("FAULT_CALL"), *at = getenv("FAULT_AT"), *path = getenv("FAULT_PATH"), *mark = getenv("FAULT_MARK");
+    char link[64], file[4096];
+    if (wanted == NULL || at == NULL || path == NULL || mark == NULL || strcmp(wanted, call) != 0) return 0;
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    ssize_t n = readlink(link, file, sizeof file - 1);
+    if (n <= 0) return 0;
+    file[n] = '\0';
+    if (strstr(file, path) == NULL) return 0;
+    if (atomic_fetch_add(&n_seen, 1) + 1 != strtol(at, NULL, 10)) return 0;
+    int m = open(mark, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+    if (m >= 0) close(m);
+    return 1;
+}
+
+static int wanted_errno(void)
+{
+    const char *e = getenv("FAULT_ERRNO");
+    return e == NULL ? EIO : (int)strtol(e, NULL, 10);
+}
+
+#define REAL(type, name, ...) ((type(*)(__VA_ARGS__))dlsym(RTLD_NEXT, name))
+
+static ssize_t faulty_pwrite(const char *name, int fd, const void *data, size_t n, off_t offset)
+{
+    if (fires("write", fd)) {
+        errno = wanted_errno();
+        if (errno != 0) return -1;
+        n = n > 1 ? n / 2 : n;
+    }
+    return REAL(ssize_t, name, int, const void *, size_t, off_t)(fd, data, n, offset);
+}
+
+ssize_t pwrite(int fd, const void *data, size_t n, off_t offset) { return faulty_pwrite("pwrite", fd, data, n, offset); }
+ssize_t pwrite64(int fd, const void *data, size_t n, off_t offset) { return faulty_pwrite("pwrite64", fd, data, n, offset); }
+
+ssize_t write(int fd, const void *data, size_t n)
+{
+    if (fires("write", fd)) {
+        errno = wanted_errno();
+        if (errno != 0) return -1;
+        n = n > 1 ? n / 2 : n;
+    }
+    return REAL(ssize_t, "write", int, const void *, size_t)(fd, data, n);
+}
+
+int fsync(int fd)
+{
+    if (fires("sync", fd)) return errno = wanted_errno(), -1;
+    return REAL(int, "fsync", int)(fd);
+}
+
+int fdatasync(int fd)
+{
+    if (fires("sync", fd)) return errno = wanted_errno(), -1;
+    return REAL(int, "fdatasync", int)(fd);
+}
+
+int fallocate(int fd, int mode, off_t from, off_t n)
+{
+    if (fires("fallocate", fd)) return errno = wanted_errno(), -1;
+    return REAL(int, "fallocate", int, int, off_t, off_t)(fd, mode, from, n);
+}
+
+int fallocate64(int fd, int mode, off_t from, off_t n) { return fallocate(fd, mode, from, n); }

@@ -1,0 +1,185 @@
+"""A full disk, write errors and short writes: clear answers, valid offsets, nothing lost, and work goes on when there is room again."""
+import ctypes
+import errno
+import os
+import shutil
+import subprocess
+
+import pytest
+from daemon_under_test import BUILD, FILES, ROOT, TUS, Daemon, document, problem, wait_until
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 16 MiB (needs root)."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    libc = ctypes.CDLL(None, use_errno=True)
+    if os.geteuid() != 0 or libc.mount(b"selvedge-test", str(folder).encode(), b"tmpfs", 0, b"size=16m") != 0:
+        pytest.skip("a small file system cannot be mounted here (not root)")
+    yield folder
+    libc.umount2(str(folder).encode(), 2)
+
+
+def declare(d, job, name, size):
+    return d.post(f"/v1/jobs/{job}/files", json={"name": name, "role": "volume", "size": size})
+
+
+def test_full_disk_is_refused_at_the_declaration(small_disk, tmp_path):
+    with Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}) as d:
+        job = d.ready_job("succeed")
+        # a first large file has its space for sure, whatever comes later
+        first = declare(d, job, "first.tif", 6 << 20).json()["upload_url"]
+        problem(declare(d, job, "second.tif", 12 << 20), 507, "disk_full")
+        assert [f["name"] for f in d.job(job)["files"]] == [*FILES, "first.tif"]
+        filler = open(small_disk / "filler", "wb")
+        with pytest.raises(OSError):
+            while True:
+                filler.write(b"x" * 65536)
+                filler.flush()
+        filler.close()
+        problem(declare(d, job, "third.tif", 1 << 20), 507, "disk_full")
+        # the database cannot grow either: an answer that says so, or success; never a lie
+        r = d.patch(first, 0, b"y" * (3 << 20))
+        assert r.status_code in (204, 507), r.text
+        offset = d.request("HEAD", first, headers=TUS)
+        os.remove(small_disk / "filler")
+        offset = int(offset.headers["Upload-Offset"]) if offset.ok else d.offset(first)
+        assert r.status_code == 507 or offset == 3 << 20
+        assert d.patch(first, offset, b"y" * ((6 << 20) - offset)).status_code == 204
+        assert d.get(f"/v1/jobs/{job}/files/first.tif").content == b"y" * (6 << 20)
+        assert d.delete(f"/v1/jobs/{job}/files/first.tif").status_code == 204
+        assert d.post(f"/v1/jobs/{job}/start").status_code == 202
+        d.wait_state(job, "succeeded")
+
+
+def test_delete_works_on_a_full_disk(small_disk):
+    with Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}) as d:
+        job = d.ready_job()
+        d.upload(job, "more.tif", b"z" * (2 << 20))
+        with open(small_disk / "filler", "wb", buffering=0) as f, pytest.raises(OSError):
+            while f.write(b"x" * 4096) == 4096:
+                pass
+            raise OSError
+        r = d.delete(f"/v1/jobs/{job}")
+        assert r.status_code == 204, r.text
+        wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
+        assert d.post("/v1/jobs", json=document("succeed")).status_code == 201
+
+
+def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):
+    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20}) as d:
+        job = d.start_job("work_once")
+        wait_until(lambda: d.job(job)["fraction"] == 0.5)
+        with open(small_disk / "filler", "wb") as f:
+            f.write(b"x" * (12 << 20))
+        assert d.wait_state(job, "paused")["lost_attempts"] == 0
+        problem(d.post("/v1/jobs", json=document("succeed")), 507, "disk_full")
+        problem(d.get("/readyz"), 503, "not_ready")
+        os.remove(small_disk / "filler")
+        done = d.wait_state(job, "succeeded")
+        assert done["attempt"] == 2 and done["lost_attempts"] == 0
+
+
+def test_a_paused_job_can_be_cancelled(small_disk):
+    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20}) as d:
+        job = d.start_job("work_once")
+        wait_until(lambda: d.job(job)["fraction"] == 0.5)
+        with open(small_disk / "filler", "wb") as f:
+            f.write(b"x" * (12 << 20))
+        d.wait_state(job, "paused")
+        assert d.post(f"/v1/jobs/{job}/cancel").status_code == 200
+        assert d.job(job)["state"] == "cancelled"
+
+
+@pytest.fixture(scope="module")
+def shim(tmp_path_factory):
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no C compiler for the fault injector")
+    if "asan" in BUILD:
+        pytest.skip("the address sanitizer wants to be loaded first")
+    path = tmp_path_factory.mktemp("shim") / "fault_shim.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", str(path), os.path.join(ROOT, "tests", "crash", "fault_shim.c"), "-ldl"], check=True)
+    return str(path)
+
+
+def insist(call):
+    """A client that repeats what failed on the server's side; returns the reply and how often it had to."""
+    for n in range(5):
+        r = call()
+        if r.status_code not in (500, 503, 507):
+            return r, n
+        assert r.json()["code"] in ("io", "disk_full", "internal"), r.text
+    raise AssertionError(f"still {r.status_code}: {r.text}")
+
+
+def scenario(d):
+    """From a document to results, with a client that insists; the number of repeats."""
+    import requests
+    repeats = 0
+
+    def send(method, path, **more):
+        nonlocal repeats
+        r, n = insist(lambda: d.request(method, path, **more))
+        repeats += n
+        return r
+
+    r = send("POST", "/v1/jobs", json=document("succeed"), headers={"Idempotency-Key": "one"})
+    assert r.status_code == 201
+    job = r.json()["id"]
+    for name, (role, data) in FILES.items():
+        r = send("POST", f"/v1/jobs/{job}/files", json={"name": name, "role": role, "size": len(data)})
+        assert r.status_code in (200, 201), r.text
+        url = r.json()["upload_url"]
+        acknowledged = 0
+        while url and acknowledged < len(data):
+            r = send("HEAD", url, headers=TUS)
+            offset = int(r.headers["Upload-Offset"])
+            assert offset >= acknowledged
+            r = d.patch(url, offset, data[offset:offset + 90])
+            if r.status_code == 204:
+                acknowledged = int(r.headers["Upload-Offset"])
+            else:
+                repeats += 1
+                assert r.status_code in (500, 507), r.text
+        assert send("GET", f"/v1/jobs/{job}/files/{name}").content == data
+    assert send("POST", f"/v1/jobs/{job}/start").status_code in (200, 202)
+    done = d.wait_state(job, "succeeded", "failed")
+    assert done["state"] == "succeeded", done["error"]
+    assert len(d.get("/v1/jobs").json()["jobs"]) == 1, "a failed creation left something behind"
+    assert isinstance(requests.__version__, str)
+    return repeats
+
+
+@pytest.mark.parametrize("call, code, path, step", [
+    ("write", errno.ENOSPC, "/upload/", 3), ("write", errno.EIO, "/upload/", 7), ("write", 0, "/upload/", 5), ("sync", errno.EIO, "/upload/", 3),
+    ("fallocate", errno.ENOSPC, "/upload/", 1), ("write", errno.ENOSPC, "selvedge.db", 11), ("write", errno.EIO, "selvedge.db", 13),
+    ("write", 0, "selvedge.db", 17), ("sync", errno.EIO, "selvedge.db", 7), ("write", errno.ENOSPC, "/jobs/", 9), ("sync", errno.EIO, "/jobs/", 9)])
+def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
+    """The 1st, then a later, then a later ... call fails, until a run passes untouched."""
+    fired = repeated = 0
+    for n in range(1, 2000, step):
+        mark = tmp_path / f"mark{n}"
+        d = Daemon(tmp_path / f"data{n}", environment={"LD_PRELOAD": shim, "FAULT_CALL": call, "FAULT_AT": str(n), "FAULT_ERRNO": str(code),
+                                                       "FAULT_PATH": path, "FAULT_MARK": str(mark)})
+        try:
+            d.start()
+        except AssertionError:  # the fault came while the database was made: an error message, and the next start is fine
+            assert mark.exists() and "error: " in d.log_text()
+            d.environment = {}
+            d.start()
+        repeated += scenario(d)
+        d.environment = {}
+        d.stop()
+        d.start()
+        assert d.get("/v1/jobs").json()["jobs"][0]["state"] == "succeeded"
+        d.stop()
+        shutil.rmtree(d.data)
+        if not mark.exists():
+            break
+        fired += 1
+    else:
+        raise AssertionError("no end")
+    assert fired > 0, "no fault was injected"
+    print(f"{call} {errno.errorcode.get(code, 'short')} {path}: {fired} faults, {repeated} repeats by the client")
