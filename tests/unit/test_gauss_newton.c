@@ -1,0 +1,103 @@
+/* Gauss-Newton over several cloths and seeds: error, honesty of the standard errors, and that it says when it has not converged. */
+#include "optimizer/descent/descent.h"
+#include "optimizer/descent/method_names.h"
+#include "tests/support/fake_estimator.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* File units: a mid-range set, then the thesis's Gabardine, Silk and Fleece (Table 5.3). */
+static const double cloth[][FAKE_N_PARAM] = {
+    {0.15, 0.08, 0.05, 0.9, 0.6, 0.4, 5.0, 15.0, 20.0},
+    {0.185, 0.047, 0.069, 0.999, 0.330, 0.354, 2.141, 10.0, 23.548},
+    {0.745, 0.008, 0.070, 0.620, 0.553, 0.562, 1.0, 10.0, 19.823},
+    {0.040, 0.087, 0.087, 0.452, 0.725, 0.948, 7.238, 10.0, 25.989},
+};
+
+static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double noise, double photograph_noise, double *truth,
+                struct fake_cloth *f, struct fit_result *r)
+{
+    struct observation_set o;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct error err = {0};
+    fake_cloth_init(f, seed, FAKE_N_FIT);
+    f->noise = noise;
+    struct estimator e = fake_estimator(f);
+    fake_param_set(file_unit, truth);
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(f, truth, photograph_noise, seed, &o), STATUS_OK);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
+    struct fit_problem problem = {.n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e,
+                                  .path_budget = budget};
+    if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    observation_set_release(&o);
+}
+
+/* No noise anywhere: the truth comes back, parameters at bounds included. */
+static void test_exact(void **state)
+{
+    (void)state;
+    for (size_t k = 0; k < sizeof cloth / sizeof cloth[0]; k++) {
+        struct fake_cloth f;
+        struct fit_result r;
+        double truth[FAKE_N_PARAM];
+        fit(cloth[k], 1, 0, 0.0, 0.0, truth, &f, &r);
+        assert_true(fake_rel_rms(&f, 0, FAKE_N_FIT, r.param, truth) < 2e-3);
+        assert_true(r.converged);
+    }
+}
+
+static void test_recovery_and_errors(void **state)
+{
+    (void)state;
+    enum { SEEDS = 20 };
+    size_t n_inside = 0, n_judged = 0;
+    for (size_t k = 0; k < sizeof cloth / sizeof cloth[0]; k++) {
+        double error[SEEDS], held = 0.0, mean = 0.0;
+        for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+            struct fake_cloth f;
+            struct fit_result r;
+            double truth[FAKE_N_PARAM];
+            fit(cloth[k], seed, 6000000, 1.0, 0.005, truth, &f, &r);
+            error[seed - 1] = fake_rel_rms(&f, 0, FAKE_N_FIT, r.param, truth);
+            held += fake_rel_rms(&f, FAKE_N_FIT, FAKE_N_HELD_OUT, r.param, truth) / SEEDS;
+            mean += error[seed - 1] / SEEDS;
+            assert_true(r.n_path <= 6600000);
+            for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+                if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
+                n_judged++;
+                n_inside += fabs(r.param[p] - truth[p]) < 2.0 * r.uncertainty.se_param[p];
+            }
+        }
+        print_message("cloth %zu: relative RMS error %.4f fitted, %.4f held out (means over %d seeds)\n", k, mean, held, SEEDS);
+        assert_true(mean < 0.025 && held < 0.05);
+    }
+    double share = (double)n_inside / (double)n_judged;
+    print_message("the truth lies within two standard errors for %.1f %% of %zu determined parameters\n", 100.0 * share, n_judged);
+    assert_true(share > 0.85);
+}
+
+static void test_says_when_it_has_not_converged(void **state)
+{
+    (void)state;
+    struct fake_cloth f;
+    struct fit_result r;
+    double truth[FAKE_N_PARAM];
+    fit(cloth[2], 1, 70000, 1.0, 0.005, truth, &f, &r);
+    assert_false(r.converged);
+    assert_non_null(strstr(r.reason, "path budget ended"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact), cmocka_unit_test(test_recovery_and_errors),
+                                       cmocka_unit_test(test_says_when_it_has_not_converged)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

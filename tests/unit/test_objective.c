@@ -1,0 +1,261 @@
+/* Objective, coordinates, small matrices, pooled linear model, uncertainty. */
+#include "optimizer/objective/objective.h"
+#include "base/rng.h"
+#include "optimizer/objective/linear_model.h"
+#include "optimizer/objective/small_matrix.h"
+#include "optimizer/objective/uncertainty.h"
+#include "tests/support/fake_estimator.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const double mid_range[FAKE_N_PARAM] = {0.15, 0.08, 0.05, 0.9, 0.6, 0.4, 5.0, 15.0, 20.0};
+
+static void test_by_hand(void **state)
+{
+    (void)state;
+    struct observation item[2] = {{.mean_rgb = {0.1, 0.2, 0.3}, .weight = 1.0}, {.mean_rgb = {0.001, 0.002, 0.003}, .weight = 4.0}};
+    struct observation_set o = {.n = 2, .item = item};
+    struct estimate a[2] = {{.mean = {0.2, 0.2, 0.3}, .n_path = 1}, {.mean = {0.0, 0.002, 0.003}, .n_path = 1}};
+    struct estimate b[2] = {{.mean = {0.3, 0.1, 0.3}, .n_path = 1}, {.mean = {0.003, 0.0, 0.003}, .n_path = 1}};
+    struct objective_value v;
+    assert_true(fabs(objective_weight(&item[0]) - 25.0) < 1e-9);      /* 1 / 0.2^2 */
+    assert_true(fabs(objective_weight(&item[1]) - 4.0 * 2500.0) < 1e-6); /* 4 / tau^2 */
+    objective_evaluate(&o, a, b, &v);
+    double f0 = 25.0 * (0.1 * 0.2), f1 = 2500.0 * (-0.001 * 0.002);
+    assert_true(fabs(v.value - (f0 + 4.0 * f1)) < 1e-12);
+    assert_true(v.se == 0.0);
+    assert_true(fabs(v.rel_rms - sqrt((f0 + f1) / 6.0)) < 1e-12);
+}
+
+/* The product of two replicas has the mean of the true square, and its stated error is not too small. */
+static void test_unbiased(void **state)
+{
+    (void)state;
+    enum { N = 400 };
+    struct fake_cloth f;
+    struct observation_set o;
+    double truth[FAKE_N_PARAM], param[FAKE_N_PARAM], sum = 0.0, sum2 = 0.0, stated = 0.0, exact = 0.0;
+    struct estimate a[FAKE_N_FIT], b[FAKE_N_FIT];
+    size_t n_path[FAKE_N_FIT];
+    fake_cloth_init(&f, 3, FAKE_N_FIT);
+    struct estimator e = fake_estimator(&f);
+    fake_param_set(mid_range, truth);
+    memcpy(param, truth, sizeof param);
+    param[3] = 0.85;
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
+    for (size_t i = 0; i < FAKE_N_FIT; i++) {
+        double rgb[3];
+        fake_radiance(&f.configuration[i], param, rgb, NULL);
+        exact += objective_weight(&o.item[i]) * objective_image_difference(rgb, o.item[i].mean_rgb);
+        n_path[i] = 8192;
+    }
+    for (uint32_t k = 0; k < N; k++) {
+        struct objective_value v;
+        double wall_s;
+        struct estimator_call call = {param, n_path, k, REPLICA_FIT_A, false};
+        assert_int_equal(e.run(e.context, &call, NULL, a, &wall_s, NULL), STATUS_OK);
+        call.replica = REPLICA_FIT_B;
+        assert_int_equal(e.run(e.context, &call, NULL, b, &wall_s, NULL), STATUS_OK);
+        objective_evaluate(&o, a, b, &v);
+        sum += v.value / N;
+        sum2 += v.value * v.value / N;
+        stated += v.se * v.se / N;
+    }
+    double scatter = sum2 - sum * sum;
+    assert_true(fabs(sum - exact) < 4.0 * sqrt(scatter / N));
+    assert_true(stated > 0.75 * scatter && stated < 3.5 * scatter); /* fully correlated channels: between 1 and 3, and its own noise */
+    observation_set_release(&o);
+}
+
+static void test_gradient(void **state)
+{
+    (void)state;
+    struct fake_cloth f;
+    struct observation_set o;
+    double truth[FAKE_N_PARAM], param[FAKE_N_PARAM], gradient[FAKE_N_PARAM];
+    struct estimate a[FAKE_N_FIT];
+    size_t n_path[FAKE_N_FIT];
+    fake_cloth_init(&f, 3, FAKE_N_FIT);
+    f.noise = 0.0;
+    struct estimator e = fake_estimator(&f);
+    fake_param_set(mid_range, truth);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) param[p] = fake_param[p].start;
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
+    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
+    struct estimator_call call = {param, n_path, 0, 0, true};
+    double wall_s;
+    assert_int_equal(e.run(e.context, &call, NULL, a, &wall_s, NULL), STATUS_OK);
+    objective_gradient(&o, a, a, FAKE_N_PARAM, gradient);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+        double value[2], keep = param[p], h = 1e-5;
+        for (int side = 0; side < 2; side++) {
+            struct objective_value v;
+            param[p] = keep + (side == 0 ? -h : h);
+            assert_int_equal(e.run(e.context, &call, NULL, a, &wall_s, NULL), STATUS_OK);
+            objective_evaluate(&o, a, a, &v);
+            value[side] = v.value;
+        }
+        param[p] = keep;
+        double difference = (value[1] - value[0]) / (2.0 * h);
+        assert_true(fabs(gradient[p] - difference) < 1e-4 * fabs(difference) + 1e-4);
+    }
+    observation_set_release(&o);
+}
+
+static void test_coordinates(void **state)
+{
+    (void)state;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+        struct coordinate k;
+        coordinate_init(&k, &fake_param[p], fake_param[p].lower, fake_param[p].upper);
+        assert_int_equal(k.kind, p < 6 ? COORDINATE_LOGIT : COORDINATE_LOG);
+        assert_true(coordinate_to_param(&k, k.upper) == fake_param[p].upper && coordinate_to_param(&k, k.lower) == fake_param[p].lower);
+        assert_true(coordinate_to_param(&k, k.upper + 9.0) == fake_param[p].upper);
+        assert_true(coordinate_from_param(&k, 99.0) == k.upper && isfinite(k.lower) && isfinite(k.upper));
+        for (int i = 1; i < 20; i++) {
+            double v = fake_param[p].lower + (fake_param[p].upper - fake_param[p].lower) * i / 20.0, x = coordinate_from_param(&k, v);
+            double difference = (coordinate_to_param(&k, x + 1e-6) - coordinate_to_param(&k, x - 1e-6)) / 2e-6;
+            assert_true(fabs(coordinate_to_param(&k, x) - v) < 1e-14);
+            assert_true(fabs(coordinate_slope(&k, v) / difference - 1.0) < 1e-6);
+        }
+    }
+    struct param_info gamma = {"gamma", "gamma", "", -1, 0.005, 1.5, 0.1}, shift = {"shift", "shift", "", -1, -1.0, 1.0, 0.0};
+    struct coordinate k;
+    coordinate_init(&k, &gamma, gamma.lower, gamma.upper);
+    assert_int_equal(k.kind, COORDINATE_LOG);
+    coordinate_init(&k, &shift, shift.lower, shift.upper);
+    assert_int_equal(k.kind, COORDINATE_LINEAR);
+}
+
+static void test_matrices(void **state)
+{
+    (void)state;
+    enum { N = 9 };
+    struct rng_key key = {.seed = 11};
+    struct rng r;
+    double half[N * N], a[N * N] = {0}, inverse[N * N], product[N * N], value[N], v[N * N];
+    rng_start(&r, &key, 0, 0);
+    for (size_t i = 0; i < N * N; i++) half[i] = rng_double(&r) - 0.5;
+    for (size_t i = 0; i < N; i++)
+        for (size_t j = 0; j < N; j++)
+            for (size_t k = 0; k < N; k++) a[i * N + j] += half[i * N + k] * half[j * N + k];
+    assert_true(small_invert(a, N, inverse));
+    small_multiply(a, inverse, N, product);
+    for (size_t i = 0; i < N * N; i++) assert_true(fabs(product[i] - (i % (N + 1) == 0 ? 1.0 : 0.0)) < 1e-6);
+    small_eigen(a, N, value, v);
+    for (size_t k = 0; k < N; k++) {
+        assert_true(value[k] > 0.0);
+        for (size_t i = 0; i < N; i++) {
+            double av = 0.0;
+            for (size_t j = 0; j < N; j++) av += a[i * N + j] * v[j * N + k];
+            assert_true(fabs(av - value[k] * v[i * N + k]) < 1e-10);
+        }
+    }
+    a[0] -= 5.0; /* indefinite now */
+    assert_false(small_invert(a, N, inverse));
+    small_clip_eigenvalues(a, N, 1e-3);
+    small_eigen(a, N, value, v);
+    for (size_t k = 0; k < N; k++) assert_true(value[k] > 0.9e-3);
+}
+
+/* A history with exact estimates at several points: pooling returns exactly what holds at the reference point, to second order. */
+static void test_pool(void **state)
+{
+    (void)state;
+    struct fake_cloth f;
+    struct observation_set o;
+    struct coordinate k[FAKE_N_PARAM];
+    struct linear_history h;
+    struct linear_model m;
+    double truth[FAKE_N_PARAM], x[FAKE_N_PARAM], param[FAKE_N_PARAM];
+    struct estimate a[FAKE_N_FIT], exact[FAKE_N_FIT];
+    size_t n_path[FAKE_N_FIT];
+    fake_cloth_init(&f, 3, FAKE_N_FIT);
+    f.noise = 0.0;
+    struct estimator e = fake_estimator(&f);
+    fake_param_set(mid_range, truth);
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
+    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 4096;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, fake_param[p].upper);
+    linear_history_init(&h, &o, k, FAKE_N_PARAM);
+    assert_int_equal(linear_model_init(&m, 3 * FAKE_N_FIT, FAKE_N_PARAM, NULL), STATUS_OK);
+    double wall_s;
+    for (int step = -1; step <= 1; step++) {
+        for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+            x[p] = coordinate_from_param(&k[p], truth[p]) + 0.02 * step;
+            param[p] = coordinate_to_param(&k[p], x[p]);
+        }
+        struct estimator_call call = {param, n_path, 0, 0, true};
+        assert_int_equal(e.run(e.context, &call, NULL, a, &wall_s, NULL), STATUS_OK);
+        for (size_t i = 0; i < FAKE_N_FIT; i++)
+            for (int c = 0; c < 3; c++) a[i].var[c] = a[i].mean[c] * a[i].mean[c] * 25.0 / 4096.0;
+        if (step == 0) memcpy(exact, a, sizeof a);
+        assert_int_equal(linear_history_append(&h, x, a, a, NULL), STATUS_OK);
+    }
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) x[p] = coordinate_from_param(&k[p], truth[p]);
+    assert_int_equal(linear_model_pool(&m, &h, x, NULL), STATUS_OK);
+    assert_true(m.n_effective > 1.5 * 4096 && m.n_effective <= 3.0 * 4096.5);
+    for (size_t row = 0; row < m.n_row; row++) {
+        assert_true(fabs(m.r[0][row]) < 2e-3);
+        for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+            double want = sqrt(objective_weight(&o.item[row / 3])) * exact[row / 3].jac[(row % 3) * FAKE_N_PARAM + p] * coordinate_slope(&k[p], truth[p]);
+            assert_true(fabs(m.j[0][row * FAKE_N_PARAM + p] - want) < 0.03 * fabs(want) + 0.002);
+        }
+    }
+    linear_model_release(&m);
+    linear_history_release(&h);
+    observation_set_release(&o);
+}
+
+/* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called undetermined. */
+static void test_uncertainty(void **state)
+{
+    (void)state;
+    enum { ROWS = 3 * FAKE_N_FIT };
+    struct observation item[FAKE_N_FIT];
+    struct observation_set o = {.n = FAKE_N_FIT, .item = item};
+    struct coordinate k[2];
+    struct linear_model m;
+    struct uncertainty u;
+    bool fixed[2] = {false, false};
+    assert_int_equal(linear_model_init(&m, ROWS, 2, NULL), STATUS_OK);
+    for (size_t p = 0; p < 2; p++) coordinate_init(&k[p], &fake_param[6], fake_param[6].lower, fake_param[6].upper);
+    double jj = 0.0;
+    for (size_t row = 0; row < ROWS; row++) {
+        item[row / 3] = (struct observation){.mean_rgb = {1.0, 1.0, 1.0}, .se_rgb = {0.01, 0.01, 0.01}, .weight = 1.0};
+        for (int q = 0; q < 2; q++) m.j[q][2 * row] = 0.5 + 0.01 * (double)row;
+        jj += m.j[0][2 * row] * m.j[0][2 * row];
+    }
+    m.x_ref[0] = m.x_ref[1] = log(fake_param[6].start);
+    uncertainty_compute(&m, &o, k, fixed, &u);
+    double want = 0.01 / sqrt(jj);
+    assert_true(fabs(sqrt(u.cov[0]) / want - 1.0) < 1e-2);
+    assert_true(fabs(u.se_param[0] / (want * fake_param[6].start) - 1.0) < 1e-2);
+    assert_true(u.determined[0] && !u.determined[1] && !u.at_bound[0]);
+    assert_true(isfinite(u.se_param[1]) && u.se_param[1] > u.se_param[0]);
+    m.x_ref[0] = k[0].upper;
+    fixed[1] = true;
+    uncertainty_compute(&m, &o, k, fixed, &u);
+    assert_true(u.at_bound[0] && u.se_param[0] > 0.0 && u.se_param[1] == 0.0 && u.determined[1]);
+    linear_model_release(&m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_by_hand),     cmocka_unit_test(test_unbiased), cmocka_unit_test(test_gradient),
+        cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices), cmocka_unit_test(test_pool),
+        cmocka_unit_test(test_uncertainty),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
