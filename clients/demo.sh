@@ -122,10 +122,8 @@ run_job() {
     draft) "$bin/selvedge" submit --resume "$id" "$sample/job.json" --watch ;;
     *)
         # the id is noted before the upload, so that an interrupted demo finds its job again
-        "$bin/selvedge" submit "$sample/job.json" --draft >"$demo/job-id.new"
-        mv "$demo/job-id.new" "$demo/job-id"
+        "$bin/selvedge" submit "$sample/job.json" --id-file "$demo/job-id" --watch
         id=$(cat "$demo/job-id")
-        "$bin/selvedge" submit --resume "$id" "$sample/job.json" --watch
         ;;
     esac
     job=$id

@@ -4,7 +4,7 @@
 #include <string.h>
 
 enum { OPT_SERVER = 1, OPT_TOKEN = 2, OPT_INPUT = 4, OPT_WATCH = 8, OPT_RESUME = 16, OPT_JSON = 32, OPT_OUT = 64,
-       OPT_FOLLOW = 128, OPT_DRAFT = 256, OPT_HELP = 512, OPT_VERSION = 1024 };
+       OPT_FOLLOW = 128, OPT_DRAFT = 256, OPT_HELP = 512, OPT_VERSION = 1024, OPT_ID_FILE = 2048 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
 static const struct cli_command {
@@ -15,7 +15,7 @@ static const struct cli_command {
                     "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
                     "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
                     "continues a submit that was interrupted. Prints the job's id on standard output.\n",
-                    OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT},
+                    OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE},
     [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
     [CLI_WATCH] = {"watch", "ID", "follow a job until it ends",
                    "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
@@ -41,6 +41,7 @@ static const struct cli_option {
     {OPT_RESUME, 0, "resume", "ID", "continue an interrupted submit of job ID (JOB.json is then not needed\n"
                                     "                      if the files are in the current folder or --input-dir)"},
     {OPT_DRAFT, 0, "draft", NULL, "upload everything but do not start the job"},
+    {OPT_ID_FILE, 0, "id-file", "FILE", "write the job's id to FILE as soon as there is one (for scripts)"},
     {OPT_JSON, 0, "json", NULL, "print the server's JSON"},
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
@@ -118,6 +119,7 @@ static void apply(struct cli_args *a, int bit, const char *value)
     case OPT_INPUT: a->input_dir = value; break;
     case OPT_RESUME: a->resume_id = value; break;
     case OPT_OUT: a->out_dir = value; break;
+    case OPT_ID_FILE: a->id_file = value; break;
     case OPT_WATCH: a->watch = true; break;
     case OPT_JSON: a->json = true; break;
     case OPT_FOLLOW: a->follow = true; break;

@@ -32,6 +32,7 @@ struct cli_args {
     const char *input_dir; /* --input-dir: where the files are that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */
+    const char *id_file;   /* --id-file */
     bool watch, json, follow, draft;
     bool help;             /* --help was given; has_command says whether for one command */
     bool version;

@@ -3,6 +3,7 @@
 #include "clients/cli/cli_text.h"
 
 #include "base/clock.h"
+#include "base/durable.h"
 
 #include <math.h>
 #include <sodium.h>
@@ -128,7 +129,10 @@ static status create_job(struct submit *u, struct error *err)
     if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's answer has no job id");
     snprintf(u->id, sizeof u->id, "%s", id);
     fprintf(u->cli->note, "job %s created\n", u->id);
-    return STATUS_OK;
+    if (u->cli->args->id_file == NULL) return STATUS_OK;
+    char line[sizeof u->id + 1];
+    int n = snprintf(line, sizeof line, "%s\n", u->id);
+    return durable_replace_volatile(u->cli->args->id_file, line, (size_t)n, err);
 }
 
 /* --resume: the job is there; a document given again replaces the server's when it differs. */

@@ -7,6 +7,7 @@ import { duration, el, isNumber, percent, refill, size, stateTag, when, withErro
 import { configurations, fiberFile, fitted, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 
+const SHOWN_WARNINGS = 2;
 const LIVE = new Set(["queued", "running", "paused"]);
 
 function card(title, ...content) {
@@ -44,7 +45,9 @@ function factsOf(job) {
 }
 
 function notesOf(job) {
-  const notes = job.warnings.map((w) => el("p", { class: "note" }, w));
+  const warnings = job.warnings.map((w) => el("p", { class: "note" }, w));
+  const notes = warnings.slice(0, SHOWN_WARNINGS);
+  if (warnings.length > SHOWN_WARNINGS) notes.push(el("details", {}, el("summary", {}, `${warnings.length - SHOWN_WARNINGS} more warnings`), warnings.slice(SHOWN_WARNINGS)));
   if (job.error && !LIVE.has(job.state)) {
     const field = job.error.field && !job.error.text.includes(job.error.field) ? `${job.error.field}: ` : "";
     notes.push(el("p", { class: "note bad" }, field + job.error.text));
@@ -64,7 +67,7 @@ function parameterTable(job) {
 
 function downloads(job, list) {
   const rows = list.files.map((f) => el("tr", {}, el("td", {}, el("a", { href: f.url, class: "mono", download: f.path.split("/").pop() }, f.path)), el("td", { class: "number" }, size(f.size))));
-  return [el("p", {}, el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("table", { id: "files" }, el("tbody", {}, rows))];
+  return [el("p", {}, el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
 }
 
 export function jobPage(page, id) {

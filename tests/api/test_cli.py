@@ -147,7 +147,8 @@ def test_failed_job_names_its_field(daemon, sample):
 
 def test_cancel_and_retry(daemon, sample):
     write_document(sample, "slow twill")
-    job_id = run(daemon.url, "submit", sample / "job.json").stdout.strip()
+    job_id = run(daemon.url, "submit", sample / "job.json", "--id-file", sample / "id").stdout.strip()
+    assert (sample / "id").read_text() == job_id + "\n"
     watcher = subprocess.Popen([CLI, "--server", daemon.url, "watch", job_id], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     for _ in range(100):
         if json.loads(run(daemon.url, "status", job_id, "--json").stdout)["state"] == "running":
