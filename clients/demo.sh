@@ -131,28 +131,33 @@ run_job() {
     [ "$state" = succeeded ] && [ -s "$demo/summary.json" ] && new=no || new=yes
 }
 
-say "1. Daemon"
-start_daemon
-say "2. Sample"
-make_sample
-say "3. Upload, reconstruction, fit"
-run_job
-say "4. Result"
-wall=$(python3 -c "import sys,time; print(round(time.time() - float(sys.argv[1]), 1))" "$started")
-[ "$new" = yes ] || wall=
-python3 clients/demo_report.py summary "$sample/truth.json" "$demo/results/result.json" "$demo/summary.json" "$wall"
+main() {
+    say "1. Daemon"
+    start_daemon
+    say "2. Sample"
+    make_sample
+    say "3. Upload, reconstruction, fit"
+    run_job
+    say "4. Result"
+    wall=$(python3 -c "import sys,time; print(round(time.time() - float(sys.argv[1]), 1))" "$started")
+    [ "$new" = yes ] || wall=
+    python3 clients/demo_report.py summary "$sample/truth.json" "$demo/results/result.json" "$demo/summary.json" "$wall"
 
-cat <<END
+    cat <<END
 
 results    $demo/results (result.json, fibers, volumes, renderings)
 summary    $demo/summary.json
 dashboard  $SELVEDGE_SERVER/#$job
 END
-if [ -z "$daemon_pid" ]; then
-    echo "selvedged goes on running; stop it with: kill $(cat "$demo/daemon.pid")"
-elif [ -t 0 ]; then
-    keep_daemon=yes
-    echo "selvedged goes on running for the dashboard; stop it with: kill $daemon_pid"
-else
-    echo "selvedged is stopped now; start it again with: $bin/selvedged --data $demo/daemon --port ${SELVEDGE_SERVER##*:}"
-fi
+    if [ -z "$daemon_pid" ]; then
+        echo "selvedged goes on running; stop it with: kill $(cat "$demo/daemon.pid")"
+    elif [ -t 0 ]; then
+        keep_daemon=yes
+        echo "selvedged goes on running for the dashboard; stop it with: kill $daemon_pid"
+    else
+        echo "selvedged is stopped now; start it again with: $bin/selvedged --data $demo/daemon --port ${SELVEDGE_SERVER##*:}"
+    fi
+}
+
+main
+exit
