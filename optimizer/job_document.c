@@ -62,8 +62,8 @@ static struct job_document *document_new(void)
     d->seed = 1;
     fill_nan(d->fixed, JOB_MAX_PARAM);
     fill_nan(d->start, JOB_MAX_PARAM);
-    d->render_px = 128;
-    d->render_sample = 64;
+    d->render_px = 96;
+    d->render_sample = 16;
     return d;
 }
 
