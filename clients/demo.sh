@@ -54,10 +54,10 @@ find_port() {
         echo "$DEMO_PORT"
         return
     fi
-    for port in $(seq 8590 8689); do
+    for port in $(seq 7878 7977); do
         if port_is_free "$port"; then echo "$port"; return; fi
     done
-    fail "no free port in 8590..8689; set DEMO_PORT"
+    fail "no free port in 7878..7977; set DEMO_PORT"
 }
 
 start_daemon() {
