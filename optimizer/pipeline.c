@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <zlib.h>
 
 struct stage_code {
@@ -88,6 +89,35 @@ static status set_parameters(struct pipeline_context *c, struct error *err)
     return STATUS_OK;
 }
 
+struct input_sum {
+    const struct pipeline_context *pipeline;
+    uint32_t sum;
+};
+
+/* Name, size and time of change of an input file. */
+static void add_input(void *context, const char *name, const char *role)
+{
+    struct input_sum *input = context;
+    char path[WORKER_PATH_BYTES];
+    struct stat st = {0};
+    (void)role;
+    worker_folder_path(input->pipeline->folder, JOB_FOLDER_INPUT, name, path);
+    if (stat(path, &st) != 0) return; /* absence is noticed by the stage that reads it */
+    int64_t seen[3] = {(int64_t)st.st_size, (int64_t)st.st_mtim.tv_sec, (int64_t)st.st_mtim.tv_nsec};
+    input->sum = (uint32_t)crc32_z(input->sum, (const void *)name, strlen(name));
+    input->sum = (uint32_t)crc32_z(input->sum, (const void *)seen, sizeof seen);
+}
+
+static status claim_inputs(struct pipeline_context *c, struct error *err)
+{
+    struct input_sum input = {.pipeline = c};
+    bool changed;
+    job_document_visit_files(c->doc, add_input, &input);
+    status s = worker_folder_claim_inputs(c->folder, c->fingerprint << 32 | input.sum, &changed, err);
+    if (s == STATUS_OK && changed) log_info(c->log, "the inputs have changed since the last run: starting anew");
+    return s;
+}
+
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -99,6 +129,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     c->fingerprint = crc32(0, (const unsigned char *)text, (unsigned)n);
     free(text);
     if (s == STATUS_OK) s = set_parameters(c, err);
+    if (s == STATUS_OK) s = claim_inputs(c, err);
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
     if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);

@@ -11,10 +11,11 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { VALIDATION_PILOT = 8192, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20, FIT_RESULT_SECTION = 1 };
+enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20, FIT_RESULT_SECTION = 1 };
 
-/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for it. */
-static const double validation_rel_se = 0.005, validation_budget = 4e6;
+/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for it, as a share of
+ * those of the fit. */
+static const double validation_rel_se = 0.005, validation_share = 0.7;
 
 /* ---- the path tracer as an estimator ---- */
 
@@ -168,10 +169,10 @@ static void plan_validation(const struct pipeline_context *c, const struct estim
     double total = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
-    double shrink = fmin(1.0, validation_budget / fmax(total, 1.0));
+    double shrink = fmin(1.0, validation_share * (double)c->fit.n_path / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
         double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
-        n = fmin(fmax(n, VALIDATION_PILOT), VALIDATION_MAX);
+        n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
         n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
     }
 }
@@ -235,7 +236,8 @@ static status estimate_validation(struct pipeline_context *c, const struct estim
     struct progress progress = {report_part, &part, c->progress.cancel};
     struct estimator_call call = {c->fit.param, n_path, 0, REPLICA_FINAL_A, false};
     double wall_s;
-    for (size_t i = 0; i < c->observation.n; i++) n_path[i] = VALIDATION_PILOT;
+    double pilot = 0.05 * (double)c->fit.n_path / (double)c->observation.n;
+    for (size_t i = 0; i < c->observation.n; i++) n_path[i] = (size_t)fmin(fmax(pilot, VALIDATION_LEAST), VALIDATION_PILOT);
     status s = e->run(e->context, &call, &progress, c->validation.replica[0], &wall_s, err);
     if (s != STATUS_OK) return s;
     plan_validation(c, c->validation.replica[0], n_path);

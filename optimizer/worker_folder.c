@@ -4,6 +4,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
+#include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -95,6 +97,40 @@ status worker_folder_replace(const struct worker_folder *f, const char *path, co
 {
     status s = worker_folder_check(f, err);
     return s == STATUS_OK ? durable_replace(path, data, n_bytes, err) : s;
+}
+
+static int remove_entry(const char *path, const struct stat *st, int kind, struct FTW *at)
+{
+    (void)st;
+    (void)kind;
+    return at->level == 0 ? 0 : remove(path);
+}
+
+/* Everything in a folder of ours, links not followed. */
+static status empty_folder(const struct worker_folder *f, const char *name, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(f, name, NULL, path);
+    if (nftw(path, remove_entry, 16, FTW_DEPTH | FTW_PHYS) != 0) return error_set_errno(err, "cannot empty '%s'", path);
+    return STATUS_OK;
+}
+
+status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], series[WORKER_PATH_BYTES], want[32], *have = NULL;
+    size_t n = 0;
+    snprintf(want, sizeof want, "%016" PRIx64 "\n", fingerprint);
+    worker_folder_path(f, JOB_FOLDER_WORK, "inputs.fingerprint", path);
+    *changed = false;
+    if (access(path, F_OK) == 0 && file_read_all(path, 64, &have, &n, NULL) == STATUS_OK) *changed = strcmp(have, want) != 0;
+    free(have);
+    if (n > 0 && !*changed) return STATUS_OK;
+    status s = worker_folder_check(f, err);
+    if (s == STATUS_OK && *changed) s = empty_folder(f, JOB_FOLDER_WORK, err);
+    if (s == STATUS_OK && *changed) s = empty_folder(f, JOB_FOLDER_RESULTS, err);
+    worker_folder_path(f, JOB_FILE_SERIES, NULL, series);
+    if (s == STATUS_OK && *changed && unlink(series) != 0 && errno != ENOENT) s = error_set_errno(err, "cannot remove '%s'", series);
+    return s == STATUS_OK ? worker_folder_replace(f, path, want, strlen(want), err) : s;
 }
 
 static void mark_path(const struct worker_folder *f, const char *stage, char path[WORKER_PATH_BYTES])

@@ -5,6 +5,7 @@
 #include "base/status.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
 enum { WORKER_PATH_BYTES = 4096 };
 
@@ -24,6 +25,10 @@ status worker_folder_check(const struct worker_folder *f, struct error *err);
 void worker_folder_path(const struct worker_folder *f, const char *a, const char *b, char path[WORKER_PATH_BYTES]);
 /* Check, then durable_replace. */
 status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes, struct error *err);
+
+/* Compares the fingerprint of the inputs with that of the run before. When it has changed (a document or a file was edited by hand), everything
+ * that was computed from the old inputs is removed: work/, results/, series.rec. */
+status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err);
 
 /* Marks of stages whose outputs are whole: work/<stage>.done. */
 bool worker_folder_stage_done(const struct worker_folder *f, const char *stage);

@@ -12,6 +12,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <ucontext.h>
+#include <unistd.h>
 
 static const char usage[] =
     "usage: selvedge-worker [options] JOBDIR\n"
@@ -70,10 +72,24 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
     return -1;
 }
 
+/* Runs in threads that a library has started before main (OpenBLAS does): they do not block the signal. Block it there for good and send it
+ * again, until the status thread's sigtimedwait takes it. */
+static void pass_on(int signal_number, siginfo_t *info, void *context)
+{
+    (void)info;
+    ucontext_t *interrupted = context;
+    sigaddset(&interrupted->uc_sigmask, signal_number);
+    kill(getpid(), signal_number);
+}
+
 /* SIGTERM and SIGINT belong to the status thread; a broken pipe is an error, not a death. */
 static void set_signals(void)
 {
+    struct sigaction action = {.sa_sigaction = pass_on, .sa_flags = SA_SIGINFO | SA_RESTART};
     sigset_t set;
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGINT, &action, NULL);
     sigemptyset(&set);
     sigaddset(&set, SIGTERM);
     sigaddset(&set, SIGINT);

@@ -99,8 +99,9 @@ static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
     return STATUS_OK;
 }
 
-/* Gain that pure noise would promise: half the noise variance of each free direction, for f = r.r. */
-static double noise_gain(const struct gauss_newton *g) { return (double)g->n_free * g->noise; }
+/* Gain that pure noise would promise: for f = r.r the noise variance of a residual for each free direction, one to three times that because the
+ * three channels of a configuration share their paths. */
+static double noise_gain(const struct gauss_newton *g) { return 2.0 * (double)g->n_free * g->noise; }
 
 static bool precise_enough(const struct gauss_newton *g, double f)
 {

@@ -1,0 +1,239 @@
+"""A worker killed with SIGKILL in mid-fit, at several points, resumes and ends exactly as one that was never interrupted, with 1 and with 2
+threads; SIGTERM cancels; a stale attempt may not write."""
+import json
+import os
+import random
+import shutil
+import signal
+import struct
+import subprocess
+import time
+
+import pytest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
+WORKER = os.path.join(BUILD, "bin", "selvedge-worker")
+
+TABLE = """# mean radiances of a cloth that does not exist
+set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b
+fit,20,0,20,180,0,0.12,0.09,0.05
+fit,45,0,45,180,0,0.14,0.10,0.06
+fit,60,0,0,180,0,0.06,0.04,0.02
+fit,45,0,45,90,90,0.05,0.03,0.02
+held-out,30,0,50,180,0,0.12,0.09,0.05
+held-out,60,0,30,20,90,0.05,0.03,0.02
+"""
+
+
+def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
+    """Layers of crossing fibers as the bytes of a .hair file: positions and diameters in millimetres."""
+    rng = random.Random(5)
+    xyz, thickness, strands = [], [], 0
+    for layer in range(layers):
+        for i in range(n):
+            strands += 1
+            across = (i + 0.5 + 0.3 * rng.random()) * tile_mm / n
+            for k in range(points):
+                along = -0.02 + (tile_mm + 0.04) * k / (points - 1)
+                height = 0.02 * layer + 0.004 * rng.random()
+                xyz += [along, across, height] if layer % 2 == 0 else [across, along, height]
+                thickness.append(2 * radius_mm)
+    text = f"selvedge tile_mm={tile_mm},{tile_mm}".encode().ljust(88, b"\0")
+    head = b"HAIR" + struct.pack("<IIIIfffff", strands, strands * points, 2 | 4, points - 1, 2 * radius_mm, 0.0, 1.0, 1.0, 1.0) + text
+    assert len(head) == 128
+    return head + struct.pack(f"<{len(xyz)}f", *xyz) + struct.pack(f"<{len(thickness)}f", *thickness)
+
+
+def make_job(folder, **fit):
+    os.makedirs(os.path.join(folder, "input"))
+    document = {"sample": "resume", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
+                "fit": {"path_budget": 160000, "max_iterations": 12, "render_px": 8, "render_samples": 1, "seed": 7, **fit}}
+    with open(os.path.join(folder, "job.json"), "w") as f:
+        json.dump(document, f)
+    with open(os.path.join(folder, "input", "cloth.hair"), "wb") as f:
+        f.write(hair())
+    with open(os.path.join(folder, "input", "rows.csv"), "w") as f:
+        f.write(TABLE)
+    return folder
+
+
+def start(folder, threads=1):
+    return subprocess.Popen([WORKER, "--quiet", "--threads", str(threads), folder], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def finish(folder, threads=1):
+    worker = start(folder, threads)
+    _, stderr = worker.communicate(timeout=120)
+    assert worker.returncode == 0, (read_json(folder, "status.json"), stderr)
+
+
+def read_json(folder, name):
+    with open(os.path.join(folder, name)) as f:
+        return json.load(f)
+
+
+def outcome(folder):
+    """What must be equal: everything but times."""
+    result = read_json(folder, "results/result.json")
+    for key in ("fit_wall_s", "stages", "warnings"):
+        result.pop(key)
+    with open(os.path.join(folder, "series.rec")) as f:
+        series = [json.loads(line[9:]) for line in f]
+    for record in series:
+        record.pop("wall_s")
+    return result, series
+
+
+def journal_bytes(folder, stage):
+    try:
+        return os.path.getsize(os.path.join(folder, "work", stage, "estimates.journal"))
+    except FileNotFoundError:
+        return 0
+
+
+def kill_when(folder, threads, condition, timeout_s=60):
+    """SIGKILL as soon as the condition holds; False when the worker ended before."""
+    worker = start(folder, threads)
+    deadline = time.monotonic() + timeout_s
+    while worker.poll() is None and not condition():
+        assert time.monotonic() < deadline, "the worker makes no progress"
+        time.sleep(0.001)
+    killed = worker.poll() is None
+    worker.kill()
+    worker.wait()
+    worker.stderr.close()
+    return killed
+
+
+@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1"])
+def reference(request, tmp_path_factory):
+    fit = {"method": request.param}
+    if request.param == "published_sgd.v1":
+        fit.update(max_iterations=2, path_budget=300000)
+    folder = make_job(str(tmp_path_factory.mktemp("reference") / "job"), **fit)
+    finish(folder, 1)
+    return fit, folder, outcome(folder)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_killed_at_several_points(reference, tmp_path, threads):
+    fit, _, want = reference
+    folder = make_job(str(tmp_path / "job"), **fit)
+    first = kill_when(folder, threads, lambda: journal_bytes(folder, "fit") > 20)
+    record = journal_bytes(folder, "fit")
+    kills = int(first)
+    for point in (3, 6, 9):
+        kills += kill_when(folder, threads, lambda p=point: journal_bytes(folder, "fit") >= p * record)
+    kills += kill_when(folder, threads, lambda: journal_bytes(folder, "validation") > 20)
+    assert kills >= 3, "the fit is too fast for this test"
+    finish(folder, threads)
+    assert outcome(folder) == want
+    assert read_json(folder, "status.json")["state"] == "succeeded"
+
+
+def test_damaged_checkpoints(reference, tmp_path):
+    """A torn journal and a damaged stage file cost work, nothing else."""
+    fit, _, want = reference
+    folder = make_job(str(tmp_path / "job"), **fit)
+    kill_when(folder, 2, lambda: journal_bytes(folder, "fit") > 20000)
+    size = journal_bytes(folder, "fit")
+    os.truncate(os.path.join(folder, "work", "fit", "estimates.journal"), size - 7)
+    with open(os.path.join(folder, "work", "fibers", "fibers.bin"), "r+b") as f:
+        f.seek(500)
+        f.write(b"damage")
+    with open(os.path.join(folder, "series.rec"), "ab") as f:
+        f.write(b"0123abcd {torn")
+    finish(folder, 2)
+    assert outcome(folder) == want
+
+
+def test_edited_document_starts_anew(reference, tmp_path):
+    """A job folder that is edited by hand does not answer with what the old document gave."""
+    fit, source, want = reference
+    folder = str(tmp_path / "job")
+    shutil.copytree(source, folder)
+    document = read_json(folder, "job.json")
+    document["fit"]["seed"] = 8
+    with open(os.path.join(folder, "job.json"), "w") as f:
+        json.dump(document, f)
+    finish(folder, 2)
+    assert outcome(folder)[0]["seed"] == 8
+    assert outcome(folder)[0]["parameters"] != want[0]["parameters"]
+    with open(os.path.join(folder, "series.rec")) as f:
+        steps = [json.loads(line[9:])["step"] for line in f]
+    assert steps == list(range(len(steps)))
+
+
+def test_cancel_and_resume(reference, tmp_path):
+    fit, _, want = reference
+    folder = make_job(str(tmp_path / "job"), **fit)
+    worker = start(folder, 2)
+    while journal_bytes(folder, "fit") <= 20 and worker.poll() is None:
+        time.sleep(0.002)
+    worker.send_signal(signal.SIGTERM)
+    sent = time.monotonic()
+    worker.communicate(timeout=20)
+    assert worker.returncode == 3
+    assert time.monotonic() - sent < 3
+    status = read_json(folder, "status.json")
+    assert status["state"] == "cancelled" and status["error"] is None
+    finish(folder, 2)
+    assert outcome(folder) == want
+
+
+def test_stale_attempt(tmp_path):
+    """A worker whose attempt has been replaced ends with status 4 and leaves status.json alone."""
+    folder = make_job(str(tmp_path / "job"), path_budget=2000000, max_iterations=80)
+    with open(os.path.join(folder, "attempt.json"), "w") as f:
+        json.dump({"attempt": 1, "token": "old"}, f)
+    worker = start(folder, 1)
+    while journal_bytes(folder, "fit") <= 20 and worker.poll() is None:
+        time.sleep(0.002)
+    second = start(folder, 1)  # the lock keeps another worker out
+    assert second.wait(timeout=20) == 4
+    second.stderr.close()
+    assert read_json(folder, "status.json")["attempt"] == 1
+    with open(os.path.join(folder, "new"), "w") as f:
+        json.dump({"attempt": 2, "token": "new"}, f)
+    os.rename(os.path.join(folder, "new"), os.path.join(folder, "attempt.json"))
+    worker.communicate(timeout=20)
+    assert worker.returncode == 4
+    assert read_json(folder, "status.json")["state"] == "running"
+
+
+def test_heartbeat(tmp_path):
+    folder = make_job(str(tmp_path / "job"), path_budget=2000000, max_iterations=80)
+    worker = start(folder, 1)
+    beats, end = set(), time.monotonic() + 4
+    while time.monotonic() < end and worker.poll() is None:
+        try:
+            status = read_json(folder, "status.json")  # always whole
+            beats.add(status["heartbeat_unix_s"])
+        except FileNotFoundError:
+            pass
+        time.sleep(0.02)
+    assert len(beats) >= 4
+    assert time.time() - max(beats) < 1.5
+    worker.terminate()
+    worker.communicate(timeout=20)
+    assert worker.returncode == 3
+
+
+def test_failure_is_told(tmp_path):
+    folder = make_job(str(tmp_path / "job"))
+    os.truncate(os.path.join(folder, "input", "cloth.hair"), 500)
+    worker = start(folder, 1)
+    worker.communicate(timeout=60)
+    assert worker.returncode == 1
+    status = read_json(folder, "status.json")
+    assert status["state"] == "failed"
+    assert status["error"]["code"] == "format" and status["error"]["field"] == "fibers.file" and "cloth.hair" in status["error"]["text"]
+
+
+def test_usage(tmp_path):
+    assert subprocess.run([WORKER], stderr=subprocess.DEVNULL).returncode == 2
+    assert subprocess.run([WORKER, "--threads", "-3", str(tmp_path)], stderr=subprocess.DEVNULL).returncode == 2
+    assert subprocess.run([WORKER, str(tmp_path / "absent")], stderr=subprocess.DEVNULL).returncode == 2
+    done = subprocess.run([WORKER, "--help"], stdout=subprocess.PIPE, text=True)
+    assert done.returncode == 0 and "JOBDIR" in done.stdout
