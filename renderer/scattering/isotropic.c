@@ -39,28 +39,32 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
         for (int p = 0; p < 3; p++) score[3 * c + p] = c == p ? 1 / s->c[c] : 0;
 }
 
-static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3])
+static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
+    (void)weight_rgb;
     (void)s;
     (void)wo;
     return fmaxf(sqrtf(wi[1] * wi[1] + wi[2] * wi[2]), FIBER_COS_MIN) * (float)(M_1_PI * M_1_PI);
 }
 
 /* cos^2 th d th: the sine of th is distributed as one coordinate of a point in the unit disk. */
-static float sample(const struct scattering_state *s, const float wo[3], const float u[3], float wi[3])
+static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3], float wi[3])
 {
+    (void)s;
+    (void)wo;
+    (void)weight_rgb;
     float z = sqrtf(u[0]) * cosf((float)(2 * M_PI) * u[1]), cos_theta = sqrtf(fmaxf(0, (1 - z) * (1 + z)));
     float phi = (float)(2 * M_PI) * u[2];
     wi[0] = z;
     wi[1] = cos_theta * cosf(phi);
     wi[2] = cos_theta * sinf(phi);
-    return pdf(s, wi, wo);
 }
 
-static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
+                      float *score)
 {
     eval(s, wi, wo, s_rgb, score);
-    return pdf(s, wi, wo);
+    return pdf(s, wi, wo, weight_rgb);
 }
 
 const struct scattering_model scattering_isotropic = {

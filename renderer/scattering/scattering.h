@@ -43,11 +43,14 @@ struct scattering_model {
     /* S in rgb, and if score != NULL the derivative of ln S_c by each flat parameter: score[c * n_param + p] (zero where a colour
      * parameter does not touch channel c). wi, wo: unit vectors in the fiber frame, any sign of the components. */
     void (*eval)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3], float *score);
-    /* Draw wi for a given wo with u in [0,1)^3; returns the density per steradian (> 0), exactly that of pdf(). */
-    float (*sample)(const struct scattering_state *state, const float wo[3], const float u[3], float wi[3]);
-    float (*pdf)(const struct scattering_state *state, const float wi[3], const float wo[3]);
-    /* eval and pdf in one pass, for the inner loop: they share most of their work. Exactly the same values. */
-    float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3], float *score);
+    /* Draw wi for a given wo with u in [0,1)^3. weight_rgb: what S is worth in each channel (a path's throughput), NULL: the same
+     * in all; one lobe may be bright in red where another is bright in blue. wi is drawn with the density per steradian that pdf()
+     * returns for the same weights, which is > 0 there. */
+    void (*sample)(const struct scattering_state *state, const float wo[3], const float *weight_rgb, const float u[3], float wi[3]);
+    float (*pdf)(const struct scattering_state *state, const float wi[3], const float wo[3], const float *weight_rgb);
+    /* eval, and pdf as the result, in one pass for the inner loop: they share most of their work. Exactly the same values. */
+    float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
+                      float *score);
 };
 
 /* All models, NULL-terminated; and by id (NULL when unknown). */

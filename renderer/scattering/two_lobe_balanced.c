@@ -112,9 +112,10 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
     two_lobe_eval_terms(s, true, &di, &dout, &t, s_rgb, score);
 }
 
-static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
+                      float *score)
 {
-    return two_lobe_eval_pdf(s, true, wi, wo, s_rgb, score);
+    return two_lobe_eval_pdf(s, true, wi, wo, weight_rgb, s_rgb, score);
 }
 
 const struct scattering_model scattering_two_lobe_balanced = {

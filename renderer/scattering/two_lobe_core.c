@@ -38,47 +38,39 @@ struct scattering_state *two_lobe_state_new(const double *param)
     return s;
 }
 
-/* Energy that each lobe brings to th_o from a uniform environment, mean of the channels: the odds of sampling it. */
-static void lobe_energy(const struct scattering_state *s, bool balanced, float theta_o, float energy[2])
+/* What a uniform environment brings to th_o through each lobe, before colours. */
+static void lobe_energy(const struct scattering_state *s, bool balanced, float theta_o, float energy[3])
 {
     enum { N = 24 };
-    float scale_o[2] = {1, 1}, unused[2];
+    float scale_o[2] = {1, 1}, unused[2], sum[2][2] = {{0}};
     if (balanced) two_lobe_scale_at(s, true, theta_o, scale_o, unused);
     for (int k = 0; k < 2; k++) {
         float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]), hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
-        float step = (hi - lo) / N, sum = 0;
+        float step = (hi - lo) / N;
         for (int i = 0; i < N; i++) {
-            float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2], mean = 0;
+            float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2];
             two_lobe_scale_at(s, balanced, t, scale, unused);
             float schlick = two_lobe_schlick(balanced ? cosf(0.5f * (t - theta_o)) : cos_t);
-            for (int c = 0; c < 3; c++) {
-                float f = s->c_r[c] + (1 - s->c_r[c]) * schlick;
-                mean += (k == TWO_LOBE_R ? f : s->c_tt[c] * (1 - f)) * (1.0f / 3);
-            }
-            sum += mean * expf(-x * x * s->inv_2var[k]) * scale[k] * cos_t * cos_t;
+            float m = s->peak[k] * expf(-x * x * s->inv_2var[k]) * scale[k] * scale_o[k] * cos_t * cos_t * step;
+            sum[k][0] += m;
+            sum[k][1] += m * schlick;
         }
-        energy[k] = sum * step * s->peak[k] * scale_o[k];
     }
+    energy[0] = sum[TWO_LOBE_R][0];
+    energy[1] = sum[TWO_LOBE_R][1];
+    energy[2] = sum[TWO_LOBE_TT][0] - sum[TWO_LOBE_TT][1];
 }
 
 void two_lobe_fill_sampling(struct scattering_state *s, bool balanced)
 {
     enum { STRIDE = 16 };
     const double step = M_PI_2 / TWO_LOBE_N_TABLE;
-    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE) {
-        float energy[2];
-        lobe_energy(s, balanced, (float)(i * step), energy);
-        float p = energy[TWO_LOBE_R] / (energy[TWO_LOBE_R] + energy[TWO_LOBE_TT]);
-        /* neither lobe is starved: both carry derivatives even where one is dark (also catches 0/0) */
-        s->sampling[i].p_r = p > 0.05f ? fminf(p, 0.95f) : 0.05f;
-    }
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE) lobe_energy(s, balanced, (float)(i * step), s->sampling[i].energy);
     for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
         struct two_lobe_sampling_entry *e = &s->sampling[i];
         int i0 = i / STRIDE * STRIDE;
-        if (i != i0) {
-            float t = (float)(i - i0) / STRIDE;
-            e->p_r = two_lobe_mix(s->sampling[i0].p_r, s->sampling[i0 + STRIDE].p_r, t);
-        }
+        float t = (float)(i - i0) / STRIDE;
+        for (int k = 0; k < 3 && i != i0; k++) e->energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
         for (int k = 0; k < 2; k++) {
             e->near[k] = (float)erf((M_PI_2 - i * step) / (M_SQRT2 * (double)s->beta[k]));
             e->far[k] = (float)erf((M_PI_2 + i * step) / (M_SQRT2 * (double)s->beta[k]));
@@ -86,18 +78,18 @@ void two_lobe_fill_sampling(struct scattering_state *s, bool balanced)
     }
 }
 
-float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3])
+float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
     struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
     struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
-    return two_lobe_pdf_terms(s, &di, &dout, &t);
+    return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
 }
 
-float two_lobe_sample(const struct scattering_state *s, const float wo[3], const float u[3], float wi[3])
+void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3], float wi[3])
 {
     struct fiber_direction dout = fiber_direction_of(wo);
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);
-    int k = u[0] < e.p_r ? TWO_LOBE_R : TWO_LOBE_TT;
+    int k = u[0] < two_lobe_p_r(s, &e, weight_rgb) ? TWO_LOBE_R : TWO_LOBE_TT;
 
     /* th_i about -th_o: the pole on the side of -th_o is the near one */
     bool upper_near = dout.theta_rad <= 0;
@@ -111,7 +103,6 @@ float two_lobe_sample(const struct scattering_state *s, const float wo[3], const
     wi[0] = sin_theta;
     wi[1] = cos_theta * (c * dout.azimuth[0] - d * dout.azimuth[1]);
     wi[2] = cos_theta * (d * dout.azimuth[0] + c * dout.azimuth[1]);
-    return two_lobe_pdf(s, wi, wo);
 }
 
 void two_lobe_release(struct scattering_state *s) { free(s); }

@@ -4,7 +4,7 @@
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
  *     published: th_f = th_i, scale = 1 / G(-th_i, beta);  balanced: th_f = (th_i - th_o) / 2, scale = a(th_i) a(th_o)
  *
- * Sampling of wi: a lobe by its energy at th_o, th_i from the normal density about -th_o cut to +-pi/2, azimuth uniform or
+ * Sampling of wi: a lobe by its energy at th_o and what the channels are worth, th_i from the normal density about -th_o cut to +-pi/2, azimuth uniform or
  * von Mises. pdf() is the exact density of that. All functions are inlined with `balanced` constant.
  */
 #ifndef SELVEDGE_RENDERER_TWO_LOBE_CORE_H
@@ -25,7 +25,7 @@ struct two_lobe_normal_entry { /* by |th|: G or a, and its derivative by beta */
 };
 
 struct two_lobe_sampling_entry { /* by |th_o| */
-    float p_r;              /* probability of the R lobe */
+    float energy[3];        /* from all around, before colours: integrals of M_R, M_R (1 - cos th)^5, M_TT (1 - (1 - cos th)^5) */
     float near[2], far[2];  /* erf of the distance from the lobe's centre to the near and the far pole, in units of sqrt(2) beta */
 };
 
@@ -44,7 +44,7 @@ extern const struct param_info two_lobe_param[TWO_LOBE_N_PARAM];
 
 /* Everything but the tables; NULL without memory. */
 struct scattering_state *two_lobe_state_new(const double *param);
-/* The sampling table, once the normal table is there. fresnel_theta: th_f by (th_i, th_o). */
+/* The sampling table, once the normal table is there. */
 void two_lobe_fill_sampling(struct scattering_state *s, bool balanced);
 
 static inline float two_lobe_table_position(float theta_rad, int *i)
@@ -142,7 +142,8 @@ static inline struct two_lobe_sampling_entry two_lobe_sampling_at(const struct s
     int i;
     float t = two_lobe_table_position(theta_rad, &i);
     const struct two_lobe_sampling_entry *a = &s->sampling[i], *b = a + 1;
-    struct two_lobe_sampling_entry e = {.p_r = two_lobe_mix(a->p_r, b->p_r, t)};
+    struct two_lobe_sampling_entry e;
+    for (int k = 0; k < 3; k++) e.energy[k] = two_lobe_mix(a->energy[k], b->energy[k], t);
     for (int k = 0; k < 2; k++) {
         e.near[k] = two_lobe_mix(a->near[k], b->near[k], t);
         e.far[k] = two_lobe_mix(a->far[k], b->far[k], t);
@@ -150,27 +151,45 @@ static inline struct two_lobe_sampling_entry two_lobe_sampling_at(const struct s
     return e;
 }
 
+/* Probability of drawing from the R lobe: least summed variance of the channels, so in proportion to the root of the channels' summed
+ * squares. Neither lobe is starved: both carry derivatives even where one is dark. */
+static inline float two_lobe_p_r(const struct scattering_state *s, const struct two_lobe_sampling_entry *e, const float *weight_rgb)
+{
+    float r = 0, tt = 0;
+    for (int c = 0; c < 3; c++) {
+        float w = weight_rgb != NULL ? weight_rgb[c] : 1;
+        float a = w * (s->c_r[c] * e->energy[0] + s->not_c_r[c] * e->energy[1]), b = w * s->c_tt[c] * s->not_c_r[c] * e->energy[2];
+        r += a * a;
+        tt += b * b;
+    }
+    r = sqrtf(r);
+    float p = r / (r + sqrtf(tt));
+    p = p < 0.95f ? p : 0.95f;
+    return p > 0.05f ? p : 0.05f; /* 0/0 too */
+}
+
 static inline float two_lobe_pdf_terms(const struct scattering_state *s, const struct fiber_direction *di,
-                                       const struct fiber_direction *dout, const struct two_lobe_terms *t)
+                                       const struct fiber_direction *dout, const float *weight_rgb, const struct two_lobe_terms *t)
 {
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout->theta_rad);
+    float p_r = two_lobe_p_r(s, &e, weight_rgb);
     float r = t->g[TWO_LOBE_R] * 2 / (e.near[TWO_LOBE_R] + e.far[TWO_LOBE_R]) * (float)(0.5 / M_PI);
     float tt = t->g[TWO_LOBE_TT] * 2 / (e.near[TWO_LOBE_TT] + e.far[TWO_LOBE_TT]) * t->von_mises;
-    return (e.p_r * r + (1 - e.p_r) * tt) / fmaxf(di->cos_theta, FIBER_COS_MIN);
+    return (p_r * r + (1 - p_r) * tt) / fmaxf(di->cos_theta, FIBER_COS_MIN);
 }
 
 static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool balanced, const float wi[3], const float wo[3],
-                                      float s_rgb[3], float *score)
+                                      const float *weight_rgb, float s_rgb[3], float *score)
 {
     struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
     struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
     two_lobe_eval_terms(s, balanced, &di, &dout, &t, s_rgb, score);
-    return two_lobe_pdf_terms(s, &di, &dout, &t);
+    return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
 }
 
 /* Shared by both models as they are. */
-float two_lobe_sample(const struct scattering_state *s, const float wo[3], const float u[3], float wi[3]);
-float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3]);
+void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3], float wi[3]);
+float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb);
 void two_lobe_release(struct scattering_state *s);
 
 #endif

@@ -3,7 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+#ifndef ROULETTE_BELOW
 #define ROULETTE_BELOW 0.2f
+#endif
+#ifndef SHADOW_BELOW
+#define SHADOW_BELOW 0.004f
+#endif
 
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
                        const struct scattering_state *state, const struct configuration *c, bool want_jacobian)
@@ -100,13 +105,19 @@ static void connect_lamp(struct walk *w, const struct scene_ray *ray, const stru
     if (!lamp_sample(&s->lamp, position, u, direction, &pdf_lamp)) return;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
     to_local(f, direction, wi);
-    float pdf = s->model->eval_pdf(s->state, wi, wo, s_rgb, s->want_jacobian ? w->score : NULL);
+    float pdf = s->model->eval_pdf(s->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float light = s->lamp.radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
     for (int c = 0; c < 3; c++) {
         value[c] = w->throughput[c] * s_rgb[c] * light;
         most = fmaxf(most, value[c]);
     }
     if (!(most > 0)) return;
+    if (most < SHADOW_BELOW) { /* hardly any light: trace few of these shadow rays, for more each */
+        float survival = most / SHADOW_BELOW;
+        if (rng_float(w->rng) >= survival) return;
+        light /= survival;
+        for (int c = 0; c < 3; c++) value[c] /= survival;
+    }
     struct scene_ray shadow;
     scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
@@ -143,8 +154,8 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
     const struct path_setting *s = w->s;
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
-    s->model->sample(s->state, wo, u, wi);
-    float pdf = s->model->eval_pdf(s->state, wi, wo, s_rgb, s->want_jacobian ? w->score : NULL);
+    s->model->sample(s->state, wo, w->throughput, u, wi);
+    float pdf = s->model->eval_pdf(s->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = cos_theta(wi) / pdf, most = 0, next[3];
     for (int c = 0; c < 3; c++) {
         next[c] = w->throughput[c] * s_rgb[c] * weight;

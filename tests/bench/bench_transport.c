@@ -4,7 +4,6 @@
  *   transport.<set>.s_to_5pct_derivative  the same for the derivative by C_TT (mean of the channels)
  *   transport.published_iteration_s.gabardine   16 configurations x 2 replicas x 64 x 64 x 64 paths
  */
-#include "base/clock.h"
 #include "renderer/transport/estimate.h"
 #include "tests/support/hand_weave.h"
 #include "tests/support/orbit_configurations.h"
@@ -13,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 static const struct {
     const char *name;
@@ -23,6 +23,14 @@ static const struct {
     {"silk", {0.745, 0.008, 0.070, 0.620, 0.553, 0.562, 1, 10, 19.823}},
     {"cotton", {0.989, 0.959, 0.874, 0.999, 0.999, 0.999, 1, 27.197, 38.269}},
 };
+
+/* One thread does all the work: its processor time, so that a busy machine counts less. */
+static double processor_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
 
 static void print(const char *set, const char *what, double value, const char *unit, const char *better)
 {
@@ -62,12 +70,12 @@ int main(int argc, char **argv)
             return 1;
         }
         q.n_path = n;
-        double t0 = clock_monotonic_s();
+        double t0 = processor_s();
         if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
             fprintf(stderr, "%s\n", err.text);
             return 1;
         }
-        double wall = clock_monotonic_s() - t0, per_path = wall / (16.0 * (double)n_path), s_mean = 0, s_derivative = 0, sd = 0, vertex = 0;
+        double spent = processor_s() - t0, per_path = spent / (16.0 * (double)n_path), s_mean = 0, s_derivative = 0, sd = 0, vertex = 0;
         for (int i = 0; i < 16; i++) {
             double mean = 0, var = 0, jac = 0, jac_var = 0;
             for (int ch = 0; ch < 3; ch++) { /* channels are correlated: add standard errors */

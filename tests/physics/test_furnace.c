@@ -95,8 +95,8 @@ static void sampled_camera_side(const struct scattering_model *m, const double *
     direction(theta_o, 1, wo);
     for (int i = 0; i < 100000; i++) {
         float u[3] = {rng_float(&r), rng_float(&r), rng_float(&r)}, wi[3], rgb[3];
-        float pdf = m->sample(s, wo, u, wi);
-        m->eval(s, wi, wo, rgb, NULL);
+        m->sample(s, wo, NULL, u, wi);
+        float pdf = m->eval_pdf(s, wi, wo, NULL, rgb, NULL);
         sample_mean_add(mean, (double)(rgb[0] * sqrtf(wi[1] * wi[1] + wi[2] * wi[2]) / pdf));
     }
     m->release(s);

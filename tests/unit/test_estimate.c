@@ -156,9 +156,10 @@ static void bad_requests(void **state)
 }
 
 /* A model that fails in one direction in a thousand: found and named. */
-static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], float rgb[3], float *score)
+static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight, float rgb[3],
+                             float *score)
 {
-    float pdf = scattering_find("isotropic.v1")->eval_pdf(s, wi, wo, rgb, score);
+    float pdf = scattering_find("isotropic.v1")->eval_pdf(s, wi, wo, weight, rgb, score);
     if (score != NULL && fabsf(wi[0]) > 0.99f) score[1] = NAN;
     return pdf;
 }

@@ -135,7 +135,7 @@ static void agrees_with_reference(void **state)
         for (int i = 0; i < 100; i++) {
             float wo[3], wi[3], u[3] = {rng_float(&r), rng_float(&r), rng_float(&r)}, rgb[3];
             random_direction(&r, wo);
-            m->sample(s, wo, u, wi);
+            m->sample(s, wo, NULL, u, wi);
             m->eval(s, wi, wo, rgb, NULL);
             double di[3] = {(double)wi[0], (double)wi[1], (double)wi[2]}, dout[3] = {(double)wo[0], (double)wo[1], (double)wo[2]};
             for (int c = 0; c < 3; c++) {
@@ -159,7 +159,7 @@ static void check_scores(const struct scattering_model *m, const double *param, 
     for (int i = 0; i < N_DIRECTION; i++) {
         float u[3] = {rng_float(r), rng_float(r), rng_float(r)};
         random_direction(r, wo[i]);
-        m->sample(s, wo[i], u, wi[i]);
+        m->sample(s, wo[i], NULL, u, wi[i]);
         m->eval(s, wi[i], wo[i], rgb[0][i], score[i]);
     }
     m->release(s);
@@ -212,9 +212,9 @@ static void scores_against_differences(void **state)
 
 static void check_finite(const struct scattering_model *m, const struct scattering_state *s, const float wo[3], const float wi[3])
 {
-    float rgb[3], score[3 * SCATTERING_MAX_PARAM], pdf = m->eval_pdf(s, wi, wo, rgb, score);
+    float rgb[3], score[3 * SCATTERING_MAX_PARAM], pdf = m->eval_pdf(s, wi, wo, NULL, rgb, score);
     assert_true(isfinite(pdf) && pdf >= 0);
-    assert_true(pdf == m->pdf(s, wi, wo));
+    assert_true(pdf == m->pdf(s, wi, wo, NULL));
     for (int c = 0; c < 3; c++) assert_true(isfinite(rgb[c]) && rgb[c] >= 0);
     for (size_t p = 0; p < 3 * m->n_param; p++) assert_true(isfinite(score[p]));
 }
@@ -237,7 +237,8 @@ static void nothing_is_nan(void **state)
                 for (size_t j = 0; j < sizeof special / sizeof special[0]; j++) check_finite(m, s, special[i], special[j]);
                 for (int u = 0; u < 27; u++) {
                     float uu[3] = {corner[u % 3], corner[u / 3 % 3], corner[u / 9]}, wi[3];
-                    float pdf = m->sample(s, special[i], uu, wi);
+                    m->sample(s, special[i], NULL, uu, wi);
+                    float pdf = m->pdf(s, wi, special[i], NULL);
                     assert_true(isfinite(pdf) && pdf > 0);
                     assert_true(fabsf(wi[0] * wi[0] + wi[1] * wi[1] + wi[2] * wi[2] - 1) < 1e-5f);
                     check_finite(m, s, special[i], wi);
@@ -263,7 +264,7 @@ static void reciprocal_models_are(void **state)
             for (int i = 0; i < 200; i++) {
                 float wo[3], wi[3], u[3] = {rng_float(&r), rng_float(&r), rng_float(&r)}, there[3], back[3];
                 random_direction(&r, wo);
-                m->sample(s, wo, u, wi);
+                m->sample(s, wo, NULL, u, wi);
                 m->eval(s, wi, wo, there, NULL);
                 m->eval(s, wo, wi, back, NULL);
                 for (int c = 0; c < 3; c++) assert_true(fabsf(there[c] - back[c]) <= 1e-5f * there[c]);
