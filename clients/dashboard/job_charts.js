@@ -8,10 +8,10 @@ const BAND = 2; // standard errors
 const MAX_POINT = 1200;
 const RGB = ["--red", "--green", "--blue"];
 
-function band(value, se, { positive = false } = {}) {
+function band(value, se, { positive = false, lower = 0, upper = Infinity } = {}) {
   if (finite(value) === null || (positive && value <= 0)) return null;
   const half = finite(se) === null ? 0 : BAND * se;
-  return [positive ? Math.max(value - half, value * 0.05) : value - half, value, value + half];
+  return [Math.max(value - half, positive ? value * 0.05 : lower), value, Math.min(value + half, upper)]; // bands end where parameters must
 }
 
 function block(title, tall) {
@@ -53,10 +53,11 @@ export class JobCharts {
   draw(job) {
     if (this.charts.length === 0) this.build(job);
     const p = this.points;
+    this.bounds = (job.parameters ?? []).map(({ lower, upper }) => ({ lower, upper }));
     this.objective.set(p.map((x) => [x.step, band(x.objective, x.objective_se, { positive: true })]));
     this.rms.set(p.map((x) => [x.step, finite(x.rel_rms) === null || x.rel_rms <= 0 ? null : [100 * x.rel_rms, 100 * x.rel_rms, 100 * x.rel_rms]]));
     for (const { group, chart } of this.parameterCharts)
-      chart.set(p.map((x) => [x.step, ...group.flat.map((f) => band(x.parameter?.[f.i], x.parameter_se?.[f.i]))]));
+      chart.set(p.map((x) => [x.step, ...group.flat.map((f) => band(x.parameter?.[f.i], x.parameter_se?.[f.i], this.bounds[f.i]))]));
   }
 
   build(job) {

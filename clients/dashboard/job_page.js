@@ -53,7 +53,7 @@ function notesOf(job) {
     notes.push(el("p", { class: "note bad" }, field + job.error.text));
   }
   if (job.missing_files?.length && job.state === "draft") notes.push(el("p", { class: "note" }, `Files still missing: ${job.missing_files.join(", ")}`));
-  if (residuals(job).converged === false) notes.push(el("p", { class: "note" }, `The fit has not converged: ${job.result.reason ?? "the parameters are the best point found"}`));
+  if (residuals(job).converged === false && !job.warnings.some((w) => w.includes("not converged"))) notes.push(el("p", { class: "note" }, `The fit has not converged: ${job.result.reason ?? "the parameters are the best point found"}`));
   return notes;
 }
 
