@@ -1,4 +1,4 @@
-/* Cem Yuksel's .hair; byte layout in docs/formats.md. All numbers little-endian. */
+/* Cem Yuksel's .hair; byte layout in docs/file-formats.md. All numbers little-endian. */
 #include "base/durable.h"
 #include "geometry/fibers/fiber_set.h"
 

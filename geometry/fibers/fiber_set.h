@@ -36,7 +36,7 @@ void fiber_set_z_range_m(const struct fiber_set *f, double *z_min_m, double *z_m
 /* Set every axis class to the axis along which the fiber runs farthest (sum of |dx|, |dy|, |dz| over its segments). */
 void fiber_set_classify(struct fiber_set *f);
 
-/* Cem Yuksel's .hair (docs/formats.md): positions in millimetres, thickness = DIAMETER in millimetres, per point.
+/* Cem Yuksel's .hair (docs/file-formats.md): positions in millimetres, thickness = DIAMETER in millimetres, per point.
  * The 88-byte text of the header carries "selvedge tile_mm=<x>,<y>" so that a set read back tiles as before; axis classes are
  * found again from the directions. Reading checks the header against the file's length before it allocates.
  * A fiber's radius is half the mean thickness of its points; default segments and thickness of other programs' files are honoured.

@@ -1,4 +1,4 @@
-/* Mitsuba grid volumes, `.vol` version 3 (byte layout: docs/formats.md). Bounding boxes are in millimetres.
+/* Mitsuba grid volumes, `.vol` version 3 (byte layout: docs/file-formats.md). Bounding boxes are in millimetres.
  *
  * Written: density as float32 or uint8; direction as float32 x 3 or in two quantised bytes. Read back: the same four.
  * Other programs give density in [0, 1] and directions that are unit or exactly zero; so do the writers here.
