@@ -2,13 +2,14 @@
  *
  * J(x, d) is sharp only on the axis of a fiber: off the axis a line that leans across the fiber stays inside for longer. So every voxel
  * first climbs to its ridge (the densest place of the blurred volume within about one radius), J is minimised there, and the
- * voxel takes the ridge's direction and J. At a ridge a coarse set of directions over the half sphere is tried in full; from the best of
- * them a descent over a fine set ends on the paraboloid through J at the best node and its neighbours. That is the minimum over all
- * directions, so no structure tensor is needed to start from. Nothing depends on how the work is divided. */
+ * voxel takes the ridge's direction and J. The descent starts from the structure tensor, which in dense bundles is not misled by the
+ * rows of touching fibers that J takes for fibers, and ends on the paraboloid through J at the best node of a fine set of directions and
+ * its neighbours. Nothing depends on how the work is divided. */
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/fiber_diameter.h"
 #include "geometry/orientation/line_filter.h"
+#include "geometry/orientation/structure_tensor.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,9 +22,9 @@ struct orientation_job {
     const struct volume *v;
     struct volume blurred;
     struct direction_volume *d;
-    struct direction_set fine, coarse;
-    uint16_t *coarse_node; /* node of the fine set nearest to each coarse direction */
+    struct direction_set fine;
     struct line_filter *filter;
+    struct tensor_window window;
     float eps_d, eps_j;
     double j_full;         /* J in solid material */
     int n_climb;           /* steps to the ridge */
@@ -120,20 +121,6 @@ static float descend(const struct orientation_job *o, const struct line_filter_s
     return value;
 }
 
-static uint16_t coarse_minimum(const struct orientation_job *o, const struct line_filter_site *site)
-{
-    float least = INFINITY;
-    uint16_t best = 0;
-    for (size_t c = 0; c < o->coarse.n; c++) {
-        float j = line_filter_j(o->filter, site, o->coarse_node[c]);
-        if (j < least) {
-            least = j;
-            best = o->coarse_node[c];
-        }
-    }
-    return best;
-}
-
 static void ridge_slice(void *context, size_t k, size_t i_thread)
 {
     struct orientation_job *o = context;
@@ -144,7 +131,9 @@ static void ridge_slice(void *context, size_t k, size_t i_thread)
             size_t at = volume_index(n, i, j, k);
             if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
             struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
-            float d[3], least = descend(o, &site, coarse_minimum(o, &site), d);
+            float d[3], least, d0[3];
+            structure_tensor_direction(&o->blurred, &o->window, i, j, k, d0, NULL);
+            least = descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, d0), d);
             double share = fmax(0.0, (double)least / o->j_full);
             o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
             o->j_histogram[k][share * J_BINS >= J_BINS ? J_BINS - 1 : (size_t)(share * J_BINS)]++;
@@ -211,14 +200,10 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     size_t n_voxel = volume_n_voxel(n);
     if (n_voxel > UINT32_MAX)
         return error_set(err, STATUS_TOO_LARGE, "cannot filter directions of %zu x %zu x %zu voxels", n[0], n[1], n[2]);
-    /* Half-width of the dip of J over angle is about radius / (h / 2); a coarse node must fall into it. */
-    double dip = fmin(0.5, diameter_voxel / (double)option->h), n_coarse = 2.0 * M_PI / (0.7 * dip * dip);
     status s = direction_set_init(&o->fine, N_FINE, err);
-    if (s == STATUS_OK) s = direction_set_init(&o->coarse, (size_t)fmin(fmax(n_coarse, 40.0), 400.0), err);
     if (s == STATUS_OK) s = line_filter_new(&o->fine, option->h, n, &o->filter, err);
     if (s != STATUS_OK) return s;
     o->scratch_per_thread = line_filter_scratch(o->filter);
-    o->coarse_node = malloc(o->coarse.n * sizeof *o->coarse_node);
     o->ridge = malloc(n_voxel * sizeof *o->ridge);
     o->is_ridge = calloc(n_voxel, sizeof *o->is_ridge);
     o->j_ridge = malloc(n_voxel * sizeof *o->j_ridge);
@@ -226,13 +211,12 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
     o->n_material = calloc(n[2], sizeof *o->n_material);
     o->n_kept = calloc(n[2], sizeof *o->n_kept);
-    if (o->coarse_node == NULL || o->ridge == NULL || o->is_ridge == NULL || o->j_ridge == NULL || o->j_histogram == NULL ||
+    if (o->ridge == NULL || o->is_ridge == NULL || o->j_ridge == NULL || o->j_histogram == NULL ||
         o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
-    for (size_t c = 0; c < o->coarse.n; c++)
-        o->coarse_node[c] = (uint16_t)direction_set_nearest(&o->fine, o->coarse.node[c].d);
     o->eps_d = (float)option->eps_d;
     o->j_full = solid_j(option->s, option->t, option->h);
+    tensor_window_init(&o->window, 0.35 * diameter_voxel);
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
     return STATUS_OK;
 }
@@ -241,9 +225,7 @@ static void release(struct orientation_job *o)
 {
     volume_release(&o->blurred);
     direction_set_release(&o->fine);
-    direction_set_release(&o->coarse);
     line_filter_free(o->filter);
-    free(o->coarse_node);
     free(o->ridge);
     free(o->is_ridge);
     free(o->j_ridge);

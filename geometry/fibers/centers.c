@@ -1,5 +1,6 @@
 #include "geometry/fibers/centers.h"
 
+#include "geometry/fibers/center_refine.h"
 #include "geometry/vision/vision.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ struct detect_job {
     size_t width, height, stride_u, stride_v, stride_slice;
     double sigma[N_SCALE];
     float min_distance;
+    double diameter;
     float *scratch; /* per thread: image and N_SCALE responses */
     size_t scratch_per_thread;
     struct slice_result *slice;
@@ -225,7 +227,7 @@ static int lower_v_first(const void *a, const void *b)
     return (x->u > y->u) - (x->u < y->u);
 }
 
-/* Of peaks nearer to each other than min_distance the strongest stays. Sorted by v at the end. */
+/* Of peaks nearer to each other than min_distance the strongest stays. */
 static void thin_out(const struct detect_job *job, struct slice_result *r)
 {
     size_t kept = 0;
@@ -241,7 +243,6 @@ static void thin_out(const struct detect_job *job, struct slice_result *r)
         if (!near) r->center[kept++] = r->center[i];
     }
     r->n = kept;
-    qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
 
 static void detect_slice(void *context, size_t i_slice, size_t i_thread)
@@ -259,6 +260,8 @@ static void detect_slice(void *context, size_t i_slice, size_t i_thread)
     if (!collect_peaks(job, i_slice, response, r))
         r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
     thin_out(job, r);
+    centers_refine(image, job->width, job->height, job->diameter, r->center, r->n, response, response + n_pixel);
+    if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
 
 static status gather(struct detect_job *job, size_t n_slice, struct center_list *list, struct error *err)
@@ -294,6 +297,7 @@ status centers_detect(const struct volume *v, const struct direction_volume *d, 
     job.stride_v = stride[job.av];
     job.stride_slice = stride[axis];
     for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
+    job.diameter = diameter_voxel;
     job.min_distance = MIN_SPACING * (float)diameter_voxel;
     job.scratch_per_thread = job.width * job.height * (N_SCALE + 1);
     job.scratch = malloc(n_thread * job.scratch_per_thread * sizeof *job.scratch);

@@ -140,25 +140,33 @@ static bool lattice_range(const struct point_lattice *l, const struct segment *g
     return true;
 }
 
-static void stamp_row(const struct segment *g, const float u[3], float inverse2, float x0, float spacing, float y, float z,
-                      size_t n, uint32_t id, float *restrict distance2, uint32_t *restrict nearest)
+/* Squared distance of a point, relative to g->a, to the segment; comparisons in place of fminf so that loops are vectorised. */
+static inline float squared_distance(float px, float py, float pz, const float u[3], float inverse2)
 {
-    float py = y - g->a[1], pz = z - g->a[2], fixed = py * u[1] + pz * u[2];
-    if (nearest == NULL) {
-        for (size_t i = 0; i < n; i++) {
-            float px = x0 + (float)(int)i * spacing - g->a[0];
-            float t = fminf(1.0f, fmaxf(0.0f, (px * u[0] + fixed) * inverse2));
-            float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2], d2 = dx * dx + dy * dy + dz * dz;
-            distance2[i] = fminf(distance2[i], d2);
-        }
-        return;
-    }
+    float t = (px * u[0] + py * u[1] + pz * u[2]) * inverse2;
+    t = t < 0.0f ? 0.0f : t;
+    t = t > 1.0f ? 1.0f : t;
+    float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2];
+    return dx * dx + dy * dy + dz * dz;
+}
+
+static void stamp_row(const float u[3], float inverse2, float px0, float spacing, float py, float pz, size_t n,
+                      float *restrict distance2)
+{
     for (size_t i = 0; i < n; i++) {
-        float px = x0 + (float)(int)i * spacing - g->a[0];
-        float t = fminf(1.0f, fmaxf(0.0f, (px * u[0] + fixed) * inverse2));
-        float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2], d2 = dx * dx + dy * dy + dz * dz;
-        nearest[i] = d2 < distance2[i] ? id : nearest[i];
-        distance2[i] = fminf(distance2[i], d2);
+        float d2 = squared_distance(px0 + (float)(int)i * spacing, py, pz, u, inverse2);
+        distance2[i] = d2 < distance2[i] ? d2 : distance2[i];
+    }
+}
+
+static void stamp_row_nearest(const float u[3], float inverse2, float px0, float spacing, float py, float pz, size_t n,
+                              uint32_t id, float *restrict distance2, uint32_t *restrict nearest)
+{
+    for (size_t i = 0; i < n; i++) {
+        float d2 = squared_distance(px0 + (float)(int)i * spacing, py, pz, u, inverse2), old = distance2[i];
+        uint32_t old_id = nearest[i];
+        nearest[i] = d2 < old ? id : old_id;
+        distance2[i] = d2 < old ? d2 : old;
     }
 }
 
@@ -174,12 +182,16 @@ void segment_distances(const struct segment_bricks *s, size_t i_brick, const str
         if (!lattice_range(l, g, s->reach, from, to)) continue;
         float u[3] = {g->b[0] - g->a[0], g->b[1] - g->a[1], g->b[2] - g->a[2]};
         float length2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], inverse2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+        float px = l->origin[0] + ((float)from[0] + 0.5f) * l->spacing - g->a[0];
         for (size_t k = from[2]; k <= to[2]; k++)
             for (size_t j = from[1]; j <= to[1]; j++) {
-                size_t row = (k * l->n[1] + j) * l->n[0] + from[0];
-                stamp_row(g, u, inverse2, l->origin[0] + ((float)from[0] + 0.5f) * l->spacing, l->spacing,
-                          l->origin[1] + ((float)j + 0.5f) * l->spacing, l->origin[2] + ((float)k + 0.5f) * l->spacing,
-                          to[0] - from[0] + 1, s->index[e], distance2 + row, nearest == NULL ? NULL : nearest + row);
+                size_t row = (k * l->n[1] + j) * l->n[0] + from[0], n = to[0] - from[0] + 1;
+                float py = l->origin[1] + ((float)j + 0.5f) * l->spacing - g->a[1];
+                float pz = l->origin[2] + ((float)k + 0.5f) * l->spacing - g->a[2];
+                if (nearest == NULL)
+                    stamp_row(u, inverse2, px, l->spacing, py, pz, n, distance2 + row);
+                else
+                    stamp_row_nearest(u, inverse2, px, l->spacing, py, pz, n, s->index[e], distance2 + row, nearest + row);
             }
     }
 }

@@ -1,0 +1,135 @@
+#include "geometry/orientation/structure_tensor.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LANES = 8 };
+typedef float lanes __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
+
+void tensor_window_init(struct tensor_window *w, double sd_voxel)
+{
+    *w = (struct tensor_window){.reach = (int)ceil(2.0 * sd_voxel)};
+    if (w->reach > TENSOR_MAX_REACH) w->reach = TENSOR_MAX_REACH;
+    for (int i = -w->reach; i <= w->reach; i++) w->weight[i + w->reach] = (float)exp(-0.5 * i * i / (sd_voxel * sd_voxel));
+}
+
+static void add_scalar(const struct volume *v, size_t at, float weight, double sum[6])
+{
+    const float *p = v->density + at;
+    size_t sy = v->n[0], sz = v->n[0] * v->n[1];
+    float gx = p[1] - *(p - 1), gy = p[sy] - *(p - sy), gz = p[sz] - *(p - sz);
+    sum[0] += (double)(weight * gx * gx);
+    sum[1] += (double)(weight * gy * gy);
+    sum[2] += (double)(weight * gz * gz);
+    sum[3] += (double)(weight * gx * gy);
+    sum[4] += (double)(weight * gx * gz);
+    sum[5] += (double)(weight * gy * gz);
+}
+
+/* n voxels of a row, weights in w (padded with zeros to whole lanes); reads up to LANES - 1 voxels beyond. */
+static void add_row(const struct volume *v, size_t at, const float *w, int n, float row_weight, lanes sum[6])
+{
+    size_t sy = v->n[0], sz = v->n[0] * v->n[1];
+    for (int x = 0; x < n; x += LANES) {
+        const float *p = v->density + at + x;
+        lanes weight = *(const lanes *)(w + x) * row_weight;
+        lanes gx = *(const lanes *)(p + 1) - *(const lanes *)(p - 1), gy = *(const lanes *)(p + sy) - *(const lanes *)(p - sy);
+        lanes gz = *(const lanes *)(p + sz) - *(const lanes *)(p - sz), wx = weight * gx, wy = weight * gy;
+        sum[0] += wx * gx;
+        sum[1] += wy * gy;
+        sum[2] += weight * gz * gz;
+        sum[3] += wx * gy;
+        sum[4] += wx * gz;
+        sum[5] += wy * gz;
+    }
+}
+
+static void collect_inner(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k, double sum[6])
+{
+    float padded[2 * TENSOR_MAX_REACH + 1 + LANES] = {0.0f};
+    int r = w->reach, n = 2 * r + 1;
+    lanes total[6] = {{0.0f}};
+    memcpy(padded, w->weight, (size_t)n * sizeof *padded);
+    for (int z = -r; z <= r; z++)
+        for (int y = -r; y <= r; y++) {
+            if (y * y + z * z > r * r) continue;
+            size_t at = volume_index(v->n, i - (size_t)r, (size_t)((ptrdiff_t)j + y), (size_t)((ptrdiff_t)k + z));
+            add_row(v, at, padded, n, w->weight[y + r] * w->weight[z + r], total);
+        }
+    for (int c = 0; c < 6; c++)
+        for (int l = 0; l < LANES; l++) sum[c] += (double)total[c][l];
+}
+
+static void collect_border(const struct volume *v, const struct tensor_window *w, const size_t centre[3], double sum[6])
+{
+    int r = w->reach, o[3];
+    for (o[2] = -r; o[2] <= r; o[2]++)
+        for (o[1] = -r; o[1] <= r; o[1]++) {
+            if (o[1] * o[1] + o[2] * o[2] > r * r) continue;
+            for (o[0] = -r; o[0] <= r; o[0]++) {
+                size_t x[3];
+                int inside = 1;
+                for (int a = 0; a < 3; a++) { /* the gradient needs a neighbour on both sides */
+                    ptrdiff_t c = (ptrdiff_t)centre[a] + o[a];
+                    inside = inside && c >= 1 && c + 1 < (ptrdiff_t)v->n[a];
+                    x[a] = (size_t)c;
+                }
+                if (inside)
+                    add_scalar(v, volume_index(v->n, x[0], x[1], x[2]), w->weight[o[0] + r] * w->weight[o[1] + r] * w->weight[o[2] + r],
+                               sum);
+            }
+        }
+}
+
+/* Eigenvectors of a symmetric matrix by Jacobi rotations: columns of e. */
+static void jacobi(double m[3][3], double e[3][3])
+{
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++) e[a][b] = a == b ? 1.0 : 0.0;
+    for (int sweep = 0; sweep < 12; sweep++)
+        for (int p = 0; p < 2; p++)
+            for (int q = p + 1; q < 3; q++) {
+                if (fabs(m[p][q]) <= 1e-14 * (fabs(m[p][p]) + fabs(m[q][q]))) continue;
+                double theta = 0.5 * (m[q][q] - m[p][p]) / m[p][q];
+                double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1.0));
+                double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
+                for (int k = 0; k < 3; k++) {
+                    double a = m[k][p], b = m[k][q];
+                    m[k][p] = c * a - s * b;
+                    m[k][q] = s * a + c * b;
+                }
+                for (int k = 0; k < 3; k++) {
+                    double a = m[p][k], b = m[q][k];
+                    m[p][k] = c * a - s * b;
+                    m[q][k] = s * a + c * b;
+                    a = e[k][p], b = e[k][q];
+                    e[k][p] = c * a - s * b;
+                    e[k][q] = s * a + c * b;
+                }
+            }
+}
+
+void structure_tensor_direction(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k,
+                                float d[3], float eigen[3])
+{
+    double sum[6] = {0.0};
+    size_t r = (size_t)w->reach + 1, centre[3] = {i, j, k};
+    if (i >= r && j >= r && k >= r && i + r + LANES < v->n[0] && j + r < v->n[1] && k + r < v->n[2])
+        collect_inner(v, w, i, j, k, sum);
+    else
+        collect_border(v, w, centre, sum);
+    double m[3][3] = {{sum[0], sum[3], sum[4]}, {sum[3], sum[1], sum[5]}, {sum[4], sum[5], sum[2]}}, e[3][3];
+    jacobi(m, e);
+    int order[3] = {0, 1, 2};
+    for (int a = 0; a < 2; a++)
+        for (int b = 0; b < 2 - a; b++)
+            if (m[order[b]][order[b]] > m[order[b + 1]][order[b + 1]]) {
+                int t = order[b];
+                order[b] = order[b + 1];
+                order[b + 1] = t;
+            }
+    for (int a = 0; a < 3; a++) {
+        d[a] = (float)e[a][order[0]];
+        if (eigen != NULL) eigen[a] = (float)m[order[a]][order[a]];
+    }
+}

@@ -1,0 +1,22 @@
+/* The direction along which densities change least around a point: eigenvector of the smallest eigenvalue of the structure tensor
+ * sum_p w(p) grad L grad L^T (Bigun and Granlund 1987). Gradients stand perpendicular to fibers on all their surfaces, so it works
+ * inside of dense bundles of parallel fibers; where fibers of two directions meet within the window it mixes them. */
+#ifndef SELVEDGE_GEOMETRY_STRUCTURE_TENSOR_H
+#define SELVEDGE_GEOMETRY_STRUCTURE_TENSOR_H
+
+#include "geometry/volume/volume.h"
+
+enum { TENSOR_MAX_REACH = 24 };
+
+struct tensor_window {
+    int reach; /* voxels */
+    float weight[2 * TENSOR_MAX_REACH + 1]; /* Gaussian along one axis */
+};
+
+/* Gaussian window of standard deviation sd_voxel, cut at 2 sd. */
+void tensor_window_init(struct tensor_window *w, double sd_voxel);
+/* Direction at voxel (i, j, k) of a blurred volume; window cut at the faces. eigen: the three eigenvalues, rising (may be NULL). */
+void structure_tensor_direction(const struct volume *blurred, const struct tensor_window *w, size_t i, size_t j, size_t k,
+                                float d[3], float eigen[3]);
+
+#endif
