@@ -7,10 +7,11 @@
 #include <stdint.h>
 
 struct image {
-    size_t width, height, n_channel;  /* n_channel planes interleaved: 3 for rgb, more with named layers */
-    float *pixel;                     /* height x width x n_channel */
-    const char *const *channel_name;  /* EXR names, e.g. "R", "G", "B", "var.R", "d_beta_R.R"; static or owned by the caller */
-    void *name_storage;               /* NULL, or the memory behind channel_name when the image owns it (render.h) */
+    size_t width, height, n_channel; /* n_channel planes interleaved: 3 for rgb, more with named layers */
+    float *pixel;                    /* height x width x n_channel */
+    const char *const
+        *channel_name;  /* EXR names, e.g. "R", "G", "B", "var.R", "d_beta_R.R"; static or owned by the caller */
+    void *name_storage; /* NULL, or the memory behind channel_name when the image owns it (render.h) */
 };
 
 /* Zero pixels. n_channel == 3 gets the names R, G, B; otherwise channel_name is NULL until the caller sets it. */
@@ -19,8 +20,9 @@ void image_release(struct image *im);
 
 /* OpenEXR scan-line file, 32-bit float, uncompressed, through OpenEXRCore. */
 status image_write_exr(const struct image *im, const char *path, struct error *err);
-/* Reads R, G, B (or Y, copied to all three) of half or float, scan-line or single-level tiled, into n_channel = 3. STATUS_FORMAT naming file and
- * reason for missing channels, deep data, truncation; at most limit_pixel pixels (STATUS_TOO_LARGE). */
+/* Reads R, G, B (or Y, copied to all three) of half or float, scan-line or single-level tiled, into n_channel = 3.
+ * STATUS_FORMAT naming file and reason for missing channels, deep data, truncation; at most limit_pixel pixels
+ * (STATUS_TOO_LARGE). */
 status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err);
 /* 8-bit sRGB PNG of rgb * exposure. */
 status image_write_png(const struct image *im, double exposure, const char *path, struct error *err);

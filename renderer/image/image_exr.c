@@ -39,13 +39,14 @@ static const char *reason(const struct exr_note *note, exr_result_t code)
 
 /* ---- writing ---- */
 
-/* Uncompressed: the library's ZIP encoder (3.1.5 of Debian 12) damages a chunk whose compressed size happens to equal its plain
- * size (AcademySoftwareFoundation/openexr issue 2306), and path-traced floats hardly shrink anyway. */
+/* Uncompressed: the library's ZIP encoder (3.1.5 of Debian 12) damages a chunk whose compressed size happens to equal
+ * its plain size (AcademySoftwareFoundation/openexr issue 2306), and path-traced floats hardly shrink anyway. */
 static exr_result_t declare(exr_context_t file, const struct image *im, int *part)
 {
     exr_result_t r = exr_add_part(file, "image", EXR_STORAGE_SCANLINE, part);
     if (r == EXR_ERR_SUCCESS)
-        r = exr_initialize_required_attr_simple(file, *part, (int32_t)im->width, (int32_t)im->height, EXR_COMPRESSION_NONE);
+        r = exr_initialize_required_attr_simple(file, *part, (int32_t)im->width, (int32_t)im->height,
+                                                EXR_COMPRESSION_NONE);
     for (size_t c = 0; c < im->n_channel && r == EXR_ERR_SUCCESS; c++)
         r = exr_add_channel(file, *part, im->channel_name[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1);
     if (r == EXR_ERR_SUCCESS) r = exr_write_header(file);
@@ -69,7 +70,8 @@ static exr_result_t write_chunks(exr_context_t file, int part, const struct imag
         exr_chunk_info_t chunk;
         r = exr_write_scanline_chunk_info(file, part, y, &chunk);
         if (r != EXR_ERR_SUCCESS) break;
-        r = first ? exr_encoding_initialize(file, part, &chunk, &encoder) : exr_encoding_update(file, part, &chunk, &encoder);
+        r = first ? exr_encoding_initialize(file, part, &chunk, &encoder)
+                  : exr_encoding_update(file, part, &chunk, &encoder);
         if (r != EXR_ERR_SUCCESS) break;
         for (int16_t k = 0; k < encoder.channel_count; k++) {
             exr_coding_channel_info_t *c = &encoder.channels[k];
@@ -126,7 +128,8 @@ static status refuse(const struct reader *rd, struct error *err, const char *why
 static status check_channels(struct reader *rd, struct error *err)
 {
     const exr_attr_chlist_t *list = NULL;
-    if (exr_get_channels(rd->file, 0, &list) != EXR_ERR_SUCCESS || list == NULL) return refuse(rd, err, "it has no list of channels");
+    if (exr_get_channels(rd->file, 0, &list) != EXR_ERR_SUCCESS || list == NULL)
+        return refuse(rd, err, "it has no list of channels");
     bool have[4] = {false, false, false, false};
     static const char name[4] = "RGBY";
     for (int i = 0; i < list->num_channels; i++) {
@@ -142,34 +145,40 @@ static status check_channels(struct reader *rd, struct error *err)
     if (rd->grey && have[3] && !(have[0] || have[1] || have[2])) return STATUS_OK;
     if (!rd->grey) return STATUS_OK;
     for (int c = 0; c < 3; c++)
-        if (!have[c]) return error_set(err, STATUS_FORMAT, "cannot read image '%s': channel '%c' is missing", rd->path, name[c]);
+        if (!have[c])
+            return error_set(err, STATUS_FORMAT, "cannot read image '%s': channel '%c' is missing", rd->path, name[c]);
     return refuse(rd, err, "channels are missing");
 }
 
 static status read_header(struct reader *rd, size_t limit_pixel, struct error *err)
 {
     exr_attr_box2i_t w;
-    if (exr_get_storage(rd->file, 0, &rd->storage) != EXR_ERR_SUCCESS) return refuse(rd, err, "unknown kind of storage");
-    if (rd->storage != EXR_STORAGE_SCANLINE && rd->storage != EXR_STORAGE_TILED) return refuse(rd, err, "deep data are not supported");
+    if (exr_get_storage(rd->file, 0, &rd->storage) != EXR_ERR_SUCCESS)
+        return refuse(rd, err, "unknown kind of storage");
+    if (rd->storage != EXR_STORAGE_SCANLINE && rd->storage != EXR_STORAGE_TILED)
+        return refuse(rd, err, "deep data are not supported");
     if (exr_get_data_window(rd->file, 0, &w) != EXR_ERR_SUCCESS) return refuse(rd, err, "it has no data window");
     int64_t width = (int64_t)w.max.x - w.min.x + 1, height = (int64_t)w.max.y - w.min.y + 1;
     if (width <= 0 || height <= 0) return refuse(rd, err, "it is empty");
     if (width > INT32_MAX / 16 || height > INT32_MAX / 16 || (uint64_t)width * (uint64_t)height > limit_pixel)
-        return error_set(err, STATUS_TOO_LARGE, "cannot read image '%s': %lld x %lld pixels, at most %zu are allowed", rd->path,
-                         (long long)width, (long long)height, limit_pixel);
+        return error_set(err, STATUS_TOO_LARGE, "cannot read image '%s': %lld x %lld pixels, at most %zu are allowed",
+                         rd->path, (long long)width, (long long)height, limit_pixel);
     rd->width = (int32_t)width;
     rd->height = (int32_t)height;
     rd->min_y = w.min.y;
     return check_channels(rd, err);
 }
 
-/* Decodes one chunk whose top left pixel is (x, y) of the image. Outputs beyond the image cannot happen: sizes are checked. */
-static exr_result_t decode_chunk(struct reader *rd, exr_decode_pipeline_t *decoder, const exr_chunk_info_t *chunk, int32_t x, int32_t y,
-                                 bool *first)
+/* Decodes one chunk whose top left pixel is (x, y) of the image. Outputs beyond the image cannot happen: sizes are
+ * checked. */
+static exr_result_t decode_chunk(struct reader *rd, exr_decode_pipeline_t *decoder, const exr_chunk_info_t *chunk,
+                                 int32_t x, int32_t y, bool *first)
 {
-    if (x < 0 || y < 0 || chunk->width <= 0 || chunk->height <= 0 || x > rd->width - chunk->width || y > rd->height - chunk->height)
+    if (x < 0 || y < 0 || chunk->width <= 0 || chunk->height <= 0 || x > rd->width - chunk->width ||
+        y > rd->height - chunk->height)
         return EXR_ERR_BAD_CHUNK_LEADER;
-    exr_result_t r = *first ? exr_decoding_initialize(rd->file, 0, chunk, decoder) : exr_decoding_update(rd->file, 0, chunk, decoder);
+    exr_result_t r = *first ? exr_decoding_initialize(rd->file, 0, chunk, decoder)
+                            : exr_decoding_update(rd->file, 0, chunk, decoder);
     if (r != EXR_ERR_SUCCESS) return r;
     static const char name[] = "RGB";
     for (int16_t k = 0; k < decoder->channel_count; k++) {
@@ -238,7 +247,8 @@ status image_read_exr(struct image *im, const char *path, size_t limit_pixel, st
         if (r != EXR_ERR_SUCCESS) st = refuse(&rd, err, reason(&rd.note, r));
     }
     if (st == STATUS_OK && rd.grey)
-        for (size_t i = 0; i < im->width * im->height; i++) im->pixel[3 * i + 1] = im->pixel[3 * i + 2] = im->pixel[3 * i];
+        for (size_t i = 0; i < im->width * im->height; i++)
+            im->pixel[3 * i + 1] = im->pixel[3 * i + 2] = im->pixel[3 * i];
     if (st != STATUS_OK) image_release(im);
     exr_finish(&rd.file);
     return st;

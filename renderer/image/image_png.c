@@ -30,7 +30,8 @@ status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, con
 status image_write_png(const struct image *im, double exposure, const char *path, struct error *err)
 {
     size_t n = im->width * im->height;
-    if (im->n_channel < 3) return error_set(err, STATUS_INVALID, "cannot write image '%s': it has %zu channels", path, im->n_channel);
+    if (im->n_channel < 3)
+        return error_set(err, STATUS_INVALID, "cannot write image '%s': it has %zu channels", path, im->n_channel);
     uint8_t *rgb = malloc(3 * n);
     if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write image '%s': out of memory", path);
     for (size_t i = 0; i < n; i++)

@@ -34,7 +34,8 @@ double lobe_normaliser(double m_rad, double s_rad, double *d_m, double *d_s)
     double p[Q_DEGREE + 3] = {0};
     if (d_m != NULL) { /* d g / d m = g (t - m) / s^2 */
         for (size_t j = 0; j <= Q_DEGREE + 1; j++)
-            p[j] = ((j > 0 ? q_coefficient[j - 1] : 0) - (j <= Q_DEGREE ? m_rad * q_coefficient[j] : 0)) / (s_rad * s_rad);
+            p[j] =
+                ((j > 0 ? q_coefficient[j - 1] : 0) - (j <= Q_DEGREE ? m_rad * q_coefficient[j] : 0)) / (s_rad * s_rad);
         *d_m = gauss_polynomial_integral(p, Q_DEGREE + 1, m_rad, s_rad, lo, hi);
     }
     if (d_s != NULL) { /* d g / d s = g ((t - m)^2 - s^2) / s^3 */

@@ -1,5 +1,5 @@
-/* Gaussian times polynomial, in closed form (fabric thesis, Lemma 4.1), and the normaliser of a longitudinal lobe made of it.
- * Double precision; pure functions. Angles in radians.
+/* Gaussian times polynomial, in closed form (fabric thesis, Lemma 4.1), and the normaliser of a longitudinal lobe made
+ * of it. Double precision; pure functions. Angles in radians.
  */
 #ifndef SELVEDGE_RENDERER_GAUSS_POLYNOMIAL_H
 #define SELVEDGE_RENDERER_GAUSS_POLYNOMIAL_H
@@ -8,7 +8,8 @@
 
 enum { GAUSS_POLYNOMIAL_MAX_DEGREE = 12 };
 
-/* Integral over [a, b] of (p[0] + ... + p[k] x^k) g(x; m, s) dx, g the normal density, 2 <= k <= GAUSS_POLYNOMIAL_MAX_DEGREE. */
+/* Integral over [a, b] of (p[0] + ... + p[k] x^k) g(x; m, s) dx, g the normal density, 2 <= k <=
+ * GAUSS_POLYNOMIAL_MAX_DEGREE. */
 double gauss_polynomial_integral(const double *p, size_t k, double m, double s, double a, double b);
 
 /* Q of section 4.4.1: an even polynomial just above cos^2 on [-pi/2, pi/2]. */

@@ -1,5 +1,6 @@
-/* isotropic.v1: a fiber that scatters the same radiance into every direction, S = C / pi^2. Reciprocal, and with C = 1 lossless from
- * both sides (the integral of cos th over the sphere is pi^2): the yardstick of furnace tests and the plainest model to fit.
+/* isotropic.v1: a fiber that scatters the same radiance into every direction, S = C / pi^2. Reciprocal, and with C = 1
+ * lossless from both sides (the integral of cos th over the sphere is pi^2): the yardstick of furnace tests and the
+ * plainest model to fit.
  */
 #include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/scattering_registry.h"
@@ -48,7 +49,8 @@ static float pdf(const struct scattering_state *s, const float wi[3], const floa
 }
 
 /* cos^2 th d th: the sine of th is distributed as one coordinate of a point in the unit disk. */
-static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3], float wi[3])
+static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
+                   float wi[3])
 {
     (void)s;
     (void)wo;
@@ -60,8 +62,8 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     wi[2] = cos_theta * sinf(phi);
 }
 
-static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
-                      float *score)
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
+                      float s_rgb[3], float *score)
 {
     eval(s, wi, wo, s_rgb, score);
     return pdf(s, wi, wo, weight_rgb);

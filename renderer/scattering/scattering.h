@@ -1,12 +1,12 @@
 /* Scattering models of fibers: one file per model, one row in the registry, found by id.
  *
- * Frame: fiber frame u, v, w with u along the fiber; w = (sin th, cos th cos ph, cos th sin ph), th in [-pi/2, pi/2] from the normal
- * plane (fabric thesis, section 5.4). Directions point away from the fiber. S(wi, wo) is the BCSDF; the light leaving along wo is
- * the integral of S Li cos(th_i) dwi. Energy: integral of S cos(th_o) dwo <= 1 for every wi.
+ * Frame: fiber frame u, v, w with u along the fiber; w = (sin th, cos th cos ph, cos th sin ph), th in [-pi/2, pi/2]
+ * from the normal plane (fabric thesis, section 5.4). Directions point away from the fiber. S(wi, wo) is the BCSDF; the
+ * light leaving along wo is the integral of S Li cos(th_i) dwi. Energy: integral of S cos(th_o) dwo <= 1 for every wi.
  *
- * A model describes its parameters; everyone else (tracer, optimizer, API, dashboard) learns of them from here. Parameters are
- * numbered flat: a colour parameter takes three consecutive slots r, g, b. Angles are radians inside, degrees in files
- * (param_info.unit "deg").
+ * A model describes its parameters; everyone else (tracer, optimizer, API, dashboard) learns of them from here.
+ * Parameters are numbered flat: a colour parameter takes three consecutive slots r, g, b. Angles are radians inside,
+ * degrees in files (param_info.unit "deg").
  */
 #ifndef SELVEDGE_RENDERER_SCATTERING_H
 #define SELVEDGE_RENDERER_SCATTERING_H
@@ -20,14 +20,15 @@ enum { SCATTERING_MAX_PARAM = 16 };
 
 /* One flat parameter slot. */
 struct param_info {
-    const char *name;   /* "C_R.r", "beta_TT": unique in the model */
-    const char *symbol; /* group name: "C_R" */
-    const char *unit;   /* "" or "deg" (how files and users see it) */
-    int channel;        /* 0 r, 1 g, 2 b; -1 acts on all channels */
+    const char *name;           /* "C_R.r", "beta_TT": unique in the model */
+    const char *symbol;         /* group name: "C_R" */
+    const char *unit;           /* "" or "deg" (how files and users see it) */
+    int channel;                /* 0 r, 1 g, 2 b; -1 acts on all channels */
     double lower, upper, start; /* internal unit: radians for "deg" */
 };
 
-/* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by threads. */
+/* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by
+ * threads. */
 struct scattering_state;
 
 struct scattering_model {
@@ -40,17 +41,21 @@ struct scattering_model {
     status (*prepare)(const double *param, struct scattering_state **state, struct error *err);
     void (*release)(struct scattering_state *state);
 
-    /* S in rgb, and if score != NULL the derivative of ln S_c by each flat parameter: score[c * n_param + p] (zero where a colour
-     * parameter does not touch channel c). wi, wo: unit vectors in the fiber frame, any sign of the components. */
-    void (*eval)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3], float *score);
-    /* Draw wi for a given wo with u in [0,1)^3. weight_rgb: what S is worth in each channel (a path's throughput), NULL: the same
-     * in all; one lobe may be bright in red where another is bright in blue. wi is drawn with the density per steradian that pdf()
-     * returns for the same weights, which is > 0 there. */
-    void (*sample)(const struct scattering_state *state, const float wo[3], const float *weight_rgb, const float u[3], float wi[3]);
+    /* S in rgb, and if score != NULL the derivative of ln S_c by each flat parameter: score[c * n_param + p] (zero
+     * where a colour parameter does not touch channel c). wi, wo: unit vectors in the fiber frame, any sign of the
+     * components. */
+    void (*eval)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3],
+                 float *score);
+    /* Draw wi for a given wo with u in [0,1)^3. weight_rgb: what S is worth in each channel (a path's throughput),
+     * NULL: the same in all; one lobe may be bright in red where another is bright in blue. wi is drawn with the
+     * density per steradian that pdf() returns for the same weights, which is > 0 there. */
+    void (*sample)(const struct scattering_state *state, const float wo[3], const float *weight_rgb, const float u[3],
+                   float wi[3]);
     float (*pdf)(const struct scattering_state *state, const float wi[3], const float wo[3], const float *weight_rgb);
-    /* eval, and pdf as the result, in one pass for the inner loop: they share most of their work. Exactly the same values. */
-    float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
-                      float *score);
+    /* eval, and pdf as the result, in one pass for the inner loop: they share most of their work. Exactly the same
+     * values. */
+    float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3],
+                      const float *weight_rgb, float s_rgb[3], float *score);
 };
 
 /* All models, NULL-terminated; and by id (NULL when unknown). */

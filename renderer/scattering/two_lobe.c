@@ -27,8 +27,8 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
     two_lobe_eval_terms(s, false, &di, &dout, &t, s_rgb, score);
 }
 
-static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
-                      float *score)
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
+                      float s_rgb[3], float *score)
 {
     return two_lobe_eval_pdf(s, false, wi, wo, weight_rgb, s_rgb, score);
 }

@@ -1,8 +1,8 @@
-/* two_lobe_balanced.v1: the two-lobe model made reciprocal. The published normaliser conserves energy for the incident side only;
- * here a lobe is a(th_i) a(th_o) g(th_o; -th_i, beta) with a such that it is lossless from both sides:
- *     a(t) * integral of a(u) g(u; -t, beta) cos^2 u du = 1.
- * a is found by Sinkhorn's balancing, a <- sqrt(a / (K a)); d ln a / d beta from the same equation by implicit differentiation.
- * The Fresnel factor is taken at the difference angle (th_i - th_o) / 2, which makes it symmetric too.
+/* two_lobe_balanced.v1: the two-lobe model made reciprocal. The published normaliser conserves energy for the incident
+ * side only; here a lobe is a(th_i) a(th_o) g(th_o; -th_i, beta) with a such that it is lossless from both sides: a(t)
+ * * integral of a(u) g(u; -t, beta) cos^2 u du = 1. a is found by Sinkhorn's balancing, a <- sqrt(a / (K a)); d ln a /
+ * d beta from the same equation by implicit differentiation. The Fresnel factor is taken at the difference angle (th_i
+ * - th_o) / 2, which makes it symmetric too.
  */
 #include "renderer/scattering/two_lobe_core.h"
 
@@ -11,9 +11,9 @@
 enum { N = TWO_LOBE_N_TABLE / 2 + 1 }; /* nodes over [0, pi/2]; a is even */
 
 struct balance {
-    double kernel[N][N];  /* g folded to u >= 0: symmetric */
+    double kernel[N][N]; /* g folded to u >= 0: symmetric */
     double d_kernel[N][N];
-    double weight[N];     /* cos^2 u du */
+    double weight[N]; /* cos^2 u du */
     double a[N], d_ln_a[N], work[N];
 };
 
@@ -112,8 +112,8 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
     two_lobe_eval_terms(s, true, &di, &dout, &t, s_rgb, score);
 }
 
-static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb, float s_rgb[3],
-                      float *score)
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
+                      float s_rgb[3], float *score)
 {
     return two_lobe_eval_pdf(s, true, wi, wo, weight_rgb, s_rgb, score);
 }

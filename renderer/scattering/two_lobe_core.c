@@ -45,7 +45,8 @@ static void lobe_energy(const struct scattering_state *s, bool balanced, float t
     float scale_o[2] = {1, 1}, unused[2], sum[2][2] = {{0}};
     if (balanced) two_lobe_scale_at(s, true, theta_o, scale_o, unused);
     for (int k = 0; k < 2; k++) {
-        float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]), hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
+        float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]),
+              hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
         float step = (hi - lo) / N;
         for (int i = 0; i < N; i++) {
             float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2];
@@ -65,12 +66,14 @@ void two_lobe_fill_sampling(struct scattering_state *s, bool balanced)
 {
     enum { STRIDE = 16 };
     const double step = M_PI_2 / TWO_LOBE_N_TABLE;
-    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE) lobe_energy(s, balanced, (float)(i * step), s->sampling[i].energy);
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE)
+        lobe_energy(s, balanced, (float)(i * step), s->sampling[i].energy);
     for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
         struct two_lobe_sampling_entry *e = &s->sampling[i];
         int i0 = i / STRIDE * STRIDE;
         float t = (float)(i - i0) / STRIDE;
-        for (int k = 0; k < 3 && i != i0; k++) e->energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
+        for (int k = 0; k < 3 && i != i0; k++)
+            e->energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
         for (int k = 0; k < 2; k++) {
             e->near[k] = (float)erf((M_PI_2 - i * step) / (M_SQRT2 * (double)s->beta[k]));
             e->far[k] = (float)erf((M_PI_2 + i * step) / (M_SQRT2 * (double)s->beta[k]));
@@ -85,7 +88,8 @@ float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const fl
     return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
 }
 
-void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3], float wi[3])
+void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
+                     float wi[3])
 {
     struct fiber_direction dout = fiber_direction_of(wo);
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);

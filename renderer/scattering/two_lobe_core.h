@@ -1,11 +1,13 @@
-/* What two_lobe.v1 and two_lobe_balanced.v1 share: state, evaluation with scores, sampling. Included by those two files only.
+/* What two_lobe.v1 and two_lobe_balanced.v1 share: state, evaluation with scores, sampling. Included by those two files
+ * only.
  *
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
  *     published: th_f = th_i, scale = 1 / G(-th_i, beta);  balanced: th_f = (th_i - th_o) / 2, scale = a(th_i) a(th_o)
  *
- * Sampling of wi: a lobe by its energy at th_o and what the channels are worth, th_i from the normal density about -th_o cut to +-pi/2, azimuth uniform or
- * von Mises. pdf() is the exact density of that. All functions are inlined with `balanced` constant.
+ * Sampling of wi: a lobe by its energy at th_o and what the channels are worth, th_i from the normal density about
+ * -th_o cut to +-pi/2, azimuth uniform or von Mises. pdf() is the exact density of that. All functions are inlined with
+ * `balanced` constant.
  */
 #ifndef SELVEDGE_RENDERER_TWO_LOBE_CORE_H
 #define SELVEDGE_RENDERER_TWO_LOBE_CORE_H
@@ -18,21 +20,29 @@
 #include <stdlib.h>
 
 enum { TWO_LOBE_N_TABLE = 1024, TWO_LOBE_N_PARAM = 9, TWO_LOBE_R = 0, TWO_LOBE_TT = 1 };
-enum { TWO_LOBE_P_C_R = 0, TWO_LOBE_P_C_TT = 3, TWO_LOBE_P_BETA_R = 6, TWO_LOBE_P_BETA_TT = 7, TWO_LOBE_P_GAMMA_TT = 8 };
+enum {
+    TWO_LOBE_P_C_R = 0,
+    TWO_LOBE_P_C_TT = 3,
+    TWO_LOBE_P_BETA_R = 6,
+    TWO_LOBE_P_BETA_TT = 7,
+    TWO_LOBE_P_GAMMA_TT = 8
+};
 
 struct two_lobe_normal_entry { /* by |th|: G or a, and its derivative by beta */
     float value[2], d_beta[2];
 };
 
 struct two_lobe_sampling_entry { /* by |th_o| */
-    float energy[3];        /* from all around, before colours: integrals of M_R, M_R (1 - cos th)^5, M_TT (1 - (1 - cos th)^5) */
-    float near[2], far[2];  /* erf of the distance from the lobe's centre to the near and the far pole, in units of sqrt(2) beta */
+    float energy[3]; /* from all around, before colours: integrals of M_R, M_R (1 - cos th)^5, M_TT (1 - (1 - cos th)^5)
+                      */
+    float near[2],
+        far[2]; /* erf of the distance from the lobe's centre to the near and the far pole, in units of sqrt(2) beta */
 };
 
 struct scattering_state {
     float c_r[3], not_c_r[3], c_tt[3]; /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all */
     float beta[2];
-    float peak[2];    /* 1 / (sqrt(2 pi) beta) */
+    float peak[2]; /* 1 / (sqrt(2 pi) beta) */
     float inv_2var[2];
     float inv[2], inv_cube[2]; /* 1 / beta, 1 / beta^3 */
     struct von_mises azimuth;
@@ -77,12 +87,13 @@ static inline float two_lobe_schlick(float cos_theta)
 }
 
 struct two_lobe_terms {
-    float g[2];     /* normal densities g(th_o; -th_i, beta) */
-    float x2;       /* (th_i + th_o)^2 */
+    float g[2]; /* normal densities g(th_o; -th_i, beta) */
+    float x2;   /* (th_i + th_o)^2 */
     float one_minus_cos, von_mises;
 };
 
-static inline struct two_lobe_terms two_lobe_terms_of(const struct scattering_state *s, const struct fiber_direction *di,
+static inline struct two_lobe_terms two_lobe_terms_of(const struct scattering_state *s,
+                                                      const struct fiber_direction *di,
                                                       const struct fiber_direction *dout)
 {
     struct two_lobe_terms t;
@@ -94,9 +105,9 @@ static inline struct two_lobe_terms two_lobe_terms_of(const struct scattering_st
     return t;
 }
 
-static inline void two_lobe_eval_terms(const struct scattering_state *s, bool balanced, const struct fiber_direction *di,
-                                       const struct fiber_direction *dout, const struct two_lobe_terms *t, float s_rgb[3],
-                                       float *score)
+static inline void two_lobe_eval_terms(const struct scattering_state *s, bool balanced,
+                                       const struct fiber_direction *di, const struct fiber_direction *dout,
+                                       const struct two_lobe_terms *t, float s_rgb[3], float *score)
 {
     float scale[2], d_scale[2], k;
     two_lobe_scale_at(s, balanced, di->theta_rad, scale, d_scale);
@@ -151,14 +162,16 @@ static inline struct two_lobe_sampling_entry two_lobe_sampling_at(const struct s
     return e;
 }
 
-/* Probability of drawing from the R lobe: least summed variance of the channels, so in proportion to the root of the channels' summed
- * squares. Neither lobe is starved: both carry derivatives even where one is dark. */
-static inline float two_lobe_p_r(const struct scattering_state *s, const struct two_lobe_sampling_entry *e, const float *weight_rgb)
+/* Probability of drawing from the R lobe: least summed variance of the channels, so in proportion to the root of the
+ * channels' summed squares. Neither lobe is starved: both carry derivatives even where one is dark. */
+static inline float two_lobe_p_r(const struct scattering_state *s, const struct two_lobe_sampling_entry *e,
+                                 const float *weight_rgb)
 {
     float r = 0, tt = 0;
     for (int c = 0; c < 3; c++) {
         float w = weight_rgb != NULL ? weight_rgb[c] : 1;
-        float a = w * (s->c_r[c] * e->energy[0] + s->not_c_r[c] * e->energy[1]), b = w * s->c_tt[c] * s->not_c_r[c] * e->energy[2];
+        float a = w * (s->c_r[c] * e->energy[0] + s->not_c_r[c] * e->energy[1]),
+              b = w * s->c_tt[c] * s->not_c_r[c] * e->energy[2];
         r += a * a;
         tt += b * b;
     }
@@ -169,17 +182,18 @@ static inline float two_lobe_p_r(const struct scattering_state *s, const struct 
 }
 
 static inline float two_lobe_pdf_terms(const struct scattering_state *s, const struct fiber_direction *di,
-                                       const struct fiber_direction *dout, const float *weight_rgb, const struct two_lobe_terms *t)
+                                       const struct fiber_direction *dout, const float *weight_rgb,
+                                       const struct two_lobe_terms *t)
 {
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout->theta_rad);
     float p_r = two_lobe_p_r(s, &e, weight_rgb);
     float r = t->g[TWO_LOBE_R] * 2 / (e.near[TWO_LOBE_R] + e.far[TWO_LOBE_R]) * (float)(0.5 / M_PI);
     float tt = t->g[TWO_LOBE_TT] * 2 / (e.near[TWO_LOBE_TT] + e.far[TWO_LOBE_TT]) * t->von_mises;
-    return (p_r * r + (1 - p_r) * tt) / fmaxf(di->cos_theta, FIBER_COS_MIN);
+    return (p_r * r + (1 - p_r) * tt) / (di->cos_theta > FIBER_COS_MIN ? di->cos_theta : FIBER_COS_MIN);
 }
 
-static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool balanced, const float wi[3], const float wo[3],
-                                      const float *weight_rgb, float s_rgb[3], float *score)
+static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool balanced, const float wi[3],
+                                      const float wo[3], const float *weight_rgb, float s_rgb[3], float *score)
 {
     struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
     struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
@@ -188,7 +202,8 @@ static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool bal
 }
 
 /* Shared by both models as they are. */
-void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3], float wi[3]);
+void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
+                     float wi[3]);
 float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb);
 void two_lobe_release(struct scattering_state *s);
 

@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* exp(-x) I_n(x) = 1/pi int_0^pi exp(x (cos t - 1)) cos(n t) dt, by the power series below 30 and Hankel's series above. */
+/* exp(-x) I_n(x) = 1/pi int_0^pi exp(x (cos t - 1)) cos(n t) dt, by the power series below 30 and Hankel's series
+ * above. */
 static double bessel_scaled(int n, double x)
 {
     if (x < 30) {

@@ -1,8 +1,8 @@
 /* The azimuthal lobe f(ph; 0, s) = exp(s^-2 cos ph) / (2 pi I0(s^-2)): constants, density, exact sampling.
  * Everything uses I0 scaled by exp(-x): for narrow lobes s^-2 exceeds 3000.
  *
- * Sampling: u -> normal quantile z -> K(z), where K solves F(K) = Phi(z) (F, Phi the two distribution functions). K is smooth and
- * nearly linear, so 512 cubic pieces reproduce it to float precision.
+ * Sampling: u -> normal quantile z -> K(z), where K solves F(K) = Phi(z) (F, Phi the two distribution functions). K is
+ * smooth and nearly linear, so 512 cubic pieces reproduce it to float precision.
  */
 #ifndef SELVEDGE_RENDERER_VON_MISES_H
 #define SELVEDGE_RENDERER_VON_MISES_H
@@ -11,10 +11,10 @@ enum { VON_MISES_N_PIECE = 512 };
 #define VON_MISES_Z_MAX 5.75f
 
 struct von_mises {
-    float kappa;             /* s^-2 */
-    float norm;              /* 1 / (2 pi exp(-kappa) I0(kappa)): the density at its peak */
-    float score_at_peak;     /* d ln f / d s at ph = 0 */
-    float score_slope;       /* ... falls by this per unit of 1 - cos ph */
+    float kappa;                          /* s^-2 */
+    float norm;                           /* 1 / (2 pi exp(-kappa) I0(kappa)): the density at its peak */
+    float score_at_peak;                  /* d ln f / d s at ph = 0 */
+    float score_slope;                    /* ... falls by this per unit of 1 - cos ph */
     float node[VON_MISES_N_PIECE + 1][2]; /* K and dK/dz times the step */
 };
 

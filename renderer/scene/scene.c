@@ -22,8 +22,8 @@ static bool count_device_memory(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-/* Ng points out of the fiber: a positive product with the direction is a way out. The packets' arrays hold one field after the
- * other (rtcore_ray.h: dir_x is field 4 of a ray, Ng_x field 0 of a hit). */
+/* Ng points out of the fiber: a positive product with the direction is a way out. The packets' arrays hold one field
+ * after the other (rtcore_ray.h: dir_x is field 4 of a ray, Ng_x field 0 of a hit). */
 static void reject_back_faces(const struct RTCFilterFunctionNArguments *a)
 {
     const float *ray = (const float *)a->ray, *hit = (const float *)a->hit;
@@ -72,7 +72,8 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
                                 (v + 2 < s->n_vertex ? RTC_CURVE_FLAG_NEIGHBOR_RIGHT : 0));
         }
     }
-    if (s->n_segment == 0) return error_set(err, STATUS_INVALID, "cannot build scene: no fiber longer than its points' rounding");
+    if (s->n_segment == 0)
+        return error_set(err, STATUS_INVALID, "cannot build scene: no fiber longer than its points' rounding");
     return STATUS_OK;
 }
 
@@ -99,9 +100,10 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
         s->inset_low_mm[a] = (float)((double)hi[a] - (h + 1) * tile);
         s->inset_high_mm[a] = (float)((double)lo[a] + (h + 1) * tile);
         if (s->inset_low_mm[a] > -0.25f * (float)tile || s->inset_high_mm[a] < 1.25f * (float)tile)
-            return error_set(err, STATUS_INVALID,
-                             "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm", (double)lo[a],
-                             (double)hi[a], a == 0 ? "x" : "y", tile);
+            return error_set(
+                err, STATUS_INVALID,
+                "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm",
+                (double)lo[a], (double)hi[a], a == 0 ? "x" : "y", tile);
     }
     return STATUS_OK;
 }
@@ -109,9 +111,10 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
 static void build_tile(struct scene *s)
 {
     RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, s->vertex, 0, sizeof *s->vertex, s->n_vertex);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, s->segment_vertex, 0, sizeof *s->segment_vertex,
-                               s->n_segment);
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, s->vertex, 0, sizeof *s->vertex,
+                               s->n_vertex);
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, s->segment_vertex, 0,
+                               sizeof *s->segment_vertex, s->n_segment);
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, s->segment_flag, 0, 1, s->n_segment);
     rtcSetGeometryIntersectFilterFunction(g, reject_back_faces);
     rtcSetGeometryOccludedFilterFunction(g, reject_back_faces);
@@ -153,7 +156,8 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     /* one build thread: the order of the tree's leaves, which decides ties, must not depend on timing */
     s->device = rtcNewDevice("threads=1,set_affinity=0");
     if (s->device == NULL) {
-        st = error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)", (int)rtcGetDeviceError(NULL));
+        st = error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)",
+                       (int)rtcGetDeviceError(NULL));
         goto out;
     }
     rtcSetDeviceErrorFunction(s->device, on_device_error, &device_error);
@@ -194,5 +198,6 @@ size_t scene_memory_bytes(const struct scene *s)
 }
 
 size_t scene_n_segment(const struct scene *s) { return s->n_segment; }
+uint32_t scene_fiber_of(const struct scene *s, uint32_t i_segment) { return s->segment_fiber[i_segment]; }
 bool scene_has_black_sheet(const struct scene *s) { return s->black_sheet; }
 double scene_thickness_mm(const struct scene *s) { return -(double)s->bottom_mm; }

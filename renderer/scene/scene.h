@@ -1,5 +1,6 @@
-/* A cloth ready for ray tracing: fibers as Embree round linear curves, one tile, instanced in a block; beyond the block rays are
- * wrapped by whole tiles, so the cloth has no edge. Immutable after scene_new: shared by threads. Millimetres inside.
+/* A cloth ready for ray tracing: fibers as Embree round linear curves, one tile, instanced in a block; beyond the block
+ * rays are wrapped by whole tiles, so the cloth has no edge. Immutable after scene_new: shared by threads. Millimetres
+ * inside.
  */
 #ifndef SELVEDGE_RENDERER_SCENE_H
 #define SELVEDGE_RENDERER_SCENE_H
@@ -12,7 +13,7 @@
 struct scene;
 
 struct scene_option {
-    bool black_sheet;   /* true: light that passes the cloth downwards is absorbed and none comes from below */
+    bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
 };
 
 /* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_INVALID. */

@@ -22,9 +22,9 @@ struct scene {
     uint32_t *segment_fiber;
     unsigned char *segment_flag;
     double tile_mm[2];
-    int half_block[2];        /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
+    int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
     float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */
-    float bottom_mm;          /* < 0; the top is 0 */
+    float bottom_mm;                         /* < 0; the top is 0 */
     bool black_sheet;
     atomic_llong device_bytes;
 };

@@ -1,9 +1,9 @@
 /* Rays through an endless cloth: the inner interface between scene and tracer.
  *
- * Frame: the cloth frame in millimetres, x and y as the fiber set has them, z shifted so that the highest fiber surface is z = 0
- * (the plane of the orbit centre). A ray's origin is local: wrapped into the centre tile; local + offset is where it really is.
- * Front faces only: a hit from inside a fiber does not exist, since a scattering event already is the way through the fiber.
- * Threads: any number on one scene; flush-to-zero should be set (thread_pool does).
+ * Frame: the cloth frame in millimetres, x and y as the fiber set has them, z shifted so that the highest fiber surface
+ * is z = 0 (the plane of the orbit centre). A ray's origin is local: wrapped into the centre tile; local + offset is
+ * where it really is. Front faces only: a hit from inside a fiber does not exist, since a scattering event already is
+ * the way through the fiber. Threads: any number on one scene; flush-to-zero should be set (thread_pool does).
  */
 #ifndef SELVEDGE_RENDERER_SCENE_RAY_H
 #define SELVEDGE_RENDERER_SCENE_RAY_H
@@ -13,9 +13,9 @@
 #include <stdint.h>
 
 struct scene_ray {
-    double offset_mm[2];  /* whole tiles */
-    float origin_mm[3];   /* local */
-    float direction[3];   /* unit */
+    double offset_mm[2]; /* whole tiles */
+    float origin_mm[3];  /* local */
+    float direction[3];  /* unit */
     float tnear_mm;
 };
 
@@ -24,21 +24,25 @@ struct scene_hit {
     float normal[3];      /* unit, out of the fiber */
     float tangent[3];     /* unit, along the fiber */
     float radius_mm;
-    uint32_t i_segment;
-    uint32_t i_fiber;
+    uint32_t i_segment; /* scene_fiber_of tells its fiber */
 };
 
-/* Nearest front face. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves the cloth
- * upwards or downwards, or, after SCENE_MAX_WRAP blocks within it, is taken to have left. */
+/* Nearest front face. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves
+ * the cloth upwards or downwards, or, after SCENE_MAX_WRAP blocks within it, is taken to have left. */
 bool scene_trace(const struct scene *scene, struct scene_ray *ray, struct scene_hit *hit);
 /* Whether any front face lies ahead; the ray itself is not changed. */
 bool scene_occluded(const struct scene *scene, const struct scene_ray *ray);
 
 /* Ray leaving a hit point: starts behind the fiber's far side when it points into the fiber. */
-void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3], struct scene_ray *ray);
+void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
+                     struct scene_ray *ray);
 /* Ray from a point outside (double precision, unwrapped), brought to the top or bottom plane of the cloth.
  * False when it never meets the cloth. */
-bool scene_ray_enter(const struct scene *scene, const double origin_mm[3], const double direction[3], struct scene_ray *ray);
+bool scene_ray_enter(const struct scene *scene, const double origin_mm[3], const double direction[3],
+                     struct scene_ray *ray);
+
+/* Index in the fiber set of a hit segment's fiber. */
+uint32_t scene_fiber_of(const struct scene *scene, uint32_t i_segment);
 
 bool scene_has_black_sheet(const struct scene *scene);
 /* z of the lowest fiber surface (the top is 0). */

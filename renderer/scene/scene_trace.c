@@ -24,18 +24,19 @@ static inline float reach(const struct scene *s, const struct scene_ray *r, bool
     float t = INFINITY;
     for (int a = 0; a < 2; a++) {
         float to = (d[a] > 0 ? s->inset_high_mm[a] : s->inset_low_mm[a]) - o[a];
-        if (d[a] != 0) t = fminf(t, to / d[a]);
+        float t_edge = d[a] != 0 ? to / d[a] : INFINITY;
+        t = t_edge < t ? t_edge : t;
     }
     float plane = d[2] > 0 ? SLAB_MARGIN_MM : s->bottom_mm - SLAB_MARGIN_MM;
     float t_slab = d[2] != 0 ? (plane - o[2]) / d[2] : INFINITY;
     *leaves = t_slab <= t;
-    return fminf(t, t_slab);
+    return *leaves ? t_slab : t;
 }
 
 static inline void advance(struct scene_ray *r, float t)
 {
     for (int a = 0; a < 3; a++) r->origin_mm[a] += t * r->direction[a];
-    r->tnear_mm = fmaxf(r->tnear_mm - t, 0);
+    r->tnear_mm = r->tnear_mm > t ? r->tnear_mm - t : 0;
 }
 
 static inline void fill_ray(struct RTCRay *q, const struct scene_ray *r, float tfar)
@@ -61,7 +62,6 @@ static void fill_hit(const struct scene *s, const struct scene_ray *r, const str
     float inv = 1 / sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     for (int a = 0; a < 3; a++) hit->normal[a] = n[a] * inv;
     hit->i_segment = q->hit.primID;
-    hit->i_fiber = s->segment_fiber[hit->i_segment];
     const struct scene_vertex *v = &s->vertex[s->segment_vertex[hit->i_segment]];
     float t[3] = {v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z};
     inv = 1 / sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
@@ -114,14 +114,15 @@ bool scene_occluded(const struct scene *s, const struct scene_ray *ray)
     return false;
 }
 
-void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3], struct scene_ray *r)
+void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
+                     struct scene_ray *r)
 {
     const float *n = hit->normal, *d = hit->tangent, *w = direction;
     float cos_n = n[0] * w[0] + n[1] * w[1] + n[2] * w[2], along = d[0] * w[0] + d[1] * w[1] + d[2] * w[2];
     float tnear = 0;
     if (cos_n < 0) { /* chord of the cylinder; capped, as fibers bend */
-        float sin2 = fmaxf(1 - along * along, 1e-6f);
-        tnear = fminf(-2 * cos_n / sin2, 4) * hit->radius_mm;
+        float sin2 = 1 - along * along;
+        tnear = (-2 * cos_n < 4 * sin2 ? -2 * cos_n / sin2 : 4) * hit->radius_mm;
     }
     memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
     memcpy(r->origin_mm, hit->position_mm, sizeof r->origin_mm);

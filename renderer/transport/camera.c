@@ -8,7 +8,8 @@ void camera_init(struct camera *m, const struct configuration *c)
     double crop = 1e3 * c->crop_m, distance = 1e3 * c->camera_distance_m;
     double back[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
     double up[3] = {-cos(theta) * cos(phi), -cos(theta) * sin(phi), sin(theta)};
-    double right[3] = {up[1] * back[2] - up[2] * back[1], up[2] * back[0] - up[0] * back[2], up[0] * back[1] - up[1] * back[0]};
+    double right[3] = {up[1] * back[2] - up[2] * back[1], up[2] * back[0] - up[0] * back[2],
+                       up[0] * back[1] - up[1] * back[0]};
     for (int a = 0; a < 3; a++) {
         m->eye_mm[a] = distance * back[a];
         m->right_mm[a] = crop * right[a];

@@ -1,5 +1,6 @@
-/* The camera of a configuration, in the frame of the (turned) cloth: perspective, crop of crop_m square at the orbit centre
- * perpendicular to the view. Up is the projection of the cloth normal, which for a view along the normal means: away from phi.
+/* The camera of a configuration, in the frame of the (turned) cloth: perspective, crop of crop_m square at the orbit
+ * centre perpendicular to the view. Up is the projection of the cloth normal, which for a view along the normal means:
+ * away from phi.
  */
 #ifndef SELVEDGE_RENDERER_CAMERA_H
 #define SELVEDGE_RENDERER_CAMERA_H

@@ -26,7 +26,7 @@ struct run {
     struct camera *camera;
     struct task *task;
     size_t n_task;
-    struct task_sum *sum;         /* per task */
+    struct task_sum *sum; /* per task */
 };
 
 static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t i_block, struct task_sum *sum)
@@ -77,12 +77,13 @@ static status make_tasks(struct run *r, struct error *err)
         for (size_t i = 0; i < q->n_configuration; i++) {
             uint64_t n_block = ((uint64_t)q->n_path[i] + BLOCK_PATHS - 1) / BLOCK_PATHS;
             if (n_block > UINT32_MAX)
-                return error_set_field(err, STATUS_TOO_LARGE, "n_path", "cannot trace %zu paths for configuration %zu: too many",
-                                       q->n_path[i], i);
+                return error_set_field(err, STATUS_TOO_LARGE, "n_path",
+                                       "cannot trace %zu paths for configuration %zu: too many", q->n_path[i], i);
             uint64_t per_task = 1 + n_block / TASKS_PER_CONFIGURATION;
             for (uint64_t b = 0; b < n_block; b += per_task, n++)
                 if (pass == 1)
-                    r->task[n] = (struct task){(uint32_t)i, (uint32_t)b, (uint32_t)(n_block - b < per_task ? n_block - b : per_task)};
+                    r->task[n] = (struct task){(uint32_t)i, (uint32_t)b,
+                                               (uint32_t)(n_block - b < per_task ? n_block - b : per_task)};
         }
         if (pass == 0) {
             r->task = malloc((n + 1) * sizeof *r->task);
@@ -98,17 +99,21 @@ static status make_tasks(struct run *r, struct error *err)
 static status check_request(const struct estimate_request *q, struct error *err)
 {
     if (q->n_configuration > 4096)
-        return error_set_field(err, STATUS_INVALID, "n_configuration", "cannot estimate %zu configurations: at most 4096 have random numbers of their own",
+        return error_set_field(err, STATUS_INVALID, "n_configuration",
+                               "cannot estimate %zu configurations: at most 4096 have random numbers of their own",
                                q->n_configuration);
     if (q->iteration > 65535 || q->replica > 15)
-        return error_set_field(err, STATUS_INVALID, "iteration", "cannot estimate iteration %u, replica %u: at most 65535 and 15",
-                               q->iteration, q->replica);
+        return error_set_field(err, STATUS_INVALID, "iteration",
+                               "cannot estimate iteration %u, replica %u: at most 65535 and 15", q->iteration,
+                               q->replica);
     for (size_t i = 0; i < q->n_configuration; i++) {
         const struct configuration *c = &q->configuration[i];
-        double sum = c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
-        if (!isfinite(sum) || !(c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2) || !(c->light_distance_m > 0) ||
-            !(c->lamp_side_m > 0) || !(c->camera_distance_m > 0) || !(c->crop_m > 0))
-            return error_set_field(err, STATUS_INVALID, "configuration", "cannot estimate configuration %zu: angles or distances make no sense", i);
+        double sum =
+            c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
+        if (!isfinite(sum) || !(c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2) ||
+            !(c->light_distance_m > 0) || !(c->lamp_side_m > 0) || !(c->camera_distance_m > 0) || !(c->crop_m > 0))
+            return error_set_field(err, STATUS_INVALID, "configuration",
+                                   "cannot estimate configuration %zu: angles or distances make no sense", i);
     }
     return STATUS_OK;
 }
@@ -143,9 +148,10 @@ static status reduce(const struct run *r, struct estimate *out, struct error *er
         double n = (double)total.n_path;
         for (size_t k = 0; k < 3 + n_jac; k++) {
             if (!isfinite(total.x2[k]))
-                return error_set_field(err, STATUS_NUMERIC, k < 3 ? "" : q->model->param[(k - 3) % q->model->n_param].name,
-                                       "scattering model '%s' gave a value that is not finite in configuration %zu (%s)", q->model->id, i,
-                                       k < 3 ? "radiance" : q->model->param[(k - 3) % q->model->n_param].name);
+                return error_set_field(
+                    err, STATUS_NUMERIC, k < 3 ? "" : q->model->param[(k - 3) % q->model->n_param].name,
+                    "scattering model '%s' gave a value that is not finite in configuration %zu (%s)", q->model->id, i,
+                    k < 3 ? "radiance" : q->model->param[(k - 3) % q->model->n_param].name);
             double mean = total.x[k] / n, var = mean_variance(total.x[k], total.x2[k], n);
             if (k < 3) {
                 e->mean[k] = mean;

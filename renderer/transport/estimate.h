@@ -1,6 +1,6 @@
-/* Path-traced estimates of mean radiance over a photograph's crop, with derivatives by every scattering parameter from the same paths
- * (fabric thesis 5.5.1, figure 5.3). Every figure carries the variance of its mean. Results depend on the key and the counts
- * only: bit-identical for any number of threads.
+/* Path-traced estimates of mean radiance over a photograph's crop, with derivatives by every scattering parameter from
+ * the same paths (fabric thesis 5.5.1, figure 5.3). Every figure carries the variance of its mean. Results depend on
+ * the key and the counts only: bit-identical for any number of threads.
  */
 #ifndef SELVEDGE_RENDERER_ESTIMATE_H
 #define SELVEDGE_RENDERER_ESTIMATE_H
@@ -16,24 +16,25 @@
 struct estimate_request {
     const struct scene *scene;
     const struct scattering_model *model;
-    const double *param;                 /* model->n_param, internal units */
+    const double *param; /* model->n_param, internal units */
     const struct configuration *configuration;
     size_t n_configuration;
-    const size_t *n_path;                /* per configuration; rounded up to whole blocks of 256; 0: skip, result n_path = 0 */
+    const size_t *n_path; /* per configuration; rounded up to whole blocks of 256; 0: skip, result n_path = 0 */
     uint64_t seed;
-    uint32_t iteration, replica;         /* rng.h; configuration i uses stream configuration = i */
+    uint32_t iteration, replica; /* rng.h; configuration i uses stream configuration = i */
     bool want_jacobian;
 };
 
 /* rgb means in radiance units. */
 struct estimate {
-    double mean[3], var[3];                      /* var: of the mean */
-    double jac[3 * SCATTERING_MAX_PARAM];        /* d mean[c] / d param p at [c * n_param + p], by internal unit */
+    double mean[3], var[3];               /* var: of the mean */
+    double jac[3 * SCATTERING_MAX_PARAM]; /* d mean[c] / d param p at [c * n_param + p], by internal unit */
     double jac_var[3 * SCATTERING_MAX_PARAM];
     uint64_t n_path, n_vertex;
 };
 
-/* out: n_configuration estimates. STATUS_CANCELLED, STATUS_NUMERIC (naming model and configuration when a NaN appears). */
+/* out: n_configuration estimates. STATUS_CANCELLED, STATUS_NUMERIC (naming model and configuration when a NaN appears).
+ */
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,
                     struct estimate *out, struct error *err);
 

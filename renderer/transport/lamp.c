@@ -6,7 +6,8 @@ static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1]
 
 void lamp_init(struct lamp *l, const struct configuration *c)
 {
-    double theta = c->light_theta_rad, phi = c->light_phi_rad - c->cloth_rotation_rad; /* turn lamp and camera, not the cloth */
+    double theta = c->light_theta_rad,
+           phi = c->light_phi_rad - c->cloth_rotation_rad; /* turn lamp and camera, not the cloth */
     double d[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
     double horizontal[3] = {-sin(phi), cos(phi), 0};
     double other[3] = {d[1] * horizontal[2] - d[2] * horizontal[1], d[2] * horizontal[0] - d[0] * horizontal[2],
@@ -23,7 +24,8 @@ void lamp_init(struct lamp *l, const struct configuration *c)
     l->radiance = (float)(M_PI / (4 * y * atan(y)));
 }
 
-bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u[2], float direction[3], float *pdf_per_sr)
+bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u[2], float direction[3],
+                 float *pdf_per_sr)
 {
     float x = (2 * u[0] - 1) * l->half_side_mm, y = (2 * u[1] - 1) * l->half_side_mm, to[3];
     for (int a = 0; a < 3; a++) to[a] = l->centre_mm[a] + x * l->edge[0][a] + y * l->edge[1][a] - position_mm[a];

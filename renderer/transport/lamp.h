@@ -1,6 +1,6 @@
 /* The square lamp of a configuration, in the frame of the (turned) cloth: millimetres, orbit centre at the origin.
- * It faces the orbit centre, one edge is horizontal, and it shines from its front side only. Its radiance makes the irradiance on a
- * surface at the orbit centre that faces the lamp exactly pi (configuration.h).
+ * It faces the orbit centre, one edge is horizontal, and it shines from its front side only. Its radiance makes the
+ * irradiance on a surface at the orbit centre that faces the lamp exactly pi (configuration.h).
  */
 #ifndef SELVEDGE_RENDERER_LAMP_H
 #define SELVEDGE_RENDERER_LAMP_H
@@ -11,15 +11,17 @@
 
 struct lamp {
     float centre_mm[3];
-    float edge[2][3];   /* unit: [0] horizontal */
-    float normal[3];    /* unit, towards the orbit centre */
+    float edge[2][3]; /* unit: [0] horizontal */
+    float normal[3];  /* unit, towards the orbit centre */
     float half_side_mm;
     float radiance;
 };
 
 void lamp_init(struct lamp *lamp, const struct configuration *c);
-/* Direction from position_mm (unwrapped) to a random point of the lamp; density per steradian. False behind the lamp. */
-bool lamp_sample(const struct lamp *lamp, const float position_mm[3], const float u[2], float direction[3], float *pdf_per_sr);
+/* Direction from position_mm (unwrapped) to a random point of the lamp; density per steradian. False behind the lamp.
+ */
+bool lamp_sample(const struct lamp *lamp, const float position_mm[3], const float u[2], float direction[3],
+                 float *pdf_per_sr);
 /* The density with which lamp_sample would have chosen this direction; 0 when it misses the lamp's front. */
 float lamp_pdf(const struct lamp *lamp, const float position_mm[3], const float direction[3]);
 

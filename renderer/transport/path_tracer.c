@@ -4,10 +4,10 @@
 #include <string.h>
 
 #ifndef ROULETTE_BELOW
-#define ROULETTE_BELOW 0.2f
+#define ROULETTE_BELOW 0.3f
 #endif
 #ifndef SHADOW_BELOW
-#define SHADOW_BELOW 0.004f
+#define SHADOW_BELOW 0.01f
 #endif
 
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
@@ -23,7 +23,8 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     s->want_jacobian = want_jacobian;
 }
 
-/* Fiber frame: u along the fiber, v and w any two perpendicular to it (Duff et al. 2017, "Building an orthonormal basis, revisited"). */
+/* Fiber frame: u along the fiber, v and w any two perpendicular to it (Duff et al. 2017, "Building an orthonormal
+ * basis, revisited"). */
 struct frame {
     float u[3], v[3], w[3];
 };
@@ -76,10 +77,10 @@ struct walk {
     const struct path_setting *s;
     struct rng *rng;
     struct path_result *out;
-    struct path_step *step;        /* being recorded, or NULL */
+    struct path_step *step; /* being recorded, or NULL */
     size_t n_score;
     float throughput[3];
-    float h[PATH_N_DERIVATIVE];    /* running score sums */
+    float h[PATH_N_DERIVATIVE]; /* running score sums */
     float score[PATH_N_DERIVATIVE];
 };
 
@@ -90,12 +91,19 @@ static inline void add_light(struct walk *w, const float value[3], const float *
     if (!w->s->want_jacobian) return;
     size_t n = w->s->model->n_param;
     for (size_t c = 0; c < 3; c++)
-        for (size_t p = c * n; p < (c + 1) * n; p++) w->out->jac[p] += value[c] * (w->h[p] + (score != NULL ? score[p] : 0));
+        for (size_t p = c * n; p < (c + 1) * n; p++)
+            w->out->jac[p] += value[c] * (w->h[p] + (score != NULL ? score[p] : 0));
+}
+
+/* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
+static void keep_nan(struct walk *w, const float value[3])
+{
+    if (isnan(value[0] + value[1] + value[2])) w->out->radiance[0] = NAN;
 }
 
 /* Next-event estimation: one point on the lamp. */
-static void connect_lamp(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit, const struct frame *f,
-                         const float wo[3])
+static void connect_lamp(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
+                         const struct frame *f, const float wo[3])
 {
     const struct path_setting *s = w->s;
     float position[3], u[2], direction[3], pdf_lamp, wi[3], s_rgb[3];
@@ -109,9 +117,12 @@ static void connect_lamp(struct walk *w, const struct scene_ray *ray, const stru
     float light = s->lamp.radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
     for (int c = 0; c < 3; c++) {
         value[c] = w->throughput[c] * s_rgb[c] * light;
-        most = fmaxf(most, value[c]);
+        most = value[c] > most ? value[c] : most;
     }
-    if (!(most > 0)) return;
+    if (!(most > 0)) {
+        keep_nan(w, value);
+        return;
+    }
     if (most < SHADOW_BELOW) { /* hardly any light: trace few of these shadow rays, for more each */
         float survival = most / SHADOW_BELOW;
         if (rng_float(w->rng) >= survival) return;
@@ -148,8 +159,8 @@ static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 }
 
 /* Scatters the ray at the hit. False: roulette (or a dark fiber) ends the path. */
-static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hit *hit, const struct frame *f, const float wo[3],
-                    float *pdf_out)
+static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hit *hit, const struct frame *f,
+                    const float wo[3], float *pdf_out)
 {
     const struct path_setting *s = w->s;
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
@@ -159,9 +170,12 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
     float weight = cos_theta(wi) / pdf, most = 0, next[3];
     for (int c = 0; c < 3; c++) {
         next[c] = w->throughput[c] * s_rgb[c] * weight;
-        most = fmaxf(most, next[c]);
+        most = next[c] > most ? next[c] : most;
     }
-    if (!(most > 0)) return false;
+    if (!(most > 0)) {
+        keep_nan(w, next);
+        return false;
+    }
     if (most < s->roulette_below) {
         survival = most / s->roulette_below;
         if (rng_float(w->rng) >= survival) return false;

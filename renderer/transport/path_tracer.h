@@ -1,6 +1,7 @@
-/* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric thesis 5.5.1,
- * figure 5.3): beside the throughput T runs the sum H of scores d ln S / d p, and every light connection adds L and L (H + score).
- * The sampling densities, the roulette and the weights that combine lamp and scattering samples (power heuristic) are held fixed.
+/* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric
+ * thesis 5.5.1, figure 5.3): beside the throughput T runs the sum H of scores d ln S / d p, and every light connection
+ * adds L and L (H + score). The sampling densities, the roulette and the weights that combine lamp and scattering
+ * samples (power heuristic) are held fixed.
  */
 #ifndef SELVEDGE_RENDERER_PATH_TRACER_H
 #define SELVEDGE_RENDERER_PATH_TRACER_H
@@ -19,8 +20,8 @@ struct path_setting {
     struct lamp lamp;
     bool has_lamp;
     bool has_environment;
-    float environment[3];    /* the same radiance from every direction (from below only without the black sheet) */
-    float roulette_below;    /* throughput under which paths are ended at random; 0: never */
+    float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
+    float roulette_below; /* throughput under which paths are ended at random; 0: never */
     bool want_jacobian;
 };
 
@@ -38,10 +39,10 @@ struct path_result {
  * T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
 struct path_step {
     float wo[3], wi[3];
-    float weight;          /* cos th_i / (density * survival) */
+    float weight; /* cos th_i / (density * survival) */
     float light_wi[3];
-    float light;           /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
-    float escape[3];       /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
+    float light;     /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
+    float escape[3]; /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
 };
 
 struct path_record {

@@ -70,9 +70,12 @@ static status name_channels(struct image *im, const struct scattering_model *m, 
     const char **name = (const char **)(void *)block;
     for (size_t i = 0; i < n; i++) {
         char *text = block + n * sizeof(char *) + i * NAME_BYTES;
-        if (i < 3) snprintf(text, NAME_BYTES, "%c", channel[i]);
-        else if (i < 6) snprintf(text, NAME_BYTES, "var.%c", channel[i - 3]);
-        else snprintf(text, NAME_BYTES, "d_%s.%c", m->param[(i - 6) / 3].name, channel[i % 3]);
+        if (i < 3)
+            snprintf(text, NAME_BYTES, "%c", channel[i]);
+        else if (i < 6)
+            snprintf(text, NAME_BYTES, "var.%c", channel[i - 3]);
+        else
+            snprintf(text, NAME_BYTES, "d_%s.%c", m->param[(i - 6) / 3].name, channel[i % 3]);
         name[i] = text;
     }
     im->channel_name = name;
@@ -85,19 +88,21 @@ static status check_finite(const struct image *im, const struct scattering_model
     for (size_t i = 0; i < im->width * im->height; i++)
         for (size_t k = 0; k < im->n_channel; k++)
             if ((k < 3 || k >= 6) && !isfinite(im->pixel[i * im->n_channel + k]))
-                return error_set(err, STATUS_NUMERIC, "scattering model '%s' gave a value that is not finite in pixel %zu, %zu (%s)", m->id,
+                return error_set(err, STATUS_NUMERIC,
+                                 "scattering model '%s' gave a value that is not finite in pixel %zu, %zu (%s)", m->id,
                                  i % im->width, i / im->width, im->channel_name[k]);
     return STATUS_OK;
 }
 
-status render_run(const struct render_request *q, struct thread_pool *pool, const struct progress *progress, struct image *im,
-                  struct error *err)
+status render_run(const struct render_request *q, struct thread_pool *pool, const struct progress *progress,
+                  struct image *im, struct error *err)
 {
     struct scattering_state *state = NULL;
     memset(im, 0, sizeof *im);
-    if (q->n_sample == 0 || q->n_sample > UINT32_MAX || q->width == 0 || q->height == 0 || q->width > 65536 || q->height > 65536 || q->stream > 4095)
-        return error_set(err, STATUS_INVALID, "cannot render %zu x %zu pixels with %zu samples in stream %u", q->width, q->height, q->n_sample,
-                         q->stream);
+    if (q->n_sample == 0 || q->n_sample > UINT32_MAX || q->width == 0 || q->height == 0 || q->width > 65536 ||
+        q->height > 65536 || q->stream > 4095)
+        return error_set(err, STATUS_INVALID, "cannot render %zu x %zu pixels with %zu samples in stream %u", q->width,
+                         q->height, q->n_sample, q->stream);
     status st = q->model->prepare(q->param, &state, err);
     if (st != STATUS_OK) return st;
     struct run r = {.q = q, .progress = progress, .im = im, .n_pixel = q->width * q->height};

@@ -13,7 +13,7 @@ struct render_request {
     const struct configuration *configuration;
     size_t width, height, n_sample; /* samples a pixel */
     uint64_t seed;
-    uint32_t stream;                /* takes the place of the configuration number in the random key */
+    uint32_t stream; /* takes the place of the configuration number in the random key */
     bool want_derivative;
 };
 

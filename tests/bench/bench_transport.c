@@ -34,7 +34,8 @@ static double processor_s(void)
 
 static void print(const char *set, const char *what, double value, const char *unit, const char *better)
 {
-    printf("{\"name\":\"transport.%s%s%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", set, what[0] ? "." : "", what, value, unit, better);
+    printf("{\"name\":\"transport.%s%s%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", set,
+           what[0] ? "." : "", what, value, unit, better);
     fflush(stdout);
 }
 
@@ -51,7 +52,8 @@ int main(int argc, char **argv)
     size_t n[16], warm[16];
     hand_weave_bench(&f);
     orbit_configurations_16(c);
-    if (scene_new(&f, &(struct scene_option){true}, &scene, &err) != STATUS_OK || thread_pool_new(1, &pool, &err) != STATUS_OK) {
+    if (scene_new(&f, &(struct scene_option){true}, &scene, &err) != STATUS_OK ||
+        thread_pool_new(1, &pool, &err) != STATUS_OK) {
         fprintf(stderr, "%s\n", err.text);
         return 1;
     }
@@ -75,7 +77,8 @@ int main(int argc, char **argv)
             fprintf(stderr, "%s\n", err.text);
             return 1;
         }
-        double spent = processor_s() - t0, per_path = spent / (16.0 * (double)n_path), s_mean = 0, s_derivative = 0, sd = 0, vertex = 0;
+        double spent = processor_s() - t0, per_path = spent / (16.0 * (double)n_path), s_mean = 0, s_derivative = 0,
+               sd = 0, vertex = 0;
         for (int i = 0; i < 16; i++) {
             double mean = 0, var = 0, jac = 0, jac_var = 0;
             for (int ch = 0; ch < 3; ch++) { /* channels are correlated: add standard errors */

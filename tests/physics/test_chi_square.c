@@ -16,12 +16,14 @@ enum { N_THETA = 48, N_PHI = 48, SUB = 24, N_SAMPLE = 200000 };
 static size_t cell_of(const float w[3])
 {
     double theta = atan2((double)w[0], hypot((double)w[1], (double)w[2])), phi = atan2((double)w[2], (double)w[1]);
-    size_t i = (size_t)fmin(N_THETA - 1, (theta / M_PI + 0.5) * N_THETA), j = (size_t)fmin(N_PHI - 1, (phi / (2 * M_PI) + 0.5) * N_PHI);
+    size_t i = (size_t)fmin(N_THETA - 1, (theta / M_PI + 0.5) * N_THETA),
+           j = (size_t)fmin(N_PHI - 1, (phi / (2 * M_PI) + 0.5) * N_PHI);
     return i * N_PHI + j;
 }
 
 /* Integral of the density over each cell; returns its sum. */
-static double expected_counts(const struct scattering_model *m, const struct scattering_state *s, const float wo[3], const float *weight, double *expected)
+static double expected_counts(const struct scattering_model *m, const struct scattering_state *s, const float wo[3],
+                              const float *weight, double *expected)
 {
     double total = 0, h_theta = M_PI / (N_THETA * SUB), h_phi = 2 * M_PI / (N_PHI * SUB);
     memset(expected, 0, N_THETA * N_PHI * sizeof *expected);
@@ -38,14 +40,17 @@ static double expected_counts(const struct scattering_model *m, const struct sca
     return total;
 }
 
-static void check(const struct scattering_model *m, const double *param, const float wo[3], const float *weight, struct rng *r, double least_p)
+static void check(const struct scattering_model *m, const double *param, const float wo[3], const float *weight,
+                  struct rng *r, double least_p)
 {
     static double expected[N_THETA * N_PHI], count[N_THETA * N_PHI];
     struct scattering_state *s = NULL;
     struct error err = {0};
     if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
     double total = expected_counts(m, s, wo, weight, expected), n_degree;
-    if (fabs(total - 1) > 2e-3) fail_msg("%s: density integrates to %.6f for wo = %g %g %g", m->id, total, (double)wo[0], (double)wo[1], (double)wo[2]);
+    if (fabs(total - 1) > 2e-3)
+        fail_msg("%s: density integrates to %.6f for wo = %g %g %g", m->id, total, (double)wo[0], (double)wo[1],
+                 (double)wo[2]);
     for (size_t i = 0; i < N_THETA * N_PHI; i++) expected[i] /= total; /* what is left is the quadrature's */
     memset(count, 0, sizeof count);
     for (int i = 0; i < N_SAMPLE; i++) {
@@ -56,7 +61,8 @@ static void check(const struct scattering_model *m, const double *param, const f
     m->release(s);
     double x = chi_square_statistic(count, expected, N_THETA * N_PHI, &n_degree), p = chi_square_tail(x, n_degree);
     if (p < least_p)
-        fail_msg("%s: chi-square %.1f at %.0f degrees of freedom (p = %.2g) for wo = %g %g %g", m->id, x, n_degree, p, (double)wo[0], (double)wo[1], (double)wo[2]);
+        fail_msg("%s: chi-square %.1f at %.0f degrees of freedom (p = %.2g) for wo = %g %g %g", m->id, x, n_degree, p,
+                 (double)wo[0], (double)wo[1], (double)wo[2]);
 }
 
 static void samples_follow_the_density(void **state)
@@ -64,7 +70,8 @@ static void samples_follow_the_density(void **state)
     (void)state;
     static const double angle_deg[][2] = {{0, 90}, {-25, 200}, {50, 10}, {75, -60}, {-88, 33}, {90, 0}};
     enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 3 };
-    static const float coloured[2][3] = {{1, 0.1f, 0}, {0, 0.3f, 20}}; /* what the channels are worth moves the choice of lobes */
+    static const float coloured[2][3] = {{1, 0.1f, 0},
+                                         {0, 0.3f, 20}}; /* what the channels are worth moves the choice of lobes */
     const float *const weight[3] = {NULL, coloured[0], coloured[1]};
     size_t n_model = 0;
     while (scattering_registry()[n_model] != NULL) n_model++;
@@ -75,11 +82,15 @@ static void samples_follow_the_density(void **state)
         for (int set = 0; set < N_SET; set++)
             for (int a = 0; a < N_ANGLE; a++) {
                 const struct scattering_model *m = scattering_registry()[k];
-                double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * M_PI / 180, phi = angle_deg[a][1] * M_PI / 180;
+                double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * M_PI / 180,
+                                                    phi = angle_deg[a][1] * M_PI / 180;
                 for (size_t p = 0; p < m->n_param; p++) { /* start; everything widest; narrow lobes */
                     const struct param_info *i = &m->param[p];
                     bool angle = i->unit[0] != '\0';
-                    param[p] = set == 0 ? i->start : set == 1 ? i->upper : angle ? i->lower + 0.1 * (i->upper - i->lower) : 0.2 + 0.3 * (i->channel % 2);
+                    param[p] = set == 0   ? i->start
+                               : set == 1 ? i->upper
+                               : angle    ? i->lower + 0.1 * (i->upper - i->lower)
+                                          : 0.2 + 0.3 * (i->channel % 2);
                 }
                 float wo[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
                 check(m, param, wo, weight[(set + a) % 3], &r, least_p);
@@ -99,7 +110,8 @@ static void narrowest_lobes(void **state)
     enum { N = 60, DRAWS = 400000 };
     double count[N] = {0}, expected[N], n_degree, sd = param[8], n_tt = 0;
     const float wo[3] = {0, -1, 0};
-    for (int i = 0; i < DRAWS; i++) { /* azimuth of the TT lobe: the half behind the fiber and |th| beyond the R lobe's reach */
+    for (int i = 0; i < DRAWS;
+         i++) { /* azimuth of the TT lobe: the half behind the fiber and |th| beyond the R lobe's reach */
         float u[3] = {0.999f, rng_float(&r), rng_float(&r)}, wi[3];
         m->sample(s, wo, NULL, u, wi);
         double phi = atan2((double)wi[2], (double)wi[1]);

@@ -1,5 +1,5 @@
-/* Light scattered once by straight parallel fibers, against quadrature over the lamp. Fibers so dark that a second scattering does
- * not show, so far apart that they neither shade nor light each other.
+/* Light scattered once by straight parallel fibers, against quadrature over the lamp. Fibers so dark that a second
+ * scattering does not show, so far apart that they neither shade nor light each other.
  */
 #include "renderer/transport/estimate.h"
 #include "tests/support/hand_weave.h"
@@ -45,7 +45,8 @@ static double single_scattering(const struct configuration *c, const double para
     e0[2] = 0;
     unit(c->light_theta_rad + M_PI_2, c->light_phi_rad, e1);
     for (int i = 0; i < N * N; i++) {
-        double a = ((i % N + 0.5) / N - 0.5) * c->lamp_side_m, b = ((i / N + 0.5) / N - 0.5) * c->lamp_side_m, p[3], r2 = 0, wi[3];
+        double a = ((i % N + 0.5) / N - 0.5) * c->lamp_side_m, b = ((i / N + 0.5) / N - 0.5) * c->lamp_side_m, p[3],
+               r2 = 0, wi[3];
         for (int k = 0; k < 3; k++) {
             p[k] = c->light_distance_m * centre[k] + a * e0[k] + b * e1[k];
             r2 += p[k] * p[k];
@@ -63,7 +64,8 @@ static double single_scattering(const struct configuration *c, const double para
     return sum * M_PI / irradiance;
 }
 
-static void check(const struct configuration *c, const double param[9], struct thread_pool *pool, const struct scene *scene)
+static void check(const struct configuration *c, const double param[9], struct thread_pool *pool,
+                  const struct scene *scene)
 {
     const size_t n_path = 200000;
     struct estimate e;
@@ -74,8 +76,9 @@ static void check(const struct configuration *c, const double param[9], struct t
     for (int k = 0; k < 3; k++) {
         double want = coverage * single_scattering(c, param, k), se = sqrt(e.var[k]);
         if (!(fabs(e.mean[k] - want) < 4 * se + 5e-3 * want) || se > 0.05 * want)
-            fail_msg("camera %.0f/%.0f lamp %.0f/%.0f rotation %.0f, channel %d: %.6g +- %.2g, quadrature %.6g", c->camera_theta_rad / DEG,
-                     c->camera_phi_rad / DEG, c->light_theta_rad / DEG, c->light_phi_rad / DEG, c->cloth_rotation_rad / DEG, k, e.mean[k], se, want);
+            fail_msg("camera %.0f/%.0f lamp %.0f/%.0f rotation %.0f, channel %d: %.6g +- %.2g, quadrature %.6g",
+                     c->camera_theta_rad / DEG, c->camera_phi_rad / DEG, c->light_theta_rad / DEG,
+                     c->light_phi_rad / DEG, c->cloth_rotation_rad / DEG, k, e.mean[k], se, want);
     }
 }
 
@@ -84,8 +87,9 @@ static void single_scattering_from_straight_fibers(void **state)
     (void)state;
     /* the camera leans along the fibers, so that the covered share of the picture is 2 r / tile */
     static const double angle_deg[][5] = {/* camera theta, phi, lamp theta, phi, rotation */
-                                          {0, 0, 30, 90, 0},   {0, 0, 30, 0, 90},   {30, 0, 30, 180, 0}, {40, 90, 35, 270, 90},
-                                          {40, 270, 50, 80, 90}, {60, 180, 62, 5, 0}, {20, 45, 30, 235, 45}, {0, 0, 0, 0, 30}};
+                                          {0, 0, 30, 90, 0},     {0, 0, 30, 0, 90},     {30, 0, 30, 180, 0},
+                                          {40, 90, 35, 270, 90}, {40, 270, 50, 80, 90}, {60, 180, 62, 5, 0},
+                                          {20, 45, 30, 235, 45}, {0, 0, 0, 0, 30}};
     const double y_z[1][2] = {{0.13e-3, 0}};
     struct fiber_set f;
     struct scene *scene = NULL;
@@ -95,7 +99,8 @@ static void single_scattering_from_straight_fibers(void **state)
     assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
     for (size_t i = 0; i < sizeof angle_deg / sizeof angle_deg[0]; i++) {
         const double *a = angle_deg[i];
-        struct configuration c = {a[2] * DEG, a[3] * DEG, a[0] * DEG, a[1] * DEG, a[4] * DEG, 0.61, 0.10, 100, 8 * tile_m};
+        struct configuration c = {a[2] * DEG, a[3] * DEG, a[0] * DEG, a[1] * DEG, a[4] * DEG,
+                                  0.61,       0.10,       100,        8 * tile_m};
         const double narrow[9] = {0.02, 0.01, 0.03, 0.01, 0.02, 0.001, 2 * DEG, 12 * DEG, 20 * DEG};
         const double wide[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
         check(&c, wide, pool, scene);

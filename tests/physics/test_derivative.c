@@ -40,7 +40,8 @@ static void mid_parameters(const struct scattering_model *m, double *param)
     static const double colour[3] = {0.7, 0.45, 0.85};
     for (size_t p = 0; p < m->n_param; p++) {
         const struct param_info *i = &m->param[p];
-        param[p] = i->channel >= 0 ? (strcmp(i->symbol, "C_R") == 0 ? 0.3 : 1) * colour[i->channel] : i->lower + 0.4 * (i->upper - i->lower);
+        param[p] = i->channel >= 0 ? (strcmp(i->symbol, "C_R") == 0 ? 0.3 : 1) * colour[i->channel]
+                                   : i->lower + 0.4 * (i->upper - i->lower);
     }
 }
 
@@ -49,7 +50,8 @@ static void mid_parameters(const struct scattering_model *m, double *param)
 enum { N_PATH = 3000, STEP_CAPACITY = 4000 };
 
 /* Radiance of recorded paths at other parameters, exactly as path_tracer.h states it. */
-static void evaluate(const struct scattering_model *m, const double *param, const struct path_record *record, size_t n_record, double out[3])
+static void evaluate(const struct scattering_model *m, const double *param, const struct path_record *record,
+                     size_t n_record, double out[3])
 {
     struct scattering_state *s = NULL;
     assert_int_equal(m->prepare(param, &s, NULL), STATUS_OK);
@@ -115,7 +117,8 @@ static void check_recorded(const struct scene *scene, const struct scattering_mo
         for (size_t k = 0; k < 3; k++) {
             double fd = (up[k] - down[k]) / (2 * h), got = jac[k * m->n_param + p], scale = value[k] / param[p];
             if (fabs(fd - got) > 1e-3 * fabs(got) + 1e-4 * scale)
-                fail_msg("%s, %s, channel %zu: %.6g, difference %.6g (value %.4g)", m->id, m->param[p].name, k, got, fd, value[k]);
+                fail_msg("%s, %s, channel %zu: %.6g, difference %.6g (value %.4g)", m->id, m->param[p].name, k, got, fd,
+                         value[k]);
         }
     }
     free(steps);
@@ -134,8 +137,8 @@ static void recorded_paths(void **state)
 
 enum { N_BATCH = 24, BATCH_PATHS = 3072 };
 
-static void run(const struct scene *scene, const struct scattering_model *m, const double *param, struct thread_pool *pool, uint32_t batch,
-                struct estimate e[3])
+static void run(const struct scene *scene, const struct scattering_model *m, const double *param,
+                struct thread_pool *pool, uint32_t batch, struct estimate e[3])
 {
     const size_t n_path[3] = {BATCH_PATHS, BATCH_PATHS, BATCH_PATHS};
     struct error err = {0};
@@ -143,10 +146,10 @@ static void run(const struct scene *scene, const struct scattering_model *m, con
     if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
 
-/* Moves every slot of one symbol (all channels of a colour) together: each channel sees only its own. The mean slope over
- * [p - h, p + h] is compared with the derivatives' mean over it by Simpson's rule, so that steps can be wide. */
-static void check_symbol(const struct scene *scene, const struct scattering_model *m, const double *param, const char *symbol,
-                         struct thread_pool *pool, int *n_check, int *n_beyond_2se)
+/* Moves every slot of one symbol (all channels of a colour) together: each channel sees only its own. The mean slope
+ * over [p - h, p + h] is compared with the derivatives' mean over it by Simpson's rule, so that steps can be wide. */
+static void check_symbol(const struct scene *scene, const struct scattering_model *m, const double *param,
+                         const char *symbol, struct thread_pool *pool, int *n_check, int *n_beyond_2se)
 {
     struct sample_mean difference[3][3] = {{{0}}}, slope[3][3] = {{{0}}}, mean_difference[3] = {{0}};
     double at[3][SCATTERING_MAX_PARAM];
@@ -181,18 +184,20 @@ static void check_symbol(const struct scene *scene, const struct scattering_mode
     for (int v = 0; v < 3; v++) {
         double total = fabs(slope[v][0].mean + slope[v][1].mean + slope[v][2].mean);
         ++*n_check;
-        if (fabs(mean_difference[v].mean) > fmax(2 * sample_mean_se(&mean_difference[v]), 0.02 * total)) ++*n_beyond_2se;
+        if (fabs(mean_difference[v].mean) > fmax(2 * sample_mean_se(&mean_difference[v]), 0.02 * total))
+            ++*n_beyond_2se;
         for (int c = 0; c < 3; c++) {
             double d = fabs(difference[v][c].mean), se = sample_mean_se(&difference[v][c]), j = fabs(slope[v][c].mean);
             if (d > fmax(4 * se, 0.02 * j))
-                fail_msg("%s, %s, view %d, channel %d: derivative %.5g, difference off by %.3g (%.1f standard errors)", m->id, symbol, v, c,
-                         slope[v][c].mean, difference[v][c].mean, d / se);
+                fail_msg("%s, %s, view %d, channel %d: derivative %.5g, difference off by %.3g (%.1f standard errors)",
+                         m->id, symbol, v, c, slope[v][c].mean, difference[v][c].mean, d / se);
         }
     }
 }
 
-/* Channels share their paths, so the sum over channels counts: of fifteen comparisons 4.6 % each are beyond two standard errors by
- * chance; four or more are with probability 0.4 %. Every channel by itself has to stay within four. */
+/* Channels share their paths, so the sum over channels counts: of fifteen comparisons 4.6 % each are beyond two
+ * standard errors by chance; four or more are with probability 0.4 %. Every channel by itself has to stay within four.
+ */
 static void traced_again(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Energy: single fibers from the incident side (quadrature) and from the camera side (sampling against quadrature), and a whole
- * endless cloth in a uniform environment.
+/* Energy: single fibers from the incident side (quadrature) and from the camera side (sampling against quadrature), and
+ * a whole endless cloth in a uniform environment.
  */
 #include "renderer/transport/camera.h"
 #include "renderer/transport/path_tracer.h"
@@ -64,7 +64,8 @@ static void lossless_from_the_incident_side(void **state)
         for (double t = -80; t <= 80; t += 20) {
             double fresnel = 0.3 + 0.7 * pow(1 - cos(t * DEG), 5), want = fresnel + 0.8 * (1 - fresnel);
             double got = incident_furnace(m, s, t * DEG);
-            if (!(got <= want * 1.0005 && got >= want * 0.99)) fail_msg("beta_R %g, th_i %g: %.5f of %.5f come out", beta_deg[k], t, got, want);
+            if (!(got <= want * 1.0005 && got >= want * 0.99))
+                fail_msg("beta_R %g, th_i %g: %.5f of %.5f come out", beta_deg[k], t, got, want);
         }
         m->release(s);
     }
@@ -86,7 +87,8 @@ static void published_lobe_from_the_camera_side(void **state)
         }
 }
 
-static void sampled_camera_side(const struct scattering_model *m, const double *param, double theta_o, struct sample_mean *mean)
+static void sampled_camera_side(const struct scattering_model *m, const double *param, double theta_o,
+                                struct sample_mean *mean)
 {
     struct scattering_state *s = prepare(m, param);
     struct rng r;
@@ -122,7 +124,8 @@ static void sampling_gives_the_camera_side_integral(void **state)
         }
 }
 
-/* One lobe of the balanced model is lossless from both sides: R with C_R near 1 has no Fresnel rise and leaves nothing to TT. */
+/* One lobe of the balanced model is lossless from both sides: R with C_R near 1 has no Fresnel rise and leaves nothing
+ * to TT. */
 static void balanced_is_lossless_from_both_sides(void **state)
 {
     (void)state;
@@ -136,15 +139,17 @@ static void balanced_is_lossless_from_both_sides(void **state)
             if (fabs(got - 1) > 2e-3) fail_msg("beta_R %g, th_i %g: %.5f come out", beta_deg[k], t, got);
             struct sample_mean mean = {0};
             sampled_camera_side(m, param, t * DEG, &mean);
-            if (fabs(mean.mean - 1) > 4 * sample_mean_se(&mean) + 2e-3) fail_msg("beta_R %g, th_o %g: %.5f", beta_deg[k], t, mean.mean);
+            if (fabs(mean.mean - 1) > 4 * sample_mean_se(&mean) + 2e-3)
+                fail_msg("beta_R %g, th_o %g: %.5f", beta_deg[k], t, mean.mean);
         }
         m->release(s);
     }
 }
 
 /* Mean radiance of n paths of the crop, everything lit by a uniform environment of radiance 1. */
-static void cloth_furnace(const struct scene *scene, const struct scattering_model *m, const double *param, const struct configuration *c,
-                          uint32_t n, bool want_jacobian, struct sample_mean mean[3], double *worst)
+static void cloth_furnace(const struct scene *scene, const struct scattering_model *m, const double *param,
+                          const struct configuration *c, uint32_t n, bool want_jacobian, struct sample_mean mean[3],
+                          double *worst)
 {
     struct scattering_state *s = prepare(m, param);
     struct path_setting setting;
@@ -202,8 +207,8 @@ static void whole_cloth_isotropic(void **state)
     scene_free(scene);
 }
 
-/* The balanced model: radiance 1 within noise. Its two Fresnel shares are symmetric but only nearly complementary; at C_R = 0.999
- * the gap is below 0.001 at each scattering, and a path has a dozen. */
+/* The balanced model: radiance 1 within noise. Its two Fresnel shares are symmetric but only nearly complementary; at
+ * C_R = 0.999 the gap is below 0.001 at each scattering, and a path has a dozen. */
 static void whole_cloth_balanced(void **state)
 {
     (void)state;
@@ -224,9 +229,12 @@ static void whole_cloth_balanced(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lossless_from_the_incident_side),         cmocka_unit_test(published_lobe_from_the_camera_side),
-        cmocka_unit_test(sampling_gives_the_camera_side_integral), cmocka_unit_test(balanced_is_lossless_from_both_sides),
-        cmocka_unit_test(whole_cloth_isotropic),                   cmocka_unit_test(whole_cloth_balanced),
+        cmocka_unit_test(lossless_from_the_incident_side),
+        cmocka_unit_test(published_lobe_from_the_camera_side),
+        cmocka_unit_test(sampling_gives_the_camera_side_integral),
+        cmocka_unit_test(balanced_is_lossless_from_both_sides),
+        cmocka_unit_test(whole_cloth_isotropic),
+        cmocka_unit_test(whole_cloth_balanced),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

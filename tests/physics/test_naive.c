@@ -1,5 +1,5 @@
-/* The renderer against the naive tracer of tests/support on a small woven cloth: two implementations that must agree. The lamp is
- * large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
+/* The renderer against the naive tracer of tests/support on a small woven cloth: two implementations that must agree.
+ * The lamp is large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
  */
 #include "renderer/transport/estimate.h"
 #include "tests/support/hand_weave.h"
@@ -55,7 +55,8 @@ static void agree(const struct configuration *c, const double *param, struct thr
     struct estimate_request q = {scene, scattering_find("two_lobe.v1"), param, c, 1, &n_path, 5, 0, 0, false};
     if (estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     double se = sqrt(sample_mean_se(&batch) * sample_mean_se(&batch) + e.var[0]), z = (batch.mean - e.mean[0]) / se;
-    print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se, 100 * se / e.mean[0]);
+    print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se,
+                  100 * se / e.mean[0]);
     if (fabs(z) > 3.5 || se > 0.03 * e.mean[0]) fail_msg("%.1f standard errors apart", z);
     scene_free(scene);
     fiber_set_release(&j.f);
@@ -70,7 +71,8 @@ static void two_tracers_agree(void **state)
     const double narrower[9] = {0.2, 0.2, 0.2, 0.35, 0.35, 0.35, 10 * DEG, 38 * DEG, 40 * DEG};
     agree(&(struct configuration){30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, wide, pool);
     agree(&(struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, wide, pool);
-    agree(&(struct configuration){45 * DEG, 250 * DEG, 40 * DEG, 90 * DEG, 90 * DEG, 0.61, 1.2, 1.0, 0.02}, narrower, pool);
+    agree(&(struct configuration){45 * DEG, 250 * DEG, 40 * DEG, 90 * DEG, 90 * DEG, 0.61, 1.2, 1.0, 0.02}, narrower,
+          pool);
     thread_pool_free(pool);
 }
 

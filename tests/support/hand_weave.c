@@ -19,7 +19,8 @@ void hand_weave(struct fiber_set *f, const struct hand_weave_option *o)
 {
     start(f, 2 * o->n_yarn * o->n_strand, o->n_segment, o->tile_m, o->fiber_radius_m);
     double pitch = o->tile_m / (double)o->n_yarn;
-    double half_width = 0.46 * pitch - o->fiber_radius_m, half_height = 0.38 * pitch - o->fiber_radius_m, wave = 0.36 * pitch;
+    double half_width = 0.46 * pitch - o->fiber_radius_m, half_height = 0.38 * pitch - o->fiber_radius_m,
+           wave = 0.36 * pitch;
     size_t i_fiber = 0;
     for (int warp = 0; warp < 2; warp++)
         for (size_t y = 0; y < o->n_yarn; y++)
@@ -45,10 +46,7 @@ void hand_weave_bench(struct fiber_set *f)
     hand_weave(f, &(struct hand_weave_option){16, 32, 120, 4.45e-3, 16e-6, 4});
 }
 
-void hand_weave_small(struct fiber_set *f)
-{
-    hand_weave(f, &(struct hand_weave_option){2, 12, 16, 0.55e-3, 16e-6, 1});
-}
+void hand_weave_small(struct fiber_set *f) { hand_weave(f, &(struct hand_weave_option){2, 12, 16, 0.55e-3, 16e-6, 1}); }
 
 void hand_straight(struct fiber_set *f, size_t n, const double (*y_z_m)[2], double tile_m, double radius_m)
 {

@@ -5,9 +5,9 @@
 #include "geometry/fibers/fiber_set.h"
 
 struct hand_weave_option {
-    size_t n_yarn;    /* each way, even */
-    size_t n_strand;  /* a yarn */
-    size_t n_segment; /* a strand */
+    size_t n_yarn;                              /* each way, even */
+    size_t n_strand;                            /* a yarn */
+    size_t n_segment;                           /* a strand */
     double tile_m, fiber_radius_m, twist_turns; /* a tile */
 };
 

@@ -10,7 +10,10 @@ struct vec {
     double x, y, z;
 };
 
-static struct vec add(struct vec a, double t, struct vec b) { return (struct vec){a.x + t * b.x, a.y + t * b.y, a.z + t * b.z}; }
+static struct vec add(struct vec a, double t, struct vec b)
+{
+    return (struct vec){a.x + t * b.x, a.y + t * b.y, a.z + t * b.z};
+}
 static double dot(struct vec a, struct vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static struct vec cross(struct vec a, struct vec b)
 {
@@ -24,7 +27,8 @@ struct hit {
 };
 
 /* Entry into the side of the cylinder a..b, or into the ball at a; nearer than h->t and beyond tnear. */
-static void intersect_segment(struct vec o, struct vec d, double tnear, struct vec a, struct vec b, double r, struct hit *h)
+static void intersect_segment(struct vec o, struct vec d, double tnear, struct vec a, struct vec b, double r,
+                              struct hit *h)
 {
     struct vec axis = add(b, -1, a), oa = add(o, -1, a);
     double length = sqrt(dot(axis, axis));
@@ -50,12 +54,15 @@ static void intersect_segment(struct vec o, struct vec d, double tnear, struct v
 }
 
 /* All copies of all fibers that the stretch t0..t1 of the ray can meet. */
-static void intersect_stretch(const struct fiber_set *f, struct vec o, struct vec d, double tnear, double t0, double t1, struct hit *h)
+static void intersect_stretch(const struct fiber_set *f, struct vec o, struct vec d, double tnear, double t0, double t1,
+                              struct hit *h)
 {
     struct vec p = add(o, t0, d), q = add(o, t1, d);
     double margin = 0.3; /* of a tile: how far vertices lie outside */
-    int i0 = (int)floor(fmin(p.x, q.x) / f->tile_size_m[0] - margin), i1 = (int)floor(fmax(p.x, q.x) / f->tile_size_m[0] + margin);
-    int j0 = (int)floor(fmin(p.y, q.y) / f->tile_size_m[1] - margin), j1 = (int)floor(fmax(p.y, q.y) / f->tile_size_m[1] + margin);
+    int i0 = (int)floor(fmin(p.x, q.x) / f->tile_size_m[0] - margin),
+        i1 = (int)floor(fmax(p.x, q.x) / f->tile_size_m[0] + margin);
+    int j0 = (int)floor(fmin(p.y, q.y) / f->tile_size_m[1] - margin),
+        j1 = (int)floor(fmax(p.y, q.y) / f->tile_size_m[1] + margin);
     for (int i = i0; i <= i1; i++)
         for (int j = j0; j <= j1; j++) {
             struct vec local = {o.x - i * f->tile_size_m[0], o.y - j * f->tile_size_m[1], o.z};
@@ -63,12 +70,14 @@ static void intersect_stretch(const struct fiber_set *f, struct vec o, struct ve
                 for (size_t v = f->first_vertex[k]; v + 1 < f->first_vertex[k + 1]; v++) {
                     const float *a = f->position_m + 3 * v;
                     intersect_segment(local, d, tnear, (struct vec){(double)a[0], (double)a[1], (double)a[2]},
-                                      (struct vec){(double)a[3], (double)a[4], (double)a[5]}, (double)f->radius_m[k], h);
+                                      (struct vec){(double)a[3], (double)a[4], (double)a[5]}, (double)f->radius_m[k],
+                                      h);
                 }
         }
 }
 
-static bool intersect(const struct fiber_set *f, struct vec o, struct vec d, double tnear, double z_low, double z_high, struct hit *h)
+static bool intersect(const struct fiber_set *f, struct vec o, struct vec d, double tnear, double z_low, double z_high,
+                      struct hit *h)
 {
     double t_leave = d.z > 0 ? (z_high - o.z) / d.z : (z_low - o.z) / d.z, stretch = 0.5 * f->tile_size_m[0];
     h->t = INFINITY;
@@ -82,7 +91,8 @@ static bool intersect(const struct fiber_set *f, struct vec o, struct vec d, dou
 /* The lamp's radiance towards -d from o (orbit centre at z_top), with the lamp's unit defined by summing its square. */
 static double lamp_radiance(const struct configuration *c, struct vec o, struct vec d)
 {
-    double phi = c->light_phi_rad - c->cloth_rotation_rad, th = c->light_theta_rad, side = c->lamp_side_m, dist = c->light_distance_m;
+    double phi = c->light_phi_rad - c->cloth_rotation_rad, th = c->light_theta_rad, side = c->lamp_side_m,
+           dist = c->light_distance_m;
     struct vec to = {sin(th) * cos(phi), sin(th) * sin(phi), cos(th)}, centre = add((struct vec){0, 0, 0}, dist, to);
     double facing = dot(d, to);
     if (facing <= 0) return 0;
@@ -92,7 +102,8 @@ static double lamp_radiance(const struct configuration *c, struct vec o, struct 
     double sum = 0;
     enum { N = 40 };
     for (int i = 0; i < N * N; i++) {
-        double x = ((i % N + 0.5) / N - 0.5) * side, y = ((i / N + 0.5) / N - 0.5) * side, r2 = x * x + y * y + dist * dist;
+        double x = ((i % N + 0.5) / N - 0.5) * side, y = ((i / N + 0.5) / N - 0.5) * side,
+               r2 = x * x + y * y + dist * dist;
         sum += dist * dist / (r2 * r2) * side * side / (N * N);
     }
     return M_PI / sum;
@@ -113,9 +124,12 @@ double naive_path(const struct fiber_set *f, const struct configuration *c, cons
         if (!intersect(f, o, d, tnear, z_low, z_high, &h))
             return d.z > 0 && tnear > 0 ? throughput * lamp_radiance(c, add(o, -z_high, (struct vec){0, 0, 1}), d) : 0;
         o = add(o, h.t, d);
-        struct vec u = h.tangent, v = unit(fabs(u.z) < 0.9 ? cross(u, (struct vec){0, 0, 1}) : cross(u, (struct vec){1, 0, 0})), w = cross(u, v);
+        struct vec u = h.tangent,
+                   v = unit(fabs(u.z) < 0.9 ? cross(u, (struct vec){0, 0, 1}) : cross(u, (struct vec){1, 0, 0})),
+                   w = cross(u, v);
         double wo[3] = {-dot(d, u), -dot(d, v), -dot(d, w)};
-        double a = rng_double(r), z = sqrt(a) * cos(2 * M_PI * rng_double(r)), az = 2 * M_PI * rng_double(r), cosine = sqrt(1 - z * z);
+        double a = rng_double(r), z = sqrt(a) * cos(2 * M_PI * rng_double(r)), az = 2 * M_PI * rng_double(r),
+               cosine = sqrt(1 - z * z);
         double wi[3] = {z, cosine * cos(az), cosine * sin(az)}; /* density cos th / pi^2 */
         throughput *= reference_s(param, wi, wo, 0) * M_PI * M_PI;
         d = add(add(add((struct vec){0, 0, 0}, wi[0], u), wi[1], v), wi[2], w);

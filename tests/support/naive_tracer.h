@@ -1,6 +1,6 @@
-/* A second path tracer, deliberately naive: double precision, every segment tested, no next-event estimation, no roulette, directions
- * drawn without looking at the model, lamp found by chance. Slow and simple: what the renderer must agree with.
- * Only two_lobe.v1, one channel, black sheet below.
+/* A second path tracer, deliberately naive: double precision, every segment tested, no next-event estimation, no
+ * roulette, directions drawn without looking at the model, lamp found by chance. Slow and simple: what the renderer
+ * must agree with. Only two_lobe.v1, one channel, black sheet below.
  */
 #ifndef SELVEDGE_TESTS_NAIVE_TRACER_H
 #define SELVEDGE_TESTS_NAIVE_TRACER_H

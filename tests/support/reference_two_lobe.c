@@ -2,7 +2,10 @@
 
 #include <math.h>
 
-static double gauss(double x, double m, double s) { return exp(-(x - m) * (x - m) / (2 * s * s)) / (sqrt(2 * M_PI) * s); }
+static double gauss(double x, double m, double s)
+{
+    return exp(-(x - m) * (x - m) / (2 * s * s)) / (sqrt(2 * M_PI) * s);
+}
 
 static double q(double t)
 {
@@ -38,7 +41,8 @@ double reference_s(const double param[9], const double wi[3], const double wo[3]
     double phi = atan2(wo[2], wo[1]) - atan2(wi[2], wi[1]);
     double fresnel = param[c] + (1 - param[c]) * pow(1 - cos(theta_i), 5);
     return fresnel * reference_gbar(theta_o, -theta_i, param[6]) / (2 * M_PI) +
-           param[3 + c] * (1 - fresnel) * reference_gbar(theta_o, -theta_i, param[7]) * reference_von_mises(phi - M_PI, param[8]);
+           param[3 + c] * (1 - fresnel) * reference_gbar(theta_o, -theta_i, param[7]) *
+               reference_von_mises(phi - M_PI, param[8]);
 }
 
 double reference_camera_furnace(const double param[9], double theta_o, int c)
@@ -46,7 +50,8 @@ double reference_camera_furnace(const double param[9], double theta_o, int c)
     double total = 0;
     for (int lobe = 0; lobe < 2; lobe++) {
         enum { N = 1000 };
-        double s = param[6 + lobe], lo = fmax(-M_PI_2, -theta_o - 9 * s), hi = fmin(M_PI_2, -theta_o + 9 * s), h = (hi - lo) / N;
+        double s = param[6 + lobe], lo = fmax(-M_PI_2, -theta_o - 9 * s), hi = fmin(M_PI_2, -theta_o + 9 * s),
+               h = (hi - lo) / N;
         for (int i = 0; i < N; i++) {
             double t = lo + (i + 0.5) * h, fresnel = param[c] + (1 - param[c]) * pow(1 - cos(t), 5);
             double weight = lobe == 0 ? fresnel : param[3 + c] * (1 - fresnel);

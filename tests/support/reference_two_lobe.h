@@ -1,5 +1,5 @@
-/* The published two-lobe model once more, in double precision and by quadrature, straight from fabric thesis 5.4: what the
- * renderer's tables and closed forms must agree with. Parameters: nine numbers, internal units.
+/* The published two-lobe model once more, in double precision and by quadrature, straight from fabric thesis 5.4: what
+ * the renderer's tables and closed forms must agree with. Parameters: nine numbers, internal units.
  */
 #ifndef SELVEDGE_TESTS_REFERENCE_TWO_LOBE_H
 #define SELVEDGE_TESTS_REFERENCE_TWO_LOBE_H

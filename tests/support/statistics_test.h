@@ -6,7 +6,8 @@
 
 /* P(chi^2 with n_degree degrees of freedom >= x). */
 double chi_square_tail(double x, double n_degree);
-/* The chi-square statistic of counts against expectations; cells expecting fewer than five are pooled. Degrees of freedom out. */
+/* The chi-square statistic of counts against expectations; cells expecting fewer than five are pooled. Degrees of
+ * freedom out. */
 double chi_square_statistic(const double *count, const double *expected, size_t n, double *n_degree);
 
 /* Running mean and variance of the mean. */

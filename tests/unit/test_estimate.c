@@ -41,7 +41,8 @@ static int tear_down(void **state)
 
 static struct estimate_request request(const size_t *n_path, size_t n_configuration)
 {
-    return (struct estimate_request){scene, scattering_find("two_lobe.v1"), start, configuration, n_configuration, n_path, 17, 3, 1, true};
+    return (struct estimate_request){
+        scene, scattering_find("two_lobe.v1"), start, configuration, n_configuration, n_path, 17, 3, 1, true};
 }
 
 static void run(const struct estimate_request *q, size_t n_thread, struct estimate *e)
@@ -78,7 +79,8 @@ static void same_bits_for_any_threads(void **state)
     /* without derivatives the same radiance */
     q.want_jacobian = false;
     run(&q, 1, more);
-    for (int c = 0; c < 3; c++) assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
+    for (int c = 0; c < 3; c++)
+        assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
 }
 
 /* The stated variance of the mean against the scatter of repeated estimates. */
@@ -129,7 +131,8 @@ static void cancels_quickly(void **state)
     double wall = clock_monotonic_s() - t0;
     pthread_join(thread, NULL);
     thread_pool_free(pool);
-    if (wall > 0.1 + 0.1 + 0.3) fail_msg("took %.3f s after the flag", wall - 0.1); /* 0.3: a loaded machine, sanitizers */
+    if (wall > 0.1 + 0.1 + 0.3)
+        fail_msg("took %.3f s after the flag", wall - 0.1); /* 0.3: a loaded machine, sanitizers */
 }
 
 static void bad_requests(void **state)
@@ -156,8 +159,8 @@ static void bad_requests(void **state)
 }
 
 /* A model that fails in one direction in a thousand: found and named. */
-static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight, float rgb[3],
-                             float *score)
+static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3],
+                             const float *weight, float rgb[3], float *score)
 {
     float pdf = scattering_find("isotropic.v1")->eval_pdf(s, wi, wo, weight, rgb, score);
     if (score != NULL && fabsf(wi[0]) > 0.99f) score[1] = NAN;
@@ -185,8 +188,11 @@ static void nan_is_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(same_bits_for_any_threads), cmocka_unit_test(variances_are_honest), cmocka_unit_test(cancels_quickly),
-        cmocka_unit_test(bad_requests),              cmocka_unit_test(nan_is_named),
+        cmocka_unit_test(same_bits_for_any_threads),
+        cmocka_unit_test(variances_are_honest),
+        cmocka_unit_test(cancels_quickly),
+        cmocka_unit_test(bad_requests),
+        cmocka_unit_test(nan_is_named),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -101,32 +101,41 @@ static void write_half(const char *path, const char *const *name, int n_channel,
     exr_context_t file;
     int part;
     assert_int_equal(exr_start_write(&file, path, EXR_WRITE_FILE_DIRECTLY, NULL), EXR_ERR_SUCCESS);
-    assert_int_equal(exr_add_part(file, "p", tile > 0 ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part), EXR_ERR_SUCCESS);
-    assert_int_equal(exr_initialize_required_attr_simple(file, part, width, height, EXR_COMPRESSION_NONE), EXR_ERR_SUCCESS);
+    assert_int_equal(exr_add_part(file, "p", tile > 0 ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part),
+                     EXR_ERR_SUCCESS);
+    assert_int_equal(exr_initialize_required_attr_simple(file, part, width, height, EXR_COMPRESSION_NONE),
+                     EXR_ERR_SUCCESS);
     if (tile > 0)
-        assert_int_equal(exr_set_tile_descriptor(file, part, (uint32_t)tile, (uint32_t)tile, EXR_TILE_ONE_LEVEL, EXR_TILE_ROUND_DOWN), EXR_ERR_SUCCESS);
+        assert_int_equal(exr_set_tile_descriptor(file, part, (uint32_t)tile, (uint32_t)tile, EXR_TILE_ONE_LEVEL,
+                                                 EXR_TILE_ROUND_DOWN),
+                         EXR_ERR_SUCCESS);
     for (int c = 0; c < n_channel; c++)
-        assert_int_equal(exr_add_channel(file, part, name[c], EXR_PIXEL_HALF, EXR_PERCEPTUALLY_LINEAR, 1, 1), EXR_ERR_SUCCESS);
+        assert_int_equal(exr_add_channel(file, part, name[c], EXR_PIXEL_HALF, EXR_PERCEPTUALLY_LINEAR, 1, 1),
+                         EXR_ERR_SUCCESS);
     assert_int_equal(exr_write_header(file), EXR_ERR_SUCCESS);
     int step_x = tile > 0 ? tile : width, step_y = tile > 0 ? tile : 1;
     for (int y = 0, j = 0; y < height; y += step_y, j++)
         for (int x = 0, i = 0; x < width; x += step_x, i++) {
             exr_chunk_info_t chunk;
-            exr_result_t r = tile > 0 ? exr_write_tile_chunk_info(file, part, i, j, 0, 0, &chunk) : exr_write_scanline_chunk_info(file, part, y, &chunk);
+            exr_result_t r = tile > 0 ? exr_write_tile_chunk_info(file, part, i, j, 0, 0, &chunk)
+                                      : exr_write_scanline_chunk_info(file, part, y, &chunk);
             assert_int_equal(r, EXR_ERR_SUCCESS);
             size_t n = (size_t)(chunk.width * chunk.height * n_channel), k = 0;
             uint16_t *data = malloc(2 * n);
             for (int yy = 0; yy < chunk.height; yy++) /* by line, then channel (in order of name), then pixel */
                 for (int c = 0; c < n_channel; c++)
-                    for (int xx = 0; xx < chunk.width; xx++) data[k++] = half_of((float)(x + xx) + 0.5f * (float)(y + yy) + 0.25f * (float)c);
-            r = tile > 0 ? exr_write_tile_chunk(file, part, i, j, 0, 0, data, 2 * n) : exr_write_scanline_chunk(file, part, y, data, 2 * n);
+                    for (int xx = 0; xx < chunk.width; xx++)
+                        data[k++] = half_of((float)(x + xx) + 0.5f * (float)(y + yy) + 0.25f * (float)c);
+            r = tile > 0 ? exr_write_tile_chunk(file, part, i, j, 0, 0, data, 2 * n)
+                         : exr_write_scanline_chunk(file, part, y, data, 2 * n);
             assert_int_equal(r, EXR_ERR_SUCCESS);
             free(data);
         }
     assert_int_equal(exr_finish(&file), EXR_ERR_SUCCESS);
 }
 
-/* Chunks of path-traced noise hardly shrink; a compressing writer damaged the one in some 200 whose sizes came out equal. */
+/* Chunks of path-traced noise hardly shrink; a compressing writer damaged the one in some 200 whose sizes came out
+ * equal. */
 static void exr_noise_survives(void **state)
 {
     (void)state;
@@ -185,7 +194,8 @@ static void bad_files(void **state)
     assert_int_equal(image_read_exr(&im, path_of("b.exr"), LIMIT, &err), STATUS_FORMAT);
 }
 
-/* Every truncation and a few thousand damaged bytes: an error or a picture, never a crash (run under the sanitizers). */
+/* Every truncation and a few thousand damaged bytes: an error or a picture, never a crash (run under the sanitizers).
+ */
 static void truncated_and_damaged(void **state)
 {
     (void)state;
@@ -244,7 +254,8 @@ static void png_is_srgb(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_round_trip), cmocka_unit_test(exr_noise_survives),       cmocka_unit_test(exr_half_tiled_grey), cmocka_unit_test(bad_files),
+        cmocka_unit_test(exr_round_trip),        cmocka_unit_test(exr_noise_survives),
+        cmocka_unit_test(exr_half_tiled_grey),   cmocka_unit_test(bad_files),
         cmocka_unit_test(truncated_and_damaged), cmocka_unit_test(png_is_srgb),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -113,8 +113,10 @@ static void back_light(void **state)
         struct estimate e;
         struct estimate_request q = {scene, scattering_find("two_lobe.v1"), start, &c, 1, n_path, 6, 0, 0, false};
         assert_int_equal(estimate_run(&q, NULL, NULL, &e, NULL), STATUS_OK);
-        if (sheet) assert_true(e.mean[0] == 0);
-        else assert_true(e.mean[0] > 0.01);
+        if (sheet)
+            assert_true(e.mean[0] == 0);
+        else
+            assert_true(e.mean[0] > 0.01);
         scene_free(scene);
     }
 }
@@ -139,8 +141,10 @@ static void bad_requests(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layers_and_threads), cmocka_unit_test(agrees_with_estimate),
-        cmocka_unit_test(back_light),         cmocka_unit_test(bad_requests),
+        cmocka_unit_test(layers_and_threads),
+        cmocka_unit_test(agrees_with_estimate),
+        cmocka_unit_test(back_light),
+        cmocka_unit_test(bad_requests),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
 }

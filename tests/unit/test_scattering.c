@@ -1,4 +1,5 @@
-/* Scattering models: golden values, the registry, agreement with a double-precision reference, scores against central differences. */
+/* Scattering models: golden values, the registry, agreement with a double-precision reference, scores against central
+ * differences. */
 #include "renderer/scattering/gauss_polynomial.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scattering/von_mises.h"
@@ -105,7 +106,8 @@ static void registry_is_sound(void **state)
         for (size_t p = 0; p < m->n_param; p++) {
             const struct param_info *i = &m->param[p];
             assert_int_equal(scattering_param_index(m, i->name), p);
-            assert_true(i->lower <= i->start && i->start <= i->upper && i->lower < i->upper && i->channel >= -1 && i->channel <= 2);
+            assert_true(i->lower <= i->start && i->start <= i->upper && i->lower < i->upper && i->channel >= -1 &&
+                        i->channel <= 2);
             assert_true(fabs(param_from_file_unit(i, param_to_file_unit(i, i->start)) - i->start) < 1e-15);
             double param[SCATTERING_MAX_PARAM];
             const double bad[3] = {NAN, i->upper * 1.01, i->lower * 0.99};
@@ -137,10 +139,12 @@ static void agrees_with_reference(void **state)
             random_direction(&r, wo);
             m->sample(s, wo, NULL, u, wi);
             m->eval(s, wi, wo, rgb, NULL);
-            double di[3] = {(double)wi[0], (double)wi[1], (double)wi[2]}, dout[3] = {(double)wo[0], (double)wo[1], (double)wo[2]};
+            double di[3] = {(double)wi[0], (double)wi[1], (double)wi[2]},
+                   dout[3] = {(double)wo[0], (double)wo[1], (double)wo[2]};
             for (int c = 0; c < 3; c++) {
                 double want = reference_s(param, di, dout, c);
-                /* float angles carry 1e-7, a 1 degree lobe turns that into up to 6 * 1e-7 / 0.0175; the table of G into 2e-3 at the poles */
+                /* float angles carry 1e-7, a 1 degree lobe turns that into up to 6 * 1e-7 / 0.0175; the table of G into
+                 * 2e-3 at the poles */
                 double tolerance = fabs(asin(di[0])) > 80 * DEG ? 3e-3 : 3e-4;
                 if (fabs((double)rgb[c] - want) > tolerance * want + 1e-12)
                     fail_msg("set %u: S = %.8g, reference %.8g", k, (double)rgb[c], want);
@@ -165,7 +169,8 @@ static void check_scores(const struct scattering_model *m, const double *param, 
     m->release(s);
     for (size_t p = 0; p < m->n_param; p++) {
         const struct param_info *info = &m->param[p];
-        double room = info->channel >= 0 ? fmin(param[p], fmax(1 - param[p], 1e-3)) : param[p]; /* ln S has poles at 0 and 1 */
+        double room =
+            info->channel >= 0 ? fmin(param[p], fmax(1 - param[p], 1e-3)) : param[p]; /* ln S has poles at 0 and 1 */
         double h = 5e-3 * fmin(room, 0.2), at[3] = {param[p] - h, param[p], param[p] + h}, weight[3] = {-0.5, 0, 0.5};
         double coordinate_shift = param[p] - h < info->lower ? 1 : param[p] + h > info->upper ? -1 : 0;
         if (coordinate_shift != 0) {
@@ -210,7 +215,8 @@ static void scores_against_differences(void **state)
     }
 }
 
-static void check_finite(const struct scattering_model *m, const struct scattering_state *s, const float wo[3], const float wi[3])
+static void check_finite(const struct scattering_model *m, const struct scattering_state *s, const float wo[3],
+                         const float wi[3])
 {
     float rgb[3], score[3 * SCATTERING_MAX_PARAM], pdf = m->eval_pdf(s, wi, wo, NULL, rgb, score);
     assert_true(isfinite(pdf) && pdf >= 0);
@@ -222,8 +228,11 @@ static void check_finite(const struct scattering_model *m, const struct scatteri
 static void nothing_is_nan(void **state)
 {
     (void)state;
-    static const float special[][3] = {{1, 0, 0},        {-1, 0, 0},         {1, 1e-7f, 0},   {-1, 0, 1e-7f},         {1, 1e-20f, 1e-20f},
-                                       {0.9999999f, 3e-4f, 0}, {0, 1, 0}, {0, 0, -1}, {0, -1, 0}, {0, 0.70710678f, 0.70710678f}};
+    static const float special[][3] = {{1, 0, 0},           {-1, 0, 0},
+                                       {1, 1e-7f, 0},       {-1, 0, 1e-7f},
+                                       {1, 1e-20f, 1e-20f}, {0.9999999f, 3e-4f, 0},
+                                       {0, 1, 0},           {0, 0, -1},
+                                       {0, -1, 0},          {0, 0.70710678f, 0.70710678f}};
     const float corner[3] = {0, 0.5f, 0.99999994f};
     struct rng r;
     rng_start(&r, &(struct rng_key){3, 0, 0, 0}, 0, 0);
@@ -234,7 +243,8 @@ static void nothing_is_nan(void **state)
             box_point(m, b, &r, param);
             struct scattering_state *s = prepare(m, param);
             for (size_t i = 0; i < sizeof special / sizeof special[0]; i++) {
-                for (size_t j = 0; j < sizeof special / sizeof special[0]; j++) check_finite(m, s, special[i], special[j]);
+                for (size_t j = 0; j < sizeof special / sizeof special[0]; j++)
+                    check_finite(m, s, special[i], special[j]);
                 for (int u = 0; u < 27; u++) {
                     float uu[3] = {corner[u % 3], corner[u / 3 % 3], corner[u / 9]}, wi[3];
                     m->sample(s, special[i], NULL, uu, wi);
@@ -277,10 +287,14 @@ static void reciprocal_models_are(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(golden_values),         cmocka_unit_test(normaliser_against_quadrature),
-        cmocka_unit_test(bessel_values),         cmocka_unit_test(erf_inverse_is_inverse),
-        cmocka_unit_test(registry_is_sound),     cmocka_unit_test(agrees_with_reference),
-        cmocka_unit_test(scores_against_differences), cmocka_unit_test(nothing_is_nan),
+        cmocka_unit_test(golden_values),
+        cmocka_unit_test(normaliser_against_quadrature),
+        cmocka_unit_test(bessel_values),
+        cmocka_unit_test(erf_inverse_is_inverse),
+        cmocka_unit_test(registry_is_sound),
+        cmocka_unit_test(agrees_with_reference),
+        cmocka_unit_test(scores_against_differences),
+        cmocka_unit_test(nothing_is_nan),
         cmocka_unit_test(reciprocal_models_are),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -31,7 +31,8 @@ static struct scene *straight_scene(bool black_sheet)
 static struct scene_ray ray_to(double x, double y, double z, double dx, double dy, double dz)
 {
     double l = sqrt(dx * dx + dy * dy + dz * dz);
-    return (struct scene_ray){.origin_mm = {(float)x, (float)y, (float)z}, .direction = {(float)(dx / l), (float)(dy / l), (float)(dz / l)}};
+    return (struct scene_ray){.origin_mm = {(float)x, (float)y, (float)z},
+                              .direction = {(float)(dx / l), (float)(dy / l), (float)(dz / l)}};
 }
 
 static void hits_are_where_they_should_be(void **state)
@@ -45,9 +46,10 @@ static void hits_are_where_they_should_be(void **state)
     /* straight down on the first fiber's crest, which is z = 0, seven tiles away */
     struct scene_ray r = ray_to(0.2 + 7 * 0.5, 0.1 - 3 * 0.5, 0.001, 0, 0, -1);
     assert_true(scene_trace(s, &r, &h));
-    assert_true(fabsf(h.position_mm[2]) < 1e-5f && fabsf(h.normal[2] - 1) < 1e-5f && fabsf(fabsf(h.tangent[0]) - 1) < 1e-6f);
+    assert_true(fabsf(h.position_mm[2]) < 1e-5f && fabsf(h.normal[2] - 1) < 1e-5f &&
+                fabsf(fabsf(h.tangent[0]) - 1) < 1e-6f);
     assert_true(fabsf(h.radius_mm - 0.02f) < 1e-7f);
-    assert_int_equal(h.i_fiber, 0);
+    assert_int_equal(scene_fiber_of(s, h.i_segment), 0);
     assert_true(fabs(r.offset_mm[0] - 3.5) < 1e-9 && fabs(r.offset_mm[1] + 1.5) < 1e-9);
     /* between the fibers: through to the sheet */
     r = ray_to(0.2, 0.2, 0.001, 0, 0, -1);
@@ -73,7 +75,7 @@ static void back_faces_do_not_exist(void **state)
     inside = ray_to(0.2, 0.1, -0.02, 0, 0.2, -0.1);
     assert_true(scene_occluded(s, &inside)); /* the next fiber ahead, not this one */
     assert_true(scene_trace(s, &inside, &h));
-    assert_int_equal(h.i_fiber, 1);
+    assert_int_equal(scene_fiber_of(s, h.i_segment), 1);
     /* leaving a hit into the fiber: starts behind it */
     struct scene_ray down = ray_to(0.2, 0.1, 0.001, 0, 0, -1), through;
     assert_true(scene_trace(s, &down, &h));
@@ -97,16 +99,20 @@ static void cloth_is_periodic(void **state)
     fiber_set_release(&f);
     int n_hit = 0, n_shadow = 0;
     for (int i = 0; i < 5000; i++) {
-        double x = tile * rng_double(&rng), y = tile * rng_double(&rng), phi = 2 * M_PI * rng_double(&rng), slope = pow(rng_double(&rng), 2);
-        struct scene_ray a = ray_to(x, y, 1e-3, cos(phi), sin(phi), -slope), b = ray_to(x + 5 * tile, y - 3 * tile, 1e-3, cos(phi), sin(phi), -slope);
+        double x = tile * rng_double(&rng), y = tile * rng_double(&rng), phi = 2 * M_PI * rng_double(&rng),
+               slope = pow(rng_double(&rng), 2);
+        struct scene_ray a = ray_to(x, y, 1e-3, cos(phi), sin(phi), -slope),
+                         b = ray_to(x + 5 * tile, y - 3 * tile, 1e-3, cos(phi), sin(phi), -slope);
         struct scene_hit ha, hb;
         bool shadow = scene_occluded(s, &a), hit = scene_trace(s, &a, &ha);
         assert_true(shadow == hit);
         n_shadow += shadow;
         if (scene_trace(s, &b, &hb) != hit) continue; /* an edge, decided by rounding */
         if (!hit) continue;
-        double dx = ((double)hb.position_mm[0] + b.offset_mm[0]) - ((double)ha.position_mm[0] + a.offset_mm[0]) - 5 * tile;
-        double dy = ((double)hb.position_mm[1] + b.offset_mm[1]) - ((double)ha.position_mm[1] + a.offset_mm[1]) + 3 * tile;
+        double dx =
+            ((double)hb.position_mm[0] + b.offset_mm[0]) - ((double)ha.position_mm[0] + a.offset_mm[0]) - 5 * tile;
+        double dy =
+            ((double)hb.position_mm[1] + b.offset_mm[1]) - ((double)ha.position_mm[1] + a.offset_mm[1]) + 3 * tile;
         n_hit += fabs(dx) < 1e-3 && fabs(dy) < 1e-3;
     }
     assert_true(n_shadow > 4000 && n_hit > n_shadow - 10);
@@ -147,7 +153,8 @@ static void camera_looks_at_the_orbit_centre(void **state)
         camera_init(&m, &c);
         assert_true(camera_ray(&m, s, 0.5, 0.5, &r));
         double z = (double)r.origin_mm[2], t = -z / (double)r.direction[2];
-        for (int a = 0; a < 2; a++) assert_true(fabs((double)r.origin_mm[a] + r.offset_mm[a] + t * (double)r.direction[a]) < 1e-3);
+        for (int a = 0; a < 2; a++)
+            assert_true(fabs((double)r.origin_mm[a] + r.offset_mm[a] + t * (double)r.direction[a]) < 1e-3);
         double phi = c.camera_phi_rad - c.cloth_rotation_rad;
         assert_true(fabs((double)r.direction[2] + cos(c.camera_theta_rad)) < 1e-6);
         assert_true(fabs((double)r.direction[0] + sin(c.camera_theta_rad) * cos(phi)) < 1e-6);
@@ -182,7 +189,8 @@ static void lamp_is_calibrated(void **state)
         for (int i = 0; i < (int)n; i++) {
             float u[2] = {rng_float(&r), rng_float(&r)}, d[3], pdf, origin[3] = {0, 0, 0};
             assert_true(lamp_sample(&l, origin, u, d, &pdf));
-            double cosine = -(double)(d[0] * l.normal[0] + d[1] * l.normal[1] + d[2] * l.normal[2]), v = (double)l.radiance * cosine / (double)pdf;
+            double cosine = -(double)(d[0] * l.normal[0] + d[1] * l.normal[1] + d[2] * l.normal[2]),
+                   v = (double)l.radiance * cosine / (double)pdf;
             sum += v;
             x2 += v * v;
             float again = lamp_pdf(&l, origin, d);
@@ -202,9 +210,12 @@ static void lamp_is_calibrated(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hits_are_where_they_should_be), cmocka_unit_test(back_faces_do_not_exist),
-        cmocka_unit_test(cloth_is_periodic),             cmocka_unit_test(bad_fibers_are_refused),
-        cmocka_unit_test(camera_looks_at_the_orbit_centre), cmocka_unit_test(lamp_is_calibrated),
+        cmocka_unit_test(hits_are_where_they_should_be),
+        cmocka_unit_test(back_faces_do_not_exist),
+        cmocka_unit_test(cloth_is_periodic),
+        cmocka_unit_test(bad_fibers_are_refused),
+        cmocka_unit_test(camera_looks_at_the_orbit_centre),
+        cmocka_unit_test(lamp_is_calibrated),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
