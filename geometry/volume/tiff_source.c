@@ -30,6 +30,14 @@ struct tiff_handle {
     char message[256]; /* libtiff's first words since the last clear */
 };
 
+/* libtiff begins some texts with "path: "; the user knows the file by its name, and folders of the server are no business of his. */
+static void drop_path(struct tiff_handle *h)
+{
+    size_t n = strlen(h->path[h->i_open]);
+    if (strncmp(h->message, h->path[h->i_open], n) != 0 || strncmp(h->message + n, ": ", 2) != 0) return;
+    memmove(h->message, h->message + n + 2, strlen(h->message + n + 2) + 1);
+}
+
 static int keep_message(TIFF *tiff, void *user, const char *module, const char *format, va_list argument)
 {
     (void)tiff;
@@ -39,6 +47,7 @@ static int keep_message(TIFF *tiff, void *user, const char *module, const char *
         vsnprintf(h->message, sizeof h->message, format, argument);
         size_t n = strlen(h->message);
         if (n > 0 && h->message[n - 1] == '.') h->message[n - 1] = '\0';
+        drop_path(h);
     }
     return 1; /* handled: libtiff's global handlers, which print, are not called */
 }
@@ -70,9 +79,9 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     if (option == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", name);
     TIFFOpenOptionsSetErrorHandlerExtR(option, keep_message, h);
     TIFFOpenOptionsSetWarningHandlerExtR(option, drop_message, h);
+    h->i_open = i_path;
     h->tiff = TIFFOpenExt(h->path[i_path], "rm", option); /* m: no memory map, a file cut short must not be a SIGBUS */
     TIFFOpenOptionsFree(option);
-    h->i_open = i_path;
     if (h->tiff == NULL)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s", name, cause(h));
     return STATUS_OK;
