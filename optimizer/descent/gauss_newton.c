@@ -2,6 +2,7 @@
  *
  * Each iteration traces new paths (two replicas) at the present point, adds them to the history, and pools all of it there
  * (linear_model.h). The step minimises the pooled quadratic model in logit / log coordinates inside the bounds and the step limits:
+ *   rows        weighted by what noise and misfit leave of them (linear_model_weigh);
  *   gradient    mirrored product of the replicas, without bias;
  *   curvature   2 J'J of the averaged replicas: too large by the noise of J, a damping that fades as paths add up;
  *   damping     plus 2 noise / limit^2: moving by the whole step limit must gain more than one residual's Monte-Carlo variance.
@@ -20,9 +21,9 @@
 enum { N = SCATTERING_MAX_PARAM, BLOCK = 256, MIN_PATH = 1024, FIRST_PATH = 2048, MAX_ITERATION = 80, DEFAULT_BUDGET = 6000000 };
 
 /* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of the objective that is. */
-static const double target_rel_rms = 0.004, target_share = 0.01;
+static const double target_rel_rms = 0.0007, target_share = 0.01;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
-static const double largest_share = 0.2;
+static const double largest_share = 0.1;
 
 struct gauss_newton {
     struct descent_run run;
@@ -103,10 +104,10 @@ static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
  * three channels of a configuration share their paths. */
 static double noise_gain(const struct gauss_newton *g) { return 2.0 * (double)g->n_free * g->noise; }
 
-static bool precise_enough(const struct gauss_newton *g, double f)
+static bool precise_enough(const struct gauss_newton *g, double f, double se)
 {
     double n_row = (double)g->model.n_row;
-    return noise_gain(g) <= fmax(target_share * f, target_rel_rms * target_rel_rms * n_row);
+    return noise_gain(g) <= fmax(target_share * (f - 2.0 * se), target_rel_rms * target_rel_rms * n_row);
 }
 
 static status estimate_here(struct gauss_newton *g, struct error *err)
@@ -151,7 +152,7 @@ static status judge_step(struct gauss_newton *g, bool *failed, struct error *err
 static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_observation)
 {
     double per_mean = 2.0 * (double)n_observation;
-    if (!gain_is_clear) g->n_path_mean *= 2.0;
+    if (!gain_is_clear) g->n_path_mean *= 1.3;
     double left = (double)g->run.path_budget - (double)g->run.n_path_total;
     double most = fmin(largest_share * (double)g->run.path_budget, left) / per_mean;
     g->n_path_mean = fmin(g->n_path_mean, most);
@@ -168,6 +169,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         if (s != STATUS_OK) return s;
         s = linear_model_pool(&g->model, &g->history, g->x, err);
         if (s != STATUS_OK) return s;
+        linear_model_weigh(&g->model);
         double se, f = linear_model_objective(&g->model, &se);
         s = report_here(g, NULL, err);
         if (s != STATUS_OK) return s;
@@ -179,7 +181,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
         bool small = g->gain <= 4.0 * noise_gain(g) || g->gain <= 0.01 * fabs(f);
         result->converged = small && !failed && g->history.n_step > 2;
-        if (result->converged && precise_enough(g, f)) {
+        if (result->converged && precise_enough(g, f, se)) {
             snprintf(result->reason, sizeof result->reason, "the next step promises %.2g, the objective is %.3g with a noise of %.1g",
                      g->gain, f, se);
             return STATUS_OK;

@@ -67,7 +67,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
 {
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
-    double *block = calloc(2 * per_replica, sizeof *block);
+    double *block = calloc(2 * per_replica + n_row, sizeof *block);
     if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot hold a model of %zu residuals: out of memory", n_row);
     for (size_t q = 0; q < 2; q++) {
         m->r[q] = block + q * per_replica;
@@ -75,6 +75,8 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
         m->j[q] = m->r_var[q] + n_row;
         m->j_var[q] = m->j[q] + n_row * n_param;
     }
+    m->weight = block + 2 * per_replica;
+    for (size_t row = 0; row < n_row; row++) m->weight[row] = 1.0;
     return STATUS_OK;
 }
 
@@ -155,18 +157,38 @@ struct pool_weight {
     double r, j;
 };
 
-/* Weights of all steps for configuration i, summing to 1. Derivatives are noisier by about j_noise and bend to first order, means to second;
- * how much was chosen by trial on analytic cloth (from 16 to 256 made little difference). */
-static void pool_weights(const struct linear_history *h, size_t i, const double *change2, struct pool_weight *weight,
-                         double *n_effective)
+/* Variance of one path's derivatives of configuration i, and the square of the mean derivatives, both summed over columns and channels. */
+static void derivative_scale(const struct linear_history *h, const double *mean, size_t i, double *path_variance, double *square)
 {
-    const double j_noise = 4.0, bend = 64.0;
-    double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0;
+    double sum = 0.0, n_path = 0.0, w = objective_weight(&h->observation->item[i]);
+    *square = 0.0;
     for (size_t k = 0; k < h->n_step; k++) {
-        double n = (double)h->step[k].replica[0][i].n_path;
-        double noise = n > 0.0 ? path_variance / n + 1e-12 : INFINITY;
-        weight[k].r = 1.0 / (noise * (1.0 + j_noise * change2[k]) + bend * change2[k] * change2[k]);
-        weight[k].j = 1.0 / (j_noise * noise + bend * change2[k]);
+        for (size_t p = 0; p < h->n_param; p++) {
+            double slope = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
+            for (int q = 0; q < 2; q++) {
+                const struct estimate *e = &h->step[k].replica[q][i];
+                double n = (double)e->n_path;
+                for (size_t c = 0; c < 3; c++) sum += n * n * w * slope * slope * e->jac_var[c * h->n_param + p];
+                if (p == 0) n_path += n;
+            }
+        }
+    }
+    *path_variance = n_path > 0.0 ? sum / n_path : 0.0;
+    for (size_t j = 3 * i * h->n_param; j < 3 * (i + 1) * h->n_param; j++) *square += mean[j] * mean[j];
+}
+
+/* Weights of all steps for configuration i, summing to 1. Means bend to second order, derivatives to first; how much was chosen by trial on
+ * analytic cloth, where a factor of four either way made little difference. */
+static void pool_weights(const struct linear_history *h, const double *mean, size_t i, const double *change2,
+                         struct pool_weight *weight, double *n_effective)
+{
+    const double bend_r = 64.0, bend_j = 16.0;
+    double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0, j_variance, j_square;
+    derivative_scale(h, mean, i, &j_variance, &j_square);
+    for (size_t k = 0; k < h->n_step; k++) {
+        double n = (double)h->step[k].replica[0][i].n_path, per_path = n > 0.0 ? 1.0 / n : INFINITY;
+        weight[k].r = 1.0 / (path_variance * per_path + bend_r * change2[k] * change2[k] + 1e-12);
+        weight[k].j = 1.0 / (j_variance * per_path + bend_j * change2[k] * j_square + 1e-12);
         sum_r += weight[k].r;
         sum_j += weight[k].j;
     }
@@ -187,7 +209,7 @@ static void pool_configuration(struct linear_model *m, const struct linear_histo
         for (size_t p = 0; p < m->n_param; p++) dx[p] = m->x_ref[p] - h->step[k].x[p];
         change2[k] = squared_change(mean, i, dx, m->n_param);
     }
-    pool_weights(h, i, change2, weight, &m->n_effective);
+    pool_weights(h, mean, i, change2, weight, &m->n_effective);
     for (size_t k = 0; k < h->n_step; k++) {
         for (size_t p = 0; p < m->n_param; p++)
             slope[p] = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
@@ -239,12 +261,22 @@ double linear_model_objective(const struct linear_model *m, double *se)
     return value;
 }
 
+void linear_model_weigh(struct linear_model *m)
+{
+    double misfit = fmax(linear_model_objective(m, NULL) / (double)m->n_row, 1e-6), mean = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) {
+        m->weight[row] = 1.0 / (misfit + 0.25 * (m->r_var[0][row] + m->r_var[1][row]));
+        mean += m->weight[row] / (double)m->n_row;
+    }
+    for (size_t row = 0; row < m->n_row; row++) m->weight[row] /= mean;
+}
+
 void linear_model_gradient(const struct linear_model *m, double *g)
 {
     memset(g, 0, m->n_param * sizeof *g);
     for (size_t row = 0; row < m->n_row; row++)
         for (size_t p = 0; p < m->n_param; p++)
-            g[p] += m->r[0][row] * m->j[1][row * m->n_param + p] + m->r[1][row] * m->j[0][row * m->n_param + p];
+            g[p] += m->weight[row] * (m->r[0][row] * m->j[1][row * m->n_param + p] + m->r[1][row] * m->j[0][row * m->n_param + p]);
 }
 
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian)
@@ -255,13 +287,13 @@ void linear_model_hessian(const struct linear_model *m, bool cross, double *hess
         const double *a = m->j[0] + row * n, *b = m->j[1] + row * n;
         for (size_t p = 0; p < n; p++)
             for (size_t q = 0; q < n; q++)
-                hessian[p * n + q] += cross ? a[p] * b[q] + b[p] * a[q] : 0.5 * (a[p] + b[p]) * (a[q] + b[q]);
+                hessian[p * n + q] += m->weight[row] * (cross ? a[p] * b[q] + b[p] * a[q] : 0.5 * (a[p] + b[p]) * (a[q] + b[q]));
     }
 }
 
 double linear_model_noise(const struct linear_model *m)
 {
     double sum = 0.0;
-    for (size_t row = 0; row < m->n_row; row++) sum += 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
+    for (size_t row = 0; row < m->n_row; row++) sum += m->weight[row] * 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
     return sum / (double)m->n_row;
 }

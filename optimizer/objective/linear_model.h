@@ -33,6 +33,7 @@ struct linear_model {
     double x_ref[SCATTERING_MAX_PARAM];
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
+    double *weight;          /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
     double n_effective;      /* paths a configuration and replica that the averages amount to, mean over configurations */
 };
 
@@ -49,6 +50,11 @@ void linear_model_release(struct linear_model *m);
 /* Averages the history at x_ref. At least one step. STATUS_NO_MEMORY. */
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err);
 
+/* Row weights v0 / (v_misfit + v_row): what is left of f per row, against the row's Monte-Carlo variance. While noise rules, rows that are
+ * known well count more (bright channels have the longest paths and the most noise); as paths add up, or where the model does not fit, all weights
+ * go to 1 and the minimum is that of f. Weights are kept until the next call and by linear_model_pool. */
+void linear_model_weigh(struct linear_model *m);
+
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);
 /* 2 x mirrored average of J' r: the gradient of f by coordinates. */
@@ -56,7 +62,7 @@ void linear_model_gradient(const struct linear_model *m, double *g);
 /* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged J, positive
  * semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian);
-/* Mean over rows of the variance of (r_A + r_B) / 2. */
+/* Weighted mean over rows of the variance of (r_A + r_B) / 2. */
 double linear_model_noise(const struct linear_model *m);
 
 #endif

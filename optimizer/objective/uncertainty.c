@@ -33,7 +33,7 @@ static void add_path_noise(const struct linear_model *m, size_t i, const size_t 
 {
     double va[N] = {0}, vb[N] = {0};
     for (size_t row = 3 * i; row < 3 * i + 3; row++) {
-        double sd = sqrt(row_noise(m, row));
+        double sd = m->weight[row] * sqrt(row_noise(m, row));
         for (size_t p = 0; p < n; p++) {
             va[p] += sd * m->j[0][row * m->n_param + index[p]];
             vb[p] += sd * m->j[1][row * m->n_param + index[p]];
@@ -53,15 +53,15 @@ static void normal_matrices(const struct linear_model *m, const struct observati
     for (size_t row = 0; row < m->n_row; row++) {
         const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
         const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
-        double v = row_variance(o, row, misfit), r2 = fmax(0.0, m->r[0][row] * m->r[1][row]);
-        *mean_variance += (v + row_noise(m, row)) / (double)m->n_row;
+        double u = m->weight[row], v = row_variance(o, row, misfit), r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * row_noise(m, row);
+        *mean_variance += u * (v + row_noise(m, row)) / (double)m->n_row;
         for (size_t p = 0; p < n; p++) {
             for (size_t q = 0; q < n; q++) {
                 double jj = 0.5 * (ja[index[p]] * jb[index[q]] + jb[index[p]] * ja[index[q]]);
-                h[p * n + q] += jj;
-                b[p * n + q] += v * jj;
+                h[p * n + q] += u * jj;
+                b[p * n + q] += u * u * v * jj;
             }
-            b[p * n + p] += r2 * 0.25 * (va[index[p]] + vb[index[p]]);
+            b[p * n + p] += u * u * r2 * 0.25 * (va[index[p]] + vb[index[p]]);
         }
     }
     for (size_t i = 0; i < m->n_row / 3; i++) add_path_noise(m, i, index, n, b);

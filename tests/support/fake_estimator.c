@@ -105,7 +105,7 @@ static double exponential_sum(struct rng *r, uint64_t n)
 
 static void sample_configuration(const struct fake_cloth *f, const struct estimator_call *call, size_t i, struct estimate *e)
 {
-    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)call->n_path[i], factor = 0.0, var = 0.0, score[FAKE_N_PARAM] = {0}, score_var = 0.0, z[2];
+    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)call->n_path[i], factor = 0.0, var = 0.0, score[FAKE_N_PARAM] = {0}, score_var = 0.0, width[FAKE_N_PARAM] = {0}, z[2];
     struct rng_key key = {.seed = f->seed, .iteration = call->iteration, .replica = call->replica, .configuration = (uint32_t)i};
     struct rng r;
     rng_start(&r, &key, 0, 0);
@@ -117,20 +117,26 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
         for (size_t p = 0; p < FAKE_N_PARAM; p++) { /* scores scatter from path to path by twice their mean */
             rng_normal_pair(&r, z);
             score[p] += kind_share[k] * (part + 2.0 * z[0] / sqrt(n * q));
+            if (p >= 6) width[p] += kind_share[k] * 2.0 * z[1] / sqrt(n * q); /* those of widths have either sign, whatever their mean is */
         }
         score_var += kind_share[k] * kind_share[k] * 6.0 / (n * q);
     }
     if (f->noise == 0.0) {
         factor = 1.0;
         var = score_var = 0.0;
-        for (size_t p = 0; p < FAKE_N_PARAM; p++) score[p] = 1.0;
+        for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+            score[p] = 1.0;
+            width[p] = 0.0;
+        }
     }
     for (size_t c = 0; c < 3; c++) {
-        e->mean[c] = rgb[c] * factor;
-        e->var[c] = rgb[c] * rgb[c] * var;
+        double part = 0.3 + 0.7 * call->param[3 + c]; /* dark channels have short paths and less noise */
+        e->mean[c] = rgb[c] * (1.0 + part * (factor - 1.0));
+        e->var[c] = rgb[c] * rgb[c] * var * part * part;
         for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-            e->jac[c * FAKE_N_PARAM + p] = jac[c * FAKE_N_PARAM + p] * score[p];
-            e->jac_var[c * FAKE_N_PARAM + p] = jac[c * FAKE_N_PARAM + p] * jac[c * FAKE_N_PARAM + p] * score_var;
+            double own = jac[c * FAKE_N_PARAM + p], per_unit = p >= 6 ? rgb[c] / call->param[p] : 0.0;
+            e->jac[c * FAKE_N_PARAM + p] = own * (1.0 + part * (score[p] - 1.0)) + per_unit * part * width[p];
+            e->jac_var[c * FAKE_N_PARAM + p] = part * part * score_var * (own * own + per_unit * per_unit * 4.0 / 6.0);
         }
     }
     e->n_path = call->n_path[i];

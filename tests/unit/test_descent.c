@@ -71,7 +71,7 @@ static void test_every_method_recovers(void **state)
     for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
         struct fixture x;
         struct fit_result r;
-        setup(&x, 1, 20000000);
+        setup(&x, 1, 400000000);
         run(&x, *m, &r);
         double error = fake_rel_rms(&x.cloth, 0, FAKE_N_FIT, r.param, x.truth);
         print_message("%s: relative RMS error %.4f, objective %.4g -> %.4g, %zu steps\n", (*m)->id, error, x.first, r.objective.value, r.n_step);
