@@ -7,7 +7,7 @@
  *   curvature   2 J'J of the averaged replicas: too large by the noise of J, a damping that fades as paths add up;
  *   damping     plus 2 noise / limit^2: moving by the whole step limit must gain more than one residual's Monte-Carlo variance.
  * A step after which the objective is higher beyond doubt halves the limits and is taken back.
- * Paths: few at first; doubled when the predicted gain is no longer clear of the noise; spread over configurations by the standard deviation of a path
+ * Paths: few at first; 1.3 times as many when the predicted gain is no longer clear of the noise; spread over configurations by the standard deviation of a path
  * (Neyman allocation). Ends when the predicted gain is within the noise and the noise is small against what is left of the objective.
  */
 #include "optimizer/descent/descent_methods.h"
