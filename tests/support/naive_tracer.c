@@ -26,12 +26,31 @@ struct hit {
     struct vec normal, tangent;
 };
 
-/* Entry into the side of the cylinder a..b, or into the ball at a; nearer than h->t and beyond tnear. */
-static void intersect_segment(struct vec o, struct vec d, double tnear, struct vec a, struct vec b, double r,
+static struct vec vertex(const struct fiber_set *f, size_t v)
+{
+    const float *p = f->position_m + 3 * v;
+    return (struct vec){(double)p[0], (double)p[1], (double)p[2]};
+}
+
+/* Inside fiber k, the union of its cylinders and balls: what lies there is no surface, only a joint. */
+static bool inside_fiber(const struct fiber_set *f, size_t k, struct vec p)
+{
+    double r = (double)f->radius_m[k] * (1 - 1e-6);
+    for (size_t v = f->first_vertex[k]; v + 1 < f->first_vertex[k + 1]; v++) {
+        struct vec a = vertex(f, v), axis = add(vertex(f, v + 1), -1, a), pa = add(p, -1, a);
+        double t = fmin(fmax(dot(pa, axis) / dot(axis, axis), 0), 1);
+        struct vec away = add(pa, -t, axis);
+        if (dot(away, away) < r * r) return true;
+    }
+    return false;
+}
+
+/* Entry into the side of segment v of fiber k, or into the balls at its ends; nearer than h->t and beyond tnear. */
+static void intersect_segment(const struct fiber_set *f, size_t k, size_t v, struct vec o, struct vec d, double tnear,
                               struct hit *h)
 {
-    struct vec axis = add(b, -1, a), oa = add(o, -1, a);
-    double length = sqrt(dot(axis, axis));
+    struct vec a = vertex(f, v), b = vertex(f, v + 1), axis = add(b, -1, a), oa = add(o, -1, a);
+    double length = sqrt(dot(axis, axis)), r = (double)f->radius_m[k];
     axis = unit(axis);
     for (int ball = 0; ball < 3; ball++) { /* cylinder, ball at a, ball at b */
         struct vec p = ball == 2 ? add(o, -1, b) : oa, dd = d, pp = p;
@@ -46,6 +65,7 @@ static void intersect_segment(struct vec o, struct vec d, double tnear, struct v
         struct vec n = add(pp, t, dd);
         double along = dot(add(p, t, d), axis);
         if (ball == 0 && (along < 0 || along > length)) continue;
+        if (inside_fiber(f, k, add(o, t, d))) continue;
         h->t = t;
         h->normal = unit(n);
         h->tangent = axis;
@@ -67,12 +87,8 @@ static void intersect_stretch(const struct fiber_set *f, struct vec o, struct ve
         for (int j = j0; j <= j1; j++) {
             struct vec local = {o.x - i * f->tile_size_m[0], o.y - j * f->tile_size_m[1], o.z};
             for (size_t k = 0; k < f->n_fiber; k++)
-                for (size_t v = f->first_vertex[k]; v + 1 < f->first_vertex[k + 1]; v++) {
-                    const float *a = f->position_m + 3 * v;
-                    intersect_segment(local, d, tnear, (struct vec){(double)a[0], (double)a[1], (double)a[2]},
-                                      (struct vec){(double)a[3], (double)a[4], (double)a[5]}, (double)f->radius_m[k],
-                                      h);
-                }
+                for (size_t v = f->first_vertex[k]; v + 1 < f->first_vertex[k + 1]; v++)
+                    intersect_segment(f, k, v, local, d, tnear, h);
         }
 }
 
