@@ -8,11 +8,13 @@
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/volume/volume.h"
+#include "geometry/volume/volume_source.h"
 
 #include <stdbool.h>
 
 /* Options of geometry; NaN (or 0 for counts) means "choose from the data". Chosen values are written back. */
 struct reconstruct_option {
+    struct volume_raw_declaration raw; /* n[0] == 0 (default): the file has a header */
     double voxel_size_m[3];      /* required unless the file states it; NaN: take the file's */
     char axes[8];                /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
     double matrix[9];            /* rotation/shear applied after `axes`, row-major; identity by default */

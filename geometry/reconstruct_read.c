@@ -191,7 +191,7 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     struct volume stored = {0};
     struct plan p;
     *v = (struct volume){0};
-    status s = volume_source_open(path, n_path, &source, err);
+    status s = volume_source_open_declared(path, n_path, &o->raw, &source, err);
     if (s != STATUS_OK) return s;
     s = plan_read(volume_source_describe(source), o, limit_bytes, &p, err);
     if (s != STATUS_OK) goto out;

@@ -5,6 +5,7 @@
  *   "volume": {                                           required unless "fibers" is given
  *     "files": ["scan.tif"],                              names of input files (one, or TIFF slices in order, or .mhd + its data file)
  *     "voxel_size_um": 2.0 | [2.0, 2.0, 2.5],             required unless the file states it
+ *     "raw": {"shape": [nx,ny,nz], "type": "uint16", "endian": "little", "header_bytes": 0}, only for files without a header
  *     "axes": "xyz",  "matrix": [9 numbers],  "crop_voxel": [x0,y0,z0,x1,y1,z1],
  *     "density_low": v, "density_high": v,
  *     "filter": {"s":, "t":, "h":, "eps_d":, "eps_J":},   all optional: chosen from the data
@@ -57,6 +58,10 @@ struct job_document {
     bool has_volume;
     size_t n_volume_file;
     char (*volume_file)[JOB_MAX_NAME_BYTES];
+    size_t raw_shape[3]; /* all 0: not given */
+    char raw_type[8];
+    bool raw_big_endian;
+    size_t raw_header_bytes;
     double voxel_size_um[3]; /* NaN: not given */
     char axes[8];
     double matrix[9];

@@ -91,6 +91,39 @@ static status parse_crop_voxel(const struct json_field *f, struct job_document *
     return STATUS_OK;
 }
 
+/* Samples without a header: shape and type are required, and the byte order where a sample has several bytes. */
+static status parse_raw(const struct json_field *f, struct job_document *doc, struct error *err)
+{
+    static const char *const key[] = {"shape", "type", "endian", "header_bytes", NULL};
+    static const char *const type[] = {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64", NULL};
+    static const char *const endian[] = {"little", "big", NULL};
+    struct json_field raw;
+    bool present;
+    size_t i_type = 0, i_endian = 0;
+    status s = json_field_object(f, "raw", &raw, &present, err);
+    if (s != STATUS_OK || !present) return s;
+    s = json_field_check_keys(&raw, key, err);
+    static const char *const required[] = {"shape", "type"};
+    for (size_t i = 0; i < 2 && s == STATUS_OK; i++)
+        if (json_object_get(raw.object, required[i]) == NULL)
+            s = error_set_field(err, STATUS_INVALID, "volume.raw", "'volume.raw' lacks '%s'", required[i]);
+    if (s == STATUS_OK) s = json_field_size_array(&raw, "shape", 3, 1u << 20, doc->raw_shape, err);
+    for (size_t a = 0; a < 3 && s == STATUS_OK; a++)
+        if (doc->raw_shape[a] == 0)
+            s = error_set_field(err, STATUS_INVALID, "volume.raw.shape", "'volume.raw.shape' must be three numbers of voxels from 1");
+    if (s == STATUS_OK) s = json_field_choice(&raw, "type", type, &i_type, err);
+    if (s == STATUS_OK) s = json_field_choice(&raw, "endian", endian, &i_endian, err);
+    if (s == STATUS_OK) s = json_field_size(&raw, "header_bytes", 0, 1u << 30, &doc->raw_header_bytes, err);
+    if (s == STATUS_OK && i_type > 1 && json_object_get(raw.object, "endian") == NULL)
+        s = error_set_field(err, STATUS_INVALID, "volume.raw", "'volume.raw' lacks 'endian': 'little' or 'big'");
+    if (s == STATUS_OK && doc->n_volume_file != 1)
+        s = error_set_field(err, STATUS_INVALID, "volume.raw", "'volume.raw' describes one file, 'volume.files' names %zu", doc->n_volume_file);
+    if (s != STATUS_OK) return s;
+    snprintf(doc->raw_type, sizeof doc->raw_type, "%s", type[i_type]);
+    doc->raw_big_endian = i_endian == 1;
+    return STATUS_OK;
+}
+
 static status parse_filter(const struct json_field *f, struct job_document *doc, struct error *err)
 {
     static const char *const key[] = {"s", "t", "h", "eps_d", "eps_J", NULL};
@@ -109,10 +142,11 @@ static status parse_filter(const struct json_field *f, struct job_document *doc,
 
 status job_parse_volume(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"files",  "voxel_size_um",    "axes",         "matrix",    "crop_voxel",      "density_low",
+    static const char *const key[] = {"files",  "raw", "voxel_size_um",    "axes",         "matrix",    "crop_voxel",      "density_low",
                                       "density_high", "filter", "link_sigma_voxel", "min_vertices", "radius_um", "radius_per_axis", NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_files(f, doc, err);
+    if (s == STATUS_OK) s = parse_raw(f, doc, err);
     if (s == STATUS_OK) s = parse_voxel_size(f, doc, err);
     if (s == STATUS_OK) s = parse_axes(f, doc, err);
     if (s == STATUS_OK) s = parse_matrix(f, doc, err);

@@ -14,6 +14,10 @@ static const double um = 1e-6, mm = 1e-3;
 static void set_options(const struct job_document *doc, struct reconstruct_option *o)
 {
     reconstruct_option_default(o);
+    memcpy(o->raw.n, doc->raw_shape, sizeof o->raw.n);
+    memcpy(o->raw.type, doc->raw_type, sizeof o->raw.type);
+    o->raw.big_endian = doc->raw_big_endian;
+    o->raw.header_bytes = doc->raw_header_bytes;
     for (int a = 0; a < 3; a++) o->voxel_size_m[a] = doc->voxel_size_um[a] * um; /* NaN stays NaN */
     memcpy(o->axes, doc->axes, sizeof o->axes);
     memcpy(o->matrix, doc->matrix, sizeof o->matrix);

@@ -19,7 +19,7 @@ typedef struct volume_reader {
     void (*close)(void *handle);
 } volume_reader;
 
-extern const volume_reader tiff_reader, metaimage_reader, vol_reader;
+extern const volume_reader tiff_reader, metaimage_reader, nrrd_reader, vol_reader;
 
 size_t volume_reader_count(void);
 const volume_reader *volume_reader_at(size_t i);

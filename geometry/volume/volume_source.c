@@ -1,12 +1,15 @@
 #include "geometry/volume/volume_source.h"
 
+#include "geometry/volume/raw_source.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const volume_reader *const reader[] = {&tiff_reader, &metaimage_reader, &vol_reader};
+static const volume_reader *const reader[] = {&tiff_reader, &metaimage_reader, &nrrd_reader, &vol_reader};
+/* Not in the table: nothing in the file tells that it is this one's. Opened by raw_source_open with a declaration. */
+static const volume_reader raw_reader = {.id = "raw.v1", .read = raw_source_read, .close = raw_source_close};
 
 struct volume_source {
     const volume_reader *reader;
@@ -89,24 +92,28 @@ static status read_first_bytes(const char *path, uint8_t first_byte[16], struct 
     return STATUS_OK;
 }
 
-status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err)
+status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
+                                   struct volume_source **source, struct error *err)
 {
     *source = NULL;
     if (n_path == 0) return error_set_field(err, STATUS_INVALID, "volume.files", "cannot read volume: no file named");
     uint8_t first_byte[16];
     status s = read_first_bytes(path[0], first_byte, err);
     if (s != STATUS_OK) return s;
-    const volume_reader *found = NULL;
+    const volume_reader *found = raw != NULL && raw->n[0] > 0 ? &raw_reader : NULL;
     for (size_t i = 0; i < volume_reader_count() && found == NULL; i++)
         if (reader[i]->recognise(first_byte, path[0])) found = reader[i];
     if (found == NULL)
         return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
-                               "cannot read volume '%s': neither TIFF nor MetaImage nor .vol", volume_file_name(path[0]));
+                               "cannot read volume '%s': neither TIFF nor MetaImage nor NRRD nor .vol (samples without a header are "
+                               "described by 'volume.raw')",
+                               volume_file_name(path[0]));
     struct volume_source *v = calloc(1, sizeof *v);
     if (v == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", volume_file_name(path[0]));
     v->reader = found;
-    s = found->open(path, n_path, &v->handle, &v->info, err);
+    s = found == &raw_reader ? raw_source_open(path, n_path, raw, &v->handle, &v->info, err)
+                             : found->open(path, n_path, &v->handle, &v->info, err);
     if (s != STATUS_OK) {
         free(v);
         return s;
@@ -114,6 +121,11 @@ status volume_source_open(const char *const *path, size_t n_path, struct volume_
     v->info.reader_id = found->id;
     *source = v;
     return STATUS_OK;
+}
+
+status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err)
+{
+    return volume_source_open_declared(path, n_path, NULL, source, err);
 }
 
 void volume_source_close(struct volume_source *source)

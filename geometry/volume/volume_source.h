@@ -9,9 +9,18 @@
 
 #include "base/status.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 struct volume_source;
+
+/* What a file without a header holds. n[0] == 0: nothing is declared, the file says itself. */
+struct volume_raw_declaration {
+    size_t n[3];         /* columns, rows, slices; x runs fastest */
+    char type[8];        /* "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64" */
+    bool big_endian;
+    size_t header_bytes; /* to skip at the start of the file */
+};
 
 struct volume_source_info {
     size_t n[3];            /* columns, rows, slices */
@@ -20,9 +29,12 @@ struct volume_source_info {
     const char *sample;     /* "uint8", "uint16", "int16", "float32" */
 };
 
-/* path: one multi-page TIFF, one .mhd or .mha, one .vol, or TIFF slices in order. The field of errors is "volume.files".
+/* path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, or TIFF slices in order. The field of errors is "volume.files".
  * STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files that are not what they claim to be; STATUS_UNSUPPORTED. */
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err);
+/* The same; with a declaration (n[0] > 0) the one file at path is raw samples. Fields "volume.raw", "volume.files". */
+status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
+                                   struct volume_source **source, struct error *err);
 void volume_source_close(struct volume_source *source);
 const struct volume_source_info *volume_source_describe(const struct volume_source *source);
 /* Slices i_slice .. i_slice + n_slice - 1 into value[n_slice][rows][columns]. */

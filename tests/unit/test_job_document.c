@@ -222,9 +222,28 @@ static void test_lists_agree(void **state)
     assert_true(fabs(total - 1.0) < 1e-9);
 }
 
+/* A file without a header is described completely, or not at all. */
+static void test_raw_volume(void **state)
+{
+    (void)state;
+    struct job_document *d = parse(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\",\"endian\":\"big\",\"header_bytes\":8}"));
+    assert_true(d->raw_shape[0] == 3 && d->raw_shape[2] == 5 && d->raw_big_endian && d->raw_header_bytes == 8);
+    assert_string_equal(d->raw_type, "uint16");
+    job_document_free(d);
+    job_document_free(parse(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\"}")));
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\"}"), "volume.raw", "lacks 'endian'");
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5]}"), "volume.raw", "lacks 'type'");
+    check_error(VOLUME_OF("\"raw\":{\"type\":\"uint8\"}"), "volume.raw", "lacks 'shape'");
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,0,5],\"type\":\"uint8\"}"), "volume.raw.shape", "from 1");
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,5],\"type\":\"uint8\"}"), "volume.raw.shape", "3");
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint12\"}"), "volume.raw.type", "uint8");
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\",\"order\":1}"), "volume.raw.order", "order");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_raw_volume),
         cmocka_unit_test(test_defaults),    cmocka_unit_test(test_everything_given), cmocka_unit_test(test_structure),
         cmocka_unit_test(test_volume),      cmocka_unit_test(test_photographs),      cmocka_unit_test(test_fit),
         cmocka_unit_test(test_bounds_are_values), cmocka_unit_test(test_file_names), cmocka_unit_test(test_damage),

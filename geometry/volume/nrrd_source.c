@@ -1,0 +1,302 @@
+/* NRRD: a text header "field: value" that an empty line ends, with the data after it (.nrrd) or in a file beside it (.nhdr).
+ * Read: three dimensions of scalars, encodings raw and gzip, lengths from "spacings" or from the lengths of "space directions"
+ * in the stated unit (millimetres when none is stated).
+ * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
+#include "geometry/volume/voxel_stream.h"
+
+#include <endian.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+enum { MAX_HEADER_BYTES = 65536 };
+
+struct nrrd {
+    char *name;      /* of the header, for errors */
+    char *data_path; /* detached data, or NULL */
+    struct voxel_layout layout;
+    double spacing[3], direction_length[3], unit_m[3];
+    long long line_skip, byte_skip;
+    bool has_dimension, has_size, has_type, has_endian, big_endian, has_encoding;
+    struct voxel_stream *stream;
+};
+
+static status bad(const struct nrrd *m, struct error *err, const char *what, const char *value)
+{
+    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%.100s'", m->name, what, value);
+}
+
+static const struct {
+    const char *name;
+    enum sample_type type;
+} type_name[] = {
+    {"uchar", SAMPLE_UINT8}, {"unsigned char", SAMPLE_UINT8}, {"uint8", SAMPLE_UINT8}, {"uint8_t", SAMPLE_UINT8},
+    {"signed char", SAMPLE_INT8}, {"int8", SAMPLE_INT8}, {"int8_t", SAMPLE_INT8},
+    {"ushort", SAMPLE_UINT16}, {"unsigned short", SAMPLE_UINT16}, {"unsigned short int", SAMPLE_UINT16}, {"uint16", SAMPLE_UINT16}, {"uint16_t", SAMPLE_UINT16},
+    {"short", SAMPLE_INT16}, {"short int", SAMPLE_INT16}, {"signed short", SAMPLE_INT16}, {"signed short int", SAMPLE_INT16}, {"int16", SAMPLE_INT16}, {"int16_t", SAMPLE_INT16},
+    {"uint", SAMPLE_UINT32}, {"unsigned int", SAMPLE_UINT32}, {"uint32", SAMPLE_UINT32}, {"uint32_t", SAMPLE_UINT32},
+    {"int", SAMPLE_INT32}, {"signed int", SAMPLE_INT32}, {"int32", SAMPLE_INT32}, {"int32_t", SAMPLE_INT32},
+    {"float", SAMPLE_FLOAT32}, {"double", SAMPLE_FLOAT64},
+};
+
+static status parse_type(struct nrrd *m, const char *value, struct error *err)
+{
+    for (size_t i = 0; i < sizeof type_name / sizeof *type_name; i++)
+        if (strcasecmp(value, type_name[i].name) == 0) {
+            m->layout.sample = type_name[i].type;
+            m->has_type = true;
+            return STATUS_OK;
+        }
+    return bad(m, err, "unsupported type", value);
+}
+
+static status parse_dimension(struct nrrd *m, const char *value, struct error *err)
+{
+    m->has_dimension = true;
+    return strcmp(value, "3") == 0 ? STATUS_OK : bad(m, err, "dimension must be 3, not", value);
+}
+
+static status parse_sizes(struct nrrd *m, const char *value, struct error *err)
+{
+    const char *p = value;
+    for (int a = 0; a < 3; a++) {
+        char *end;
+        errno = 0;
+        unsigned long long n = strtoull(p, &end, 10);
+        if (end == p || errno != 0 || n == 0 || n > VOXEL_STREAM_MAX_EDGE || strchr(value, '-') != NULL)
+            return bad(m, err, "sizes are not three positive numbers:", value);
+        m->layout.n[a] = (size_t)n;
+        p = end;
+    }
+    if (p[strspn(p, " \t")] != '\0') return bad(m, err, "sizes are not three positive numbers:", value);
+    m->has_size = true;
+    return STATUS_OK;
+}
+
+/* Left NaN where the file says "nan" or "none": unknown, to be given by the job. */
+static status parse_spacings(struct nrrd *m, const char *value, struct error *err)
+{
+    const char *p = value;
+    for (int a = 0; a < 3; a++) {
+        char *end;
+        double w = strtod(p, &end);
+        if (end == p || (!isnan(w) && !(fabs(w) > 0.0 && isfinite(w)))) return bad(m, err, "spacings are not three positive numbers:", value);
+        m->spacing[a] = fabs(w);
+        p = end;
+    }
+    return STATUS_OK;
+}
+
+/* "(0.002,0,0) (0,0.002,0) (0,0,0.002)": a voxel's edges in space; their lengths are the spacings. */
+static status parse_directions(struct nrrd *m, const char *value, struct error *err)
+{
+    const char *p = value;
+    for (int a = 0; a < 3; a++) {
+        double square = 0.0;
+        p += strspn(p, " \t");
+        if (*p++ != '(') return bad(m, err, "space directions are not three vectors:", value);
+        for (int c = 0; c < 3; c++) {
+            char *end;
+            double x = strtod(p, &end);
+            bool given = end != p && isfinite(x);
+            p = end + strspn(end, " \t");
+            if (!given || *p != (c < 2 ? ',' : ')')) return bad(m, err, "space directions are not three vectors:", value);
+            p++;
+            square += x * x;
+        }
+        if (!(square > 0.0) || !isfinite(square)) return bad(m, err, "a space direction has no length:", value);
+        m->direction_length[a] = sqrt(square);
+    }
+    return STATUS_OK;
+}
+
+/* "\"mm\" \"mm\" \"mm\"" */
+static status parse_units(struct nrrd *m, const char *value, struct error *err)
+{
+    static const struct {
+        const char *name;
+        double metre;
+    } unit[] = {{"mm", 1e-3}, {"millimeter", 1e-3}, {"millimeters", 1e-3}, {"um", 1e-6}, {"\xc2\xb5m", 1e-6}, {"\xce\xbcm", 1e-6},
+                {"micron", 1e-6}, {"microns", 1e-6}, {"micrometer", 1e-6}, {"micrometers", 1e-6}, {"nm", 1e-9}, {"cm", 1e-2}, {"m", 1.0}, {"", 1e-3}};
+    const char *p = value;
+    for (int a = 0; a < 3; a++) {
+        const char *open = strchr(p, '"'), *close = open != NULL ? strchr(open + 1, '"') : NULL;
+        if (close == NULL) return bad(m, err, "units are not three quoted words:", value);
+        size_t n = (size_t)(close - open - 1), i = 0, n_unit = sizeof unit / sizeof *unit;
+        while (i < n_unit && (strlen(unit[i].name) != n || strncasecmp(unit[i].name, open + 1, n) != 0)) i++;
+        if (i == n_unit) return bad(m, err, "unknown unit of length in", value);
+        m->unit_m[a] = unit[i].metre;
+        p = close + 1;
+    }
+    return STATUS_OK;
+}
+
+static status parse_encoding(struct nrrd *m, const char *value, struct error *err)
+{
+    m->has_encoding = true;
+    m->layout.compressed = strcasecmp(value, "gzip") == 0 || strcasecmp(value, "gz") == 0;
+    if (m->layout.compressed || strcasecmp(value, "raw") == 0) return STATUS_OK;
+    return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+                           "cannot read volume '%s': encoding '%.40s' is not supported: save it as raw or gzip", m->name, value);
+}
+
+static status parse_endian(struct nrrd *m, const char *value, struct error *err)
+{
+    m->has_endian = true;
+    m->big_endian = strcasecmp(value, "big") == 0;
+    return m->big_endian || strcasecmp(value, "little") == 0 ? STATUS_OK : bad(m, err, "endian must be little or big, not", value);
+}
+
+static status parse_data_file(struct nrrd *m, const char *path, const char *value, struct error *err)
+{
+    if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
+        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files", "cannot read volume '%s': data in a list of files is not supported",
+                               m->name);
+    if (strncmp(value, "./", 2) == 0) value += 2;
+    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not reach outside its own folder */
+        return bad(m, err, "the data file must be beside the header, not", value);
+    free(m->data_path);
+    m->data_path = voxel_stream_beside(path, value);
+    return m->data_path != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+}
+
+static status parse_skip(struct nrrd *m, const char *value, long long least, long long *skip, struct error *err)
+{
+    char *end;
+    errno = 0;
+    *skip = strtoll(value, &end, 10);
+    if (end == value || *end != '\0' || errno != 0 || *skip < least || *skip > 1LL << 40) return bad(m, err, "a skip makes no sense:", value);
+    return STATUS_OK;
+}
+
+static status parse_field(struct nrrd *m, const char *path, const char *key, const char *value, struct error *err)
+{
+    if (strcasecmp(key, "type") == 0) return parse_type(m, value, err);
+    if (strcasecmp(key, "dimension") == 0) return parse_dimension(m, value, err);
+    if (strcasecmp(key, "sizes") == 0) return parse_sizes(m, value, err);
+    if (strcasecmp(key, "spacings") == 0) return parse_spacings(m, value, err);
+    if (strcasecmp(key, "space directions") == 0) return parse_directions(m, value, err);
+    if (strcasecmp(key, "space units") == 0 || strcasecmp(key, "units") == 0) return parse_units(m, value, err);
+    if (strcasecmp(key, "encoding") == 0) return parse_encoding(m, value, err);
+    if (strcasecmp(key, "endian") == 0) return parse_endian(m, value, err);
+    if (strcasecmp(key, "data file") == 0 || strcasecmp(key, "datafile") == 0) return parse_data_file(m, path, value, err);
+    if (strcasecmp(key, "line skip") == 0 || strcasecmp(key, "lineskip") == 0) return parse_skip(m, value, 0, &m->line_skip, err);
+    if (strcasecmp(key, "byte skip") == 0 || strcasecmp(key, "byteskip") == 0) return parse_skip(m, value, -1, &m->byte_skip, err);
+    return STATUS_OK; /* everything else says nothing about the voxels */
+}
+
+static status check_complete(const struct nrrd *m, struct error *err)
+{
+    const char *missing = !m->has_dimension ? "dimension" : !m->has_size ? "sizes" : !m->has_type ? "type" : !m->has_encoding ? "encoding" : NULL;
+    if (missing == NULL && !m->has_endian && sample_bytes(m->layout.sample) > 1) missing = "endian";
+    if (missing != NULL) return bad(m, err, "the header lacks", missing);
+    if (m->layout.compressed && m->byte_skip < 0) return bad(m, err, "compressed data cannot have byte skip", "-1");
+    return STATUS_OK;
+}
+
+/* Header lines up to the empty one, or to the end of a detached header. */
+static status parse_header(struct nrrd *m, const char *path, FILE *file, struct error *err)
+{
+    char line[4096];
+    bool ended = false;
+    if (fgets(line, sizeof line, file) == NULL || strncmp(line, "NRRD000", 7) != 0) return bad(m, err, "it does not begin with", "NRRD000");
+    while (!ended && fgets(line, sizeof line, file) != NULL) {
+        size_t n = strlen(line);
+        if (n + 1 == sizeof line || ftell(file) > MAX_HEADER_BYTES) return bad(m, err, "the header does not end within", "65536 bytes");
+        while (n > 0 && strchr(" \t\r\n", line[n - 1]) != NULL) line[--n] = '\0';
+        ended = n == 0;
+        char *colon = strchr(line, ':');
+        if (ended || line[0] == '#' || colon == NULL || colon[1] == '=') continue;
+        *colon = '\0';
+        status s = parse_field(m, path, line, colon + 1 + strspn(colon + 1, " \t"), err);
+        if (s != STATUS_OK) return s;
+    }
+    if (!ended && m->data_path == NULL) return bad(m, err, "no data: no empty line ends the header, and it names no", "data file");
+    return check_complete(m, err);
+}
+
+/* Where the data begin, "line skip" lines later. */
+static status find_data(struct nrrd *m, FILE *header, struct error *err)
+{
+    FILE *file = header;
+    if (m->data_path != NULL) file = fopen(m->data_path, "rbe");
+    if (file == NULL) return STATUS_OK; /* voxel_stream_open says why */
+    for (long long i = 0; i < m->line_skip; i++) {
+        int c;
+        do c = fgetc(file);
+        while (c != '\n' && c != EOF);
+        if (c == EOF) break;
+    }
+    m->layout.offset_bytes = ftello(file);
+    if (file != header) fclose(file);
+    m->layout.skip_bytes = m->byte_skip > 0 ? m->byte_skip : 0;
+    if (m->byte_skip == -1) m->layout.offset_bytes = -1;
+    return m->layout.offset_bytes >= -1 ? STATUS_OK : error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+}
+
+static void nrrd_close(void *handle)
+{
+    struct nrrd *m = handle;
+    if (m == NULL) return;
+    voxel_stream_close(m->stream);
+    free(m->name);
+    free(m->data_path);
+    free(m);
+}
+
+static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path, struct error *err)
+{
+    const char *data = m->data_path != NULL ? m->data_path : path[0];
+    for (size_t i = 1; i < n_path; i++) /* uploads name the data file, too; nothing else makes sense */
+        if (strcmp(path[i], data) != 0) return bad(m, err, "its data file is not", volume_file_name(path[i]));
+    m->layout.swap = m->big_endian != (BYTE_ORDER == BIG_ENDIAN);
+    status s = voxel_stream_open(m->name, data, &m->layout, &m->stream, err);
+    return s == STATUS_OK ? voxel_stream_check_order(m->stream, err) : s;
+}
+
+static status nrrd_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info, struct error *err)
+{
+    struct nrrd *m = calloc(1, sizeof *m);
+    if (m != NULL) m->name = strdup(volume_file_name(path[0]));
+    if (m == NULL || m->name == NULL) {
+        nrrd_close(m);
+        return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+    }
+    for (int a = 0; a < 3; a++) {
+        m->spacing[a] = m->direction_length[a] = NAN;
+        m->unit_m[a] = 1e-3;
+    }
+    status s = STATUS_OK;
+    FILE *header = fopen(path[0], "rbe");
+    if (header == NULL) s = error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+    if (s == STATUS_OK) s = parse_header(m, path[0], header, err);
+    if (s == STATUS_OK) s = find_data(m, header, err);
+    if (header != NULL) fclose(header);
+    if (s == STATUS_OK) s = open_parsed(m, path, n_path, err);
+    if (s != STATUS_OK) {
+        nrrd_close(m);
+        return s;
+    }
+    *info = (struct volume_source_info){.sample = sample_name(m->layout.sample)};
+    memcpy(info->n, m->layout.n, sizeof info->n);
+    for (int a = 0; a < 3; a++)
+        info->voxel_size_m[a] = (isnan(m->direction_length[a]) ? m->spacing[a] : m->direction_length[a]) * m->unit_m[a];
+    *handle = m;
+    return STATUS_OK;
+}
+
+static status nrrd_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err)
+{
+    struct nrrd *m = handle;
+    return voxel_stream_read(m->stream, i_slice, n_slice, value, err);
+}
+
+static bool nrrd_recognise(const uint8_t b[16], const char *path)
+{
+    (void)path;
+    return memcmp(b, "NRRD000", 7) == 0;
+}
+
+const volume_reader nrrd_reader = {"nrrd.v1", nrrd_recognise, nrrd_open, nrrd_read, nrrd_close};

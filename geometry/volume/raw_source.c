@@ -1,0 +1,50 @@
+#include "geometry/volume/raw_source.h"
+
+#include "geometry/volume/voxel_stream.h"
+
+#include <endian.h>
+#include <math.h>
+#include <string.h>
+
+bool sample_type_of_name(const char *name, enum sample_type *type)
+{
+    for (enum sample_type t = 0; t < SAMPLE_COUNT; t++)
+        if (strcmp(name, sample_name(t)) == 0) {
+            *type = t;
+            return true;
+        }
+    return false;
+}
+
+status raw_source_open(const char *const *path, size_t n_path, const struct volume_raw_declaration *d, void **handle,
+                       struct volume_source_info *info, struct error *err)
+{
+    struct voxel_layout layout = {.offset_bytes = (long long)d->header_bytes};
+    struct voxel_stream *stream = NULL;
+    if (n_path != 1)
+        return error_set_field(err, STATUS_INVALID, "volume.raw", "cannot read the volume: 'raw' describes one file, %zu are given", n_path);
+    if (!sample_type_of_name(d->type, &layout.sample))
+        return error_set_field(err, STATUS_INVALID, "volume.raw.type", "cannot read volume '%s': unknown sample type '%s'",
+                               volume_file_name(path[0]), d->type);
+    memcpy(layout.n, d->n, sizeof layout.n);
+    layout.swap = d->big_endian != (BYTE_ORDER == BIG_ENDIAN);
+    status s = voxel_stream_open(volume_file_name(path[0]), path[0], &layout, &stream, err);
+    if (s == STATUS_OK) s = voxel_stream_check_order(stream, err);
+    if (s != STATUS_OK) {
+        voxel_stream_close(stream);
+        return s;
+    }
+    *info = (struct volume_source_info){.n = {d->n[0], d->n[1], d->n[2]},
+                                        .voxel_size_m = {NAN, NAN, NAN},
+                                        .reader_id = "raw.v1",
+                                        .sample = sample_name(layout.sample)};
+    *handle = stream;
+    return STATUS_OK;
+}
+
+status raw_source_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err)
+{
+    return voxel_stream_read(handle, i_slice, n_slice, value, err);
+}
+
+void raw_source_close(void *handle) { voxel_stream_close(handle); }
