@@ -24,6 +24,7 @@ enum { N = SCATTERING_MAX_PARAM, BLOCK = 256, MIN_PATH = 1024, FIRST_PATH = 2048
 static const double target_rel_rms = 0.0007, target_share = 0.01;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
 static const double largest_share = 0.1;
+static const double least_limit = 1.0 / 32.0; /* of the step limits */
 
 struct gauss_newton {
     struct descent_run run;
@@ -34,6 +35,7 @@ struct gauss_newton {
     double best_f, best_se; /* objective there, by the pooled model */
     double limit_scale;     /* of the step limits, 1 or less */
     double n_path_mean;     /* a configuration and replica, of the next iteration */
+    double promised;        /* fall of f by the last step, as the model saw it */
     double gain, noise, damping, largest_step;
     size_t n_free;
 };
@@ -130,18 +132,22 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
     return descent_report(&g->run, &step, err);
 }
 
-/* failed: the last step made things worse beyond doubt: back to the best point, with half the limits. */
+/* What the last step has done against what it promised. Worse beyond doubt: `failed`, back to the best point. Clearly less than promised (a fit
+ * with large residuals overshoots from side to side): half the limits; otherwise they grow again. */
 static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
 {
-    double se, f = linear_model_objective(&g->model, &se);
-    if (g->history.n_step > 1 && f - g->best_f > 3.0 * (se + g->best_se) && f > 1.1 * g->best_f && g->limit_scale > 0.1) {
-        g->limit_scale *= 0.5;
+    double se, f = linear_model_objective(&g->model, &se), doubt = se + g->best_se;
+    bool first = g->history.n_step == 1;
+    *failed = !first && f - g->best_f > 3.0 * doubt && f > 1.1 * g->best_f && g->limit_scale > least_limit;
+    bool short_of_promise = !first && g->best_f - f < 0.25 * g->promised && g->promised > 2.0 * doubt;
+    if (*failed || short_of_promise) g->limit_scale = fmax(least_limit, 0.5 * g->limit_scale);
+    else g->limit_scale = fmin(1.0, 1.5 * g->limit_scale);
+    if (*failed) {
         memcpy(g->x, g->best_x, sizeof g->x);
-        *failed = true;
-        return linear_model_pool(&g->model, &g->history, g->x, err);
+        status s = linear_model_pool(&g->model, &g->history, g->x, err);
+        if (s == STATUS_OK) linear_model_weigh(&g->model);
+        return s;
     }
-    *failed = false;
-    g->limit_scale = fmin(1.0, g->limit_scale * 1.5);
     memcpy(g->best_x, g->x, sizeof g->x);
     g->best_f = f;
     g->best_se = se;
@@ -177,6 +183,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         s = judge_step(g, &failed, err);
         if (s == STATUS_OK) s = solve_step(g, dx, err);
         if (s != STATUS_OK) return s;
+        g->promised = g->gain;
         for (size_t p = 0; p < g->model.n_param; p++) g->x[p] += dx[p];
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
         bool small = g->gain <= 4.0 * noise_gain(g) || g->gain <= 0.01 * fabs(f);
