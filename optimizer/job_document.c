@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const root_key[] = {"sample", "volume", "fibers",       "lamp",        "camera",
-                                       "black_sheet", "measurements", "photographs", "fit", NULL};
+static const char *const root_key[] = {"sample",      "volume",       "fibers",      "lamp", "camera",
+                                       "black_sheet", "measurements", "photographs", "fit",  NULL};
 
 bool job_file_name_valid(const char *name)
 {
@@ -21,9 +21,10 @@ bool job_file_name_valid(const char *name)
 status job_check_file_name(const char *path, const char *name, struct error *err)
 {
     if (job_file_name_valid(name)) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, path,
-                           "'%s' is '%.140s': a file name has 1 to %d characters out of A-Z a-z 0-9 . _ - and does not start with a dot",
-                           path, name, JOB_MAX_NAME_BYTES - 1);
+    return error_set_field(
+        err, STATUS_INVALID, path,
+        "'%s' is '%.140s': a file name has 1 to %d characters out of A-Z a-z 0-9 . _ - and does not start with a dot",
+        path, name, JOB_MAX_NAME_BYTES - 1);
 }
 
 status job_parse_file_name(const struct json_field *f, const char *key, char out[JOB_MAX_NAME_BYTES], struct error *err)
@@ -82,7 +83,8 @@ static status parse_sample(const struct json_field *root, struct job_document *d
     size_t n = 0;
     for (const char *p = doc->sample; *p != '\0'; p++)
         if (((unsigned char)*p & 0xC0) != 0x80) n++;
-    if (n > 200) return error_set_field(err, STATUS_INVALID, "sample", "'sample' has %zu characters: allowed are 1 to 200", n);
+    if (n > 200)
+        return error_set_field(err, STATUS_INVALID, "sample", "'sample' has %zu characters: allowed are 1 to 200", n);
     return STATUS_OK;
 }
 
@@ -95,9 +97,11 @@ static status parse_cloth(const struct json_field *root, struct job_document *do
     if (s == STATUS_OK) s = json_field_object(root, "fibers", &fibers, &has_fibers, err);
     if (s != STATUS_OK) return s;
     if (doc->has_volume && has_fibers)
-        return error_set_field(err, STATUS_INVALID, "fibers", "'volume' and 'fibers' are both given: a job takes one of them");
+        return error_set_field(err, STATUS_INVALID, "fibers",
+                               "'volume' and 'fibers' are both given: a job takes one of them");
     if (!doc->has_volume && !has_fibers)
-        return error_set_field(err, STATUS_INVALID, "volume", "'volume' is missing: give a scan ('volume') or a fiber file ('fibers')");
+        return error_set_field(err, STATUS_INVALID, "volume",
+                               "'volume' is missing: give a scan ('volume') or a fiber file ('fibers')");
     return has_fibers ? job_parse_fibers(&fibers, doc, err) : job_parse_volume(&volume, doc, err);
 }
 
@@ -113,7 +117,8 @@ static status parse_setup(const struct json_field *root, struct job_document *do
         if (s == STATUS_OK) s = json_field_number(&f, "side_cm", 0.01, 1000.0, &doc->lamp_side_cm, err);
         if (s == STATUS_OK) s = json_field_number(&f, "distance_cm", 1.0, 100000.0, &doc->lamp_distance_cm, err);
         if (s == STATUS_OK && doc->lamp_side_cm > 2.0 * doc->lamp_distance_cm)
-            s = error_set_field(err, STATUS_INVALID, "lamp.side_cm", "'lamp.side_cm' is %g: allowed is at most twice lamp.distance_cm (%g)",
+            s = error_set_field(err, STATUS_INVALID, "lamp.side_cm",
+                                "'lamp.side_cm' is %g: allowed is at most twice lamp.distance_cm (%g)",
                                 doc->lamp_side_cm, doc->lamp_distance_cm);
     }
     if (s == STATUS_OK) s = json_field_object(root, "camera", &f, &present, err);
@@ -122,8 +127,9 @@ static status parse_setup(const struct json_field *root, struct job_document *do
         if (s == STATUS_OK) s = json_field_number(&f, "distance_cm", 1.0, 100000.0, &doc->camera_distance_cm, err);
         if (s == STATUS_OK) s = json_field_number(&f, "crop_cm", 0.01, 100.0, &doc->crop_cm, err);
         if (s == STATUS_OK && doc->crop_cm > doc->camera_distance_cm)
-            s = error_set_field(err, STATUS_INVALID, "camera.crop_cm", "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)",
-                                doc->crop_cm, doc->camera_distance_cm);
+            s = error_set_field(err, STATUS_INVALID, "camera.crop_cm",
+                                "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)", doc->crop_cm,
+                                doc->camera_distance_cm);
     }
     if (s == STATUS_OK) s = json_field_bool(root, "black_sheet", &doc->black_sheet, err);
     return s;
@@ -185,8 +191,10 @@ static status check_duplicates(const struct job_document *doc, struct error *err
         for (size_t i = 0; i < doc->n_volume_file; i++)
             if (strcmp(doc->volume_file[i], list.duplicate) == 0) snprintf(path, sizeof path, "volume.files[%zu]", i);
         for (size_t i = 0; i < doc->n_photograph; i++)
-            if (strcmp(doc->photograph[i].file, list.duplicate) == 0) snprintf(path, sizeof path, "photographs[%zu].file", i);
-        s = error_set_field(err, STATUS_INVALID, path, "'%s' names the file '%s' a second time: each input file has one use", path,
+            if (strcmp(doc->photograph[i].file, list.duplicate) == 0)
+                snprintf(path, sizeof path, "photographs[%zu].file", i);
+        s = error_set_field(err, STATUS_INVALID, path,
+                            "'%s' names the file '%s' a second time: each input file has one use", path,
                             list.duplicate);
     }
     free(list.name);
@@ -199,11 +207,13 @@ status job_document_parse(const char *text, size_t n_bytes, struct job_document 
     json_t *json = NULL;
     status s = STATUS_OK;
     if (n_bytes > JOB_MAX_DOCUMENT_BYTES)
-        return error_set(err, STATUS_TOO_LARGE, "the job document has %zu bytes, the limit is %d", n_bytes, JOB_MAX_DOCUMENT_BYTES);
+        return error_set(err, STATUS_TOO_LARGE, "the job document has %zu bytes, the limit is %d", n_bytes,
+                         JOB_MAX_DOCUMENT_BYTES);
     json_error_t at;
     json = json_loadb(text, n_bytes, JSON_REJECT_DUPLICATES, &at);
     if (json == NULL)
-        return error_set(err, STATUS_INVALID, "the job document is not valid JSON: line %d, column %d: %s", at.line, at.column, at.text);
+        return error_set(err, STATUS_INVALID, "the job document is not valid JSON: line %d, column %d: %s", at.line,
+                         at.column, at.text);
     d = document_new();
     if (d == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
@@ -228,8 +238,8 @@ out:
     return s;
 }
 
-void job_document_visit_files(const struct job_document *doc, void (*visit)(void *context, const char *name, const char *role),
-                              void *context)
+void job_document_visit_files(const struct job_document *doc,
+                              void (*visit)(void *context, const char *name, const char *role), void *context)
 {
     for (size_t i = 0; i < doc->n_volume_file; i++) visit(context, doc->volume_file[i], "volume");
     if (doc->fiber_file[0] != '\0') visit(context, doc->fiber_file, "fibers");

@@ -3,9 +3,9 @@
  * {
  *   "sample": "blue twill, batch 7",                     required, 1..200 characters
  *   "volume": {                                           required unless "fibers" is given
- *     "files": ["scan.tif"],                              names of input files (one, or TIFF slices in order, or .mhd + its data file)
- *     "voxel_size_um": 2.0 | [2.0, 2.0, 2.5],             required unless the file states it
- *     "raw": {"shape": [nx,ny,nz], "type": "uint16", "endian": "little", "header_bytes": 0}, only for files without a header
+ *     "files": ["scan.tif"],                              names of input files (one, or TIFF slices in order, or .mhd +
+ * its data file) "voxel_size_um": 2.0 | [2.0, 2.0, 2.5],             required unless the file states it "raw":
+ * {"shape": [nx,ny,nz], "type": "uint16", "endian": "little", "header_bytes": 0}, only for files without a header
  *     "axes": "xyz",  "matrix": [9 numbers],  "crop_voxel": [x0,y0,z0,x1,y1,z1],
  *     "density_low": v, "density_high": v,
  *     "filter": {"s":, "t":, "h":, "eps_d":, "eps_J":},   all optional: chosen from the data
@@ -20,10 +20,11 @@
  *     {"file":"p00.exr","set":"fit"|"held-out","light_theta_deg":,"light_phi_deg":,"camera_theta_deg":,"camera_phi_deg":,
  *      "cloth_rotation_deg":, "scale": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
  *   "fit": {"model": "two_lobe.v1", "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
- *           "max_iterations": n, "path_budget": n, "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v}, "render_px": 128, "render_samples": 64}
+ *           "max_iterations": n, "path_budget": n, "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},
+ * "render_px": 128, "render_samples": 64}
  * }
- * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path such as
- * "photographs[3].light_theta_deg" and a text that says what is allowed. Limits: see job_limits.
+ * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path
+ * such as "photographs[3].light_theta_deg" and a text that says what is allowed. Limits: see job_limits.
  */
 #ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
@@ -67,8 +68,8 @@ struct job_document {
     double matrix[9];
     size_t crop_voxel[6];
     double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j; /* NaN: not given */
-    size_t filter_h;                                                                 /* 0: not given */
-    double link_sigma_voxel, radius_um;                                              /* NaN: not given */
+    size_t filter_h;                                                                  /* 0: not given */
+    double link_sigma_voxel, radius_um;                                               /* NaN: not given */
     size_t min_vertex;
     bool radius_per_axis;
     /* fibers */
@@ -84,8 +85,8 @@ struct job_document {
     /* fit */
     char model[64], method[64];
     uint64_t seed;
-    size_t max_iteration; /* 0: the method's default */
-    uint64_t path_budget; /* 0: the method's default */
+    size_t max_iteration;                              /* 0: the method's default */
+    uint64_t path_budget;                              /* 0: the method's default */
     double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, flat; NaN: not given */
     size_t render_px, render_sample;
 };
@@ -95,8 +96,8 @@ status job_document_parse(const char *text, size_t n_bytes, struct job_document 
 void job_document_free(struct job_document *doc);
 
 /* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
-void job_document_visit_files(const struct job_document *doc, void (*visit)(void *context, const char *name, const char *role),
-                              void *context);
+void job_document_visit_files(const struct job_document *doc,
+                              void (*visit)(void *context, const char *name, const char *role), void *context);
 /* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
 bool job_file_name_valid(const char *name);
 

@@ -12,15 +12,18 @@ static status parse_files(const struct json_field *f, struct job_document *doc, 
     json_field_path(f, "files", path);
     const json_t *list = json_object_get(f->object, "files");
     if (!json_is_array(list) || json_array_size(list) == 0 || json_array_size(list) > JOB_MAX_VOLUME_FILE)
-        return error_set_field(err, STATUS_INVALID, path, "'%s' must be a list of 1 to %d file names", path, JOB_MAX_VOLUME_FILE);
+        return error_set_field(err, STATUS_INVALID, path, "'%s' must be a list of 1 to %d file names", path,
+                               JOB_MAX_VOLUME_FILE);
     size_t n = json_array_size(list);
     doc->volume_file = calloc(n, sizeof *doc->volume_file);
-    if (doc->volume_file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
+    if (doc->volume_file == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     for (size_t i = 0; i < n; i++) {
         const json_t *item = json_array_get(list, i);
         snprintf(element, sizeof element, "%.140s[%zu]", path, i);
         if (!json_is_string(item))
-            return error_set_field(err, STATUS_INVALID, element, "'%s' must be a text: the name of an input file", element);
+            return error_set_field(err, STATUS_INVALID, element, "'%s' must be a text: the name of an input file",
+                                   element);
         status s = job_check_file_name(element, json_string_value(item), err);
         if (s != STATUS_OK) return s;
         snprintf(doc->volume_file[i], JOB_MAX_NAME_BYTES, "%s", json_string_value(item));
@@ -60,9 +63,10 @@ static status parse_axes(const struct json_field *f, struct job_document *doc, s
     if (s != STATUS_OK) return s;
     json_field_path(f, "axes", path);
     if (!axes_valid(text))
-        return error_set_field(err, STATUS_INVALID, path,
-                               "'%s' is '%s': allowed is each of x, y, z once, with an optional minus sign, such as 'xyz' or '-zxy'", path,
-                               text);
+        return error_set_field(
+            err, STATUS_INVALID, path,
+            "'%s' is '%s': allowed is each of x, y, z once, with an optional minus sign, such as 'xyz' or '-zxy'", path,
+            text);
     memcpy(doc->axes, text, sizeof text);
     return STATUS_OK;
 }
@@ -72,9 +76,11 @@ static status parse_matrix(const struct json_field *f, struct job_document *doc,
     double *m = doc->matrix;
     status s = json_field_number_array(f, "matrix", 9, -1000.0, 1000.0, m, err);
     if (s != STATUS_OK) return s;
-    double det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    double det =
+        m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
     if (fabs(det) < 1e-6)
-        return error_set_field(err, STATUS_INVALID, "volume.matrix", "'volume.matrix' has determinant %g: it must be invertible", det);
+        return error_set_field(err, STATUS_INVALID, "volume.matrix",
+                               "'volume.matrix' has determinant %g: it must be invertible", det);
     return STATUS_OK;
 }
 
@@ -86,8 +92,9 @@ static status parse_crop_voxel(const struct json_field *f, struct job_document *
     bool given = json_object_get(f->object, "crop_voxel") != NULL;
     for (size_t a = 0; given && a < 3; a++)
         if (c[a + 3] <= c[a])
-            return error_set_field(err, STATUS_INVALID, "volume.crop_voxel",
-                                   "'volume.crop_voxel' is empty along %c: the order is x0, y0, z0, x1, y1, z1 with x0 < x1", "xyz"[a]);
+            return error_set_field(
+                err, STATUS_INVALID, "volume.crop_voxel",
+                "'volume.crop_voxel' is empty along %c: the order is x0, y0, z0, x1, y1, z1 with x0 < x1", "xyz"[a]);
     return STATUS_OK;
 }
 
@@ -95,7 +102,8 @@ static status parse_crop_voxel(const struct json_field *f, struct job_document *
 static status parse_raw(const struct json_field *f, struct job_document *doc, struct error *err)
 {
     static const char *const key[] = {"shape", "type", "endian", "header_bytes", NULL};
-    static const char *const type[] = {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64", NULL};
+    static const char *const type[] = {"uint8", "int8",    "uint16",  "int16", "uint32",
+                                       "int32", "float32", "float64", NULL};
     static const char *const endian[] = {"little", "big", NULL};
     struct json_field raw;
     bool present;
@@ -110,14 +118,16 @@ static status parse_raw(const struct json_field *f, struct job_document *doc, st
     if (s == STATUS_OK) s = json_field_size_array(&raw, "shape", 3, 1u << 20, doc->raw_shape, err);
     for (size_t a = 0; a < 3 && s == STATUS_OK; a++)
         if (doc->raw_shape[a] == 0)
-            s = error_set_field(err, STATUS_INVALID, "volume.raw.shape", "'volume.raw.shape' must be three numbers of voxels from 1");
+            s = error_set_field(err, STATUS_INVALID, "volume.raw.shape",
+                                "'volume.raw.shape' must be three numbers of voxels from 1");
     if (s == STATUS_OK) s = json_field_choice(&raw, "type", type, &i_type, err);
     if (s == STATUS_OK) s = json_field_choice(&raw, "endian", endian, &i_endian, err);
     if (s == STATUS_OK) s = json_field_size(&raw, "header_bytes", 0, 1u << 30, &doc->raw_header_bytes, err);
     if (s == STATUS_OK && i_type > 1 && json_object_get(raw.object, "endian") == NULL)
         s = error_set_field(err, STATUS_INVALID, "volume.raw", "'volume.raw' lacks 'endian': 'little' or 'big'");
     if (s == STATUS_OK && doc->n_volume_file != 1)
-        s = error_set_field(err, STATUS_INVALID, "volume.raw", "'volume.raw' describes one file, 'volume.files' names %zu", doc->n_volume_file);
+        s = error_set_field(err, STATUS_INVALID, "volume.raw",
+                            "'volume.raw' describes one file, 'volume.files' names %zu", doc->n_volume_file);
     if (s != STATUS_OK) return s;
     snprintf(doc->raw_type, sizeof doc->raw_type, "%s", type[i_type]);
     doc->raw_big_endian = i_endian == 1;
@@ -142,8 +152,9 @@ static status parse_filter(const struct json_field *f, struct job_document *doc,
 
 status job_parse_volume(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"files",  "raw", "voxel_size_um",    "axes",         "matrix",    "crop_voxel",      "density_low",
-                                      "density_high", "filter", "link_sigma_voxel", "min_vertices", "radius_um", "radius_per_axis", NULL};
+    static const char *const key[] = {"files",        "raw",         "voxel_size_um",   "axes",   "matrix",
+                                      "crop_voxel",   "density_low", "density_high",    "filter", "link_sigma_voxel",
+                                      "min_vertices", "radius_um",   "radius_per_axis", NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_files(f, doc, err);
     if (s == STATUS_OK) s = parse_raw(f, doc, err);
@@ -154,8 +165,9 @@ status job_parse_volume(const struct json_field *f, struct job_document *doc, st
     if (s == STATUS_OK) s = json_field_number(f, "density_low", -1e9, 1e9, &doc->density_low, err);
     if (s == STATUS_OK) s = json_field_number(f, "density_high", -1e9, 1e9, &doc->density_high, err);
     if (s == STATUS_OK && doc->density_low >= doc->density_high)
-        s = error_set_field(err, STATUS_INVALID, "volume.density_high", "'volume.density_high' (%g) must be above density_low (%g)",
-                            doc->density_high, doc->density_low);
+        s = error_set_field(err, STATUS_INVALID, "volume.density_high",
+                            "'volume.density_high' (%g) must be above density_low (%g)", doc->density_high,
+                            doc->density_low);
     if (s == STATUS_OK) s = parse_filter(f, doc, err);
     if (s == STATUS_OK) s = json_field_number(f, "link_sigma_voxel", 0.1, 100.0, &doc->link_sigma_voxel, err);
     if (s == STATUS_OK) s = json_field_size(f, "min_vertices", 2, 100000, &doc->min_vertex, err);
@@ -176,7 +188,8 @@ status job_parse_fibers(const struct json_field *f, struct job_document *doc, st
 /* ---- photographs ---- */
 
 /* Behind the cloth the lamp lights it through; that needs a cloth without its black sheet. */
-static status parse_light_theta(const struct json_field *f, const struct job_document *doc, double *theta_deg, struct error *err)
+static status parse_light_theta(const struct json_field *f, const struct job_document *doc, double *theta_deg,
+                                struct error *err)
 {
     char path[JSON_PATH_BYTES];
     json_field_path(f, "light_theta_deg", path);
@@ -184,7 +197,8 @@ static status parse_light_theta(const struct json_field *f, const struct job_doc
     if (s != STATUS_OK) return s;
     if (*theta_deg == 90.0 || (*theta_deg > 90.0 && doc->black_sheet))
         return error_set_field(err, STATUS_INVALID, path,
-                               "'%s' is %g: allowed are 0 to below 90 degrees from the normal (above 90, from behind, without black_sheet)",
+                               "'%s' is %g: allowed are 0 to below 90 degrees from the normal (above 90, from behind, "
+                               "without black_sheet)",
                                path, *theta_deg);
     return STATUS_OK;
 }
@@ -192,8 +206,17 @@ static status parse_light_theta(const struct json_field *f, const struct job_doc
 static status parse_photograph(const struct json_field *f, const struct job_document *doc, struct job_photograph *p,
                                struct error *err)
 {
-    static const char *const key[] = {"file",           "set",   "light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg",
-                                      "cloth_rotation_deg", "scale", "crop_px",     "transfer",      NULL};
+    static const char *const key[] = {"file",
+                                      "set",
+                                      "light_theta_deg",
+                                      "light_phi_deg",
+                                      "camera_theta_deg",
+                                      "camera_phi_deg",
+                                      "cloth_rotation_deg",
+                                      "scale",
+                                      "crop_px",
+                                      "transfer",
+                                      NULL};
     static const char *const set_name[] = {"fit", "held-out", NULL};
     static const char *const transfer[] = {"linear", "srgb", NULL};
     char path[JSON_PATH_BYTES];
@@ -212,8 +235,10 @@ static status parse_photograph(const struct json_field *f, const struct job_docu
     if (s == STATUS_OK) s = json_field_choice(f, "transfer", transfer, &srgb, err);
     if (s != STATUS_OK) return s;
     json_field_path(f, "crop_px", path);
-    if (json_object_get(f->object, "crop_px") != NULL && (p->crop_px[2] <= p->crop_px[0] || p->crop_px[3] <= p->crop_px[1]))
-        return error_set_field(err, STATUS_INVALID, path, "'%s' is empty: the order is x0, y0, x1, y1 with x0 < x1 and y0 < y1", path);
+    if (json_object_get(f->object, "crop_px") != NULL &&
+        (p->crop_px[2] <= p->crop_px[0] || p->crop_px[3] <= p->crop_px[1]))
+        return error_set_field(err, STATUS_INVALID, path,
+                               "'%s' is empty: the order is x0, y0, x1, y1 with x0 < x1 and y0 < y1", path);
     p->set = (enum job_set)set;
     p->srgb = srgb == 1;
     return STATUS_OK;
@@ -223,8 +248,8 @@ status job_parse_photographs(const struct json_field *root, struct job_document 
 {
     const json_t *list = json_object_get(root->object, "photographs");
     if (!json_is_array(list) || json_array_size(list) == 0 || json_array_size(list) > JOB_MAX_PHOTOGRAPH)
-        return error_set_field(err, STATUS_INVALID, "photographs", "'photographs' must be a list of 1 to %d photographs",
-                               JOB_MAX_PHOTOGRAPH);
+        return error_set_field(err, STATUS_INVALID, "photographs",
+                               "'photographs' must be a list of 1 to %d photographs", JOB_MAX_PHOTOGRAPH);
     size_t n = json_array_size(list), n_fit = 0;
     doc->photograph = calloc(n, sizeof *doc->photograph);
     if (doc->photograph == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
@@ -237,6 +262,7 @@ status job_parse_photographs(const struct json_field *root, struct job_document 
         if (doc->photograph[i].set == JOB_SET_FIT) n_fit++;
     }
     if (n_fit == 0)
-        return error_set_field(err, STATUS_INVALID, "photographs", "'photographs' has no photograph with \"set\": \"fit\": give at least one");
+        return error_set_field(err, STATUS_INVALID, "photographs",
+                               "'photographs' has no photograph with \"set\": \"fit\": give at least one");
     return STATUS_OK;
 }

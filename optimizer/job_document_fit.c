@@ -37,8 +37,8 @@ static void list_symbols(const struct scattering_model *m, char *text, size_t n_
 }
 
 /* One key of "fixed" or "start": a group ("C_TT": one number for all channels, or three) or one slot ("C_TT.r"). */
-static status parse_value(const struct json_field *f, const char *key, const json_t *value, const struct scattering_model *m,
-                          double *out, struct error *err)
+static status parse_value(const struct json_field *f, const char *key, const json_t *value,
+                          const struct scattering_model *m, double *out, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM], n_slot = 0;
     for (size_t p = 0; p < m->n_param && p < JOB_MAX_PARAM; p++)
@@ -47,8 +47,8 @@ static status parse_value(const struct json_field *f, const char *key, const jso
     json_field_path(f, key, path);
     if (n_slot == 0) {
         list_symbols(m, list, sizeof list);
-        return error_set_field(err, STATUS_INVALID, path, "unknown parameter '%.60s' of model '%s': its parameters are %s", key, m->id,
-                               list);
+        return error_set_field(err, STATUS_INVALID, path,
+                               "unknown parameter '%.60s' of model '%s': its parameters are %s", key, m->id, list);
     }
     const struct param_info *info = &m->param[slot[0]];
     double lower = param_to_file_unit(info, info->lower), upper = param_to_file_unit(info, info->upper);
@@ -64,14 +64,15 @@ static status parse_value(const struct json_field *f, const char *key, const jso
     if (s != STATUS_OK) return s;
     for (size_t i = 0; i < n_slot; i++) {
         if (!isnan(out[slot[i]]))
-            return error_set_field(err, STATUS_INVALID, path, "'%s' sets '%s' a second time", path, m->param[slot[i]].name);
+            return error_set_field(err, STATUS_INVALID, path, "'%s' sets '%s' a second time", path,
+                                   m->param[slot[i]].name);
         out[slot[i]] = fmin(fmax(v[i], lower), upper);
     }
     return STATUS_OK;
 }
 
-static status parse_values(const struct json_field *fit, const char *section, const struct scattering_model *m, double *out,
-                           struct error *err)
+static status parse_values(const struct json_field *fit, const char *section, const struct scattering_model *m,
+                           double *out, struct error *err)
 {
     struct json_field f;
     bool present;
@@ -91,20 +92,20 @@ static status check_free_parameters(const struct scattering_model *m, const stru
     for (size_t p = 0; p < m->n_param && p < JOB_MAX_PARAM; p++) {
         bool fixed = !isnan(doc->fixed[p]);
         if (fixed && !isnan(doc->start[p]))
-            return error_set_field(err, STATUS_INVALID, "fit.start", "'fit.start' has '%s', which 'fit.fixed' holds fixed",
-                                   m->param[p].name);
+            return error_set_field(err, STATUS_INVALID, "fit.start",
+                                   "'fit.start' has '%s', which 'fit.fixed' holds fixed", m->param[p].name);
         if (!fixed) n_free++;
     }
     if (n_free == 0)
-        return error_set_field(err, STATUS_INVALID, "fit.fixed", "'fit.fixed' holds every parameter of model '%s': leave at least one free",
-                               m->id);
+        return error_set_field(err, STATUS_INVALID, "fit.fixed",
+                               "'fit.fixed' holds every parameter of model '%s': leave at least one free", m->id);
     return STATUS_OK;
 }
 
 status job_parse_fit(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"model", "method", "seed", "max_iterations", "path_budget", "fixed", "start", "render_px",
-                                      "render_samples", NULL};
+    static const char *const key[] = {"model", "method", "seed",      "max_iterations", "path_budget",
+                                      "fixed", "start",  "render_px", "render_samples", NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_model(f, doc, err);
     if (s == STATUS_OK) s = json_field_u64(f, "seed", 0, &doc->seed, err);
@@ -114,7 +115,8 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
     if (s == STATUS_OK) s = json_field_size(f, "render_samples", 1, 65536, &doc->render_sample, err);
     if (s != STATUS_OK) return s;
     const struct scattering_model *m = scattering_find(doc->model);
-    if (m == NULL) return error_set_field(err, STATUS_INVALID, "fit.model", "the model '%s' is not in this program", doc->model);
+    if (m == NULL)
+        return error_set_field(err, STATUS_INVALID, "fit.model", "the model '%s' is not in this program", doc->model);
     s = parse_values(f, "fixed", m, doc->fixed, err);
     if (s == STATUS_OK) s = parse_values(f, "start", m, doc->start, err);
     if (s == STATUS_OK) s = check_free_parameters(m, doc, err);

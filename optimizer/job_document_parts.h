@@ -1,4 +1,5 @@
-/* Inside the job-document parser: one function a section. Each gets the section's object and fills its fields of doc. */
+/* Inside the job-document parser: one function a section. Each gets the section's object and fills its fields of doc.
+ */
 #ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_PARTS_H
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_PARTS_H
 
@@ -11,7 +12,8 @@ status job_parse_photographs(const struct json_field *root, struct job_document 
 status job_parse_fit(const struct json_field *f, struct job_document *doc, struct error *err);
 
 /* A file name that the document gives: checked with job_file_name_valid. */
-status job_parse_file_name(const struct json_field *f, const char *key, char out[JOB_MAX_NAME_BYTES], struct error *err);
+status job_parse_file_name(const struct json_field *f, const char *key, char out[JOB_MAX_NAME_BYTES],
+                           struct error *err);
 status job_check_file_name(const char *path, const char *name, struct error *err);
 
 #endif

@@ -53,8 +53,8 @@ void pipeline_context_release(struct pipeline_context *c)
     free(c->validation.replica[1]);
 }
 
-status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name, char path[WORKER_PATH_BYTES],
-                          struct error *err)
+status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
+                          char path[WORKER_PATH_BYTES], struct error *err)
 {
     char relative[256];
     snprintf(relative, sizeof relative, "%s/%s", JOB_FOLDER_WORK, stage);
@@ -83,8 +83,11 @@ static status set_parameters(struct pipeline_context *c, struct error *err)
         k->lower = info->lower;
         k->upper = info->upper;
         k->fixed = !isnan(fixed);
-        k->start = k->fixed ? param_from_file_unit(info, fixed) : isnan(start) ? info->start : param_from_file_unit(info, start);
-        k->start = fmin(fmax(k->start, k->lower), k->upper); /* degrees to radians may step over a bound by one rounding */
+        k->start = k->fixed       ? param_from_file_unit(info, fixed)
+                   : isnan(start) ? info->start
+                                  : param_from_file_unit(info, start);
+        k->start =
+            fmin(fmax(k->start, k->lower), k->upper); /* degrees to radians may step over a bound by one rounding */
     }
     return STATUS_OK;
 }
@@ -135,7 +138,8 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
     if (s == STATUS_OK && 3 * c->fitted.n < c->model->n_param) {
         char warning[200];
-        snprintf(warning, sizeof warning, "%zu fitted rows give %zu numbers for %zu parameters: some will stay undetermined", c->fitted.n,
+        snprintf(warning, sizeof warning,
+                 "%zu fitted rows give %zu numbers for %zu parameters: some will stay undetermined", c->fitted.n,
                  3 * c->fitted.n, c->model->n_param);
         worker_status_warn(c->status, warning);
     }

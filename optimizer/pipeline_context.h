@@ -1,5 +1,5 @@
-/* What the stages of a job share: inputs, products, and the way to the outside. One thread runs the stages; each stage uses the pool.
- * Ownership: pipeline_context_init/release; everything in it is owned unless said otherwise.
+/* What the stages of a job share: inputs, products, and the way to the outside. One thread runs the stages; each stage
+ * uses the pool. Ownership: pipeline_context_init/release; everything in it is owned unless said otherwise.
  */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
@@ -22,7 +22,8 @@
 struct validation {
     struct estimate *replica[2];
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
-    double worst_rel_se;                  /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
+    double
+        worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
 };
 
 struct pipeline_context {
@@ -31,7 +32,7 @@ struct pipeline_context {
     struct log *log;
     struct thread_pool *pool;
     size_t memory_limit_bytes;
-    struct progress progress;           /* of the running stage */
+    struct progress progress; /* of the running stage */
 
     struct job_document *doc;
     uint64_t fingerprint;               /* of the job document's text */
@@ -42,13 +43,13 @@ struct pipeline_context {
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;
-    struct volume volume;               /* empty when not in memory: pipeline_need_volume */
+    struct volume volume; /* empty when not in memory: pipeline_need_volume */
     struct direction_volume direction;
     struct fiber_set fiber;
     struct scene *scene;
     struct fit_result fit;
     struct validation validation;
-    double stage_wall_s[16];            /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
+    double stage_wall_s[16]; /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
 };
 
 void pipeline_context_init(struct pipeline_context *c);
@@ -60,8 +61,8 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err);
 /* Runs all stages that are not done. memory: context of the caller with folder, status, log, pool filled in. */
 status pipeline_run(struct pipeline_context *c, struct error *err);
 
-/* ---- the stages (pipeline_geometry.c, pipeline_fit.c, pipeline_report.c): run does the work and stores it under work/<stage>/;
- * load brings back what a finished stage stored ---- */
+/* ---- the stages (pipeline_geometry.c, pipeline_fit.c, pipeline_report.c): run does the work and stores it under
+ * work/<stage>/; load brings back what a finished stage stored ---- */
 status stage_volume(struct pipeline_context *c, struct error *err);
 status stage_volume_load(struct pipeline_context *c, struct error *err);
 status stage_orientation(struct pipeline_context *c, struct error *err);
@@ -80,15 +81,16 @@ status stage_report(struct pipeline_context *c, struct error *err);
 /* The mapped volume in memory, from its checkpoint when it was let go. */
 status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
-status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name, char path[WORKER_PATH_BYTES],
-                          struct error *err);
+status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
+                          char path[WORKER_PATH_BYTES], struct error *err);
 /* The path tracer as an estimator over a set of observations. The scene, model and pool are those of c. */
 struct trace_context {
     struct pipeline_context *pipeline;
     struct configuration *configuration; /* owned by the user of this struct: free() */
     size_t n_configuration;
 };
-status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o, struct error *err);
+status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o,
+                          struct error *err);
 struct estimator trace_estimator(struct trace_context *t);
 
 #endif

@@ -1,4 +1,5 @@
-/* Stages "fit" and "validation": the path tracer behind a journal, a method of descent, and fresh estimates at its result. */
+/* Stages "fit" and "validation": the path tracer behind a journal, a method of descent, and fresh estimates at its
+ * result. */
 #include "base/clock.h"
 #include "optimizer/descent/estimate_journal.h"
 #include "optimizer/pipeline_context.h"
@@ -11,31 +12,46 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20, FIT_RESULT_SECTION = 1 };
+enum {
+    VALIDATION_PILOT = 8192,
+    VALIDATION_LEAST = 1024,
+    VALIDATION_BLOCK = 256,
+    VALIDATION_MAX = 1 << 20,
+    FIT_RESULT_SECTION = 1
+};
 
-/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for it, as a share of
- * those of the fit. */
+/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for
+ * it, as a share of those of the fit. */
 static const double validation_rel_se = 0.005, validation_share = 0.7;
 
 /* ---- the path tracer as an estimator ---- */
 
-status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o, struct error *err)
+status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o,
+                          struct error *err)
 {
     *t = (struct trace_context){.pipeline = c, .n_configuration = o->n};
     t->configuration = malloc((o->n > 0 ? o->n : 1) * sizeof *t->configuration);
-    if (t->configuration == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
+    if (t->configuration == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
     for (size_t i = 0; i < o->n; i++) t->configuration[i] = o->item[i].configuration;
     return STATUS_OK;
 }
 
-static status trace(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
-                    double *wall_s, struct error *err)
+static status trace(void *context, const struct estimator_call *call, const struct progress *progress,
+                    struct estimate *out, double *wall_s, struct error *err)
 {
     const struct trace_context *t = context;
     const struct pipeline_context *c = t->pipeline;
-    struct estimate_request q = {.scene = c->scene, .model = c->model, .param = call->param, .configuration = t->configuration,
-                                 .n_configuration = t->n_configuration, .n_path = call->n_path, .seed = c->doc->seed,
-                                 .iteration = call->iteration, .replica = call->replica, .want_jacobian = call->want_jacobian};
+    struct estimate_request q = {.scene = c->scene,
+                                 .model = c->model,
+                                 .param = call->param,
+                                 .configuration = t->configuration,
+                                 .n_configuration = t->n_configuration,
+                                 .n_path = call->n_path,
+                                 .seed = c->doc->seed,
+                                 .iteration = call->iteration,
+                                 .replica = call->replica,
+                                 .want_jacobian = call->want_jacobian};
     double start_s = clock_monotonic_s();
     status s = estimate_run(&q, c->pool, progress, out, err);
     *wall_s = clock_monotonic_s() - start_s;
@@ -44,7 +60,8 @@ static status trace(void *context, const struct estimator_call *call, const stru
 
 struct estimator trace_estimator(struct trace_context *t)
 {
-    return (struct estimator){.context = t, .n_configuration = t->n_configuration, .n_param = t->pipeline->model->n_param, .run = trace};
+    return (struct estimator){
+        .context = t, .n_configuration = t->n_configuration, .n_param = t->pipeline->model->n_param, .run = trace};
 }
 
 static status may_write(void *context, struct error *err)
@@ -60,7 +77,8 @@ static uint64_t fit_fingerprint(const struct pipeline_context *c)
     uint32_t sum = (uint32_t)crc32_z(0, (const void *)f->position_m, 3 * f->n_vertex * sizeof *f->position_m);
     sum = (uint32_t)crc32_z(sum, (const void *)f->radius_m, f->n_fiber * sizeof *f->radius_m);
     for (size_t i = 0; i < c->observation.n; i++) {
-        sum = (uint32_t)crc32_z(sum, (const void *)c->observation.item[i].mean_rgb, sizeof c->observation.item[i].mean_rgb);
+        sum = (uint32_t)crc32_z(sum, (const void *)c->observation.item[i].mean_rgb,
+                                sizeof c->observation.item[i].mean_rgb);
         sum = (uint32_t)crc32_z(sum, (const void *)&c->observation.item[i].configuration, sizeof(struct configuration));
     }
     return c->fingerprint << 32 | sum;
@@ -80,20 +98,30 @@ static status on_step(void *context, const struct fit_step *step, struct error *
     struct pipeline_context *c = l->pipeline;
     bool replayed = estimate_journal_replaying(l->journal);
     worker_status_objective(c->status, step->step, step->objective.value, step->objective.se);
-    if (replayed) worker_status_restart_eta(c->status);
+    if (replayed)
+        worker_status_restart_eta(c->status);
     else
-        log_info(c->log, "step %zu (%s): objective %.5g +- %.2g, relative RMS error %.3f, %.0f thousand paths in all", step->step, step->phase,
-                 step->objective.value, step->objective.se, step->objective.rel_rms, (double)step->n_path_total / 1e3);
+        log_info(c->log, "step %zu (%s): objective %.5g +- %.2g, relative RMS error %.3f, %.0f thousand paths in all",
+                 step->step, step->phase, step->objective.value, step->objective.se, step->objective.rel_rms,
+                 (double)step->n_path_total / 1e3);
     return worker_series_add(l->series, step, c->model->param, replayed, err);
 }
 
-static status run_method(struct pipeline_context *c, const struct estimator *estimator, struct fit_listener *listener, struct error *err)
+static status run_method(struct pipeline_context *c, const struct estimator *estimator, struct fit_listener *listener,
+                         struct error *err)
 {
     const struct descent_method *method = descent_find(c->doc->method);
-    if (method == NULL) return error_set_field(err, STATUS_INVALID, "fit.method", "unknown method '%s'", c->doc->method);
-    struct fit_problem problem = {.n_param = c->model->n_param, .info = c->model->param, .param = c->parameter,
-                                  .observation = &c->fitted, .estimator = estimator, .path_budget = c->doc->path_budget,
-                                  .max_iteration = c->doc->max_iteration, .report = on_step, .report_context = listener,
+    if (method == NULL)
+        return error_set_field(err, STATUS_INVALID, "fit.method", "unknown method '%s'", c->doc->method);
+    struct fit_problem problem = {.n_param = c->model->n_param,
+                                  .info = c->model->param,
+                                  .param = c->parameter,
+                                  .observation = &c->fitted,
+                                  .estimator = estimator,
+                                  .path_budget = c->doc->path_budget,
+                                  .max_iteration = c->doc->max_iteration,
+                                  .report = on_step,
+                                  .report_context = listener,
                                   .progress = &c->progress};
     return method->run(&problem, &c->fit, err);
 }
@@ -133,8 +161,9 @@ status stage_fit(struct pipeline_context *c, struct error *err)
     if (s != STATUS_OK) goto out;
     if (estimate_journal_n_replayed(listener.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(listener.journal));
-    log_info(c->log, "fit %s after %zu steps, %.3g paths, %.1f s: %s", c->fit.converged ? "converged" : "did NOT converge", c->fit.n_step,
-             (double)c->fit.n_path, c->fit.wall_s, c->fit.reason);
+    log_info(c->log, "fit %s after %zu steps, %.3g paths, %.1f s: %s",
+             c->fit.converged ? "converged" : "did NOT converge", c->fit.n_step, (double)c->fit.n_path, c->fit.wall_s,
+             c->fit.reason);
     if (!c->fit.converged) {
         char warning[400];
         snprintf(warning, sizeof warning, "the fit has not converged: %s", c->fit.reason);
@@ -163,7 +192,8 @@ static double relative_path_variance(const struct observation *o, const struct e
     return (double)pilot->n_path * largest / (a * a);
 }
 
-/* Paths a replica, so that both together reach the standard error asked for; all rows give way alike when the budget is short. */
+/* Paths a replica, so that both together reach the standard error asked for; all rows give way alike when the budget is
+ * short. */
 static void plan_validation(const struct pipeline_context *c, const struct estimate *pilot, size_t *n_path)
 {
     double total = 0.0;
@@ -171,7 +201,8 @@ static void plan_validation(const struct pipeline_context *c, const struct estim
         total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
     double shrink = fmin(1.0, validation_share * (double)c->fit.n_path / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
-        double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
+        double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
+                   (validation_rel_se * validation_rel_se);
         n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
         n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
     }
@@ -230,14 +261,16 @@ static void report_part(void *context, double fraction)
 }
 
 /* Pilot, then two replicas, each through a journal: an interrupted validation does not start over. */
-static status estimate_validation(struct pipeline_context *c, const struct estimator *e, size_t *n_path, struct error *err)
+static status estimate_validation(struct pipeline_context *c, const struct estimator *e, size_t *n_path,
+                                  struct error *err)
 {
     struct part_progress part = {&c->progress, 0.0, 0.1};
     struct progress progress = {report_part, &part, c->progress.cancel};
     struct estimator_call call = {c->fit.param, n_path, 0, REPLICA_FINAL_A, false};
     double wall_s;
     double pilot = 0.05 * (double)c->fit.n_path / (double)c->observation.n;
-    for (size_t i = 0; i < c->observation.n; i++) n_path[i] = (size_t)fmin(fmax(pilot, VALIDATION_LEAST), VALIDATION_PILOT);
+    for (size_t i = 0; i < c->observation.n; i++)
+        n_path[i] = (size_t)fmin(fmax(pilot, VALIDATION_LEAST), VALIDATION_PILOT);
     status s = e->run(e->context, &call, &progress, c->validation.replica[0], &wall_s, err);
     if (s != STATUS_OK) return s;
     plan_validation(c, c->validation.replica[0], n_path);
@@ -280,7 +313,8 @@ status stage_validation(struct pipeline_context *c, struct error *err)
     struct estimator live, estimator;
     char path[WORKER_PATH_BYTES];
     size_t *n_path = calloc(c->observation.n, sizeof *n_path);
-    status s = n_path != NULL ? allocate_validation(c, err) : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    status s = n_path != NULL ? allocate_validation(c, err)
+                              : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
     if (s == STATUS_OK) s = trace_context_init(&trace_c, c, &c->observation, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.journal", path, err);
     if (s != STATUS_OK) goto out;
@@ -291,7 +325,9 @@ status stage_validation(struct pipeline_context *c, struct error *err)
     s = estimate_validation(c, &estimator, n_path, err);
     if (s != STATUS_OK) goto out;
     score_validation(c);
-    log_info(c->log, "validation: relative RMS error %.4f over the fitted rows, %.4f over the held-out rows; rendered means have a standard error below %.2f %%",
+    log_info(c->log,
+             "validation: relative RMS error %.4f over the fitted rows, %.4f over the held-out rows; rendered means "
+             "have a standard error below %.2f %%",
              c->validation.fit.rel_rms, c->validation.held_out.rel_rms, 100.0 * c->validation.worst_rel_se);
     s = store_validation(c, err);
 out:

@@ -52,7 +52,8 @@ static status read_volume(struct pipeline_context *c, struct error *err)
         worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text[i]);
         path[i] = text[i];
     }
-    s = reconstruct_read(path, n, &c->option, c->memory_limit_bytes, c->pool, &c->progress, &c->volume, &c->geometry, err);
+    s = reconstruct_read(path, n, &c->option, c->memory_limit_bytes, c->pool, &c->progress, &c->volume, &c->geometry,
+                         err);
 out:
     free(path);
     free(text);
@@ -75,15 +76,18 @@ status stage_volume(struct pipeline_context *c, struct error *err)
     return work_file_write(path, "volume.1", section, 5, err);
 }
 
-static status load_volume(struct pipeline_context *c, struct reconstruct_option *option, struct reconstruct_report *report,
-                          struct error *err)
+static status load_volume(struct pipeline_context *c, struct reconstruct_option *option,
+                          struct reconstruct_report *report, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     struct volume v = {0};
     status s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s != STATUS_OK) return s;
-    struct work_section section[] = {
-        {option, sizeof *option}, {report, sizeof *report}, {v.n, sizeof v.n}, {v.voxel_size_m, sizeof v.voxel_size_m}, {NULL, 0}};
+    struct work_section section[] = {{option, sizeof *option},
+                                     {report, sizeof *report},
+                                     {v.n, sizeof v.n},
+                                     {v.voxel_size_m, sizeof v.voxel_size_m},
+                                     {NULL, 0}};
     s = work_file_read(path, "volume.1", section, 5, err);
     if (s != STATUS_OK) return s;
     v.density = section[4].data;
@@ -92,7 +96,10 @@ static status load_volume(struct pipeline_context *c, struct reconstruct_option 
     return STATUS_OK;
 }
 
-status stage_volume_load(struct pipeline_context *c, struct error *err) { return load_volume(c, &c->option, &c->geometry, err); }
+status stage_volume_load(struct pipeline_context *c, struct error *err)
+{
+    return load_volume(c, &c->option, &c->geometry, err);
+}
 
 status pipeline_need_volume(struct pipeline_context *c, struct error *err)
 {
@@ -111,8 +118,12 @@ static status store_direction(struct pipeline_context *c, const char *stage, str
     if (s != STATUS_OK) return s;
     struct direction_volume *d = &c->direction;
     size_t n = volume_n_voxel(d->n);
-    struct work_section section[] = {{&c->option, sizeof c->option}, {&c->geometry, sizeof c->geometry}, {d->n, sizeof d->n},
-                                     {d->voxel_size_m, sizeof d->voxel_size_m}, {d->density, n}, {d->octahedral, 4 * n}};
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {d->n, sizeof d->n},
+                                     {d->voxel_size_m, sizeof d->voxel_size_m},
+                                     {d->density, n},
+                                     {d->octahedral, 4 * n}};
     return work_file_write(path, "direction.1", section, 6, err);
 }
 
@@ -122,8 +133,12 @@ static status load_direction(struct pipeline_context *c, const char *stage, stru
     struct direction_volume d = {0};
     status s = pipeline_work_path(c, stage, "direction.bin", path, err);
     if (s != STATUS_OK) return s;
-    struct work_section section[] = {{&c->option, sizeof c->option}, {&c->geometry, sizeof c->geometry}, {d.n, sizeof d.n},
-                                     {d.voxel_size_m, sizeof d.voxel_size_m}, {NULL, 0}, {NULL, 0}};
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {d.n, sizeof d.n},
+                                     {d.voxel_size_m, sizeof d.voxel_size_m},
+                                     {NULL, 0},
+                                     {NULL, 0}};
     s = work_file_read(path, "direction.1", section, 6, err);
     if (s != STATUS_OK) return s;
     d.density = section[4].data;
@@ -141,7 +156,10 @@ status stage_orientation(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? store_direction(c, "orientation", err) : s;
 }
 
-status stage_orientation_load(struct pipeline_context *c, struct error *err) { return load_direction(c, "orientation", err); }
+status stage_orientation_load(struct pipeline_context *c, struct error *err)
+{
+    return load_direction(c, "orientation", err);
+}
 
 status stage_directions(struct pipeline_context *c, struct error *err)
 {
@@ -149,7 +167,10 @@ status stage_directions(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? store_direction(c, "directions", err) : s;
 }
 
-status stage_directions_load(struct pipeline_context *c, struct error *err) { return load_direction(c, "directions", err); }
+status stage_directions_load(struct pipeline_context *c, struct error *err)
+{
+    return load_direction(c, "directions", err);
+}
 
 /* ---- fibers ---- */
 
@@ -167,8 +188,9 @@ static status read_fiber_file(struct pipeline_context *c, struct error *err)
     for (int a = 0; a < 2; a++)
         if (!isnan(c->doc->tile_mm[a])) c->fiber.tile_size_m[a] = c->doc->tile_mm[a] * mm;
     if (!(c->fiber.tile_size_m[0] > 0.0 && c->fiber.tile_size_m[1] > 0.0))
-        return error_set_field(err, STATUS_INVALID, "fibers.tile_mm",
-                               "'fibers.tile_mm' is missing: the file '%s' does not say with which period the cloth repeats", name);
+        return error_set_field(
+            err, STATUS_INVALID, "fibers.tile_mm",
+            "'fibers.tile_mm' is missing: the file '%s' does not say with which period the cloth repeats", name);
     fiber_set_classify(&c->fiber);
     s = fiber_set_validate(&c->fiber, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, "fibers.file");
@@ -182,7 +204,8 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
     if (c->doc->has_volume) {
         s = pipeline_need_volume(c, err);
         if (s == STATUS_OK)
-            s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &c->progress, &c->fiber, &c->geometry, err);
+            s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &c->progress, &c->fiber,
+                                   &c->geometry, err);
         volume_release(&c->volume);
         memset(&c->volume, 0, sizeof c->volume);
     } else {

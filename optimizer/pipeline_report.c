@@ -1,4 +1,5 @@
-/* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while pictures are rendered. */
+/* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
+ * pictures are rendered. */
 #include "optimizer/pipeline_context.h"
 #include "optimizer/report/result_json.h"
 #include "optimizer/report/result_pictures.h"

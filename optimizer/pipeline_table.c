@@ -1,6 +1,7 @@
 #include "optimizer/pipeline.h"
 
-/* Weights are shares of the wall time of a typical job (one small volume, 16 configurations, default budget, 2 cores). */
+/* Weights are shares of the wall time of a typical job (one small volume, 16 configurations, default budget, 2 cores).
+ */
 static const struct pipeline_stage_info stage_table[] = {
     {"volume", "Reading the scan", 0.01},
     {"orientation", "Finding local fiber directions", 0.04},

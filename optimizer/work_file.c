@@ -25,7 +25,8 @@ static uint32_t checksum(uint32_t sum, const void *data, size_t n_bytes)
     return (uint32_t)crc32_z(sum, data, n_bytes);
 }
 
-status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section, struct error *err)
+status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section,
+                       struct error *err)
 {
     struct work_header h = {.n_section = n_section};
     char temporary[4096];
@@ -51,8 +52,8 @@ status work_file_write(const char *path, const char *tag, const struct work_sect
     return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
 }
 
-static status read_sections(FILE *f, const char *path, const struct work_header *h, struct work_section *section, bool *mine,
-                            struct error *err)
+static status read_sections(FILE *f, const char *path, const struct work_header *h, struct work_section *section,
+                            bool *mine, struct error *err)
 {
     uint32_t sum = checksum(0, h, sizeof *h), stored;
     for (size_t i = 0; i < h->n_section; i++) {
@@ -61,7 +62,8 @@ static status read_sections(FILE *f, const char *path, const struct work_header 
             section[i].n_bytes = h->n_bytes[i];
             mine[i] = true;
         }
-        if (section[i].data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read checkpoint '%s': out of memory", path);
+        if (section[i].data == NULL)
+            return error_set(err, STATUS_NO_MEMORY, "cannot read checkpoint '%s': out of memory", path);
         if (section[i].n_bytes != h->n_bytes[i])
             return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another program version", path);
         if (h->n_bytes[i] == 0) continue;
@@ -75,16 +77,20 @@ static status read_sections(FILE *f, const char *path, const struct work_header 
 }
 
 /* Sizes that cannot be true must not reach malloc. */
-static status check_header(FILE *f, const char *path, const struct work_header *h, const char *tag, size_t n_section, struct error *err)
+static status check_header(FILE *f, const char *path, const struct work_header *h, const char *tag, size_t n_section,
+                           struct error *err)
 {
     char want[WORK_FILE_TAG_BYTES] = {0};
     struct stat st;
     uint64_t total = sizeof *h + sizeof(uint32_t);
     snprintf(want, sizeof want, "%s", tag);
-    if (memcmp(h->magic, magic, sizeof magic) != 0 || memcmp(h->tag, want, sizeof want) != 0 || h->n_section != n_section)
-        return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another kind or program version", path);
+    if (memcmp(h->magic, magic, sizeof magic) != 0 || memcmp(h->tag, want, sizeof want) != 0 ||
+        h->n_section != n_section)
+        return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another kind or program version",
+                         path);
     for (size_t i = 0; i < n_section; i++) {
-        if (h->n_bytes[i] > (uint64_t)1 << 48) return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is damaged", path);
+        if (h->n_bytes[i] > (uint64_t)1 << 48)
+            return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is damaged", path);
         total += h->n_bytes[i];
     }
     if (fstat(fileno(f), &st) != 0 || (uint64_t)st.st_size != total)
@@ -92,7 +98,8 @@ static status check_header(FILE *f, const char *path, const struct work_header *
     return STATUS_OK;
 }
 
-status work_file_read(const char *path, const char *tag, struct work_section *section, size_t n_section, struct error *err)
+status work_file_read(const char *path, const char *tag, struct work_section *section, size_t n_section,
+                      struct error *err)
 {
     struct work_header h;
     bool mine[WORK_FILE_MAX_SECTION] = {false};
@@ -100,7 +107,8 @@ status work_file_read(const char *path, const char *tag, struct work_section *se
     if (f == NULL && errno == ENOENT) return error_set(err, STATUS_NOT_FOUND, "there is no checkpoint '%s'", path);
     if (f == NULL) return error_set_errno(err, "cannot read checkpoint '%s'", path);
     status s = STATUS_OK;
-    if (fread(&h, sizeof h, 1, f) != 1) s = error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is truncated", path);
+    if (fread(&h, sizeof h, 1, f) != 1)
+        s = error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is truncated", path);
     if (s == STATUS_OK) s = check_header(f, path, &h, tag, n_section, err);
     if (s == STATUS_OK) s = read_sections(f, path, &h, section, mine, err);
     fclose(f);

@@ -1,6 +1,6 @@
-/* Checkpoint files of stages: named sections of bytes with a checksum, written as a whole (temporary file, fsync, rename).
- * Scratch of one machine and one program: host byte order, plain structs. A file with another tag, another size of a fixed section or a
- * wrong checksum is refused, and the stage runs again.
+/* Checkpoint files of stages: named sections of bytes with a checksum, written as a whole (temporary file, fsync,
+ * rename). Scratch of one machine and one program: host byte order, plain structs. A file with another tag, another
+ * size of a fixed section or a wrong checksum is refused, and the stage runs again.
  */
 #ifndef SELVEDGE_OPTIMIZER_WORK_FILE_H
 #define SELVEDGE_OPTIMIZER_WORK_FILE_H
@@ -15,9 +15,11 @@ struct work_section {
 };
 
 /* tag: what is in it and in which version, such as "fibers.1". */
-status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section, struct error *err);
-/* section[i].data == NULL: memory is taken (free() it) and n_bytes set; otherwise the stored size must be n_bytes. On failure nothing is
- * left to free. STATUS_NOT_FOUND when there is no file; STATUS_FORMAT, STATUS_CHECKSUM. */
-status work_file_read(const char *path, const char *tag, struct work_section *section, size_t n_section, struct error *err);
+status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section,
+                       struct error *err);
+/* section[i].data == NULL: memory is taken (free() it) and n_bytes set; otherwise the stored size must be n_bytes. On
+ * failure nothing is left to free. STATUS_NOT_FOUND when there is no file; STATUS_FORMAT, STATUS_CHECKSUM. */
+status work_file_read(const char *path, const char *tag, struct work_section *section, size_t n_section,
+                      struct error *err);
 
 #endif

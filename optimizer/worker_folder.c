@@ -22,7 +22,8 @@ void worker_folder_path(const struct worker_folder *f, const char *a, const char
 }
 
 /* attempt.json; number 0 and an empty token when there is none. */
-static status read_attempt(const struct worker_folder *f, long long *attempt, char *token, size_t n_token, struct error *err)
+static status read_attempt(const struct worker_folder *f, long long *attempt, char *token, size_t n_token,
+                           struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
     size_t n = 0;
@@ -52,7 +53,8 @@ static status take_lock(struct worker_folder *f, struct error *err)
     f->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (f->lock_fd < 0) return error_set_errno(err, "cannot lock job folder '%s'", f->path);
     if (flock(f->lock_fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
-    if (errno == EWOULDBLOCK) return error_set(err, STATUS_STALE, "job folder '%s' is in use by another worker", f->path);
+    if (errno == EWOULDBLOCK)
+        return error_set(err, STATUS_STALE, "job folder '%s' is in use by another worker", f->path);
     return error_set_errno(err, "cannot lock job folder '%s'", f->path);
 }
 
@@ -90,10 +92,12 @@ status worker_folder_check(const struct worker_folder *f, struct error *err)
     status s = read_attempt(f, &attempt, token, sizeof token, err);
     if (s != STATUS_OK) return s;
     if (attempt == f->attempt && strcmp(token, f->token) == 0) return STATUS_OK;
-    return error_set(err, STATUS_STALE, "attempt %lld of this job is no longer current: attempt %lld is", f->attempt, attempt);
+    return error_set(err, STATUS_STALE, "attempt %lld of this job is no longer current: attempt %lld is", f->attempt,
+                     attempt);
 }
 
-status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes, struct error *err)
+status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes,
+                             struct error *err)
 {
     status s = worker_folder_check(f, err);
     return s == STATUS_OK ? durable_replace(path, data, n_bytes, err) : s;
@@ -122,14 +126,16 @@ status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t finger
     snprintf(want, sizeof want, "%016" PRIx64 "\n", fingerprint);
     worker_folder_path(f, JOB_FOLDER_WORK, "inputs.fingerprint", path);
     *changed = false;
-    if (access(path, F_OK) == 0 && file_read_all(path, 64, &have, &n, NULL) == STATUS_OK) *changed = strcmp(have, want) != 0;
+    if (access(path, F_OK) == 0 && file_read_all(path, 64, &have, &n, NULL) == STATUS_OK)
+        *changed = strcmp(have, want) != 0;
     free(have);
     if (n > 0 && !*changed) return STATUS_OK;
     status s = worker_folder_check(f, err);
     if (s == STATUS_OK && *changed) s = empty_folder(f, JOB_FOLDER_WORK, err);
     if (s == STATUS_OK && *changed) s = empty_folder(f, JOB_FOLDER_RESULTS, err);
     worker_folder_path(f, JOB_FILE_SERIES, NULL, series);
-    if (s == STATUS_OK && *changed && unlink(series) != 0 && errno != ENOENT) s = error_set_errno(err, "cannot remove '%s'", series);
+    if (s == STATUS_OK && *changed && unlink(series) != 0 && errno != ENOENT)
+        s = error_set_errno(err, "cannot remove '%s'", series);
     return s == STATUS_OK ? worker_folder_replace(f, path, want, strlen(want), err) : s;
 }
 

@@ -12,11 +12,12 @@ enum { WORKER_PATH_BYTES = 4096 };
 struct worker_folder {
     char path[2048];
     int lock_fd;
-    long long attempt;   /* 0 when run by hand */
-    char token[256];     /* "" when run by hand */
+    long long attempt; /* 0 when run by hand */
+    char token[256];   /* "" when run by hand */
 };
 
-/* Takes the lock and notes the attempt; makes work/ and results/. STATUS_NOT_FOUND: no such folder; STATUS_STALE: another worker holds it. */
+/* Takes the lock and notes the attempt; makes work/ and results/. STATUS_NOT_FOUND: no such folder; STATUS_STALE:
+ * another worker holds it. */
 status worker_folder_open(struct worker_folder *f, const char *path, struct error *err);
 void worker_folder_close(struct worker_folder *f);
 /* STATUS_STALE when attempt.json names another attempt by now. Called before every durable write. */
@@ -24,11 +25,13 @@ status worker_folder_check(const struct worker_folder *f, struct error *err);
 /* "JOB/a/b"; b may be NULL. */
 void worker_folder_path(const struct worker_folder *f, const char *a, const char *b, char path[WORKER_PATH_BYTES]);
 /* Check, then durable_replace. */
-status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes, struct error *err);
+status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes,
+                             struct error *err);
 
-/* Compares the fingerprint of the inputs with that of the run before. When it has changed (a document or a file was edited by hand), everything
- * that was computed from the old inputs is removed: work/, results/, series.rec. */
-status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err);
+/* Compares the fingerprint of the inputs with that of the run before. When it has changed (a document or a file was
+ * edited by hand), everything that was computed from the old inputs is removed: work/, results/, series.rec. */
+status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed,
+                                  struct error *err);
 
 /* Marks of stages whose outputs are whole: work/<stage>.done. */
 bool worker_folder_stage_done(const struct worker_folder *f, const char *stage);

@@ -17,14 +17,16 @@
 
 static const char usage[] =
     "usage: selvedge-worker [options] JOBDIR\n"
-    "Run the job in JOBDIR: job.json and input/ are read, results/ is written. Run again after an interruption, it continues where it was.\n"
+    "Run the job in JOBDIR: job.json and input/ are read, results/ is written. Run again after an interruption, it "
+    "continues where it was.\n"
     "\n"
     "  --threads N        computing threads (default: one a processor); results do not depend on it\n"
     "  --memory-mib N     memory for the scan in mebibytes (default 2048); a larger volume is refused\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --version, --help\n"
     "\n"
-    "Exit status: 0 succeeded, 1 failed (JOBDIR/status.json says why), 2 usage, 3 cancelled by SIGTERM, 4 another attempt owns the job.\n";
+    "Exit status: 0 succeeded, 1 failed (JOBDIR/status.json says why), 2 usage, 3 cancelled by SIGTERM, 4 another "
+    "attempt owns the job.\n";
 
 struct arguments {
     const char *folder;
@@ -45,19 +47,32 @@ static bool parse_count(const char *text, size_t upper, size_t *out)
 /* -1: go on; otherwise the exit status. */
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option option[] = {{"threads", required_argument, NULL, 't'}, {"memory-mib", required_argument, NULL, 'm'},
-                                           {"quiet", no_argument, NULL, 'q'},         {"help", no_argument, NULL, 'h'},
-                                           {"version", no_argument, NULL, 'v'},       {NULL, 0, NULL, 0}};
+    static const struct option option[] = {
+        {"threads", required_argument, NULL, 't'}, {"memory-mib", required_argument, NULL, 'm'},
+        {"quiet", no_argument, NULL, 'q'},         {"help", no_argument, NULL, 'h'},
+        {"version", no_argument, NULL, 'v'},       {NULL, 0, NULL, 0}};
     *a = (struct arguments){.memory_mib = 2048};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         bool ok = true;
         switch (c) {
-        case 't': ok = parse_count(optarg, 1024, &a->n_thread); break;
-        case 'm': ok = parse_count(optarg, (size_t)1 << 32, &a->memory_mib); break;
-        case 'q': a->quiet = true; break;
-        case 'h': fputs(usage, stdout); return 0;
-        case 'v': puts(RESULT_PROGRAM); return 0;
-        default: fputs(usage, stderr); return WORKER_USAGE;
+        case 't':
+            ok = parse_count(optarg, 1024, &a->n_thread);
+            break;
+        case 'm':
+            ok = parse_count(optarg, (size_t)1 << 32, &a->memory_mib);
+            break;
+        case 'q':
+            a->quiet = true;
+            break;
+        case 'h':
+            fputs(usage, stdout);
+            return 0;
+        case 'v':
+            puts(RESULT_PROGRAM);
+            return 0;
+        default:
+            fputs(usage, stderr);
+            return WORKER_USAGE;
         }
         if (!ok) {
             fprintf(stderr, "selvedge-worker: '%s' is not a count in the allowed range\n", optarg);
@@ -72,8 +87,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
     return -1;
 }
 
-/* Runs in threads that a library has started before main (OpenBLAS does): they do not block the signal. Block it there for good and send it
- * again, until the status thread's sigtimedwait takes it. */
+/* Runs in threads that a library has started before main (OpenBLAS does): they do not block the signal. Block it there
+ * for good and send it again, until the status thread's sigtimedwait takes it. */
 static void pass_on(int signal_number, siginfo_t *info, void *context)
 {
     (void)info;
@@ -115,9 +130,13 @@ static int conclude(struct worker_status *st, struct log *log, status outcome, c
         log_error(log, "stopped: the attempt of this worker is no longer current");
         return WORKER_STALE;
     }
-    if (code == WORKER_SUCCEEDED) log_info(log, "succeeded");
-    else if (code == WORKER_CANCELLED) log_info(log, "cancelled");
-    else log_error(log, "failed (%s%s%s): %s", status_name(outcome), error->field[0] != '\0' ? ", " : "", error->field, error->text);
+    if (code == WORKER_SUCCEEDED)
+        log_info(log, "succeeded");
+    else if (code == WORKER_CANCELLED)
+        log_info(log, "cancelled");
+    else
+        log_error(log, "failed (%s%s%s): %s", status_name(outcome), error->field[0] != '\0' ? ", " : "", error->field,
+                  error->text);
     const char *state = code == WORKER_SUCCEEDED ? "succeeded" : code == WORKER_CANCELLED ? "cancelled" : "failed";
     if (worker_status_finish(st, state, code == WORKER_FAILED ? error : NULL, &err) != STATUS_OK) {
         log_error(log, "%s", err.text);

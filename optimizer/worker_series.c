@@ -12,9 +12,9 @@
 struct worker_series {
     const struct worker_folder *folder;
     char path[WORKER_PATH_BYTES];
-    uint64_t *end;   /* end[i]: byte behind record i of the file */
+    uint64_t *end; /* end[i]: byte behind record i of the file */
     size_t n_record, capacity;
-    size_t i_next;   /* number of the next record */
+    size_t i_next; /* number of the next record */
 };
 
 static bool grow(struct worker_series *s, uint64_t end)
@@ -56,11 +56,14 @@ status worker_series_open(const struct worker_folder *folder, struct worker_seri
         struct scan scan = {.series = s};
         uint64_t next = 0;
         result = record_read(s->path, 0, note_record, &scan, &next, err);
-        if (result == STATUS_OK && scan.out_of_memory) result = error_set(err, STATUS_NO_MEMORY, "cannot open the series: out of memory");
+        if (result == STATUS_OK && scan.out_of_memory)
+            result = error_set(err, STATUS_NO_MEMORY, "cannot open the series: out of memory");
         if (result == STATUS_OK) result = record_truncate(s->path, next, err);
     }
-    if (result == STATUS_OK) *series = s;
-    else worker_series_close(s);
+    if (result == STATUS_OK)
+        *series = s;
+    else
+        worker_series_close(s);
     return result;
 }
 
@@ -75,10 +78,12 @@ static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(
 
 static char *record_text(const struct fit_step *step, const struct param_info *info)
 {
-    json_t *parameter = json_array(), *parameter_se = step->param_se != NULL ? json_array() : json_null(), *rendered = json_array();
+    json_t *parameter = json_array(), *parameter_se = step->param_se != NULL ? json_array() : json_null(),
+           *rendered = json_array();
     for (size_t p = 0; p < step->n_param; p++) {
         json_array_append_new(parameter, number(param_to_file_unit(&info[p], step->param[p])));
-        if (step->param_se != NULL) json_array_append_new(parameter_se, number(param_to_file_unit(&info[p], step->param_se[p])));
+        if (step->param_se != NULL)
+            json_array_append_new(parameter_se, number(param_to_file_unit(&info[p], step->param_se[p])));
     }
     for (size_t i = 0; i < step->n_configuration; i++) {
         json_t *rgb = json_array();
@@ -86,19 +91,20 @@ static char *record_text(const struct fit_step *step, const struct param_info *i
             json_array_append_new(rgb, number(0.5 * (step->replica[0][i].mean[c] + step->replica[1][i].mean[c])));
         json_array_append_new(rendered, rgb);
     }
-    json_t *json = json_pack("{s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}", "step", (json_int_t)step->step,
-                             "phase", step->phase, "wall_s", step->wall_s, "n_path", (json_int_t)step->n_path, "n_path_total",
-                             (json_int_t)step->n_path_total, "objective", number(step->objective.value), "objective_se",
-                             number(step->objective.se), "parameter", parameter, "parameter_se", parameter_se, "rel_rms",
-                             number(step->objective.rel_rms), "rendered", rendered, "damping", number(step->damping), "noise",
-                             number(step->noise), "note", step->note != NULL ? step->note : "");
+    json_t *json = json_pack("{s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}", "step",
+                             (json_int_t)step->step, "phase", step->phase, "wall_s", step->wall_s, "n_path",
+                             (json_int_t)step->n_path, "n_path_total", (json_int_t)step->n_path_total, "objective",
+                             number(step->objective.value), "objective_se", number(step->objective.se), "parameter",
+                             parameter, "parameter_se", parameter_se, "rel_rms", number(step->objective.rel_rms),
+                             "rendered", rendered, "damping", number(step->damping), "noise", number(step->noise),
+                             "note", step->note != NULL ? step->note : "");
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(9) | JSON_COMPACT) : NULL;
     json_decref(json);
     return text;
 }
 
-status worker_series_add(struct worker_series *s, const struct fit_step *step, const struct param_info *info, bool replayed,
-                         struct error *err)
+status worker_series_add(struct worker_series *s, const struct fit_step *step, const struct param_info *info,
+                         bool replayed, struct error *err)
 {
     if (replayed && s->i_next < s->n_record) {
         s->i_next++;

@@ -57,15 +57,16 @@ static char *status_text(const struct worker_status *st, const char *state, cons
     getrusage(RUSAGE_SELF, &usage);
     json_t *warnings = json_array();
     for (size_t i = 0; i < st->n_warning; i++) json_array_append_new(warnings, json_string(st->warning[i]));
-    json_t *json = json_pack(
-        "{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state", state, "attempt",
-        (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage", (json_int_t)st->i_stage, "n_stage", (json_int_t)st->n_stage,
-        "stage_fraction", st->stage_fraction, "fraction", fraction, "eta_s", over ? json_null() : number_or_null(eta_s(st, fraction)),
-        "heartbeat_unix_s", clock_wall_s(), "started_unix_s", st->started_unix_s, "message", st->message, "objective",
-        st->has_objective ? number_or_null(st->objective) : json_null(), "objective_se",
-        st->has_objective ? number_or_null(st->objective_se) : json_null(), "step",
-        st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error", error_json(error),
-        "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
+    json_t *json =
+        json_pack("{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state",
+                  state, "attempt", (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage",
+                  (json_int_t)st->i_stage, "n_stage", (json_int_t)st->n_stage, "stage_fraction", st->stage_fraction,
+                  "fraction", fraction, "eta_s", over ? json_null() : number_or_null(eta_s(st, fraction)),
+                  "heartbeat_unix_s", clock_wall_s(), "started_unix_s", st->started_unix_s, "message", st->message,
+                  "objective", st->has_objective ? number_or_null(st->objective) : json_null(), "objective_se",
+                  st->has_objective ? number_or_null(st->objective_se) : json_null(), "step",
+                  st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
+                  error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(12)) : NULL;
     json_decref(json);
     return text;
@@ -85,7 +86,8 @@ static void beat(struct worker_status *st)
     char *text = status_text(st, "running", NULL);
     pthread_mutex_unlock(&st->mutex);
     /* a heartbeat that cannot be written (disk full) is no reason to lose the work */
-    if (text != NULL && durable_replace_volatile(path, text, strlen(text), &err) != STATUS_OK) log_warning(st->log, "%s", err.text);
+    if (text != NULL && durable_replace_volatile(path, text, strlen(text), &err) != STATUS_OK)
+        log_warning(st->log, "%s", err.text);
     free(text);
 }
 
@@ -108,7 +110,8 @@ static void *heartbeat(void *context)
     return NULL;
 }
 
-status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **out, struct error *err)
+status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **out,
+                           struct error *err)
 {
     struct worker_status *st = calloc(1, sizeof *st);
     if (st == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: out of memory");
@@ -143,8 +146,10 @@ status worker_status_finish(struct worker_status *st, const char *state, const s
     stop_thread(st);
     if (worker_status_stale(st)) return error_set(err, STATUS_STALE, "the attempt of this worker is no longer current");
     pthread_mutex_lock(&st->mutex);
-    if (strcmp(state, "succeeded") == 0) snprintf(st->message, sizeof st->message, "done");
-    else snprintf(st->message, sizeof st->message, "%s", error != NULL ? error->text : state);
+    if (strcmp(state, "succeeded") == 0)
+        snprintf(st->message, sizeof st->message, "done");
+    else
+        snprintf(st->message, sizeof st->message, "%s", error != NULL ? error->text : state);
     char *text = status_text(st, state, error);
     pthread_mutex_unlock(&st->mutex);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the final status: out of memory");
@@ -165,8 +170,8 @@ void worker_status_free(struct worker_status *st)
 const atomic_bool *worker_status_cancel(const struct worker_status *st) { return &st->cancel; }
 bool worker_status_stale(const struct worker_status *st) { return atomic_load(&st->stale); }
 
-void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage, double base,
-                         double weight)
+void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage,
+                         double base, double weight)
 {
     pthread_mutex_lock(&st->mutex);
     snprintf(st->stage, sizeof st->stage, "%s", name);

@@ -31,7 +31,10 @@ static void polish(const struct quadratic *q, const double *lower, const double 
         for (size_t i = 0; i < q->n; i++) {
             double slope = q->g[i], curvature = q->hessian[i * q->n + i];
             for (size_t j = 0; j < q->n; j++) slope += q->hessian[i * q->n + j] * y[j];
-            double to = curvature > 0.0 ? y[i] - slope / curvature : slope > 0.0 ? lower[i] : slope < 0.0 ? upper[i] : y[i];
+            double to = curvature > 0.0 ? y[i] - slope / curvature
+                        : slope > 0.0   ? lower[i]
+                        : slope < 0.0   ? upper[i]
+                                        : y[i];
             to = fmin(fmax(to, lower[i]), upper[i]);
             largest = fmax(largest, fabs(to - y[i]));
             y[i] = to;
@@ -40,8 +43,8 @@ static void polish(const struct quadratic *q, const double *lower, const double 
     }
 }
 
-status bounded_quadratic(const double *hessian, const double *g, const double *lower, const double *upper, size_t n, double *y,
-                         struct error *err)
+status bounded_quadratic(const double *hessian, const double *g, const double *lower, const double *upper, size_t n,
+                         double *y, struct error *err)
 {
     struct quadratic q = {hessian, g, n};
     double value;
@@ -55,9 +58,11 @@ status bounded_quadratic(const double *hessian, const double *g, const double *l
     nlopt_set_maxeval(opt, 500);
     nlopt_result result = nlopt_optimize(opt, y, &value);
     nlopt_destroy(opt);
-    if (result == NLOPT_OUT_OF_MEMORY) return error_set(err, STATUS_NO_MEMORY, "cannot solve for a step: out of memory");
+    if (result == NLOPT_OUT_OF_MEMORY)
+        return error_set(err, STATUS_NO_MEMORY, "cannot solve for a step: out of memory");
     for (size_t i = 0; i < n; i++) {
-        if (!isfinite(y[i])) return error_set(err, STATUS_NUMERIC, "cannot solve for a step: the quadratic model is not finite");
+        if (!isfinite(y[i]))
+            return error_set(err, STATUS_NUMERIC, "cannot solve for a step: the quadratic model is not finite");
         y[i] = fmin(fmax(y[i], lower[i]), upper[i]);
     }
     polish(&q, lower, upper, y);

@@ -1,7 +1,8 @@
 /* Methods of descent: one file each, one row in the registry, found by id.
  *
- * A method is a deterministic function of the problem and of the estimates it asks for; it keeps nothing between runs and never looks at a clock. That is
- * what makes a fit bit-identical for any number of threads and after a resume (estimate_journal.h).
+ * A method is a deterministic function of the problem and of the estimates it asks for; it keeps nothing between runs
+ * and never looks at a clock. That is what makes a fit bit-identical for any number of threads and after a resume
+ * (estimate_journal.h).
  */
 #ifndef SELVEDGE_OPTIMIZER_DESCENT_H
 #define SELVEDGE_OPTIMIZER_DESCENT_H
@@ -22,28 +23,29 @@ struct fit_parameter {
 struct fit_step {
     size_t step;
     const char *phase;
-    double wall_s;           /* since the fit began, this and all earlier attempts */
+    double wall_s; /* since the fit began, this and all earlier attempts */
     uint64_t n_path, n_path_total;
     struct objective_value objective;
     size_t n_param, n_configuration;
-    const double *param;     /* where the objective was estimated */
-    const double *param_se;  /* NULL when unknown */
+    const double *param;    /* where the objective was estimated */
+    const double *param_se; /* NULL when unknown */
     const struct estimate *replica[2];
-    double damping, noise;   /* mean damping added to the diagonal; Monte-Carlo variance per residual of the pooled model */
+    double damping,
+        noise; /* mean damping added to the diagonal; Monte-Carlo variance per residual of the pooled model */
     const char *note;
 };
 
 struct fit_problem {
     size_t n_param;
-    const struct param_info *info;       /* of the model */
+    const struct param_info *info; /* of the model */
     const struct fit_parameter *param;
     const struct observation_set *observation; /* fitted ones only; one configuration of the estimator each */
     const struct estimator *estimator;
-    uint64_t path_budget;                /* 0: the method's default */
-    size_t max_iteration;                /* 0: the method's default */
+    uint64_t path_budget;                                                            /* 0: the method's default */
+    size_t max_iteration;                                                            /* 0: the method's default */
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
-    const struct progress *progress;     /* fraction of the budget; cancel */
+    const struct progress *progress; /* fraction of the budget; cancel */
 };
 
 struct fit_result {
@@ -53,7 +55,7 @@ struct fit_result {
     size_t n_step;
     uint64_t n_path;
     double wall_s;
-    struct objective_value objective;    /* predicted at `param` by all estimates of the fit together */
+    struct objective_value objective; /* predicted at `param` by all estimates of the fit together */
     struct uncertainty uncertainty;
 };
 

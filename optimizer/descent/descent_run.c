@@ -7,16 +7,18 @@
 status descent_check(const struct fit_problem *problem, struct error *err)
 {
     if (problem->n_param == 0 || problem->n_param > SCATTERING_MAX_PARAM)
-        return error_set(err, STATUS_INVALID, "cannot fit %zu parameters: allowed are 1 to %d", problem->n_param, SCATTERING_MAX_PARAM);
+        return error_set(err, STATUS_INVALID, "cannot fit %zu parameters: allowed are 1 to %d", problem->n_param,
+                         SCATTERING_MAX_PARAM);
     if (problem->observation->n == 0 || problem->observation->n != problem->estimator->n_configuration)
         return error_set(err, STATUS_INVALID, "cannot fit %zu observations with an estimator of %zu configurations",
                          problem->observation->n, problem->estimator->n_configuration);
     for (size_t p = 0; p < problem->n_param; p++) {
         const struct fit_parameter *k = &problem->param[p];
         if (!(k->start >= k->lower && k->start <= k->upper))
-            return error_set_field(err, STATUS_INVALID, "fit.start", "parameter '%s' starts at %g: its bounds are %g and %g",
-                                   problem->info[p].name, param_to_file_unit(&problem->info[p], k->start),
-                                   param_to_file_unit(&problem->info[p], k->lower), param_to_file_unit(&problem->info[p], k->upper));
+            return error_set_field(
+                err, STATUS_INVALID, "fit.start", "parameter '%s' starts at %g: its bounds are %g and %g",
+                problem->info[p].name, param_to_file_unit(&problem->info[p], k->start),
+                param_to_file_unit(&problem->info[p], k->lower), param_to_file_unit(&problem->info[p], k->upper));
     }
     return STATUS_OK;
 }
@@ -61,16 +63,19 @@ static void report_call(void *context, double fraction)
     progress_report(c->run->problem->progress, fmin(1.0, done / (double)c->run->path_budget));
 }
 
-status descent_estimate(struct descent_run *run, const double *param, uint32_t iteration, bool want_jacobian, struct error *err)
+status descent_estimate(struct descent_run *run, const double *param, uint32_t iteration, bool want_jacobian,
+                        struct error *err)
 {
     const struct estimator *e = run->problem->estimator;
     struct call_progress part = {.run = run};
-    struct progress progress = {.report = report_call, .context = &part,
+    struct progress progress = {.report = report_call,
+                                .context = &part,
                                 .cancel = run->problem->progress != NULL ? run->problem->progress->cancel : NULL};
     for (size_t i = 0; i < e->n_configuration; i++) part.n_path_call += (double)run->n_path[i];
     run->n_path_step = 0;
     for (uint32_t q = 0; q < 2; q++) {
-        struct estimator_call call = {param, run->n_path, iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B, want_jacobian};
+        struct estimator_call call = {param, run->n_path, iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B,
+                                      want_jacobian};
         double wall_s = 0.0;
         status s = e->run(e->context, &call, &progress, run->replica[q], &wall_s, err);
         if (s != STATUS_OK) return s;

@@ -22,8 +22,8 @@ struct estimate_journal {
     void *may_write_context;
     bool replaying;
     size_t n_replayed;
-    off_t end;          /* behind the last record that is in use */
-    size_t n_bytes;     /* of a payload: the same for every call of one fit */
+    off_t end;      /* behind the last record that is in use */
+    size_t n_bytes; /* of a payload: the same for every call of one fit */
     uint8_t *payload, *record;
 };
 
@@ -35,7 +35,8 @@ struct call_header {
 static size_t payload_bytes(const struct estimator *e)
 {
     size_t per_estimate = (6 + 6 * e->n_param) * sizeof(double) + 2 * sizeof(uint64_t);
-    return sizeof(struct call_header) + e->n_param * sizeof(double) + e->n_configuration * (sizeof(uint64_t) + per_estimate);
+    return sizeof(struct call_header) + e->n_param * sizeof(double) +
+           e->n_configuration * (sizeof(uint64_t) + per_estimate);
 }
 
 static void put(uint8_t **p, const void *data, size_t n)
@@ -51,11 +52,13 @@ static void get(const uint8_t **p, void *data, size_t n)
 }
 
 /* The part of a payload that says what was asked; returns the place behind it. */
-static uint8_t *put_call(const struct estimate_journal *j, const struct estimator_call *call, double wall_s, uint8_t *to)
+static uint8_t *put_call(const struct estimate_journal *j, const struct estimator_call *call, double wall_s,
+                         uint8_t *to)
 {
     const struct estimator *e = j->live;
-    struct call_header h = {call->iteration, call->replica, call->want_jacobian, (uint32_t)e->n_configuration, (uint32_t)e->n_param, 0,
-                            wall_s};
+    struct call_header h = {
+        call->iteration, call->replica, call->want_jacobian, (uint32_t)e->n_configuration, (uint32_t)e->n_param, 0,
+        wall_s};
     put(&to, &h, sizeof h);
     put(&to, call->param, e->n_param * sizeof(double));
     for (size_t i = 0; i < e->n_configuration; i++) {
@@ -199,8 +202,8 @@ static bool replay(struct estimate_journal *j, const struct estimator_call *call
     return true;
 }
 
-static status append(struct estimate_journal *j, const struct estimator_call *call, const struct estimate *out, double wall_s,
-                     struct error *err)
+static status append(struct estimate_journal *j, const struct estimator_call *call, const struct estimate *out,
+                     double wall_s, struct error *err)
 {
     status s = j->may_write != NULL ? j->may_write(j->may_write_context, err) : STATUS_OK;
     if (s != STATUS_OK) return s;
@@ -212,8 +215,8 @@ static status append(struct estimate_journal *j, const struct estimator_call *ca
     return s;
 }
 
-static status run(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
-                  double *wall_s, struct error *err)
+static status run(void *context, const struct estimator_call *call, const struct progress *progress,
+                  struct estimate *out, double *wall_s, struct error *err)
 {
     struct estimate_journal *j = context;
     if (j->replaying) {
@@ -227,7 +230,8 @@ static status run(void *context, const struct estimator_call *call, const struct
 
 struct estimator estimate_journal_estimator(struct estimate_journal *j)
 {
-    return (struct estimator){.context = j, .n_configuration = j->live->n_configuration, .n_param = j->live->n_param, .run = run};
+    return (struct estimator){
+        .context = j, .n_configuration = j->live->n_configuration, .n_param = j->live->n_param, .run = run};
 }
 
 bool estimate_journal_replaying(const struct estimate_journal *j) { return j->replaying; }

@@ -1,5 +1,5 @@
-/* What a descent method asks for: mean radiances of every fitted configuration at given parameters. Production calls the path tracer (estimate.h)
- * through a journal (estimate_journal.h); tests put an analytic function here.
+/* What a descent method asks for: mean radiances of every fitted configuration at given parameters. Production calls
+ * the path tracer (estimate.h) through a journal (estimate_journal.h); tests put an analytic function here.
  */
 #ifndef SELVEDGE_OPTIMIZER_ESTIMATOR_H
 #define SELVEDGE_OPTIMIZER_ESTIMATOR_H
@@ -19,8 +19,8 @@ enum estimator_replica {
 };
 
 struct estimator_call {
-    const double *param;        /* internal units */
-    const size_t *n_path;       /* per configuration */
+    const double *param;  /* internal units */
+    const size_t *n_path; /* per configuration */
     uint32_t iteration, replica;
     bool want_jacobian;
 };
@@ -29,8 +29,8 @@ struct estimator {
     void *context;
     size_t n_configuration, n_param;
     /* out: n_configuration estimates; *wall_s: seconds that the call took (when it was first made). */
-    status (*run)(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
-                  double *wall_s, struct error *err);
+    status (*run)(void *context, const struct estimator_call *call, const struct progress *progress,
+                  struct estimate *out, double *wall_s, struct error *err);
 };
 
 #endif

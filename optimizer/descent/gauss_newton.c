@@ -1,14 +1,14 @@
 /* gauss_newton.v1: bounded, damped Gauss-Newton on the Monte-Carlo Jacobian.
  *
- * Each iteration traces new paths (two replicas) at the present point, adds them to the history, and pools all of it there
- * (linear_model.h). The step minimises the pooled quadratic model in logit / log coordinates inside the bounds and the step limits:
- *   rows        weighted by what noise and misfit leave of them (linear_model_weigh);
- *   gradient    mirrored product of the replicas, without bias;
- *   curvature   2 J'J of the averaged replicas: too large by the noise of J, a damping that fades as paths add up;
- *   damping     plus 2 noise / limit^2: moving by the whole step limit must gain more than one residual's Monte-Carlo variance.
- * A step after which the objective is higher beyond doubt halves the limits and is taken back.
- * Paths: few at first; 1.3 times as many when the predicted gain is no longer clear of the noise; spread over configurations by the standard deviation of a path
- * (Neyman allocation). Ends when the predicted gain is within the noise and the noise is small against what is left of the objective.
+ * Each iteration traces new paths (two replicas) at the present point, adds them to the history, and pools all of it
+ * there (linear_model.h). The step minimises the pooled quadratic model in logit / log coordinates inside the bounds
+ * and the step limits: rows        weighted by what noise and misfit leave of them (linear_model_weigh); gradient
+ * mirrored product of the replicas, without bias; curvature   2 J'J of the averaged replicas: too large by the noise of
+ * J, a damping that fades as paths add up; damping     plus 2 noise / limit^2: moving by the whole step limit must gain
+ * more than one residual's Monte-Carlo variance. A step after which the objective is higher beyond doubt halves the
+ * limits and is taken back. Paths: few at first; 1.3 times as many when the predicted gain is no longer clear of the
+ * noise; spread over configurations by the standard deviation of a path (Neyman allocation). Ends when the predicted
+ * gain is within the noise and the noise is small against what is left of the objective.
  */
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/method_names.h"
@@ -18,9 +18,17 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM, BLOCK = 256, MIN_PATH = 1024, FIRST_PATH = 2048, MAX_ITERATION = 80, DEFAULT_BUDGET = 6000000 };
+enum {
+    N = SCATTERING_MAX_PARAM,
+    BLOCK = 256,
+    MIN_PATH = 1024,
+    FIRST_PATH = 2048,
+    MAX_ITERATION = 80,
+    DEFAULT_BUDGET = 6000000
+};
 
-/* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of the objective that is. */
+/* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of
+ * the objective that is. */
 static const double target_rel_rms = 0.0007, target_share = 0.01;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
 static const double largest_share = 0.1;
@@ -80,7 +88,8 @@ static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
     for (size_t a = 0; a < n; a++) {
         const struct coordinate *k = &g->run.coordinate[index[a]];
         double limit = k->step_limit;
-        for (size_t b = 0; b < n; b++) hs[a * n + b] = h[index[a] * n_param + index[b]] * limit * g->run.coordinate[index[b]].step_limit;
+        for (size_t b = 0; b < n; b++)
+            hs[a * n + b] = h[index[a] * n_param + index[b]] * limit * g->run.coordinate[index[b]].step_limit;
         gs[a] = gradient[index[a]] * limit;
         lower[a] = fmax(-g->limit_scale, (k->lower - g->model.x_ref[index[a]]) / limit);
         upper[a] = fmin(g->limit_scale, (k->upper - g->model.x_ref[index[a]]) / limit);
@@ -102,8 +111,8 @@ static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
     return STATUS_OK;
 }
 
-/* Gain that pure noise would promise: for f = r.r the noise variance of a residual for each free direction, one to three times that because the
- * three channels of a configuration share their paths. */
+/* Gain that pure noise would promise: for f = r.r the noise variance of a residual for each free direction, one to
+ * three times that because the three channels of a configuration share their paths. */
 static double noise_gain(const struct gauss_newton *g) { return 2.0 * (double)g->n_free * g->noise; }
 
 static bool precise_enough(const struct gauss_newton *g, double f, double se)
@@ -125,23 +134,27 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
 {
     double param[N];
     struct uncertainty u;
-    struct fit_step step = {.phase = "gauss_newton", .param = param, .damping = g->damping, .noise = g->noise, .note = note};
+    struct fit_step step = {
+        .phase = "gauss_newton", .param = param, .damping = g->damping, .noise = g->noise, .note = note};
     param_of(g, g->x, param);
     uncertainty_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed, &u);
     step.param_se = u.se_param;
     return descent_report(&g->run, &step, err);
 }
 
-/* What the last step has done against what it promised. Worse beyond doubt: `failed`, back to the best point. Clearly less than promised (a fit
- * with large residuals overshoots from side to side): half the limits; otherwise they grow again. */
+/* What the last step has done against what it promised. Worse beyond doubt: `failed`, back to the best point. Clearly
+ * less than promised (a fit with large residuals overshoots from side to side): half the limits; otherwise they grow
+ * again. */
 static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
 {
     double se, f = linear_model_objective(&g->model, &se), doubt = se + g->best_se;
     bool first = g->history.n_step == 1;
     *failed = !first && f - g->best_f > 3.0 * doubt && f > 1.1 * g->best_f && g->limit_scale > least_limit;
     bool short_of_promise = !first && g->best_f - f < 0.25 * g->promised && g->promised > 2.0 * doubt;
-    if (*failed || short_of_promise) g->limit_scale = fmax(least_limit, 0.5 * g->limit_scale);
-    else g->limit_scale = fmin(1.0, 1.5 * g->limit_scale);
+    if (*failed || short_of_promise)
+        g->limit_scale = fmax(least_limit, 0.5 * g->limit_scale);
+    else
+        g->limit_scale = fmin(1.0, 1.5 * g->limit_scale);
     if (*failed) {
         memcpy(g->x, g->best_x, sizeof g->x);
         status s = linear_model_pool(&g->model, &g->history, g->x, err);
@@ -189,8 +202,8 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         bool small = g->gain <= 4.0 * noise_gain(g) || g->gain <= 0.01 * fabs(f);
         result->converged = small && !failed && g->history.n_step > 2;
         if (result->converged && precise_enough(g, f, se)) {
-            snprintf(result->reason, sizeof result->reason, "the next step promises %.2g, the objective is %.3g with a noise of %.1g",
-                     g->gain, f, se);
+            snprintf(result->reason, sizeof result->reason,
+                     "the next step promises %.2g, the objective is %.3g with a noise of %.1g", g->gain, f, se);
             return STATUS_OK;
         }
         bool paths_left = plan_paths(g, clear, problem->observation->n);
@@ -198,11 +211,12 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         const char *used = paths_left ? "the iterations" : "the path budget";
         if (result->converged)
             snprintf(result->reason, sizeof result->reason,
-                     "%s ended when the objective (%.3g) could no longer be told from its noise (%.1g); more paths would narrow the errors", used, f,
-                     se);
+                     "%s ended when the objective (%.3g) could no longer be told from its noise (%.1g); more paths "
+                     "would narrow the errors",
+                     used, f, se);
         else
-            snprintf(result->reason, sizeof result->reason, "%s ended while a step still promised to lower the objective by %.2g from %.3g", used,
-                     g->gain, f);
+            snprintf(result->reason, sizeof result->reason,
+                     "%s ended while a step still promised to lower the objective by %.2g from %.3g", used, g->gain, f);
         return STATUS_OK;
     }
 }
@@ -232,7 +246,8 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     if (s != STATUS_OK) goto out;
     size_t index[N];
     g.n_free = free_index(&g, index);
-    for (size_t p = 0; p < problem->n_param; p++) g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->param[p].start);
+    for (size_t p = 0; p < problem->n_param; p++)
+        g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->param[p].start);
     /* small budgets start smaller, so that there are iterations to speak of */
     double first = (double)g.run.path_budget / (40.0 * 2.0 * (double)problem->observation->n);
     g.n_path_mean = fmax(MIN_PATH, fmin(FIRST_PATH, first));

@@ -1,5 +1,5 @@
-/* Names of the descent methods: pure data, so that the daemon can check job documents without linking the methods themselves.
- * A test compares this list with the registry (descent.h).
+/* Names of the descent methods: pure data, so that the daemon can check job documents without linking the methods
+ * themselves. A test compares this list with the registry (descent.h).
  */
 #ifndef SELVEDGE_OPTIMIZER_METHOD_NAMES_H
 #define SELVEDGE_OPTIMIZER_METHOD_NAMES_H

@@ -1,13 +1,15 @@
 /* published_sgd.v1: the optimizer of the fabric thesis (5.5.4, 5.5.5, B.1), so that results can be compared.
  *
- * Rescaling curves first (rescale.h). Then six runs from the start with the step a / i, i = 50, 51, ..., 60 iterations each, with
- * exponentially spaced a; the run with the lowest final objective wins; if it still oscillates, 10 more iterations at a tenth of its last step.
- * Every iteration renders all configurations twice (two replicas). As published that is 64 x 64 x 64 paths a configuration and replica.
+ * Rescaling curves first (rescale.h). Then six runs from the start with the step a / i, i = 50, 51, ..., 60 iterations
+ * each, with exponentially spaced a; the run with the lowest final objective wins; if it still oscillates, 10 more
+ * iterations at a tenth of its last step. Every iteration renders all configurations twice (two replicas). As published
+ * that is 64 x 64 x 64 paths a configuration and replica.
  *
- * Differs: the thesis does not give the six values of a; here they grow by a factor of 3, and the first step moves the parameter that moves most by
- * 0.5 % .. 120 % of its rescaled range. "Final objective" is the mean over the last five iterations of a run: the value of one iteration is noisy.
- * "Oscillates" means that successive steps point against each other on average. A parameter that is fixed keeps its value. With a path
- * budget, all renderings shrink alike. Errors come from 4 more estimates at the winner.
+ * Differs: the thesis does not give the six values of a; here they grow by a factor of 3, and the first step moves the
+ * parameter that moves most by 0.5 % .. 120 % of its rescaled range. "Final objective" is the mean over the last five
+ * iterations of a run: the value of one iteration is noisy. "Oscillates" means that successive steps point against each
+ * other on average. A parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors
+ * come from 4 more estimates at the winner.
  */
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/method_names.h"
@@ -18,7 +20,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM, N_RUN = 6, N_ITERATION = 60, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5, BLOCK = 256 };
+enum {
+    N = SCATTERING_MAX_PARAM,
+    N_RUN = 6,
+    N_ITERATION = 60,
+    N_EXTRA = 10,
+    FIRST_I = 50,
+    N_FINAL = 4,
+    N_LAST = 5,
+    BLOCK = 256
+};
 
 static const uint64_t published_path = 64 * 64 * 64;
 static const double first_move = 0.005, factor = 3.0;
@@ -69,8 +80,9 @@ static status iterate(struct sgd *g, const char *phase, double rate, struct erro
     double moved[N];
     for (size_t p = 0; p < problem->n_param; p++) {
         move[p] = -rate * gradient[p];
-        moved[p] = g->run.fixed[p] ? g->param[p]
-                                   : rescale_backward(&g->curve[p], rescale_forward(&g->curve[p], g->param[p]) + move[p]);
+        moved[p] = g->run.fixed[p]
+                       ? g->param[p]
+                       : rescale_backward(&g->curve[p], rescale_forward(&g->curve[p], g->param[p]) + move[p]);
     }
     if (g->i > 0) g->turn += (cosine(move, g->last_step, problem->n_param) - g->turn) / N_EXTRA;
     memcpy(g->last_step, move, sizeof move);
@@ -126,7 +138,8 @@ static status run_all(struct sgd *g, size_t n_iteration, double a, struct winner
         }
         double f = final_objective(g);
         if (k > 0 && !(f < best->objective)) continue;
-        *best = (struct winner){.objective = f, .turn = g->turn, .a = a, .i_run = k, .rate = a / (double)(FIRST_I + n_iteration - 1)};
+        *best = (struct winner){
+            .objective = f, .turn = g->turn, .a = a, .i_run = k, .rate = a / (double)(FIRST_I + n_iteration - 1)};
         memcpy(best->param, g->param, sizeof g->param);
     }
     return STATUS_OK;
@@ -170,8 +183,10 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
         uncertainty_compute(&model, problem->observation, g->run.coordinate, g->run.fixed, &result->uncertainty);
         result->converged = best->turn <= 0.3 && best->i_run > 0 && best->i_run < N_RUN - 1;
         snprintf(result->reason, sizeof result->reason,
-                 "run %d of %d had the lowest objective%s; successive steps have a mean cosine of %.2f (below 0.3 counts as converged)",
-                 best->i_run + 1, N_RUN, best->i_run == 0 || best->i_run == N_RUN - 1 ? ", which is at the end of the bracket" : "",
+                 "run %d of %d had the lowest objective%s; successive steps have a mean cosine of %.2f (below 0.3 "
+                 "counts as converged)",
+                 best->i_run + 1, N_RUN,
+                 best->i_run == 0 || best->i_run == N_RUN - 1 ? ", which is at the end of the bracket" : "",
                  best->turn);
     }
     linear_model_release(&model);
@@ -188,7 +203,8 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
     status s = descent_run_init(&g->run, problem, &descent_published_sgd, err);
     if (s != STATUS_OK) goto out;
     size_t n = problem->observation->n, n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
-    /* renderings of one configuration: the curves (at most one a parameter), the first rate, the runs, settling, the end */
+    /* renderings of one configuration: the curves (at most one a parameter), the first rate, the runs, settling, the
+     * end */
     double n_call = RESCALE_POINTS * 5.0 + 2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
     double paths = (double)g->run.path_budget / (n_call * (double)n);
     if (problem->path_budget == 0) {
@@ -203,8 +219,10 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
     s = first_rate(g, &a, err);
     if (s == STATUS_OK) s = run_all(g, n_iteration, a, &best, err);
     if (s != STATUS_OK) goto out;
-    if (best.turn < 0.0) s = settle(g, &best, err);
-    else memcpy(g->param, best.param, sizeof g->param);
+    if (best.turn < 0.0)
+        s = settle(g, &best, err);
+    else
+        memcpy(g->param, best.param, sizeof g->param);
     if (s == STATUS_OK) s = finish(g, &best, result, err);
 out:
     descent_run_release(&g->run);

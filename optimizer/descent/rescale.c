@@ -11,10 +11,8 @@ struct published_curve {
 };
 
 static const struct published_curve published[] = {
-    {"C_R", 1.02296, -0.032255, 1.5403, 0.001, 0.999, true},
-    {"beta_R", -7.0, 8.0, 1.1, 1.0, 10.0, false},
-    {"C_TT", 1.02296, -1.02197, 0.64922, 0.001, 0.999, false},
-    {"beta_TT", -0.91, 1.9, 1.5, 1.0, 45.0, false},
+    {"C_R", 1.02296, -0.032255, 1.5403, 0.001, 0.999, true},   {"beta_R", -7.0, 8.0, 1.1, 1.0, 10.0, false},
+    {"C_TT", 1.02296, -1.02197, 0.64922, 0.001, 0.999, false}, {"beta_TT", -0.91, 1.9, 1.5, 1.0, 45.0, false},
     {"gamma_TT", -0.91, 1.9, 1.5, 1.0, 45.0, false},
 };
 
@@ -43,7 +41,8 @@ void rescale_points(const struct param_info *info, const struct coordinate *k, s
     for (int i = 0; i < RESCALE_POINTS; i++) {
         double value = known ? param_from_file_unit(info, c[i])
                              : coordinate_to_param(k, k->lower + (k->upper - k->lower) * i / (RESCALE_POINTS - 1.0));
-        if (value > curve->c[curve->n - 1] && value < k->param_upper && curve->n < RESCALE_POINTS - 1) curve->c[curve->n++] = value;
+        if (value > curve->c[curve->n - 1] && value < k->param_upper && curve->n < RESCALE_POINTS - 1)
+            curve->c[curve->n++] = value;
     }
     curve->c[curve->n++] = k->param_upper;
     memset(curve->r, 0, sizeof curve->r);
@@ -65,8 +64,14 @@ static double interpolate(const double *from, const double *to, size_t n, double
     return width > 0.0 ? to[i] + (to[i + 1] - to[i]) * (v - from[i]) / width : to[i];
 }
 
-double rescale_forward(const struct rescale_curve *curve, double p) { return interpolate(curve->c, curve->r, curve->n, p); }
-double rescale_backward(const struct rescale_curve *curve, double r) { return interpolate(curve->r, curve->c, curve->n, r); }
+double rescale_forward(const struct rescale_curve *curve, double p)
+{
+    return interpolate(curve->c, curve->r, curve->n, p);
+}
+double rescale_backward(const struct rescale_curve *curve, double r)
+{
+    return interpolate(curve->r, curve->c, curve->n, r);
+}
 
 double rescale_slope(const struct rescale_curve *curve, double p)
 {
@@ -77,14 +82,15 @@ double rescale_slope(const struct rescale_curve *curve, double p)
 static double curve_step(const struct observation_set *o, const struct estimate *x, const struct estimate *y)
 {
     double sum = 0.0;
-    for (size_t i = 0; i < o->n; i++) sum += objective_weight(&o->item[i]) * sqrt(objective_image_difference(x[i].mean, y[i].mean));
+    for (size_t i = 0; i < o->n; i++)
+        sum += objective_weight(&o->item[i]) * sqrt(objective_image_difference(x[i].mean, y[i].mean));
     return sum;
 }
 
 /* One curve: all slots of the same symbol move together. */
 static status measure_symbol(const struct fit_problem *problem, size_t first, size_t n_slot, const size_t *n_path,
-                             struct rescale_curve *curve, struct estimate *buffer[2], uint64_t *n_path_used, double *wall_s,
-                             struct error *err)
+                             struct rescale_curve *curve, struct estimate *buffer[2], uint64_t *n_path_used,
+                             double *wall_s, struct error *err)
 {
     double param[SCATTERING_MAX_PARAM];
     const struct estimator *e = problem->estimator;

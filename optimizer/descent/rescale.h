@@ -1,12 +1,13 @@
 /* Parameter rescaling of the published optimizer (fabric thesis 5.5.5, eq. 5.14, and B.1).
  *
  * For parameter p with the others at their start, R is evaluated at nine values c_1 .. c_9, and
- *   r_p(c_1) = 0,  r_p(c_{j+1}) - r_p(c_j) = sum_i w_i sqrt(f_image(R_i(c_j), R_i(c_{j+1}))),  piecewise linear between;
- * a colour parameter is moved in all three channels at once, and each channel gets r_p / 3. Descent runs in r.
+ *   r_p(c_1) = 0,  r_p(c_{j+1}) - r_p(c_j) = sum_i w_i sqrt(f_image(R_i(c_j), R_i(c_{j+1}))),  piecewise linear
+ * between; a colour parameter is moved in all three channels at once, and each channel gets r_p / 3. Descent runs in r.
  *
- * Differs: the nine values of one curve are rendered with the same random numbers, which keeps noise out of their differences; values below the bound
- * of the fit (beta_TT: the published curve starts at 1 degree, the bound is 10) are cut off, which shifts r by a constant only. Parameters
- * that the published table does not list get nine values evenly spaced in their fit coordinate.
+ * Differs: the nine values of one curve are rendered with the same random numbers, which keeps noise out of their
+ * differences; values below the bound of the fit (beta_TT: the published curve starts at 1 degree, the bound is 10) are
+ * cut off, which shifts r by a constant only. Parameters that the published table does not list get nine values evenly
+ * spaced in their fit coordinate.
  */
 #ifndef SELVEDGE_OPTIMIZER_RESCALE_H
 #define SELVEDGE_OPTIMIZER_RESCALE_H

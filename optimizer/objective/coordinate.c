@@ -6,17 +6,22 @@
 static double forward(enum coordinate_kind kind, double p)
 {
     switch (kind) {
-    case COORDINATE_LOG: return log(p);
-    case COORDINATE_LOGIT: return log(p) - log1p(-p);
-    default: return p;
+    case COORDINATE_LOG:
+        return log(p);
+    case COORDINATE_LOGIT:
+        return log(p) - log1p(-p);
+    default:
+        return p;
     }
 }
 
 void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper)
 {
     bool angle = strcmp(info->unit, "deg") == 0;
-    if (!angle && lower > 0.0 && upper < 1.0) k->kind = COORDINATE_LOGIT;
-    else k->kind = lower > 0.0 ? COORDINATE_LOG : COORDINATE_LINEAR;
+    if (!angle && lower > 0.0 && upper < 1.0)
+        k->kind = COORDINATE_LOGIT;
+    else
+        k->kind = lower > 0.0 ? COORDINATE_LOG : COORDINATE_LINEAR;
     k->param_lower = lower;
     k->param_upper = upper;
     k->lower = forward(k->kind, lower);
@@ -42,8 +47,11 @@ double coordinate_to_param(const struct coordinate *k, double x)
 double coordinate_slope(const struct coordinate *k, double param)
 {
     switch (k->kind) {
-    case COORDINATE_LOG: return param;
-    case COORDINATE_LOGIT: return param * (1.0 - param);
-    default: return 1.0;
+    case COORDINATE_LOG:
+        return param;
+    case COORDINATE_LOGIT:
+        return param * (1.0 - param);
+    default:
+        return 1.0;
     }
 }

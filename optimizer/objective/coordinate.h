@@ -1,5 +1,6 @@
-/* Fit coordinates: the scale on which a parameter is moved. Colours and albedos strictly inside (0, 1) move in ln(p / (1 - p)), positive
- * quantities (lobe widths) in ln p, all others linearly. The bounds are finite in all three, so a parameter can reach one and stay there.
+/* Fit coordinates: the scale on which a parameter is moved. Colours and albedos strictly inside (0, 1) move in ln(p /
+ * (1 - p)), positive quantities (lobe widths) in ln p, all others linearly. The bounds are finite in all three, so a
+ * parameter can reach one and stay there.
  */
 #ifndef SELVEDGE_OPTIMIZER_COORDINATE_H
 #define SELVEDGE_OPTIMIZER_COORDINATE_H
@@ -12,7 +13,7 @@ struct coordinate {
     enum coordinate_kind kind;
     double param_lower, param_upper; /* internal unit */
     double lower, upper;             /* the same in the coordinate */
-    double step_limit;               /* largest step of one iteration: 1 in logit, 0.25 in log, 1/8 of the range otherwise */
+    double step_limit; /* largest step of one iteration: 1 in logit, 0.25 in log, 1/8 of the range otherwise */
 };
 
 /* lower and upper: bounds of this fit, inside those of the model. */

@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-void linear_history_init(struct linear_history *h, const struct observation_set *o, const struct coordinate *k, size_t n_param)
+void linear_history_init(struct linear_history *h, const struct observation_set *o, const struct coordinate *k,
+                         size_t n_param)
 {
     *h = (struct linear_history){.observation = o, .coordinate = k, .n_param = n_param};
 }
@@ -21,8 +22,8 @@ void linear_history_release(struct linear_history *h)
     h->n_step = h->capacity = 0;
 }
 
-status linear_history_append(struct linear_history *h, const double *x, const struct estimate *a, const struct estimate *b,
-                             struct error *err)
+status linear_history_append(struct linear_history *h, const double *x, const struct estimate *a,
+                             const struct estimate *b, struct error *err)
 {
     if (h->n_step == h->capacity) {
         size_t capacity = h->capacity > 0 ? 2 * h->capacity : 32;
@@ -68,7 +69,8 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
     double *block = calloc(2 * per_replica + n_row, sizeof *block);
-    if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot hold a model of %zu residuals: out of memory", n_row);
+    if (block == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot hold a model of %zu residuals: out of memory", n_row);
     for (size_t q = 0; q < 2; q++) {
         m->r[q] = block + q * per_replica;
         m->r_var[q] = m->r[q] + n_row;
@@ -88,8 +90,9 @@ void linear_model_release(struct linear_model *m)
 
 /* ---- pooling ---- */
 
-/* Mean derivatives by coordinates over all steps, weighted by paths: n_row x n_param. One set for all steps: measured with its own
- * derivatives, a step that happens to hold a rare bright path would seem farther away, count less, and the mean would come out too dark. */
+/* Mean derivatives by coordinates over all steps, weighted by paths: n_row x n_param. One set for all steps: measured
+ * with its own derivatives, a step that happens to hold a rare bright path would seem farther away, count less, and the
+ * mean would come out too dark. */
 static void mean_derivatives(const struct linear_history *h, double *mean)
 {
     size_t n = h->n_param, n_row = 3 * h->observation->n;
@@ -101,7 +104,8 @@ static void mean_derivatives(const struct linear_history *h, double *mean)
                 const struct estimate *e = &h->step[k].replica[q][row / 3];
                 n_path += (double)e->n_path;
                 for (size_t p = 0; p < n; p++) {
-                    double slope = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
+                    double slope =
+                        coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
                     mean[row * n + p] += (double)e->n_path * e->jac[(row % 3) * n + p] * slope;
                 }
             }
@@ -122,8 +126,8 @@ static double squared_change(const double *mean, size_t i, const double *dx, siz
     return largest;
 }
 
-static void add_derivatives(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q, size_t i,
-                            const double *slope, double weight)
+static void add_derivatives(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q,
+                            size_t i, const double *slope, double weight)
 {
     const struct estimate *e = &s->replica[q][i];
     double root_w = sqrt(objective_weight(&h->observation->item[i]));
@@ -137,9 +141,10 @@ static void add_derivatives(struct linear_model *m, const struct linear_history 
     }
 }
 
-/* Carried to x_ref by the averaged derivatives: those of the step itself are noisier, and by the same rare paths as its mean. */
-static void add_residuals(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q, size_t i,
-                          const double *dx, double weight)
+/* Carried to x_ref by the averaged derivatives: those of the step itself are noisier, and by the same rare paths as its
+ * mean. */
+static void add_residuals(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q,
+                          size_t i, const double *dx, double weight)
 {
     const struct estimate *e = &s->replica[q][i];
     const struct observation *o = &h->observation->item[i];
@@ -157,8 +162,10 @@ struct pool_weight {
     double r, j;
 };
 
-/* Variance of one path's derivatives of configuration i, and the square of the mean derivatives, both summed over columns and channels. */
-static void derivative_scale(const struct linear_history *h, const double *mean, size_t i, double *path_variance, double *square)
+/* Variance of one path's derivatives of configuration i, and the square of the mean derivatives, both summed over
+ * columns and channels. */
+static void derivative_scale(const struct linear_history *h, const double *mean, size_t i, double *path_variance,
+                             double *square)
 {
     double sum = 0.0, n_path = 0.0, w = objective_weight(&h->observation->item[i]);
     *square = 0.0;
@@ -177,13 +184,14 @@ static void derivative_scale(const struct linear_history *h, const double *mean,
     for (size_t j = 3 * i * h->n_param; j < 3 * (i + 1) * h->n_param; j++) *square += mean[j] * mean[j];
 }
 
-/* Weights of all steps for configuration i, summing to 1. Means bend to second order, derivatives to first; how much was chosen by trial on
- * analytic cloth, where a factor of four either way made little difference. */
+/* Weights of all steps for configuration i, summing to 1. Means bend to second order, derivatives to first; how much
+ * was chosen by trial on analytic cloth, where a factor of four either way made little difference. */
 static void pool_weights(const struct linear_history *h, const double *mean, size_t i, const double *change2,
                          struct pool_weight *weight, double *n_effective)
 {
     const double bend_r = 64.0, bend_j = 16.0;
-    double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0, j_variance, j_square;
+    double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0, j_variance,
+           j_square;
     derivative_scale(h, mean, i, &j_variance, &j_square);
     for (size_t k = 0; k < h->n_step; k++) {
         double n = (double)h->step[k].replica[0][i].n_path, per_path = n > 0.0 ? 1.0 / n : INFINITY;
@@ -276,7 +284,8 @@ void linear_model_gradient(const struct linear_model *m, double *g)
     memset(g, 0, m->n_param * sizeof *g);
     for (size_t row = 0; row < m->n_row; row++)
         for (size_t p = 0; p < m->n_param; p++)
-            g[p] += m->weight[row] * (m->r[0][row] * m->j[1][row * m->n_param + p] + m->r[1][row] * m->j[0][row * m->n_param + p]);
+            g[p] += m->weight[row] *
+                    (m->r[0][row] * m->j[1][row * m->n_param + p] + m->r[1][row] * m->j[0][row * m->n_param + p]);
 }
 
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian)
@@ -287,7 +296,8 @@ void linear_model_hessian(const struct linear_model *m, bool cross, double *hess
         const double *a = m->j[0] + row * n, *b = m->j[1] + row * n;
         for (size_t p = 0; p < n; p++)
             for (size_t q = 0; q < n; q++)
-                hessian[p * n + q] += m->weight[row] * (cross ? a[p] * b[q] + b[p] * a[q] : 0.5 * (a[p] + b[p]) * (a[q] + b[q]));
+                hessian[p * n + q] +=
+                    m->weight[row] * (cross ? a[p] * b[q] + b[p] * a[q] : 0.5 * (a[p] + b[p]) * (a[q] + b[q]));
     }
 }
 

@@ -1,12 +1,14 @@
-/* What all estimates of a fit so far say about the residuals near one point: R(x) ~ R + J (x - x_ref), for two independent replicas.
+/* What all estimates of a fit so far say about the residuals near one point: R(x) ~ R + J (x - x_ref), for two
+ * independent replicas.
  *
- * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by its own derivatives, and they are
- * averaged with weights 1 / (noise^2 + curvature^2): noise from the path count and the configuration's pooled variance per path (not
- * from the estimate's own variance, which is correlated with its value), curvature from the predicted squared change of the residuals between the
- * two points. So early, cheap iterations fade out and the last ones add up: this is the averaging over the last steps.
+ * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by its own
+ * derivatives, and they are averaged with weights 1 / (noise^2 + curvature^2): noise from the path count and the
+ * configuration's pooled variance per path (not from the estimate's own variance, which is correlated with its value),
+ * curvature from the predicted squared change of the residuals between the two points. So early, cheap iterations fade
+ * out and the last ones add up: this is the averaging over the last steps.
  *
- * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic), row 3 i + c; columns are the fit coordinates of all parameters.
- * Ownership: init/release. Not thread-safe.
+ * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic), row 3 i + c; columns are the fit coordinates of
+ * all parameters. Ownership: init/release. Not thread-safe.
  */
 #ifndef SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
 #define SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
@@ -33,34 +35,38 @@ struct linear_model {
     double x_ref[SCATTERING_MAX_PARAM];
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
-    double *weight;          /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
-    double n_effective;      /* paths a configuration and replica that the averages amount to, mean over configurations */
+    double *weight;     /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
+    double n_effective; /* paths a configuration and replica that the averages amount to, mean over configurations */
 };
 
-void linear_history_init(struct linear_history *h, const struct observation_set *o, const struct coordinate *k, size_t n_param);
+void linear_history_init(struct linear_history *h, const struct observation_set *o, const struct coordinate *k,
+                         size_t n_param);
 void linear_history_release(struct linear_history *h);
 /* Copies the estimates. */
-status linear_history_append(struct linear_history *h, const double *x, const struct estimate *a, const struct estimate *b,
-                             struct error *err);
-/* Variance of one path of configuration i in squared relative units: w_i * (mean over channels and steps of var * n_path). */
+status linear_history_append(struct linear_history *h, const double *x, const struct estimate *a,
+                             const struct estimate *b, struct error *err);
+/* Variance of one path of configuration i in squared relative units: w_i * (mean over channels and steps of var *
+ * n_path). */
 double linear_history_path_variance(const struct linear_history *h, size_t i);
 
 status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, struct error *err);
 void linear_model_release(struct linear_model *m);
 /* Averages the history at x_ref. At least one step. STATUS_NO_MEMORY. */
-status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err);
+status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref,
+                         struct error *err);
 
-/* Row weights v0 / (v_misfit + v_row): what is left of f per row, against the row's Monte-Carlo variance. While noise rules, rows that are
- * known well count more (bright channels have the longest paths and the most noise); as paths add up, or where the model does not fit, all weights
- * go to 1 and the minimum is that of f. Weights are kept until the next call and by linear_model_pool. */
+/* Row weights v0 / (v_misfit + v_row): what is left of f per row, against the row's Monte-Carlo variance. While noise
+ * rules, rows that are known well count more (bright channels have the longest paths and the most noise); as paths add
+ * up, or where the model does not fit, all weights go to 1 and the minimum is that of f. Weights are kept until the
+ * next call and by linear_model_pool. */
 void linear_model_weigh(struct linear_model *m);
 
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);
 /* 2 x mirrored average of J' r: the gradient of f by coordinates. */
 void linear_model_gradient(const struct linear_model *m, double *g);
-/* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged J, positive
- * semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */
+/* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged
+ * J, positive semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian);
 /* Weighted mean over rows of the variance of (r_A + r_B) / 2. */
 double linear_model_noise(const struct linear_model *m);

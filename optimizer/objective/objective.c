@@ -41,8 +41,8 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
     out->rel_rms = o->n > 0 ? sqrt(fmax(0.0, relative) / (3.0 * (double)o->n)) : 0.0;
 }
 
-void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b, size_t n_param,
-                        double *gradient)
+void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
+                        size_t n_param, double *gradient)
 {
     memset(gradient, 0, n_param * sizeof *gradient);
     for (size_t i = 0; i < o->n; i++) {

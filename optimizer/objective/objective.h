@@ -3,16 +3,17 @@
  *   a_i = mean over channels of M_i,  tau = 0.02,  w_i = weight_i / max(a_i, tau)^2,
  *   f   = sum_i w_i sum_c (R_ic - M_ic)^2
  *
- * R is known through noisy estimates only, so the square is replaced by the product of two independent replicas A and B:
- *   f = sum_i w_i sum_c (A_ic - M_ic)(B_ic - M_ic),       E f = f of the true means; single values may be negative,
+ * R is known through noisy estimates only, so the square is replaced by the product of two independent replicas A and
+ * B: f = sum_i w_i sum_c (A_ic - M_ic)(B_ic - M_ic),       E f = f of the true means; single values may be negative,
  * and the gradient by the mirrored average  sum_i w_i sum_c [(A - M) dB + (B - M) dA].
  *
- * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of one configuration share
- * their paths; their correlation is not in an estimate, so it is taken as full: the stated error is an upper estimate, too large by at
- * most a factor sqrt(3).
+ * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of one
+ * configuration share their paths; their correlation is not in an estimate, so it is taken as full: the stated error is
+ * an upper estimate, too large by at most a factor sqrt(3).
  *
- * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out. The
- * Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer paths are used.
+ * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out.
+ * The Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer
+ * paths are used.
  */
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H
 #define SELVEDGE_OPTIMIZER_OBJECTIVE_H
@@ -36,8 +37,8 @@ double objective_weight(const struct observation *o);
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out);
 /* gradient[n_param], by internal units. */
-void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b, size_t n_param,
-                        double *gradient);
+void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
+                        size_t n_param, double *gradient);
 /* Sum over c of (x_c - y_c)^2 (eq. 5.12). */
 double objective_image_difference(const double x_rgb[3], const double y_rgb[3]);
 

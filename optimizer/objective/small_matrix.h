@@ -1,5 +1,5 @@
-/* Dense symmetric matrices of at most SCATTERING_MAX_PARAM rows, row-major, on the stack. Plain loops in a fixed order: results do not
- * depend on a library's threads or on the processor's vector width.
+/* Dense symmetric matrices of at most SCATTERING_MAX_PARAM rows, row-major, on the stack. Plain loops in a fixed order:
+ * results do not depend on a library's threads or on the processor's vector width.
  */
 #ifndef SELVEDGE_OPTIMIZER_SMALL_MATRIX_H
 #define SELVEDGE_OPTIMIZER_SMALL_MATRIX_H
@@ -9,7 +9,8 @@
 
 enum { SMALL_MATRIX_MAX = 16 };
 
-/* Eigenvalues (not sorted) and eigenvectors (column j of v belongs to value j) of a symmetric a, by Jacobi rotations. a is kept. */
+/* Eigenvalues (not sorted) and eigenvectors (column j of v belongs to value j) of a symmetric a, by Jacobi rotations. a
+ * is kept. */
 void small_eigen(const double *a, size_t n, double *value, double *v);
 /* a <- nearest matrix with eigenvalues >= floor. */
 void small_clip_eigenvalues(double *a, size_t n, double floor);

@@ -8,12 +8,14 @@
 
 enum { N = SCATTERING_MAX_PARAM };
 
-/* Squared residuals (without Monte-Carlo bias) beyond what the photographs' own noise explains, per degree of freedom. */
+/* Squared residuals (without Monte-Carlo bias) beyond what the photographs' own noise explains, per degree of freedom.
+ */
 static double misfit_variance(const struct linear_model *m, const struct observation_set *o, size_t n_free)
 {
     double f = linear_model_objective(m, NULL), photograph = 0.0;
     for (size_t i = 0; i < o->n; i++)
-        for (int c = 0; c < 3; c++) photograph += objective_weight(&o->item[i]) * o->item[i].se_rgb[c] * o->item[i].se_rgb[c];
+        for (int c = 0; c < 3; c++)
+            photograph += objective_weight(&o->item[i]) * o->item[i].se_rgb[c] * o->item[i].se_rgb[c];
     double n = (double)m->n_row, freedom = fmax(1.0, n - (double)n_free);
     return fmax(0.0, f / freedom - photograph / n);
 }
@@ -26,7 +28,10 @@ static double row_variance(const struct observation_set *o, size_t row, double m
     return objective_weight(item) * se * se + misfit * item->weight;
 }
 
-static double row_noise(const struct linear_model *m, size_t row) { return 0.25 * (m->r_var[0][row] + m->r_var[1][row]); }
+static double row_noise(const struct linear_model *m, size_t row)
+{
+    return 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
+}
 
 /* The three channels of a configuration come from the same paths: their Monte-Carlo noise moves together. */
 static void add_path_noise(const struct linear_model *m, size_t i, const size_t *index, size_t n, double *b)
@@ -44,8 +49,8 @@ static void add_path_noise(const struct linear_model *m, size_t i, const size_t 
 }
 
 /* H and B of the parameters index[0..n-1]. */
-static void normal_matrices(const struct linear_model *m, const struct observation_set *o, const size_t *index, size_t n,
-                            double misfit, double *h, double *b, double *mean_variance)
+static void normal_matrices(const struct linear_model *m, const struct observation_set *o, const size_t *index,
+                            size_t n, double misfit, double *h, double *b, double *mean_variance)
 {
     memset(h, 0, n * n * sizeof *h);
     memset(b, 0, n * n * sizeof *b);
@@ -53,7 +58,8 @@ static void normal_matrices(const struct linear_model *m, const struct observati
     for (size_t row = 0; row < m->n_row; row++) {
         const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
         const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
-        double u = m->weight[row], v = row_variance(o, row, misfit), r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * row_noise(m, row);
+        double u = m->weight[row], v = row_variance(o, row, misfit),
+               r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * row_noise(m, row);
         *mean_variance += u * (v + row_noise(m, row)) / (double)m->n_row;
         for (size_t p = 0; p < n; p++) {
             for (size_t q = 0; q < n; q++) {
@@ -103,8 +109,8 @@ static void scatter(const double *cov, const size_t *index, size_t n, size_t n_p
         for (size_t q = 0; q < n; q++) full[index[p] * n_param + index[q]] = cov[p * n + q];
 }
 
-void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k, const bool *fixed,
-                         struct uncertainty *u)
+void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+                         const bool *fixed, struct uncertainty *u)
 {
     size_t n = m->n_param, moving[N], inner[N], n_moving = 0, n_inner = 0;
     double cov[N * N];

@@ -2,12 +2,14 @@
  *
  * Sandwich covariance in fit coordinates, on the parameters that are neither fixed nor at a bound:
  *   cov = (H + L)^-1 (B + s2 L) (H + L)^-1,   H = J'J,  B = J' V J + D,
- * all three from the mirrored product of two independent replicas, so that the noise of J does not make H look larger (one set of paths alone
- * understates the errors). V: per residual, photograph variance + misfit variance + Monte-Carlo variance of the pooled mean (fully correlated between channels, which share their paths)
- * (what is left of f per degree of freedom, for residuals that no noise explains). D: Monte-Carlo noise of J times the residuals.
- * L = s2 / (prior sd)^2: the allowed range as a weak prior, so that an undetermined parameter gets an error as large as its range
- * and not infinity. s2: mean of V. A parameter at a bound gets the error that it would have if it could move.
- * File units by the delta method: se(p) = |dp/dx| se(x), not more than that of a uniform distribution over the allowed range.
+ * all three from the mirrored product of two independent replicas, so that the noise of J does not make H look larger
+ * (one set of paths alone understates the errors). V: per residual, photograph variance + misfit variance + Monte-Carlo
+ * variance of the pooled mean (fully correlated between channels, which share their paths) (what is left of f per
+ * degree of freedom, for residuals that no noise explains). D: Monte-Carlo noise of J times the residuals. L = s2 /
+ * (prior sd)^2: the allowed range as a weak prior, so that an undetermined parameter gets an error as large as its
+ * range and not infinity. s2: mean of V. A parameter at a bound gets the error that it would have if it could move.
+ * File units by the delta method: se(p) = |dp/dx| se(x), not more than that of a uniform distribution over the allowed
+ * range.
  */
 #ifndef SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 #define SELVEDGE_OPTIMIZER_UNCERTAINTY_H
@@ -18,18 +20,20 @@
 
 struct uncertainty {
     size_t n_param;
-    double cov[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM];         /* fit coordinates; rows of fixed parameters are zero */
-    double correlation[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed or at a bound */
-    double se_param[SCATTERING_MAX_PARAM];                           /* internal unit; 0 for fixed parameters */
+    double cov[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* fit coordinates; rows of fixed parameters are zero */
+    double correlation[SCATTERING_MAX_PARAM *
+                       SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed or at a bound */
+    double se_param[SCATTERING_MAX_PARAM];    /* internal unit; 0 for fixed parameters */
     bool at_bound[SCATTERING_MAX_PARAM];
     /* The standard error is below half of that of a uniform distribution over the allowed range. */
     bool determined[SCATTERING_MAX_PARAM];
-    double misfit_var; /* per residual, in units of the objective: about the squared relative error that the model leaves */
+    double misfit_var; /* per residual, in units of the objective: about the squared relative error that the model
+                          leaves */
     double noise_var;  /* mean Monte-Carlo variance per residual of the pooled mean */
 };
 
 /* m: pooled at the result. fixed: n_param flags. */
-void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k, const bool *fixed,
-                         struct uncertainty *u);
+void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+                         const bool *fixed, struct uncertainty *u);
 
 #endif

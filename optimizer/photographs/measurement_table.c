@@ -9,35 +9,63 @@
 enum { MAX_CELL = 64, MAX_ROW = 4096 };
 
 enum column {
-    COLUMN_SET, COLUMN_LIGHT_THETA, COLUMN_LIGHT_PHI, COLUMN_CAMERA_THETA, COLUMN_CAMERA_PHI, COLUMN_R, COLUMN_G, COLUMN_B,
+    COLUMN_SET,
+    COLUMN_LIGHT_THETA,
+    COLUMN_LIGHT_PHI,
+    COLUMN_CAMERA_THETA,
+    COLUMN_CAMERA_PHI,
+    COLUMN_R,
+    COLUMN_G,
+    COLUMN_B,
     COLUMN_N_REQUIRED,
-    COLUMN_ROTATION = COLUMN_N_REQUIRED, COLUMN_R_SE, COLUMN_G_SE, COLUMN_B_SE, COLUMN_WEIGHT, COLUMN_INDEX, COLUMN_NAME,
+    COLUMN_ROTATION = COLUMN_N_REQUIRED,
+    COLUMN_R_SE,
+    COLUMN_G_SE,
+    COLUMN_B_SE,
+    COLUMN_WEIGHT,
+    COLUMN_INDEX,
+    COLUMN_NAME,
     COLUMN_COUNT
 };
 
-static const char *const column_name[COLUMN_COUNT + 1] = {
-    "set", "light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg", "r", "g", "b",
-    "cloth_rotation_deg", "r_se", "g_se", "b_se", "weight", "index", "name", NULL};
+static const char *const column_name[COLUMN_COUNT + 1] = {"set",
+                                                          "light_theta_deg",
+                                                          "light_phi_deg",
+                                                          "camera_theta_deg",
+                                                          "camera_phi_deg",
+                                                          "r",
+                                                          "g",
+                                                          "b",
+                                                          "cloth_rotation_deg",
+                                                          "r_se",
+                                                          "g_se",
+                                                          "b_se",
+                                                          "weight",
+                                                          "index",
+                                                          "name",
+                                                          NULL};
 
 struct table {
     const char *file;
     const struct job_document *doc;
     size_t line;
     size_t n_column;
-    int column[MAX_CELL];       /* which enum column the file's column i is */
-    int place[COLUMN_COUNT];    /* the file's column for an enum column, or -1 */
+    int column[MAX_CELL];    /* which enum column the file's column i is */
+    int place[COLUMN_COUNT]; /* the file's column for an enum column, or -1 */
     char *cell[MAX_CELL];
     size_t n_cell;
 };
 
-#define table_error(t, code, ...) error_set_field(err, (code), "measurements.file", "cannot use table '%s': line %zu: " __VA_ARGS__)
+#define table_error(t, code, ...)                                                                                      \
+    error_set_field(err, (code), "measurements.file", "cannot use table '%s': line %zu: " __VA_ARGS__)
 
 /* Cuts a line into cells at commas and strips blanks, in place. */
 static status split(struct table *t, char *line, struct error *err)
 {
     t->n_cell = 0;
-    for (char *p = line;; ) {
-        if (t->n_cell == MAX_CELL) return table_error(t, STATUS_FORMAT, "more than %d cells", t->file, t->line, MAX_CELL);
+    for (char *p = line;;) {
+        if (t->n_cell == MAX_CELL)
+            return table_error(t, STATUS_FORMAT, "more than %d cells", t->file, t->line, MAX_CELL);
         char *end = p + strcspn(p, ",");
         bool last = *end == '\0';
         *end = '\0';
@@ -57,13 +85,15 @@ static status read_header(struct table *t, struct error *err)
         while (c < COLUMN_COUNT && strcmp(column_name[c], t->cell[i]) != 0) c++;
         if (c == COLUMN_COUNT)
             return table_error(t, STATUS_FORMAT, "unknown column '%.60s'", t->file, t->line, t->cell[i]);
-        if (t->place[c] >= 0) return table_error(t, STATUS_FORMAT, "column '%s' appears twice", t->file, t->line, column_name[c]);
+        if (t->place[c] >= 0)
+            return table_error(t, STATUS_FORMAT, "column '%s' appears twice", t->file, t->line, column_name[c]);
         t->place[c] = (int)i;
         t->column[i] = c;
     }
     t->n_column = t->n_cell;
     for (int c = 0; c < COLUMN_N_REQUIRED; c++)
-        if (t->place[c] < 0) return table_error(t, STATUS_FORMAT, "column '%s' is missing", t->file, t->line, column_name[c]);
+        if (t->place[c] < 0)
+            return table_error(t, STATUS_FORMAT, "column '%s' is missing", t->file, t->line, column_name[c]);
     return STATUS_OK;
 }
 
@@ -75,19 +105,22 @@ static status cell_number(const struct table *t, enum column c, double missing, 
     char *end;
     *out = strtod(text, &end);
     if (end == text || *end != '\0')
-        return table_error(t, STATUS_FORMAT, "column '%s': '%.40s' is not a number", t->file, t->line, column_name[c], text);
+        return table_error(t, STATUS_FORMAT, "column '%s': '%.40s' is not a number", t->file, t->line, column_name[c],
+                           text);
     if (!isfinite(*out))
-        return table_error(t, STATUS_INVALID, "column '%s' is '%.40s': it must be finite", t->file, t->line, column_name[c], text);
+        return table_error(t, STATUS_INVALID, "column '%s' is '%.40s': it must be finite", t->file, t->line,
+                           column_name[c], text);
     return STATUS_OK;
 }
 
-static status cell_angle(const struct table *t, enum column c, double lower, double upper, double *out, struct error *err)
+static status cell_angle(const struct table *t, enum column c, double lower, double upper, double *out,
+                         struct error *err)
 {
     status s = cell_number(t, c, 0.0, out, err);
     if (s != STATUS_OK) return s;
     if (*out < lower || *out > upper)
-        return table_error(t, STATUS_INVALID, "column '%s' is %g degrees: allowed are %g to %g", t->file, t->line, column_name[c], *out,
-                           lower, upper);
+        return table_error(t, STATUS_INVALID, "column '%s' is %g degrees: allowed are %g to %g", t->file, t->line,
+                           column_name[c], *out, lower, upper);
     return STATUS_OK;
 }
 
@@ -96,29 +129,37 @@ static status cell_polar(const struct table *t, enum column c, bool may_be_behin
     status s = cell_number(t, c, 0.0, out, err);
     if (s != STATUS_OK) return s;
     if (*out >= 0.0 && (*out < 90.0 || (may_be_behind && *out > 90.0 && *out <= 180.0))) return STATUS_OK;
-    return table_error(t, STATUS_INVALID, "column '%s' is %g degrees: allowed are 0 to below 90 degrees from the normal", t->file,
-                       t->line, column_name[c], *out);
+    return table_error(t, STATUS_INVALID,
+                       "column '%s' is %g degrees: allowed are 0 to below 90 degrees from the normal", t->file, t->line,
+                       column_name[c], *out);
 }
 
-static status cell_not_negative(const struct table *t, enum column c, double missing, double upper, double *out, struct error *err)
+static status cell_not_negative(const struct table *t, enum column c, double missing, double upper, double *out,
+                                struct error *err)
 {
     status s = cell_number(t, c, missing, out, err);
     if (s != STATUS_OK) return s;
     if (*out < 0.0 || *out > upper)
-        return table_error(t, STATUS_INVALID, "column '%s' is %g: allowed are 0 to %g", t->file, t->line, column_name[c], *out, upper);
+        return table_error(t, STATUS_INVALID, "column '%s' is %g: allowed are 0 to %g", t->file, t->line,
+                           column_name[c], *out, upper);
     return STATUS_OK;
 }
 
 static status read_row(struct table *t, struct observation_set *o, struct error *err)
 {
     if (t->n_cell != t->n_column)
-        return table_error(t, STATUS_FORMAT, "%zu cells, but the header has %zu columns", t->file, t->line, t->n_cell, t->n_column);
+        return table_error(t, STATUS_FORMAT, "%zu cells, but the header has %zu columns", t->file, t->line, t->n_cell,
+                           t->n_column);
     if (o->n >= MAX_ROW) return table_error(t, STATUS_TOO_LARGE, "more than %d rows", t->file, t->line, MAX_ROW);
     struct observation item = {0};
     const char *set = t->cell[t->place[COLUMN_SET]];
-    if (strcmp(set, "fit") == 0) item.set = JOB_SET_FIT;
-    else if (strcmp(set, "held-out") == 0) item.set = JOB_SET_HELD_OUT;
-    else return table_error(t, STATUS_INVALID, "column 'set' is '%.40s': allowed are fit, held-out", t->file, t->line, set);
+    if (strcmp(set, "fit") == 0)
+        item.set = JOB_SET_FIT;
+    else if (strcmp(set, "held-out") == 0)
+        item.set = JOB_SET_HELD_OUT;
+    else
+        return table_error(t, STATUS_INVALID, "column 'set' is '%.40s': allowed are fit, held-out", t->file, t->line,
+                           set);
     double light_theta, light_phi, camera_theta, camera_phi, rotation;
     status s = cell_polar(t, COLUMN_LIGHT_THETA, !t->doc->black_sheet, &light_theta, err);
     if (s == STATUS_OK) s = cell_angle(t, COLUMN_LIGHT_PHI, -360.0, 360.0, &light_phi, err);
@@ -150,7 +191,8 @@ status measurement_table_parse(const char *text, size_t n_bytes, const char *nam
     memcpy(copy, text, n_bytes);
     copy[n_bytes] = '\0';
     if (strlen(copy) != n_bytes) {
-        s = error_set_field(err, STATUS_FORMAT, "measurements.file", "cannot use table '%s': it is not text (zero byte)", name);
+        s = error_set_field(err, STATUS_FORMAT, "measurements.file",
+                            "cannot use table '%s': it is not text (zero byte)", name);
         goto out;
     }
     char *p = copy;
@@ -168,9 +210,11 @@ status measurement_table_parse(const char *text, size_t n_bytes, const char *nam
         header = true;
     }
     if (!header)
-        s = error_set_field(err, STATUS_FORMAT, "measurements.file", "cannot use table '%s': it has no header line", name);
+        s = error_set_field(err, STATUS_FORMAT, "measurements.file", "cannot use table '%s': it has no header line",
+                            name);
     else if (observation_set_count(o, JOB_SET_FIT) == 0)
-        s = error_set_field(err, STATUS_INVALID, "measurements.file", "cannot use table '%s': it has no row of the set 'fit'", name);
+        s = error_set_field(err, STATUS_INVALID, "measurements.file",
+                            "cannot use table '%s': it has no row of the set 'fit'", name);
 out:
     free(copy);
     return s;

@@ -23,7 +23,8 @@ status observation_set_append(struct observation_set *o, const struct observatio
     if (o->n == o->capacity) {
         size_t capacity = o->capacity > 0 ? 2 * o->capacity : 64;
         struct observation *grown = realloc(o->item, capacity * sizeof *grown);
-        if (grown == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu observations: out of memory", capacity);
+        if (grown == NULL)
+            return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu observations: out of memory", capacity);
         o->item = grown;
         o->capacity = capacity;
     }
@@ -38,7 +39,8 @@ size_t observation_set_count(const struct observation_set *o, enum job_set set)
     return n;
 }
 
-status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part, struct error *err)
+status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
+                              struct error *err)
 {
     for (size_t i = 0; i < o->n; i++) {
         if (o->item[i].set != set) continue;
@@ -48,8 +50,9 @@ status observation_set_select(const struct observation_set *o, enum job_set set,
     return STATUS_OK;
 }
 
-struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg, double light_phi_deg,
-                                               double camera_theta_deg, double camera_phi_deg, double cloth_rotation_deg)
+struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
+                                               double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
+                                               double cloth_rotation_deg)
 {
     const double rad = M_PI / 180.0, cm = 0.01;
     struct configuration c = {
@@ -66,7 +69,8 @@ struct configuration observation_configuration(const struct job_document *doc, d
     return c;
 }
 
-static status load_table(const struct job_document *doc, const char *folder, struct observation_set *o, struct error *err)
+static status load_table(const struct job_document *doc, const char *folder, struct observation_set *o,
+                         struct error *err)
 {
     char path[4096];
     char *text = NULL;
@@ -82,8 +86,8 @@ static status load_table(const struct job_document *doc, const char *folder, str
     return s;
 }
 
-static status load_photograph(const struct job_document *doc, size_t i, const char *folder, observation_warning warn, void *context,
-                              struct observation_set *o, struct error *err)
+static status load_photograph(const struct job_document *doc, size_t i, const char *folder, observation_warning warn,
+                              void *context, struct observation_set *o, struct error *err)
 {
     const struct job_photograph *p = &doc->photograph[i];
     struct photograph_mean mean;
@@ -99,8 +103,8 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
     snprintf(item.name, sizeof item.name, "%s", p->file);
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
-    item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
-                                                   p->cloth_rotation_deg);
+    item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
+                                                   p->camera_phi_deg, p->cloth_rotation_deg);
     return observation_set_append(o, &item, err);
 }
 

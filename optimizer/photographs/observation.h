@@ -14,8 +14,8 @@ struct observation {
     enum job_set set;
     struct configuration configuration;
     double mean_rgb[3];
-    double se_rgb[3];  /* 0 when the source states none */
-    double weight;     /* factor of the objective's weight of this observation; 1 */
+    double se_rgb[3]; /* 0 when the source states none */
+    double weight;    /* factor of the objective's weight of this observation; 1 */
 };
 
 struct observation_set {
@@ -28,11 +28,13 @@ void observation_set_release(struct observation_set *o);
 status observation_set_append(struct observation_set *o, const struct observation *item, struct error *err);
 size_t observation_set_count(const struct observation_set *o, enum job_set set);
 /* Copies the observations of one set, in order, into `part` (initialised). */
-status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part, struct error *err);
+status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
+                              struct error *err);
 
 /* Configuration in SI units from the document's angles and set-up. */
-struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg, double light_phi_deg,
-                                               double camera_theta_deg, double camera_phi_deg, double cloth_rotation_deg);
+struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
+                                               double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
+                                               double cloth_rotation_deg);
 
 /* Reads what the document names, files being in `folder`. Warnings (see photograph.h) go to warn, NULL allowed.
  * err->field is the document's field. */

@@ -21,7 +21,8 @@ static status crop_image(struct image *im, const size_t crop[4], const char *nam
 {
     if (crop[2] == 0) return STATUS_OK;
     if (crop[2] > im->width || crop[3] > im->height)
-        return error_set(err, STATUS_INVALID, "cannot use photograph '%s': the crop ends at (%zu, %zu), the picture at (%zu, %zu)", name,
+        return error_set(err, STATUS_INVALID,
+                         "cannot use photograph '%s': the crop ends at (%zu, %zu), the picture at (%zu, %zu)", name,
                          crop[2], crop[3], im->width, im->height);
     size_t w = crop[2] - crop[0], h = crop[3] - crop[1], n = im->n_channel;
     for (size_t y = 0; y < h; y++)
@@ -31,16 +32,20 @@ static status crop_image(struct image *im, const size_t crop[4], const char *nam
     return STATUS_OK;
 }
 
-status photograph_read(const char *path, const struct job_photograph *p, struct image *im, double *saturated_share, struct error *err)
+status photograph_read(const char *path, const struct job_photograph *p, struct image *im, double *saturated_share,
+                       struct error *err)
 {
     const char *dot = strrchr(path, '.');
     double saturated = 0.0;
     status s;
     memset(im, 0, sizeof *im);
-    if (dot != NULL && strcasecmp(dot, ".exr") == 0) s = image_read_exr(im, path, LIMIT_PIXEL, err);
-    else if (dot != NULL && strcasecmp(dot, ".png") == 0) s = photograph_read_png(path, p->srgb, LIMIT_PIXEL, im, &saturated, err);
+    if (dot != NULL && strcasecmp(dot, ".exr") == 0)
+        s = image_read_exr(im, path, LIMIT_PIXEL, err);
+    else if (dot != NULL && strcasecmp(dot, ".png") == 0)
+        s = photograph_read_png(path, p->srgb, LIMIT_PIXEL, im, &saturated, err);
     else
-        return error_set(err, STATUS_UNSUPPORTED, "cannot read photograph '%s': its name must end in .exr or .png", base_name(path));
+        return error_set(err, STATUS_UNSUPPORTED, "cannot read photograph '%s': its name must end in .exr or .png",
+                         base_name(path));
     if (s != STATUS_OK) return s;
     s = crop_image(im, p->crop_px, base_name(path), err);
     if (s != STATUS_OK) {
@@ -79,12 +84,14 @@ static status check_pixels(const struct image *im, const char *name, struct erro
     for (size_t i = 0; i < im->width * im->height; i++)
         for (size_t c = 0; c < 3; c++)
             if (!isfinite(im->pixel[i * im->n_channel + c]))
-                return error_set(err, STATUS_INVALID, "cannot use photograph '%s': pixel (%zu, %zu) is not a finite number", name,
+                return error_set(err, STATUS_INVALID,
+                                 "cannot use photograph '%s': pixel (%zu, %zu) is not a finite number", name,
                                  i % im->width, i / im->width);
     return STATUS_OK;
 }
 
-status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean, struct error *err)
+status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
+                          struct error *err)
 {
     const char *name = base_name(path);
     struct image im;
@@ -103,16 +110,19 @@ status photograph_measure(const char *path, const struct job_photograph *p, stru
     }
     const double *m = mean->mean_rgb;
     if (m[0] < 0.0 || m[1] < 0.0 || m[2] < 0.0)
-        s = error_set(err, STATUS_INVALID, "cannot use photograph '%s': its mean rgb (%g, %g, %g) is negative", name, m[0], m[1], m[2]);
+        s = error_set(err, STATUS_INVALID, "cannot use photograph '%s': its mean rgb (%g, %g, %g) is negative", name,
+                      m[0], m[1], m[2]);
     else if (m[0] + m[1] + m[2] <= 0.0)
         s = error_set(err, STATUS_INVALID, "cannot use photograph '%s': it is all black", name);
     else if (mean->saturated_share > saturated_limit)
-        s = error_set(err, STATUS_INVALID, "cannot use photograph '%s': %.1f %% of its pixels are saturated, allowed are %.0f %%", name,
+        s = error_set(err, STATUS_INVALID,
+                      "cannot use photograph '%s': %.1f %% of its pixels are saturated, allowed are %.0f %%", name,
                       100.0 * mean->saturated_share, 100.0 * saturated_limit);
     else if (mean->block_contrast > contrast_limit)
-        snprintf(mean->warning, sizeof mean->warning,
-                 "photograph '%s' is not uniform: the means of its parts scatter by %.0f %%, so one mean describes it badly", name,
-                 100.0 * mean->block_contrast);
+        snprintf(
+            mean->warning, sizeof mean->warning,
+            "photograph '%s' is not uniform: the means of its parts scatter by %.0f %%, so one mean describes it badly",
+            name, 100.0 * mean->block_contrast);
 out:
     image_release(&im);
     return s;

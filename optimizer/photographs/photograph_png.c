@@ -61,8 +61,9 @@ static status check_size(FILE *f, const char *name, size_t limit_pixel, struct e
     size_t width = (size_t)h[16] << 24 | (size_t)h[17] << 16 | (size_t)h[18] << 8 | h[19];
     size_t height = (size_t)h[20] << 24 | (size_t)h[21] << 16 | (size_t)h[22] << 8 | h[23];
     if (width > 0 && height > limit_pixel / width)
-        return error_set(err, STATUS_TOO_LARGE, "cannot read photograph '%s': %zu x %zu pixels, the limit is %zu in all", name, width,
-                         height, limit_pixel);
+        return error_set(err, STATUS_TOO_LARGE,
+                         "cannot read photograph '%s': %zu x %zu pixels, the limit is %zu in all", name, width, height,
+                         limit_pixel);
     rewind(f);
     return STATUS_OK;
 }
@@ -88,8 +89,9 @@ status photograph_read_png(const char *path, bool srgb, size_t limit_pixel, stru
         s = error_set(err, STATUS_FORMAT, "cannot read photograph '%s': %s", name, failure.text);
     } else {
         png_init_io(png, f);
-        png_read_png(png, info, PNG_TRANSFORM_EXPAND | PNG_TRANSFORM_STRIP_ALPHA | PNG_TRANSFORM_PACKING | PNG_TRANSFORM_GRAY_TO_RGB,
-                     NULL);
+        png_read_png(
+            png, info,
+            PNG_TRANSFORM_EXPAND | PNG_TRANSFORM_STRIP_ALPHA | PNG_TRANSFORM_PACKING | PNG_TRANSFORM_GRAY_TO_RGB, NULL);
         s = image_init(im, png_get_image_width(png, info), png_get_image_height(png, info), 3, err);
         if (s == STATUS_OK) *saturated_share = convert(png, info, srgb, im);
     }

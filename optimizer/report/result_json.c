@@ -35,7 +35,8 @@ status result_picture_names(const struct observation_set *o, picture_name **name
         int n = dot != NULL && dot > from ? (int)(dot - from) : (int)strlen(from);
         snprintf(list[i], sizeof list[i], "%.*s", n, from);
         for (size_t j = 0; j < i; j++)
-            if (strcmp(list[i], list[j]) == 0) snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, i);
+            if (strcmp(list[i], list[j]) == 0)
+                snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, i);
     }
     *name = list;
     return STATUS_OK;
@@ -54,7 +55,8 @@ double result_png_exposure(const struct observation_set *o)
         free(v);
         return exposure;
     }
-    for (size_t i = 0; i < o->n; i++) v[i] = fmax(fmax(o->item[i].mean_rgb[0], o->item[i].mean_rgb[1]), o->item[i].mean_rgb[2]);
+    for (size_t i = 0; i < o->n; i++)
+        v[i] = fmax(fmax(o->item[i].mean_rgb[0], o->item[i].mean_rgb[1]), o->item[i].mean_rgb[2]);
     qsort(v, o->n, sizeof *v, compare_double);
     double bright = v[(o->n - 1) * 9 / 10];
     if (bright > 0.0) exposure = 0.8 / bright;
@@ -78,11 +80,12 @@ static json_t *parameters_json(const struct pipeline_context *c)
         const struct param_info *info = &c->model->param[p];
         const struct fit_parameter *k = &c->parameter[p];
         json_array_append_new(
-            list, json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit", info->unit, "value",
-                            number(param_to_file_unit(info, c->fit.param[p])), "standard_error",
-                            number(param_to_file_unit(info, c->fit.uncertainty.se_param[p])), "lower", param_to_file_unit(info, k->lower),
-                            "upper", param_to_file_unit(info, k->upper), "start", param_to_file_unit(info, k->start), "at_bound",
-                            at_bound(c, p), "determined", (int)c->fit.uncertainty.determined[p], "fixed", (int)k->fixed));
+            list, json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit",
+                            info->unit, "value", number(param_to_file_unit(info, c->fit.param[p])), "standard_error",
+                            number(param_to_file_unit(info, c->fit.uncertainty.se_param[p])), "lower",
+                            param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
+                            param_to_file_unit(info, k->start), "at_bound", at_bound(c, p), "determined",
+                            (int)c->fit.uncertainty.determined[p], "fixed", (int)k->fixed));
     }
     return list;
 }
@@ -91,7 +94,8 @@ static json_t *correlation_json(const struct pipeline_context *c)
 {
     size_t n = c->model->n_param;
     json_t *list = json_array();
-    for (size_t p = 0; p < n; p++) json_array_append_new(list, number_list(c->fit.uncertainty.correlation + p * n, n, 1.0));
+    for (size_t p = 0; p < n; p++)
+        json_array_append_new(list, number_list(c->fit.uncertainty.correlation + p * n, n, 1.0));
     return list;
 }
 
@@ -110,9 +114,10 @@ static json_t *row_json(const struct pipeline_context *c, size_t i, const char *
     snprintf(png, sizeof png, "renderings/%s.png", picture);
     snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
     snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
-    json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "name", o->name, "set", o->set == JOB_SET_FIT ? "fit" : "held-out",
-                            "light_theta_deg", k->light_theta_rad * deg, "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg",
-                            k->camera_theta_rad * deg, "camera_phi_deg", k->camera_phi_rad * deg, "cloth_rotation_deg",
+    json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "name", o->name, "set",
+                            o->set == JOB_SET_FIT ? "fit" : "held-out", "light_theta_deg", k->light_theta_rad * deg,
+                            "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg", k->camera_theta_rad * deg,
+                            "camera_phi_deg", k->camera_phi_rad * deg, "cloth_rotation_deg",
                             k->cloth_rotation_rad * deg, "weight", o->weight);
     json_object_set_new(row, "measured", number_list(o->mean_rgb, 3, 1.0));
     json_object_set_new(row, "measured_se", number_list(o->se_rgb, 3, 1.0));
@@ -128,8 +133,9 @@ static json_t *geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
     const double um = 1e6, mm = 1e3;
-    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input", c->doc->has_volume ? "volume" : "fibers", "n_fiber", count(c->fiber.n_fiber),
-                             "n_vertex", count(c->fiber.n_vertex), "tile_mm", number_list(c->fiber.tile_size_m, 2, mm));
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input", c->doc->has_volume ? "volume" : "fibers", "n_fiber",
+                             count(c->fiber.n_fiber), "n_vertex", count(c->fiber.n_vertex), "tile_mm",
+                             number_list(c->fiber.tile_size_m, 2, mm));
     json_object_set_new(json, "total_length_mm", number(g->total_length_m * mm));
     double radius = 0.0;
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
@@ -155,9 +161,10 @@ static json_t *geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "dice", number(g->dice));
     json_object_set_new(json, "direction_change_mean_deg", number(g->direction_change_mean_deg));
     json_object_set_new(json, "options",
-                        json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", number(o->s), "t", number(o->t), "h",
-                                  count(o->h), "eps_d", number(o->eps_d), "eps_J", number(o->eps_j), "link_sigma_voxel",
-                                  number(o->link_sigma_voxel), "min_vertices", count(o->min_vertex), "smooth_alpha", number(o->smooth_alpha)));
+                        json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", number(o->s),
+                                  "t", number(o->t), "h", count(o->h), "eps_d", number(o->eps_d), "eps_J",
+                                  number(o->eps_j), "link_sigma_voxel", number(o->link_sigma_voxel), "min_vertices",
+                                  count(o->min_vertex), "smooth_alpha", number(o->smooth_alpha)));
     return json;
 }
 
@@ -165,7 +172,8 @@ static json_t *warnings_json(struct pipeline_context *c)
 {
     json_t *list = json_array();
     char text[600];
-    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) json_array_append_new(list, json_string(text));
+    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
+        json_array_append_new(list, json_string(text));
     return list;
 }
 
@@ -175,7 +183,8 @@ static json_t *stages_json(const struct pipeline_context *c)
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
     json_t *list = json_array();
     for (size_t i = 0; i < n_stage; i++)
-        json_array_append_new(list, json_pack("{s:s, s:o}", "name", info[i].name, "wall_s", number(c->stage_wall_s[i])));
+        json_array_append_new(list,
+                              json_pack("{s:s, s:o}", "name", info[i].name, "wall_s", number(c->stage_wall_s[i])));
     return list;
 }
 
@@ -187,8 +196,9 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
         json_array_append_new(rows, row_json(c, i, picture[i]));
         n_path += c->validation.replica[0][i].n_path + c->validation.replica[1][i].n_path;
     }
-    json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I, s:b, s:s}", "format", 1, "sample", c->doc->sample, "model", c->model->id, "method",
-                             c->doc->method, "seed", (json_int_t)c->doc->seed, "converged", (int)c->fit.converged, "reason", c->fit.reason);
+    json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I, s:b, s:s}", "format", 1, "sample", c->doc->sample, "model",
+                             c->model->id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed, "converged",
+                             (int)c->fit.converged, "reason", c->fit.reason);
     json_object_set_new(json, "parameters", parameters_json(c));
     json_object_set_new(json, "correlation", correlation_json(c));
     json_object_set_new(json, "objective", number(c->validation.fit.value));

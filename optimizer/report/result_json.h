@@ -2,11 +2,12 @@
  *
  * {"format":1, "sample", "model", "method", "seed", "converged":bool, "reason",
  *  "parameters":[{"name":"C_R.r","unit":""|"deg","value","standard_error","lower","upper","start","at_bound":null|"lower"|"upper","determined":bool,
- *                 "fixed":bool}],                     file units; standard_error includes photograph noise, Monte-Carlo noise and misfit
- *  "correlation":[[...]],                             in fit coordinates; 0 for parameters that are fixed or at a bound
- *  "objective", "objective_se", "fit_rel_rms",       fresh paths at the result, fitted rows (objective.h defines all three)
- *  "heldout_rel_rms":number|null, "misfit_rel_rms",  misfit: per residual, what no noise explains
- *  "validation_worst_rel_se",                         largest standard error of a rendered mean, relative to the row's brightness
+ *                 "fixed":bool}],                     file units; standard_error includes photograph noise, Monte-Carlo
+ * noise and misfit "correlation":[[...]],                             in fit coordinates; 0 for parameters that are
+ * fixed or at a bound "objective", "objective_se", "fit_rel_rms",       fresh paths at the result, fitted rows
+ * (objective.h defines all three) "heldout_rel_rms":number|null, "misfit_rel_rms",  misfit: per residual, what no noise
+ * explains "validation_worst_rel_se",                         largest standard error of a rendered mean, relative to
+ * the row's brightness
  *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg",
  *           "weight","measured":[r,g,b],"measured_se":[3],"rendered":[3],"rendered_se":[3],
  *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null}],
@@ -14,7 +15,8 @@
  *  "png_exposure",                                    all PNG pictures show radiance x this, sRGB
  *  "n_path_fit", "n_step", "fit_wall_s", "n_path_validation", "stages":[{"name","wall_s":number|null}],
  *  "warnings":[...], "program":"selvedge-worker 0.1.0"}
- * Angles in degrees, lengths in micrometres or millimetres as the keys say. Numbers have 17 digits: equal fits give equal bytes.
+ * Angles in degrees, lengths in micrometres or millimetres as the keys say. Numbers have 17 digits: equal fits give
+ * equal bytes.
  */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_JSON_H
 #define SELVEDGE_OPTIMIZER_RESULT_JSON_H

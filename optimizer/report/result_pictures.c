@@ -24,7 +24,8 @@ static void picture_paths(const struct pipeline_context *c, const char *folder, 
 }
 
 /* After a writer has made `temporary`. */
-static status put_in_place(const struct pipeline_context *c, status written, const char *temporary, const char *path, struct error *err)
+static status put_in_place(const struct pipeline_context *c, status written, const char *temporary, const char *path,
+                           struct error *err)
 {
     status s = written == STATUS_OK ? worker_folder_check(c->folder, err) : written;
     if (s == STATUS_OK && rename(temporary, path) != 0) s = error_set_errno(err, "cannot write '%s'", path);
@@ -59,7 +60,8 @@ static status write_volumes(const struct pipeline_context *c, struct error *err)
     struct volume v;
     picture_paths(c, "", "direction", ".vol", path, temporary);
     status s = exists(path) ? STATUS_OK
-                            : put_in_place(c, vol_write_direction(temporary, &c->direction, VOL_QUANTISED, err), temporary, path, err);
+                            : put_in_place(c, vol_write_direction(temporary, &c->direction, VOL_QUANTISED, err),
+                                           temporary, path, err);
     picture_paths(c, "", "density", ".vol", path, temporary);
     if (s != STATUS_OK || exists(path)) return s;
     s = volume_init(&v, c->direction.n, c->direction.voxel_size_m, err);
@@ -77,7 +79,8 @@ static status write_slice(const struct pipeline_context *c, int axis, struct err
     uint8_t *rgb = NULL;
     size_t width, height;
     picture_paths(c, "pictures", name[axis], ".png", path, temporary);
-    status s = reconstruct_slice_picture(&c->volume, &c->fiber, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
+    status s =
+        reconstruct_slice_picture(&c->volume, &c->fiber, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
     if (s != STATUS_OK) return s;
     s = put_in_place(c, image_write_png_rgb8(rgb, width, height, temporary, err), temporary, path, err);
     free(rgb);
@@ -97,8 +100,8 @@ status result_geometry_write(struct pipeline_context *c, struct error *err)
 
 /* ---- renderings ---- */
 
-static status write_image(const struct pipeline_context *c, const struct image *im, const char *folder, const char *name,
-                          double exposure, bool exr, struct error *err)
+static status write_image(const struct pipeline_context *c, const struct image *im, const char *folder,
+                          const char *name, double exposure, bool exr, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
     status s = STATUS_OK;
@@ -110,7 +113,8 @@ static status write_image(const struct pipeline_context *c, const struct image *
     return s == STATUS_OK ? put_in_place(c, image_write_png(im, exposure, temporary, err), temporary, path, err) : s;
 }
 
-static status write_photograph(const struct pipeline_context *c, size_t i, const char *name, double exposure, struct error *err)
+static status write_photograph(const struct pipeline_context *c, size_t i, const char *name, double exposure,
+                               struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     struct image im;
@@ -133,16 +137,21 @@ static void report_picture(void *context, double fraction)
     progress_report(p->whole, p->base + p->share * fraction);
 }
 
-static status write_rendering(struct pipeline_context *c, size_t i, const char *name, double exposure, const struct progress *progress,
-                              struct error *err)
+static status write_rendering(struct pipeline_context *c, size_t i, const char *name, double exposure,
+                              const struct progress *progress, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
     struct image im;
     picture_paths(c, "renderings", name, ".png", path, temporary); /* written last of the two */
     if (exists(path)) return STATUS_OK;
-    struct render_request q = {.scene = c->scene, .model = c->model, .param = c->fit.param,
-                               .configuration = &c->observation.item[i].configuration, .width = c->doc->render_px,
-                               .height = c->doc->render_px, .n_sample = c->doc->render_sample, .seed = c->doc->seed ^ 0x70696374757265u,
+    struct render_request q = {.scene = c->scene,
+                               .model = c->model,
+                               .param = c->fit.param,
+                               .configuration = &c->observation.item[i].configuration,
+                               .width = c->doc->render_px,
+                               .height = c->doc->render_px,
+                               .n_sample = c->doc->render_sample,
+                               .seed = c->doc->seed ^ 0x70696374757265u,
                                .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
@@ -159,9 +168,11 @@ status result_renderings_write(struct pipeline_context *c, double base, struct e
     status s = result_picture_names(&c->observation, &name, err);
     if (s == STATUS_OK) s = make_folder(c, "renderings", err);
     if (s == STATUS_OK && c->doc->n_photograph > 0) s = make_folder(c, "photographs", err);
-    for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++) s = write_photograph(c, i, name[i], exposure, err);
+    for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++)
+        s = write_photograph(c, i, name[i], exposure, err);
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
-        struct picture_progress part = {&c->progress, base + (1.0 - base) * (double)i / (double)n, (1.0 - base) / (double)n};
+        struct picture_progress part = {&c->progress, base + (1.0 - base) * (double)i / (double)n,
+                                        (1.0 - base) / (double)n};
         struct progress progress = {report_picture, &part, c->progress.cancel};
         s = write_rendering(c, i, name[i], exposure, &progress, err);
     }

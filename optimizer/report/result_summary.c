@@ -15,19 +15,19 @@ static void print_parameters(const struct pipeline_context *c, FILE *out)
         const struct fit_parameter *k = &c->parameter[p];
         const struct uncertainty *u = &c->fit.uncertainty;
         char allowed[64];
-        snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower), param_to_file_unit(info, k->upper),
-                 info->unit);
+        snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
+                 param_to_file_unit(info, k->upper), info->unit);
         fprintf(out, "%-12s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, c->fit.param[p]),
-                param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : "", u->at_bound[p] ? "at a bound " : "",
-                u->determined[p] ? "" : "not determined by these photographs");
+                param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : "",
+                u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these photographs");
     }
 }
 
 static void print_rows(const struct pipeline_context *c, FILE *out)
 {
     const double deg = 180.0 / M_PI;
-    fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi", "turn",
-            "measured r g b", "rendered r g b", "error");
+    fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi",
+            "turn", "measured r g b", "rendered r g b", "error");
     for (size_t i = 0; i < c->observation.n; i++) {
         const struct observation *o = &c->observation.item[i];
         const struct configuration *k = &o->configuration;
@@ -36,17 +36,18 @@ static void print_rows(const struct pipeline_context *c, FILE *out)
             r[q] = 0.5 * (c->validation.replica[0][i].mean[q] + c->validation.replica[1][i].mean[q]);
             error += (r[q] - o->mean_rgb[q]) * (r[q] - o->mean_rgb[q]) / 3.0;
         }
-        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6.1f   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n", o->name,
-                o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg, k->camera_theta_rad * deg,
-                k->camera_phi_rad * deg, k->cloth_rotation_rad * deg, o->mean_rgb[0], o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2],
-                100.0 * sqrt(error * objective_relative_weight(o)));
+        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6.1f   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
+                o->name, o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg,
+                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->cloth_rotation_rad * deg, o->mean_rgb[0],
+                o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], 100.0 * sqrt(error * objective_relative_weight(o)));
     }
 }
 
 static void print_summary(struct pipeline_context *c, FILE *out)
 {
     char text[600];
-    fprintf(out, "%s\n\nmodel    %s (%s)\nmethod   %s\n", c->doc->sample, c->model->id, c->model->title, c->doc->method);
+    fprintf(out, "%s\n\nmodel    %s (%s)\nmethod   %s\n", c->doc->sample, c->model->id, c->model->title,
+            c->doc->method);
     fprintf(out, "fit      %s: %s\n", c->fit.converged ? "converged" : "NOT CONVERGED", c->fit.reason);
     fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", c->fit.n_step, (double)c->fit.n_path, c->fit.wall_s);
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n\n", c->fiber.n_fiber, c->fiber.n_vertex,
@@ -54,11 +55,12 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "relative RMS error over the fitted rows    %.2f %%\n", 100.0 * c->validation.fit.rel_rms);
     if (isfinite(c->validation.held_out.rel_rms))
         fprintf(out, "relative RMS error over the held-out rows  %.2f %%\n", 100.0 * c->validation.held_out.rel_rms);
-    fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n", c->validation.fit.value,
-            c->validation.fit.se, 100.0 * c->validation.worst_rel_se);
+    fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
+            c->validation.fit.value, c->validation.fit.se, 100.0 * c->validation.worst_rel_se);
     print_parameters(c, out);
     print_rows(c, out);
-    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
+    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
+        fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
 }
 
 status result_summary_write(struct pipeline_context *c, struct error *err)

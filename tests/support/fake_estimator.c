@@ -20,16 +20,24 @@ const struct param_info fake_param[FAKE_N_PARAM] = {
     {"gamma_TT", "gamma_TT", "deg", -1, 1.0 * DEG, 45.0 * DEG, 10.0 * DEG},
 };
 
-/* light theta, camera theta, camera phi; light phi is 0; every row twice, with the cloth turned by 0 and by 90 degrees */
-static const double fit_row[8][3] = {{20, 20, 180}, {45, 45, 180}, {75, 75, 180}, {60, 0, 180}, {20, 20, 90}, {45, 45, 90}, {64, 64, 90}, {60, 0, 90}};
-static const double held_row[12][3] = {{10, 30, 180}, {30, 50, 180}, {50, 70, 180}, {70, 50, 180}, {30, 30, 135}, {60, 60, 135},
-                                       {45, 20, 90},  {70, 30, 90},  {40, 40, 45},  {60, 30, 20},  {70, 70, 150}, {0, 60, 0}};
+/* light theta, camera theta, camera phi; light phi is 0; every row twice, with the cloth turned by 0 and by 90 degrees
+ */
+static const double fit_row[8][3] = {{20, 20, 180}, {45, 45, 180}, {75, 75, 180}, {60, 0, 180},
+                                     {20, 20, 90},  {45, 45, 90},  {64, 64, 90},  {60, 0, 90}};
+static const double held_row[12][3] = {{10, 30, 180}, {30, 50, 180}, {50, 70, 180}, {70, 50, 180},
+                                       {30, 30, 135}, {60, 60, 135}, {45, 20, 90},  {70, 30, 90},
+                                       {40, 40, 45},  {60, 30, 20},  {70, 70, 150}, {0, 60, 0}};
 
 static struct configuration make_configuration(const double row[3], double rotation_deg)
 {
-    struct configuration c = {.light_theta_rad = row[0] * DEG, .camera_theta_rad = row[1] * DEG, .camera_phi_rad = row[2] * DEG,
-                              .cloth_rotation_rad = rotation_deg * DEG, .light_distance_m = 0.61, .lamp_side_m = 0.1,
-                              .camera_distance_m = 1.0, .crop_m = 0.01};
+    struct configuration c = {.light_theta_rad = row[0] * DEG,
+                              .camera_theta_rad = row[1] * DEG,
+                              .camera_phi_rad = row[2] * DEG,
+                              .cloth_rotation_rad = rotation_deg * DEG,
+                              .light_distance_m = 0.61,
+                              .lamp_side_m = 0.1,
+                              .camera_distance_m = 1.0,
+                              .crop_m = 0.01};
     return c;
 }
 
@@ -39,7 +47,8 @@ void fake_cloth_init(struct fake_cloth *f, uint64_t seed, size_t n)
     f->seed = seed;
     f->noise = 1.0;
     f->n_configuration = n;
-    for (size_t i = 0; i < FAKE_N_FIT; i++) f->configuration[i] = make_configuration(fit_row[i % 8], i < 8 ? 0.0 : 90.0);
+    for (size_t i = 0; i < FAKE_N_FIT; i++)
+        f->configuration[i] = make_configuration(fit_row[i % 8], i < 8 ? 0.0 : 90.0);
     for (size_t i = 0; i < FAKE_N_HELD_OUT; i++)
         f->configuration[FAKE_N_FIT + i] = make_configuration(held_row[i % 12], i < 12 ? 0.0 : 90.0);
 }
@@ -51,19 +60,23 @@ void fake_param_set(const double file_unit[FAKE_N_PARAM], double param[FAKE_N_PA
 
 /* ---- the mean ---- */
 
-static double radiance(const struct configuration *c, double c_r, double c_tt, double beta_r, double beta_tt, double gamma)
+static double radiance(const struct configuration *c, double c_r, double c_tt, double beta_r, double beta_tt,
+                       double gamma)
 {
-    double tl = c->light_theta_rad, tc = c->camera_theta_rad, phi = c->camera_phi_rad, turn = cos(c->cloth_rotation_rad);
-    double half = tl * cos(M_PI - phi) - tc;                          /* 0 at the mirror direction */
-    double across = (phi - M_PI) * sin(fmin(tl, tc));                 /* away from the plane of incidence */
+    double tl = c->light_theta_rad, tc = c->camera_theta_rad, phi = c->camera_phi_rad,
+           turn = cos(c->cloth_rotation_rad);
+    double half = tl * cos(M_PI - phi) - tc;          /* 0 at the mirror direction */
+    double across = (phi - M_PI) * sin(fmin(tl, tc)); /* away from the plane of incidence */
     double grazing = pow(sin(0.5 * (tl + tc)), 4.0);
     double fresnel = c_r + (1.0 - c_r) * pow(1.0 - cos(0.5 * (tl + tc)), 5.0);
     double wide_r = beta_r + 0.12 + 0.03 * turn, wide_tt = beta_tt + 0.1;
-    double surface = 0.5 * fresnel * exp(-0.5 * half * half / (wide_r * wide_r)) * (0.2 / wide_r) * exp(-across * across);
+    double surface =
+        0.5 * fresnel * exp(-0.5 * half * half / (wide_r * wide_r)) * (0.2 / wide_r) * exp(-across * across);
     double through = c_tt * (1.0 - fresnel) * grazing * (1.0 + 0.2 * turn) *
-                     exp(-0.5 * half * half / (wide_tt * wide_tt) - 0.5 * across * across / (gamma * gamma + 0.2)) * 1.5;
-    double many = 0.25 * c_tt * c_tt / (1.0 - 0.85 * c_tt * (1.0 - 0.3 * fresnel)) * cos(tl) / (0.4 + 0.6 * cos(tl)) * (0.6 + 0.4 * tanh(2.0 * gamma)) *
-                  (1.0 - 0.4 * tanh(beta_tt) * sin(tc));
+                     exp(-0.5 * half * half / (wide_tt * wide_tt) - 0.5 * across * across / (gamma * gamma + 0.2)) *
+                     1.5;
+    double many = 0.25 * c_tt * c_tt / (1.0 - 0.85 * c_tt * (1.0 - 0.3 * fresnel)) * cos(tl) / (0.4 + 0.6 * cos(tl)) *
+                  (0.6 + 0.4 * tanh(2.0 * gamma)) * (1.0 - 0.4 * tanh(beta_tt) * sin(tc));
     return surface + through + many;
 }
 
@@ -103,10 +116,13 @@ static double exponential_sum(struct rng *r, uint64_t n)
     return sum;
 }
 
-static void sample_configuration(const struct fake_cloth *f, const struct estimator_call *call, size_t i, struct estimate *e)
+static void sample_configuration(const struct fake_cloth *f, const struct estimator_call *call, size_t i,
+                                 struct estimate *e)
 {
-    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)call->n_path[i], factor = 0.0, var = 0.0, score[FAKE_N_PARAM] = {0}, score_var = 0.0, width[FAKE_N_PARAM] = {0}, z[2];
-    struct rng_key key = {.seed = f->seed, .iteration = call->iteration, .replica = call->replica, .configuration = (uint32_t)i};
+    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)call->n_path[i], factor = 0.0, var = 0.0,
+                                          score[FAKE_N_PARAM] = {0}, score_var = 0.0, width[FAKE_N_PARAM] = {0}, z[2];
+    struct rng_key key = {
+        .seed = f->seed, .iteration = call->iteration, .replica = call->replica, .configuration = (uint32_t)i};
     struct rng r;
     rng_start(&r, &key, 0, 0);
     fake_radiance(&f->configuration[i], call->param, rgb, jac);
@@ -117,7 +133,9 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
         for (size_t p = 0; p < FAKE_N_PARAM; p++) { /* scores scatter from path to path by twice their mean */
             rng_normal_pair(&r, z);
             score[p] += kind_share[k] * (part + 2.0 * z[0] / sqrt(n * q));
-            if (p >= 6) width[p] += kind_share[k] * 2.0 * z[1] / sqrt(n * q); /* those of widths have either sign, whatever their mean is */
+            if (p >= 6)
+                width[p] += kind_share[k] * 2.0 * z[1] /
+                            sqrt(n * q); /* those of widths have either sign, whatever their mean is */
         }
         score_var += kind_share[k] * kind_share[k] * 6.0 / (n * q);
     }
@@ -143,8 +161,8 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
     e->n_vertex = 10 * e->n_path;
 }
 
-static status run(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
-                  double *wall_s, struct error *err)
+static status run(void *context, const struct estimator_call *call, const struct progress *progress,
+                  struct estimate *out, double *wall_s, struct error *err)
 {
     struct fake_cloth *f = context;
     if (progress_cancelled(progress) || (f->fail_after > 0 && f->n_call >= f->fail_after))
@@ -163,13 +181,16 @@ struct estimator fake_estimator(struct fake_cloth *f)
     return (struct estimator){.context = f, .n_configuration = f->n_configuration, .n_param = FAKE_N_PARAM, .run = run};
 }
 
-status fake_observe(const struct fake_cloth *f, const double *param, double rel_noise, uint64_t seed, struct observation_set *o)
+status fake_observe(const struct fake_cloth *f, const double *param, double rel_noise, uint64_t seed,
+                    struct observation_set *o)
 {
     struct rng_key key = {.seed = seed ^ 0x6f6273u};
     struct rng r;
     rng_start(&r, &key, 0, 0);
     for (size_t i = 0; i < f->n_configuration; i++) {
-        struct observation item = {.set = i < FAKE_N_FIT ? JOB_SET_FIT : JOB_SET_HELD_OUT, .weight = 1.0, .configuration = f->configuration[i]};
+        struct observation item = {.set = i < FAKE_N_FIT ? JOB_SET_FIT : JOB_SET_HELD_OUT,
+                                   .weight = 1.0,
+                                   .configuration = f->configuration[i]};
         double rgb[3];
         snprintf(item.name, sizeof item.name, "row-%zu", i);
         fake_radiance(&f->configuration[i], param, rgb, NULL);

@@ -1,7 +1,7 @@
-/* Every method of the registry: it recovers a known cloth, honours fixed parameters and bounds, repeats itself bit by bit, and resumes bit by bit
- * from its journal wherever it was cut. */
-#include "optimizer/descent/descent.h"
+/* Every method of the registry: it recovers a known cloth, honours fixed parameters and bounds, repeats itself bit by
+ * bit, and resumes bit by bit from its journal wherever it was cut. */
 #include "base/durable.h"
+#include "optimizer/descent/descent.h"
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/estimate_journal.h"
 #include "tests/support/fake_estimator.h"
@@ -38,7 +38,8 @@ static status on_step(void *context, const struct fit_step *step, struct error *
     x->last = step->objective.value;
     x->n_reported++;
     assert_true(isfinite(step->objective.value) && step->objective.se > 0.0);
-    for (size_t p = 0; p < step->n_param; p++) assert_true(step->param[p] >= fake_param[p].lower && step->param[p] <= fake_param[p].upper);
+    for (size_t p = 0; p < step->n_param; p++)
+        assert_true(step->param[p] >= fake_param[p].lower && step->param[p] <= fake_param[p].upper);
     return STATUS_OK;
 }
 
@@ -52,8 +53,14 @@ static void setup(struct fixture *x, uint64_t seed, uint64_t path_budget)
     assert_int_equal(fake_observe(&x->cloth, x->truth, 0.005, seed, &x->observation), STATUS_OK);
     for (size_t p = 0; p < FAKE_N_PARAM; p++)
         x->parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
-    x->problem = (struct fit_problem){.n_param = FAKE_N_PARAM, .info = fake_param, .param = x->parameter, .observation = &x->observation,
-                                      .estimator = &x->estimator, .path_budget = path_budget, .report = on_step, .report_context = x};
+    x->problem = (struct fit_problem){.n_param = FAKE_N_PARAM,
+                                      .info = fake_param,
+                                      .param = x->parameter,
+                                      .observation = &x->observation,
+                                      .estimator = &x->estimator,
+                                      .path_budget = path_budget,
+                                      .report = on_step,
+                                      .report_context = x};
 }
 
 static void run(struct fixture *x, const struct descent_method *method, struct fit_result *result)
@@ -74,7 +81,8 @@ static void test_every_method_recovers(void **state)
         setup(&x, 1, 400000000);
         run(&x, *m, &r);
         double error = fake_rel_rms(&x.cloth, 0, FAKE_N_FIT, r.param, x.truth);
-        print_message("%s: relative RMS error %.4f, objective %.4g -> %.4g, %zu steps\n", (*m)->id, error, x.first, r.objective.value, r.n_step);
+        print_message("%s: relative RMS error %.4f, objective %.4g -> %.4g, %zu steps\n", (*m)->id, error, x.first,
+                      r.objective.value, r.n_step);
         assert_true(error < 0.1);
         assert_true(r.objective.value < 0.1 * x.first);
         observation_set_release(&x.observation);
@@ -113,8 +121,10 @@ static void test_every_method_repeats(void **state)
     }
 }
 
-/* Through a journal, stopped at several places, with and without a torn tail: the end is that of an uninterrupted fit. */
-static void resume_after(void **state, const struct descent_method *m, size_t n_call, bool tear, const struct fit_result *want)
+/* Through a journal, stopped at several places, with and without a torn tail: the end is that of an uninterrupted fit.
+ */
+static void resume_after(void **state, const struct descent_method *m, size_t n_call, bool tear,
+                         const struct fit_result *want)
 {
     struct fixture x;
     struct fit_result r;
@@ -201,7 +211,9 @@ static void test_stale_writer(void **state)
     struct estimate_journal *j = NULL;
     struct fit_result r;
     setup(&x, 5, 100000);
-    assert_int_equal(estimate_journal_open(scratch_path(state, "stale.journal"), 1, &x.estimator, refuse, NULL, &j, NULL), STATUS_OK);
+    assert_int_equal(
+        estimate_journal_open(scratch_path(state, "stale.journal"), 1, &x.estimator, refuse, NULL, &j, NULL),
+        STATUS_OK);
     struct estimator e = estimate_journal_estimator(j);
     x.problem.estimator = &e;
     assert_int_equal(descent_registry()[0]->run(&x.problem, &r, NULL), STATUS_STALE);
@@ -219,11 +231,13 @@ static void test_bounded_quadratic(void **state)
         assert_int_equal(bounded_quadratic(h, g, lower, upper, 2, y, NULL), STATUS_OK);
         for (int a = 0; a <= 300; a++) {
             for (int b = 0; b <= 300; b++) {
-                double u = lower[0] + (upper[0] - lower[0]) * a / 300.0, v = lower[1] + (upper[1] - lower[1]) * b / 300.0;
+                double u = lower[0] + (upper[0] - lower[0]) * a / 300.0,
+                       v = lower[1] + (upper[1] - lower[1]) * b / 300.0;
                 best = fmin(best, g[0] * u + g[1] * v + 0.5 * (h[0] * u * u + 2.0 * h[1] * u * v + h[3] * v * v));
             }
         }
-        double value = g[0] * y[0] + g[1] * y[1] + 0.5 * (h[0] * y[0] * y[0] + 2.0 * h[1] * y[0] * y[1] + h[3] * y[1] * y[1]);
+        double value =
+            g[0] * y[0] + g[1] * y[1] + 0.5 * (h[0] * y[0] * y[0] + 2.0 * h[1] * y[0] * y[1] + h[3] * y[1] * y[1]);
         assert_true(value <= best + 1e-9 && value > best - 1e-3);
         assert_true(y[0] >= lower[0] && y[0] <= upper[0] && y[1] >= lower[1] && y[1] <= upper[1]);
     }
@@ -256,8 +270,9 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds), cmocka_unit_test(test_every_method_repeats),
-        cmocka_unit_test(test_resume),                cmocka_unit_test(test_foreign_journal),  cmocka_unit_test(test_stale_writer),
+        cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
+        cmocka_unit_test(test_every_method_repeats),  cmocka_unit_test(test_resume),
+        cmocka_unit_test(test_foreign_journal),       cmocka_unit_test(test_stale_writer),
         cmocka_unit_test(test_bounded_quadratic),     cmocka_unit_test(test_bad_problems),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);

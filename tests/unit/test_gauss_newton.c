@@ -1,4 +1,5 @@
-/* Gauss-Newton over several cloths and seeds: error, honesty of the standard errors, and that it says when it has not converged. */
+/* Gauss-Newton over several cloths and seeds: error, honesty of the standard errors, and that it says when it has not
+ * converged. */
 #include "optimizer/descent/descent.h"
 #include "optimizer/descent/method_names.h"
 #include "tests/support/fake_estimator.h"
@@ -20,8 +21,8 @@ static const double cloth[][FAKE_N_PARAM] = {
     {0.040, 0.087, 0.087, 0.452, 0.725, 0.948, 7.238, 10.0, 25.989},
 };
 
-static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double noise, double photograph_noise, double *truth,
-                struct fake_cloth *f, struct fit_result *r)
+static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double noise, double photograph_noise,
+                double *truth, struct fake_cloth *f, struct fit_result *r)
 {
     struct observation_set o;
     struct fit_parameter parameter[FAKE_N_PARAM];
@@ -34,7 +35,11 @@ static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double 
     assert_int_equal(fake_observe(f, truth, photograph_noise, seed, &o), STATUS_OK);
     for (size_t p = 0; p < FAKE_N_PARAM; p++)
         parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
-    struct fit_problem problem = {.n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e,
+    struct fit_problem problem = {.n_param = FAKE_N_PARAM,
+                                  .info = fake_param,
+                                  .param = parameter,
+                                  .observation = &o,
+                                  .estimator = &e,
                                   .path_budget = budget};
     if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
     observation_set_release(&o);
@@ -76,11 +81,13 @@ static void test_recovery_and_errors(void **state)
                 n_inside += fabs(r.param[p] - truth[p]) < 2.0 * r.uncertainty.se_param[p];
             }
         }
-        print_message("cloth %zu: relative RMS error %.4f fitted, %.4f held out (means over %d seeds)\n", k, mean, held, SEEDS);
+        print_message("cloth %zu: relative RMS error %.4f fitted, %.4f held out (means over %d seeds)\n", k, mean, held,
+                      SEEDS);
         assert_true(mean < 0.025 && held < 0.05);
     }
     double share = (double)n_inside / (double)n_judged;
-    print_message("the truth lies within two standard errors for %.1f %% of %zu determined parameters\n", 100.0 * share, n_judged);
+    print_message("the truth lies within two standard errors for %.1f %% of %zu determined parameters\n", 100.0 * share,
+                  n_judged);
     assert_true(share > 0.85);
 }
 

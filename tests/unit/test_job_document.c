@@ -13,12 +13,16 @@
 
 #include <cmocka.h>
 
-#define PHOTO "{\"file\":\"p0.exr\",\"set\":\"fit\",\"light_theta_deg\":20,\"light_phi_deg\":0,\"camera_theta_deg\":30,\"camera_phi_deg\":180}"
+#define PHOTO                                                                                                          \
+    "{\"file\":\"p0.exr\",\"set\":\"fit\",\"light_theta_deg\":20,\"light_phi_deg\":0,\"camera_theta_deg\":30,"         \
+    "\"camera_phi_deg\":180}"
 #define VOLUME "\"volume\":{\"files\":[\"scan.tif\"],\"voxel_size_um\":2}"
 #define FIT_OF(fit) "{\"sample\":\"s\"," VOLUME ",\"photographs\":[" PHOTO "],\"fit\":" fit "}"
-#define VOLUME_OF(extra) "{\"sample\":\"s\",\"volume\":{\"files\":[\"scan.tif\"]," extra "},\"photographs\":[" PHOTO "]}"
-#define PHOTO_OF(extra) \
-    "{\"sample\":\"s\"," VOLUME ",\"photographs\":[{\"file\":\"p0.exr\",\"light_phi_deg\":0,\"camera_phi_deg\":180," extra "}]}"
+#define VOLUME_OF(extra)                                                                                               \
+    "{\"sample\":\"s\",\"volume\":{\"files\":[\"scan.tif\"]," extra "},\"photographs\":[" PHOTO "]}"
+#define PHOTO_OF(extra)                                                                                                \
+    "{\"sample\":\"s\"," VOLUME                                                                                        \
+    ",\"photographs\":[{\"file\":\"p0.exr\",\"light_phi_deg\":0,\"camera_phi_deg\":180," extra "}]}"
 
 static void check_error(const char *text, const char *field, const char *part)
 {
@@ -41,13 +45,16 @@ static struct job_document *parse(const char *text)
 static void test_defaults(void **state)
 {
     (void)state;
-    struct job_document *d = parse("{\"sample\":\"blue \xc3\xa9toffe\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"}}");
+    struct job_document *d =
+        parse("{\"sample\":\"blue \xc3\xa9toffe\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"}}");
     assert_true(d->has_volume);
     assert_string_equal(d->volume_file[0], "scan.tif");
     assert_true(d->voxel_size_um[2] == 2.0);
     assert_string_equal(d->axes, "xyz");
-    assert_true(isnan(d->density_low) && isnan(d->filter_s) && isnan(d->radius_um) && isnan(d->fixed[0]) && isnan(d->start[8]));
-    assert_true(d->lamp_side_cm == 10.0 && d->lamp_distance_cm == 61.0 && d->camera_distance_cm == 100.0 && d->crop_cm == 1.0);
+    assert_true(isnan(d->density_low) && isnan(d->filter_s) && isnan(d->radius_um) && isnan(d->fixed[0]) &&
+                isnan(d->start[8]));
+    assert_true(d->lamp_side_cm == 10.0 && d->lamp_distance_cm == 61.0 && d->camera_distance_cm == 100.0 &&
+                d->crop_cm == 1.0);
     assert_true(d->black_sheet);
     assert_string_equal(d->model, "two_lobe.v1");
     assert_string_equal(d->method, METHOD_GAUSS_NEWTON);
@@ -60,14 +67,20 @@ static void test_everything_given(void **state)
 {
     (void)state;
     struct job_document *d = parse(
-        "{\"sample\":\"s\",\"volume\":{\"files\":[\"a.tif\",\"b.tif\"],\"voxel_size_um\":[1,2,3.5],\"axes\":\"-z-x-y\",\"matrix\":[1,0.1,0,0,1,0,0,0,1],"
-        "\"crop_voxel\":[0,1,2,10,11,12],\"density_low\":10,\"density_high\":200,\"filter\":{\"s\":1,\"t\":2,\"h\":11,\"eps_d\":0.4,\"eps_J\":-10},"
+        "{\"sample\":\"s\",\"volume\":{\"files\":[\"a.tif\",\"b.tif\"],\"voxel_size_um\":[1,2,3.5],\"axes\":\"-z-x-y\","
+        "\"matrix\":[1,0.1,0,0,1,0,0,0,1],"
+        "\"crop_voxel\":[0,1,2,10,11,12],\"density_low\":10,\"density_high\":200,\"filter\":{\"s\":1,\"t\":2,\"h\":11,"
+        "\"eps_d\":0.4,\"eps_J\":-10},"
         "\"link_sigma_voxel\":4,\"min_vertices\":8,\"radius_um\":7.5,\"radius_per_axis\":true},"
-        "\"lamp\":{\"side_cm\":5,\"distance_cm\":50},\"camera\":{\"distance_cm\":80,\"crop_cm\":0.5},\"black_sheet\":false,"
-        "\"photographs\":[" PHOTO ",{\"file\":\"p1.png\",\"set\":\"held-out\",\"light_theta_deg\":150,\"light_phi_deg\":-10,\"camera_theta_deg\":0,"
+        "\"lamp\":{\"side_cm\":5,\"distance_cm\":50},\"camera\":{\"distance_cm\":80,\"crop_cm\":0.5},\"black_sheet\":"
+        "false,"
+        "\"photographs\":[" PHOTO ",{\"file\":\"p1.png\",\"set\":\"held-out\",\"light_theta_deg\":150,\"light_phi_"
+                                  "deg\":-10,\"camera_theta_deg\":0,"
         "\"camera_phi_deg\":0,\"cloth_rotation_deg\":90,\"scale\":2,\"crop_px\":[1,2,3,4],\"transfer\":\"srgb\"}],"
-        "\"fit\":{\"model\":\"two_lobe_balanced.v1\",\"method\":\"published_sgd.v1\",\"seed\":9,\"max_iterations\":5,\"path_budget\":100000,"
-        "\"fixed\":{\"beta_R\":5,\"C_R.g\":0.5},\"start\":{\"C_TT\":[0.1,0.2,0.3],\"C_R.r\":0.9},\"render_px\":32,\"render_samples\":2}}");
+        "\"fit\":{\"model\":\"two_lobe_balanced.v1\",\"method\":\"published_sgd.v1\",\"seed\":9,\"max_iterations\":5,"
+        "\"path_budget\":100000,"
+        "\"fixed\":{\"beta_R\":5,\"C_R.g\":0.5},\"start\":{\"C_TT\":[0.1,0.2,0.3],\"C_R.r\":0.9},\"render_px\":32,"
+        "\"render_samples\":2}}");
     assert_int_equal(d->n_volume_file, 2);
     assert_string_equal(d->axes, "-z-x-y");
     assert_int_equal(d->crop_voxel[5], 12);
@@ -95,14 +108,20 @@ static void test_structure(void **state)
     check_error("{\"sample\":\"s\"}", "volume", "missing");
     check_error("{\"sample\":\"s\"," VOLUME ",\"fibers\":{\"file\":\"a.hair\"}}", "fibers", "one of them");
     check_error("{\"sample\":\"s\"," VOLUME "}", "photographs", "missing");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"photographs\":[" PHOTO "]}", "photographs", "one of them");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"photographs\":[" PHOTO "]}",
+                "photographs", "one of them");
     check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[]}", "photographs", "1 to 1024");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[" PHOTO "," PHOTO "]}", "photographs[1].file", "second time");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"scan.tif\"}}", "volume.files[0]", "second time");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"../a.csv\"}}", "measurements.file", "A-Z a-z 0-9");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[" PHOTO "," PHOTO "]}", "photographs[1].file",
+                "second time");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"scan.tif\"}}", "volume.files[0]",
+                "second time");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"../a.csv\"}}", "measurements.file",
+                "A-Z a-z 0-9");
     check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{}}", "measurements.file", "missing");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"lamp\":{\"side_cm\":true}}", "lamp.side_cm", "true or false");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"black_sheet\":1}", "black_sheet", "true or false");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"lamp\":{\"side_cm\":true}}",
+                "lamp.side_cm", "true or false");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"black_sheet\":1}", "black_sheet",
+                "true or false");
 }
 
 static void test_volume(void **state)
@@ -127,15 +146,21 @@ static void test_photographs(void **state)
 {
     (void)state;
     check_error(PHOTO_OF("\"camera_theta_deg\":0"), "photographs[0].light_theta_deg", "missing");
-    check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":90"), "photographs[0].light_theta_deg", "below 90");
-    check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":120"), "photographs[0].light_theta_deg", "black_sheet");
+    check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":90"), "photographs[0].light_theta_deg",
+                "below 90");
+    check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":120"), "photographs[0].light_theta_deg",
+                "black_sheet");
     check_error(PHOTO_OF("\"camera_theta_deg\":91,\"light_theta_deg\":10"), "photographs[0].camera_theta_deg", "91");
     check_error(PHOTO_OF("\"camera_theta_deg\":-1,\"light_theta_deg\":10"), "photographs[0].camera_theta_deg", "-1");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"test\""), "photographs[0].set", "fit, held-out");
+    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"test\""), "photographs[0].set",
+                "fit, held-out");
     check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"scale\":0"), "photographs[0].scale", "1e-09");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"crop_px\":[4,0,4,5]"), "photographs[0].crop_px", "empty");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"transfer\":\"gamma\""), "photographs[0].transfer", "linear, srgb");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"held-out\""), "photographs", "at least one");
+    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"crop_px\":[4,0,4,5]"),
+                "photographs[0].crop_px", "empty");
+    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"transfer\":\"gamma\""),
+                "photographs[0].transfer", "linear, srgb");
+    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"held-out\""), "photographs",
+                "at least one");
 }
 
 static void test_fit(void **state)
@@ -149,7 +174,8 @@ static void test_fit(void **state)
     check_error(FIT_OF("{\"start\":{\"C_TT\":[0.1,0.2]}}"), "fit.start.C_TT", "3 numbers");
     check_error(FIT_OF("{\"start\":{\"C_TT\":0.5,\"C_TT.r\":0.2}}"), "fit.start.C_TT.r", "second time");
     check_error(FIT_OF("{\"start\":{\"beta_R\":5},\"fixed\":{\"beta_R\":5}}"), "fit.start", "beta_R");
-    check_error(FIT_OF("{\"fixed\":{\"beta_R\":5,\"beta_TT\":10,\"gamma_TT\":10,\"C_R\":0.1,\"C_TT\":0.8}}"), "fit.fixed", "at least one free");
+    check_error(FIT_OF("{\"fixed\":{\"beta_R\":5,\"beta_TT\":10,\"gamma_TT\":10,\"C_R\":0.1,\"C_TT\":0.8}}"),
+                "fit.fixed", "at least one free");
     check_error(FIT_OF("{\"path_budget\":10}"), "fit.path_budget", "1000");
 }
 
@@ -180,7 +206,8 @@ static void test_file_names(void **state)
     assert_false(job_file_name_valid(name));
 }
 
-/* Cutting a document anywhere, or changing any one byte of it, must never crash and never leave a document behind on failure. */
+/* Cutting a document anywhere, or changing any one byte of it, must never crash and never leave a document behind on
+ * failure. */
 static void test_damage(void **state)
 {
     (void)state;
@@ -226,7 +253,8 @@ static void test_lists_agree(void **state)
 static void test_raw_volume(void **state)
 {
     (void)state;
-    struct job_document *d = parse(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\",\"endian\":\"big\",\"header_bytes\":8}"));
+    struct job_document *d =
+        parse(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\",\"endian\":\"big\",\"header_bytes\":8}"));
     assert_true(d->raw_shape[0] == 3 && d->raw_shape[2] == 5 && d->raw_big_endian && d->raw_header_bytes == 8);
     assert_string_equal(d->raw_type, "uint16");
     job_document_free(d);
@@ -244,9 +272,15 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_raw_volume),
-        cmocka_unit_test(test_defaults),    cmocka_unit_test(test_everything_given), cmocka_unit_test(test_structure),
-        cmocka_unit_test(test_volume),      cmocka_unit_test(test_photographs),      cmocka_unit_test(test_fit),
-        cmocka_unit_test(test_bounds_are_values), cmocka_unit_test(test_file_names), cmocka_unit_test(test_damage),
+        cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_everything_given),
+        cmocka_unit_test(test_structure),
+        cmocka_unit_test(test_volume),
+        cmocka_unit_test(test_photographs),
+        cmocka_unit_test(test_fit),
+        cmocka_unit_test(test_bounds_are_values),
+        cmocka_unit_test(test_file_names),
+        cmocka_unit_test(test_damage),
         cmocka_unit_test(test_lists_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

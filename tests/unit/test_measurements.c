@@ -12,7 +12,8 @@
 
 #define HEAD "set,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n"
 
-static const struct job_document set_up = {.lamp_side_cm = 10, .lamp_distance_cm = 61, .camera_distance_cm = 100, .crop_cm = 1, .black_sheet = true};
+static const struct job_document set_up = {
+    .lamp_side_cm = 10, .lamp_distance_cm = 61, .camera_distance_cm = 100, .crop_cm = 1, .black_sheet = true};
 
 static void check_error(const char *text, status code, const char *part)
 {
@@ -21,18 +22,20 @@ static void check_error(const char *text, status code, const char *part)
     observation_set_init(&o);
     assert_int_equal(measurement_table_parse(text, strlen(text), "t.csv", &set_up, &o, &err), code);
     assert_string_equal(err.field, "measurements.file");
-    if (strstr(err.text, part) == NULL || strstr(err.text, "t.csv") == NULL) fail_msg("'%s' is not in '%s'", part, err.text);
+    if (strstr(err.text, part) == NULL || strstr(err.text, "t.csv") == NULL)
+        fail_msg("'%s' is not in '%s'", part, err.text);
     observation_set_release(&o);
 }
 
 static void test_read(void **state)
 {
     (void)state;
-    const char *text = "\xef\xbb\xbf# comment, with commas\r\n\n"
-                       "b_se, r_se ,g_se,g,r,b,weight,camera_phi_deg,camera_theta_deg,light_phi_deg,light_theta_deg,set\r\n"
-                       "0.3,0.1,0.2, 2 ,1,3,0.5,180,45,-30,60,fit\r\n"
-                       "0,0,0,0,0,0,1,0,0,0,0,held-out\n"
-                       "0.3,0.1,0.2,2,1,3,0.5,180,45,-30,60,fit";
+    const char *text =
+        "\xef\xbb\xbf# comment, with commas\r\n\n"
+        "b_se, r_se ,g_se,g,r,b,weight,camera_phi_deg,camera_theta_deg,light_phi_deg,light_theta_deg,set\r\n"
+        "0.3,0.1,0.2, 2 ,1,3,0.5,180,45,-30,60,fit\r\n"
+        "0,0,0,0,0,0,1,0,0,0,0,held-out\n"
+        "0.3,0.1,0.2,2,1,3,0.5,180,45,-30,60,fit";
     struct observation_set o;
     struct error err = {0};
     observation_set_init(&o);
@@ -42,7 +45,8 @@ static void test_read(void **state)
     const struct observation *a = &o.item[0];
     assert_true(a->mean_rgb[0] == 1 && a->mean_rgb[1] == 2 && a->mean_rgb[2] == 3);
     assert_true(a->se_rgb[0] == 0.1 && a->se_rgb[1] == 0.2 && a->se_rgb[2] == 0.3 && a->weight == 0.5);
-    assert_true(fabs(a->configuration.light_theta_rad - M_PI / 3) < 1e-12 && fabs(a->configuration.light_phi_rad + M_PI / 6) < 1e-12);
+    assert_true(fabs(a->configuration.light_theta_rad - M_PI / 3) < 1e-12 &&
+                fabs(a->configuration.light_phi_rad + M_PI / 6) < 1e-12);
     assert_true(fabs(a->configuration.light_distance_m - 0.61) < 1e-12 && fabs(a->configuration.crop_m - 0.01) < 1e-12);
     assert_true(a->configuration.cloth_rotation_rad == 0.0 && o.item[1].weight == 1.0);
     assert_string_equal(a->name, "fit-00");
@@ -57,7 +61,8 @@ static void test_errors(void **state)
     check_error("", STATUS_FORMAT, "no header");
     check_error("# only a comment\n", STATUS_FORMAT, "no header");
     check_error(HEAD, STATUS_INVALID, "no row of the set 'fit'");
-    check_error("set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g\n", STATUS_FORMAT, "line 1: column 'b' is missing");
+    check_error("set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g\n", STATUS_FORMAT,
+                "line 1: column 'b' is missing");
     check_error("set,colour\n", STATUS_FORMAT, "unknown column 'colour'");
     check_error("set,r,r\n", STATUS_FORMAT, "'r' appears twice");
     check_error(HEAD "fit,0,20,0,20,180,0,nan,0.1,0.1\n", STATUS_INVALID, "line 2: column 'r' is 'nan'");
@@ -105,6 +110,7 @@ static void test_real_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_errors), cmocka_unit_test(test_real_tables)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_errors),
+                                       cmocka_unit_test(test_real_tables)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,7 @@
 /* Objective, coordinates, small matrices, pooled linear model, uncertainty. */
-#include "optimizer/objective/objective.h"
 #include "base/rng.h"
 #include "optimizer/objective/linear_model.h"
+#include "optimizer/objective/objective.h"
 #include "optimizer/objective/small_matrix.h"
 #include "optimizer/objective/uncertainty.h"
 #include "tests/support/fake_estimator.h"
@@ -20,12 +20,13 @@ static const double mid_range[FAKE_N_PARAM] = {0.15, 0.08, 0.05, 0.9, 0.6, 0.4, 
 static void test_by_hand(void **state)
 {
     (void)state;
-    struct observation item[2] = {{.mean_rgb = {0.1, 0.2, 0.3}, .weight = 1.0}, {.mean_rgb = {0.001, 0.002, 0.003}, .weight = 4.0}};
+    struct observation item[2] = {{.mean_rgb = {0.1, 0.2, 0.3}, .weight = 1.0},
+                                  {.mean_rgb = {0.001, 0.002, 0.003}, .weight = 4.0}};
     struct observation_set o = {.n = 2, .item = item};
     struct estimate a[2] = {{.mean = {0.2, 0.2, 0.3}, .n_path = 1}, {.mean = {0.0, 0.002, 0.003}, .n_path = 1}};
     struct estimate b[2] = {{.mean = {0.3, 0.1, 0.3}, .n_path = 1}, {.mean = {0.003, 0.0, 0.003}, .n_path = 1}};
     struct objective_value v;
-    assert_true(fabs(objective_weight(&item[0]) - 25.0) < 1e-9);      /* 1 / 0.2^2 */
+    assert_true(fabs(objective_weight(&item[0]) - 25.0) < 1e-9);         /* 1 / 0.2^2 */
     assert_true(fabs(objective_weight(&item[1]) - 4.0 * 2500.0) < 1e-6); /* 4 / tau^2 */
     objective_evaluate(&o, a, b, &v);
     double f0 = 25.0 * (0.1 * 0.2), f1 = 2500.0 * (-0.001 * 0.002);
@@ -71,7 +72,8 @@ static void test_unbiased(void **state)
     }
     double scatter = sum2 - sum * sum;
     assert_true(fabs(sum - exact) < 4.0 * sqrt(scatter / N));
-    assert_true(stated > 0.75 * scatter && stated < 3.5 * scatter); /* fully correlated channels: between 1 and 3, and its own noise */
+    assert_true(stated > 0.75 * scatter &&
+                stated < 3.5 * scatter); /* fully correlated channels: between 1 and 3, and its own noise */
     observation_set_release(&o);
 }
 
@@ -118,17 +120,20 @@ static void test_coordinates(void **state)
         struct coordinate k;
         coordinate_init(&k, &fake_param[p], fake_param[p].lower, fake_param[p].upper);
         assert_int_equal(k.kind, p < 6 ? COORDINATE_LOGIT : COORDINATE_LOG);
-        assert_true(coordinate_to_param(&k, k.upper) == fake_param[p].upper && coordinate_to_param(&k, k.lower) == fake_param[p].lower);
+        assert_true(coordinate_to_param(&k, k.upper) == fake_param[p].upper &&
+                    coordinate_to_param(&k, k.lower) == fake_param[p].lower);
         assert_true(coordinate_to_param(&k, k.upper + 9.0) == fake_param[p].upper);
         assert_true(coordinate_from_param(&k, 99.0) == k.upper && isfinite(k.lower) && isfinite(k.upper));
         for (int i = 1; i < 20; i++) {
-            double v = fake_param[p].lower + (fake_param[p].upper - fake_param[p].lower) * i / 20.0, x = coordinate_from_param(&k, v);
+            double v = fake_param[p].lower + (fake_param[p].upper - fake_param[p].lower) * i / 20.0,
+                   x = coordinate_from_param(&k, v);
             double difference = (coordinate_to_param(&k, x + 1e-6) - coordinate_to_param(&k, x - 1e-6)) / 2e-6;
             assert_true(fabs(coordinate_to_param(&k, x) - v) < 1e-14);
             assert_true(fabs(coordinate_slope(&k, v) / difference - 1.0) < 1e-6);
         }
     }
-    struct param_info gamma = {"gamma", "gamma", "", -1, 0.005, 1.5, 0.1}, shift = {"shift", "shift", "", -1, -1.0, 1.0, 0.0};
+    struct param_info gamma = {"gamma", "gamma", "", -1, 0.005, 1.5, 0.1},
+                      shift = {"shift", "shift", "", -1, -1.0, 1.0, 0.0};
     struct coordinate k;
     coordinate_init(&k, &gamma, gamma.lower, gamma.upper);
     assert_int_equal(k.kind, COORDINATE_LOG);
@@ -167,7 +172,8 @@ static void test_matrices(void **state)
     for (size_t k = 0; k < N; k++) assert_true(value[k] > 0.9e-3);
 }
 
-/* A history with exact estimates at several points: pooling returns exactly what holds at the reference point, to second order. */
+/* A history with exact estimates at several points: pooling returns exactly what holds at the reference point, to
+ * second order. */
 static void test_pool(void **state)
 {
     (void)state;
@@ -186,7 +192,8 @@ static void test_pool(void **state)
     observation_set_init(&o);
     assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
     for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 4096;
-    for (size_t p = 0; p < FAKE_N_PARAM; p++) coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, fake_param[p].upper);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, fake_param[p].upper);
     linear_history_init(&h, &o, k, FAKE_N_PARAM);
     assert_int_equal(linear_model_init(&m, 3 * FAKE_N_FIT, FAKE_N_PARAM, NULL), STATUS_OK);
     double wall_s;
@@ -208,7 +215,8 @@ static void test_pool(void **state)
     for (size_t row = 0; row < m.n_row; row++) {
         assert_true(fabs(m.r[0][row]) < 2e-3);
         for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-            double want = sqrt(objective_weight(&o.item[row / 3])) * exact[row / 3].jac[(row % 3) * FAKE_N_PARAM + p] * coordinate_slope(&k[p], truth[p]);
+            double want = sqrt(objective_weight(&o.item[row / 3])) * exact[row / 3].jac[(row % 3) * FAKE_N_PARAM + p] *
+                          coordinate_slope(&k[p], truth[p]);
             assert_true(fabs(m.j[0][row * FAKE_N_PARAM + p] - want) < 0.03 * fabs(want) + 0.002);
         }
     }
@@ -217,7 +225,8 @@ static void test_pool(void **state)
     observation_set_release(&o);
 }
 
-/* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called undetermined. */
+/* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called
+ * undetermined. */
 static void test_uncertainty(void **state)
 {
     (void)state;

@@ -23,7 +23,10 @@ static void write_exr(const char *path, size_t side, float (*value)(size_t x, si
     image_release(&im);
 }
 
-static float ramp(size_t x, size_t y, size_t c) { return (float)(c + 1) * (1.0f + 0.001f * (float)x + 0.002f * (float)y); }
+static float ramp(size_t x, size_t y, size_t c)
+{
+    return (float)(c + 1) * (1.0f + 0.001f * (float)x + 0.002f * (float)y);
+}
 static float black(size_t x, size_t y, size_t c) { return 0.0f * (float)(x + y + c); }
 static float with_nan(size_t x, size_t y, size_t c) { return x == 3 && y == 5 && c == 1 ? NAN : 1.0f; }
 static float negative(size_t x, size_t y, size_t c) { return c == 2 ? -0.1f : 0.0f * (float)(x + y) + 1.0f; }
@@ -42,7 +45,8 @@ static void test_mean(void **state)
     assert_true(fabs(m.mean_rgb[0] - (1.0 + 0.001 * 11.5 + 0.002 * 20.5)) < 1e-6);
 }
 
-/* Pixels in 4 x 4 patches of one random value each: the error of the mean is that of 256 patches, not of 4096 pixels. */
+/* Pixels in 4 x 4 patches of one random value each: the error of the mean is that of 256 patches, not of 4096 pixels.
+ */
 static float patches(size_t x, size_t y, size_t c)
 {
     struct rng_key key = {.seed = 5};
@@ -70,7 +74,8 @@ static void check_refused(void **state, const char *name, status code, const cha
     struct photograph_mean m;
     struct error err = {0};
     assert_int_equal(photograph_measure(scratch_path(state, name), &p, &m, &err), code);
-    if (strstr(err.text, name) == NULL || strstr(err.text, part) == NULL) fail_msg("'%s' is not in '%s'", part, err.text);
+    if (strstr(err.text, name) == NULL || strstr(err.text, part) == NULL)
+        fail_msg("'%s' is not in '%s'", part, err.text);
 }
 
 static void test_refused(void **state)
@@ -147,8 +152,9 @@ static void test_truncated_png(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_mean),        cmocka_unit_test(test_error_of_texture), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_not_uniform), cmocka_unit_test(test_png),              cmocka_unit_test(test_truncated_png),
+        cmocka_unit_test(test_mean),    cmocka_unit_test(test_error_of_texture),
+        cmocka_unit_test(test_refused), cmocka_unit_test(test_not_uniform),
+        cmocka_unit_test(test_png),     cmocka_unit_test(test_truncated_png),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -1,7 +1,7 @@
 /* The worker's plumbing: checkpoint files, the hold on a job folder, the series across resumes, the inputs. */
-#include "optimizer/pipeline_context.h"
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
+#include "optimizer/pipeline_context.h"
 #include "optimizer/work_file.h"
 #include "optimizer/worker_series.h"
 #include "tests/support/fake_estimator.h"
@@ -95,13 +95,18 @@ static void add_steps(struct worker_series *s, size_t first, size_t n, bool repl
     static struct estimate estimate[2];
     double param[FAKE_N_PARAM] = {0};
     for (size_t i = first; i < first + n; i++) {
-        struct fit_step step = {.step = i, .phase = "p", .n_param = FAKE_N_PARAM, .n_configuration = 1, .param = param,
+        struct fit_step step = {.step = i,
+                                .phase = "p",
+                                .n_param = FAKE_N_PARAM,
+                                .n_configuration = 1,
+                                .param = param,
                                 .replica = {&estimate[0], &estimate[1]}};
         assert_int_equal(worker_series_add(s, &step, fake_param, replayed, NULL), STATUS_OK);
     }
 }
 
-/* A resumed fit passes through its old steps again: none is written twice, what is behind the resumption is cut, a torn record too. */
+/* A resumed fit passes through its old steps again: none is written twice, what is behind the resumption is cut, a torn
+ * record too. */
 static void test_series(void **state)
 {
     struct worker_folder f;
@@ -118,7 +123,8 @@ static void test_series(void **state)
         add_steps(s, 0, attempt[k].n_replayed, true);
         add_steps(s, attempt[k].n_replayed, attempt[k].n_new, false);
         worker_series_close(s);
-        assert_int_equal(record_read(scratch_path(state, "series/series.rec"), 0, count_record, &n, NULL, NULL), STATUS_OK);
+        assert_int_equal(record_read(scratch_path(state, "series/series.rec"), 0, count_record, &n, NULL, NULL),
+                         STATUS_OK);
         assert_int_equal(n, attempt[k].n_after);
         FILE *torn = fopen(scratch_path(state, "series/series.rec"), "ab");
         assert_non_null(torn);
@@ -146,17 +152,23 @@ static void check_input_error(void **state, const char *document, const char *fi
 
 static void test_inputs(void **state)
 {
-    check_input_error(state, "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"measurements\":{\"file\":\"absent.csv\"}}", "measurements.file");
-    check_input_error(state, "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"measurements\":{\"file\":\"a.csv\"},\"fit\":{\"model\":\"x\"}}", "fit.model");
     check_input_error(state,
-                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"photographs\":[{\"file\":\"p.exr\",\"light_theta_deg\":1,\"light_phi_deg\":1,"
+                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"measurements\":{\"file\":\"absent.csv\"}}",
+                      "measurements.file");
+    check_input_error(state,
+                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"measurements\":{\"file\":\"a.csv\"},"
+                      "\"fit\":{\"model\":\"x\"}}",
+                      "fit.model");
+    check_input_error(state,
+                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"photographs\":[{\"file\":\"p.exr\",\"light_"
+                      "theta_deg\":1,\"light_phi_deg\":1,"
                       "\"camera_theta_deg\":1,\"camera_phi_deg\":1}]}",
                       "photographs[0].file");
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_folder), cmocka_unit_test(test_series),
-                                       cmocka_unit_test(test_inputs)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_folder),
+                                       cmocka_unit_test(test_series), cmocka_unit_test(test_inputs)};
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -15,7 +15,8 @@ static void check_points(const char *symbol, const double want[9])
     double c[RESCALE_POINTS];
     assert_true(rescale_published_points(symbol, c));
     for (int i = 0; i < 9; i++)
-        if (fabs(c[i] - want[i]) > 1e-5 * fmax(1.0, want[i])) fail_msg("%s: c_%d is %.7g, published %.7g", symbol, i + 1, c[i], want[i]);
+        if (fabs(c[i] - want[i]) > 1e-5 * fmax(1.0, want[i]))
+            fail_msg("%s: c_%d is %.7g, published %.7g", symbol, i + 1, c[i], want[i]);
 }
 
 static void test_published_table(void **state)
@@ -23,7 +24,8 @@ static void test_published_table(void **state)
     (void)state;
     check_points("C_R", (double[]){0.001, 0.026722, 0.053566, 0.094913, 0.158599, 0.256696, 0.407794, 0.640530, 0.999});
     check_points("beta_R", (double[]){1, 1.8, 2.68, 3.648, 4.7128, 5.88408, 7.172488, 8.589737, 10});
-    check_points("C_TT", (double[]){0.001, 0.359470, 0.592206, 0.743304, 0.841401, 0.905087, 0.946434, 0.973278, 0.999});
+    check_points("C_TT",
+                 (double[]){0.001, 0.359470, 0.592206, 0.743304, 0.841401, 0.905087, 0.946434, 0.973278, 0.999});
     check_points("beta_TT", (double[]){1, 1.94, 3.365, 5.5025, 8.70875, 13.518125, 20.732187, 31.553281, 45});
     check_points("gamma_TT", (double[]){1, 1.94, 3.365, 5.5025, 8.70875, 13.518125, 20.732187, 31.553281, 45});
     double c[RESCALE_POINTS];
@@ -54,10 +56,13 @@ static void test_map(void **state)
 {
     (void)state;
     const struct rescale_curve curve = {.n = 3, .c = {1.0, 2.0, 4.0}, .r = {0.0, 5.0, 6.0}};
-    assert_true(rescale_forward(&curve, 1.5) == 2.5 && rescale_forward(&curve, 3.0) == 5.5 && rescale_forward(&curve, 0.0) == 0.0);
-    assert_true(rescale_backward(&curve, 2.5) == 1.5 && rescale_backward(&curve, 99.0) == 4.0 && rescale_backward(&curve, -1.0) == 1.0);
+    assert_true(rescale_forward(&curve, 1.5) == 2.5 && rescale_forward(&curve, 3.0) == 5.5 &&
+                rescale_forward(&curve, 0.0) == 0.0);
+    assert_true(rescale_backward(&curve, 2.5) == 1.5 && rescale_backward(&curve, 99.0) == 4.0 &&
+                rescale_backward(&curve, -1.0) == 1.0);
     assert_true(rescale_slope(&curve, 1.5) == 0.2 && rescale_slope(&curve, 3.0) == 2.0);
-    for (double p = 1.0; p <= 4.0; p += 0.01) assert_true(fabs(rescale_backward(&curve, rescale_forward(&curve, p)) - p) < 1e-12);
+    for (double p = 1.0; p <= 4.0; p += 0.01)
+        assert_true(fabs(rescale_backward(&curve, rescale_forward(&curve, p)) - p) < 1e-12);
 }
 
 /* Without noise the measured curve is eq. 5.14 word for word, and colours get a third of it. */
@@ -83,7 +88,8 @@ static void test_measured_curve(void **state)
     for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
     observation_set_init(&o);
     assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
-    struct fit_problem problem = {.n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
+    struct fit_problem problem = {
+        .n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
     assert_int_equal(rescale_measure(&problem, k, n_path, curve, &used, &wall_s, NULL), STATUS_OK);
     for (size_t p = 0; p < FAKE_N_PARAM; p += p < 6 ? 3 : 1) {
         double r = 0.0, low[FAKE_N_PARAM], high[FAKE_N_PARAM];
@@ -110,7 +116,8 @@ static void test_measured_curve(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_published_table), cmocka_unit_test(test_points_within_bounds),
-                                       cmocka_unit_test(test_map), cmocka_unit_test(test_measured_curve)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_published_table),
+                                       cmocka_unit_test(test_points_within_bounds), cmocka_unit_test(test_map),
+                                       cmocka_unit_test(test_measured_curve)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
