@@ -7,6 +7,8 @@ static const struct scattering_model *const registry[] = {
     &scattering_two_lobe,
     &scattering_two_lobe_balanced,
     &scattering_isotropic,
+    &scattering_kajiya_kay,
+    &scattering_marschner,
     NULL,
 };
 

@@ -86,7 +86,7 @@ static void samples_follow_the_density(void **state)
                                                     phi = angle_deg[a][1] * M_PI / 180;
                 for (size_t p = 0; p < m->n_param; p++) { /* start; everything widest; narrow lobes */
                     const struct param_info *i = &m->param[p];
-                    bool angle = i->unit[0] != '\0';
+                    bool angle = i->channel < 0;
                     param[p] = set == 0   ? i->start
                                : set == 1 ? i->upper
                                : angle    ? i->lower + 0.1 * (i->upper - i->lower)

@@ -262,7 +262,7 @@ static void nothing_is_nan(void **state)
 static void reciprocal_models_are(void **state)
 {
     (void)state;
-    static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1"};
+    static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1", "kajiya_kay.v1", "marschner.v1"};
     struct rng r;
     rng_start(&r, &(struct rng_key){4, 0, 0, 0}, 0, 0);
     for (size_t k = 0; k < sizeof id / sizeof id[0]; k++) {
