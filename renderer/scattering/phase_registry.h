@@ -1,0 +1,14 @@
+/* What the phase-function files and their registry share; nothing outside this folder includes it. */
+#ifndef SELVEDGE_RENDERER_PHASE_REGISTRY_H
+#define SELVEDGE_RENDERER_PHASE_REGISTRY_H
+
+#include "renderer/scattering/phase_model.h"
+
+extern const struct phase_model phase_two_lobe;
+extern const struct phase_model phase_microflake;
+extern const struct phase_model phase_isotropic;
+
+/* STATUS_INVALID, field = parameter name, for NaN or a value outside its bounds. */
+status phase_check_param(const struct phase_model *m, const double *param, struct error *err);
+
+#endif
