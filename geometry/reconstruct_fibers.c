@@ -2,16 +2,22 @@
 #include "geometry/reconstruct.h"
 
 #include "geometry/fibers/centers.h"
+#include "geometry/fibers/disagreement.h"
+#include "geometry/fibers/growing.h"
 #include "geometry/fibers/joining.h"
 #include "geometry/fibers/linking.h"
 #include "geometry/fibers/radius.h"
+#include "geometry/fibers/relax.h"
 #include "geometry/fibers/smoothing.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MIN_PIECE = 4 }; /* centers in a chain before joining */
+enum {
+    MIN_PIECE = 4, /* centers in a chain before joining */
+    MAX_GROWTH = 64 /* voxels that an end may grow */
+};
 
 struct fiber_job {
     const struct volume *v;
@@ -37,23 +43,47 @@ static void enter_part(struct fiber_job *job, double from, double to)
     job->share = to - from;
 }
 
+/* Axis that a frame's centers are counted under: a diagonal between two axes counts under the first. */
+static int frame_axis(const struct slice_frame *f)
+{
+    int axis = 0;
+    for (int a = 1; a < 3; a++)
+        if (fabsf(f->w[a]) > fabsf(f->w[axis]) + 0.01f) axis = a;
+    return axis;
+}
+
 static status find_chains(struct fiber_job *job, struct polyline_set *chains, struct error *err)
 {
-    uint8_t *mask = malloc(volume_n_voxel(job->v->n));
+    uint16_t *mask = malloc(volume_n_voxel(job->v->n) * sizeof *mask);
     if (mask == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
     status s = class_mask(job->d, job->pool, mask, job->report->n_class_voxel, err);
-    for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) {
+    for (int a = 0; a < 3; a++) job->report->n_center[a] = job->report->n_chain[a] = 0;
+    for (int i = 0; i < N_SLICE_FRAME && s == STATUS_OK; i++) {
         struct center_list list = {0};
-        enter_part(job, 0.2 * axis, 0.2 * axis + 0.2);
-        s = centers_detect(job->v, job->d, mask, axis, job->diameter, job->pool, &job->inner, &list, err);
+        struct slice_frame frame;
+        size_t n_chain = 0;
+        slice_frame_init(&frame, i, job->v->n);
+        enter_part(job, 0.6 * i / N_SLICE_FRAME, 0.6 * (i + 1) / N_SLICE_FRAME);
+        s = centers_detect(job->v, job->d, mask, &frame, job->diameter, job->pool, &job->inner, &list, err);
         if (s != STATUS_OK) break;
-        job->report->n_center[axis] = list.first[list.n_slice];
-        s = centers_link(&list, axis, job->o->link_sigma_voxel, job->diameter, MIN_PIECE, chains,
-                         &job->report->n_chain[axis], err);
+        s = centers_link(&list, &frame, job->o->link_sigma_voxel, job->diameter, MIN_PIECE, chains, &n_chain, err);
+        job->report->n_center[frame_axis(&frame)] += list.first[list.n_slice];
+        job->report->n_chain[frame_axis(&frame)] += n_chain;
         center_list_release(&list);
     }
     free(mask);
     return s;
+}
+
+/* The class of a fiber is the axis along which it moves most. */
+static void classify(struct polyline_set *p)
+{
+    for (size_t l = 0; l < p->n_line; l++) {
+        float moved[3] = {0.0f, 0.0f, 0.0f};
+        for (size_t i = p->first[l]; i + 1 < p->first[l + 1]; i++)
+            for (int a = 0; a < 3; a++) moved[a] += fabsf(p->vertex[i + 1][a] - p->vertex[i][a]);
+        p->axis[l] = moved[0] >= moved[1] && moved[0] >= moved[2] ? 0 : moved[1] >= moved[2] ? 1 : 2;
+    }
 }
 
 /* Smooth every line, and drop those under min_vertex. */
@@ -96,44 +126,67 @@ static void reach_face(struct polyline_set *p, size_t line, bool last, const siz
         for (int a = 0; a < 3; a++) x[a] += nearest * t[a];
 }
 
-/* The class of a fiber is the axis along which it moves most. */
-static void classify(struct polyline_set *p)
+/* One pass over the pieces: cut duplicates, let the ends grow, join what meets. in is emptied. */
+static status mend(struct fiber_job *job, struct polyline_set *in, bool grow, struct polyline_set *out,
+                   struct join_counts *counts, struct error *err)
 {
-    for (size_t l = 0; l < p->n_line; l++) {
-        float moved[3] = {0.0f, 0.0f, 0.0f};
-        for (size_t i = p->first[l]; i + 1 < p->first[l + 1]; i++)
-            for (int a = 0; a < 3; a++) moved[a] += fabsf(p->vertex[i + 1][a] - p->vertex[i][a]);
-        p->axis[l] = moved[0] >= moved[1] && moved[0] >= moved[2] ? 0 : moved[1] >= moved[2] ? 1 : 2;
+    struct polyline_set agreeing, single, grown;
+    const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, MAX_GROWTH};
+    size_t n_grown = 0, n_cut = 0;
+    polyline_set_init(&agreeing);
+    polyline_set_init(&single);
+    polyline_set_init(&grown);
+    status s = polylines_cut_disagreeing(in, job->d, 30.0 * M_PI / 180.0, MIN_PIECE, &agreeing, &n_cut, err);
+    if (s == STATUS_OK)
+        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, MIN_PIECE, &single, counts, err);
+    if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
+    if (s == STATUS_OK)
+        s = polylines_join(grow ? &grown : &single, job->v, job->diameter, job->o->eps_d, out, counts, err);
+    polyline_set_release(&agreeing);
+    polyline_set_release(&single);
+    polyline_set_release(&grown);
+    polyline_set_release(in);
+    return s;
+}
+
+static status relax(struct fiber_job *job, struct polyline_set *lines, int n_round, struct error *err)
+{
+    return polylines_relax(lines, job->v, (float)(0.6 * job->diameter), n_round, job->o->smooth_alpha, job->pool, &job->inner, err);
+}
+
+static void finish_lines(struct fiber_job *job, struct polyline_set *lines)
+{
+    classify(lines);
+    for (size_t l = 0; l < lines->n_line; l++) {
+        reach_face(lines, l, false, job->v->n);
+        reach_face(lines, l, true, job->v->n);
     }
 }
 
 static status make_lines(struct fiber_job *job, struct polyline_set *lines, struct error *err)
 {
-    struct polyline_set chains, single, joined;
+    struct polyline_set part[3];
     struct join_counts counts = {0};
-    polyline_set_init(&chains);
-    polyline_set_init(&single);
-    polyline_set_init(&joined);
-    status s = find_chains(job, &chains, err);
-    if (s == STATUS_OK)
-        s = polylines_remove_duplicates(&chains, job->v->n, job->diameter, MIN_PIECE, &single, &counts, err);
-    if (s == STATUS_OK) s = polylines_join(&single, job->v, job->diameter, job->o->eps_d, &joined, &counts, err);
-    if (s == STATUS_OK) s = smooth_and_drop(job, &joined, lines, err);
+    for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
+    status s = find_chains(job, &part[0], err);
+    enter_part(job, 0.6, 0.65);
+    if (s == STATUS_OK) s = mend(job, &part[0], false, &part[1], &counts, err);
+    if (s == STATUS_OK) s = relax(job, &part[1], 2, err);
+    if (s == STATUS_OK) s = mend(job, &part[1], true, &part[2], &counts, err);
+    if (s == STATUS_OK) {
+        classify(&part[2]); /* from subvolumes to axes */
+        s = smooth_and_drop(job, &part[2], lines, err);
+    }
+    if (s == STATUS_OK) s = relax(job, lines, 3, err);
     if (s == STATUS_OK) {
         job->report->n_gap_bridged = counts.n_gap_bridged;
         job->report->n_joined = counts.n_joined;
-        classify(lines);
-        for (size_t l = 0; l < lines->n_line; l++) {
-            reach_face(lines, l, false, job->v->n);
-            reach_face(lines, l, true, job->v->n);
-        }
+        finish_lines(job, lines);
         if (lines->n_line == 0)
             s = error_set_field(err, STATUS_INVALID, "volume.files",
                                 "cannot find fibers: none of the chains of centers has %zu vertices", job->o->min_vertex);
     }
-    polyline_set_release(&chains);
-    polyline_set_release(&single);
-    polyline_set_release(&joined);
+    for (int i = 0; i < 3; i++) polyline_set_release(&part[i]);
     return s;
 }
 

@@ -25,9 +25,9 @@ struct slice_result {
 struct detect_job {
     const struct volume *v;
     const struct direction_volume *d;
-    const uint8_t *mask;
-    int axis, au, av;
-    size_t width, height, stride_u, stride_v, stride_slice;
+    const uint16_t *mask;
+    const struct slice_frame *frame;
+    size_t width, height;
     double sigma[N_SCALE];
     float min_distance;
     double diameter;
@@ -47,7 +47,8 @@ void center_list_release(struct center_list *l)
 
 struct mask_job {
     const struct direction_volume *d;
-    uint8_t *mask;
+    uint16_t *mask;
+    float normal[N_SLICE_FRAME][3];
     size_t (*count)[3]; /* per slice */
 };
 
@@ -59,27 +60,27 @@ static void mask_slice(void *context, size_t k, size_t i_thread)
     for (size_t i = k * n; i < (k + 1) * n; i++) {
         job->mask[i] = 0;
         if (job->d->density[i] == 0) continue;
-        float d[3], most = 0.0f;
-        unsigned bits = 0;
-        int strict = 0;
+        float d[3];
         direction_volume_get(job->d, i, d);
-        for (int a = 0; a < 3; a++)
-            if (fabsf(d[a]) > most) {
-                most = fabsf(d[a]);
-                strict = a;
-            }
-        for (unsigned a = 0; a < 3; a++)
-            if (fabsf(d[a]) >= CLASS_TOLERANCE * most) bits |= 1u << a;
-        job->mask[i] = (uint8_t)(bits | (16u << strict));
-        job->count[k][strict]++;
+        int nearest = 0;
+        for (int a = 1; a < 3; a++)
+            if (fabsf(d[a]) > fabsf(d[nearest])) nearest = a;
+        unsigned bits = 1u << (12 + nearest);
+        for (unsigned f = 0; f < N_SLICE_FRAME; f++) {
+            const float *w = job->normal[f];
+            if (fabsf(d[0] * w[0] + d[1] * w[1] + d[2] * w[2]) >= CLASS_COSINE) bits |= 1u << f;
+        }
+        job->mask[i] = (uint16_t)bits;
+        job->count[k][nearest]++;
     }
 }
 
-status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint8_t *mask, size_t n_class_voxel[3],
+status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint16_t *mask, size_t n_class_voxel[3],
                   struct error *err)
 {
-    struct mask_job job = {d, mask, calloc(d->n[2], sizeof(size_t[3]))};
+    struct mask_job job = {.d = d, .mask = mask, .count = calloc(d->n[2], sizeof(size_t[3]))};
     if (job.count == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot separate the axes: out of memory");
+    for (int f = 0; f < N_SLICE_FRAME; f++) slice_frame_normal(f, job.normal[f]);
     status s = thread_pool_run(pool, d->n[2], mask_slice, &job, NULL);
     for (int a = 0; a < 3; a++) {
         n_class_voxel[a] = 0;
@@ -89,7 +90,7 @@ status class_mask(const struct direction_volume *d, struct thread_pool *pool, ui
     return s;
 }
 
-/* An emptied voxel shows its density unless all its kept neighbours belong to other axes (it is then the rim of such a fiber). */
+/* An emptied voxel shows its density unless all its kept neighbours belong to other slices (it is then the rim of such a fiber). */
 static bool rim_of_others(const struct detect_job *job, size_t at, const size_t x[3])
 {
     const size_t *n = job->v->n, stride[3] = {1, n[0], n[0] * n[1]};
@@ -97,28 +98,84 @@ static bool rim_of_others(const struct detect_job *job, size_t at, const size_t 
     for (int a = 0; a < 3; a++)
         for (int side = 0; side < 2; side++) {
             if (side == 0 ? x[a] == 0 : x[a] + 1 == n[a]) continue;
-            uint8_t m = job->mask[side == 0 ? at - stride[a] : at + stride[a]];
-            if ((m >> job->axis & 1) != 0) return false;
+            uint16_t m = job->mask[side == 0 ? at - stride[a] : at + stride[a]];
+            if ((m >> job->frame->index & 1) != 0) return false;
             others = others || m != 0;
         }
     return others;
 }
 
-/* The slice of the subvolume; false when nothing of the class is in it. */
+/* Voxel that holds point x; false (and the nearest voxel) when x lies outside of the volume. */
+static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
+{
+    bool inside = true;
+    for (int a = 0; a < 3; a++) {
+        inside = inside && x[a] >= 0.0f && x[a] < (float)n[a];
+        at[a] = x[a] <= 0.0f ? 0 : x[a] >= (float)n[a] - 1.0f ? n[a] - 1 : (size_t)x[a];
+    }
+    return inside;
+}
+
+/* Density of the subvolume at a voxel, 0 where it is emptied. */
+static float class_density(const struct detect_job *job, const size_t x[3], bool *own)
+{
+    size_t at = volume_index(job->v->n, x[0], x[1], x[2]);
+    uint16_t m = job->mask[at];
+    *own = (m >> job->frame->index & 1) != 0;
+    return *own || (m == 0 && !rim_of_others(job, at, x)) ? job->v->density[at] : 0.0f;
+}
+
+/* Between voxels: bilinear in the plane of the two diagonal axes (the third stays on the grid). */
+static float diagonal_density(const struct detect_job *job, const float x[3], bool *own)
+{
+    const struct slice_frame *f = job->frame;
+    const size_t *n = job->v->n;
+    float sum = 0.0f;
+    *own = false;
+    for (int corner = 0; corner < 4; corner++) {
+        size_t at[3];
+        float weight = 1.0f;
+        for (int a = 0, bit = 0; a < 3; a++) {
+            float c = x[a] - 0.5f, whole = floorf(c);
+            if (f->w[a] == 0.0f) {
+                whole = floorf(x[a]);
+            } else {
+                float fraction = c - whole;
+                if (corner >> bit & 1) {
+                    weight *= fraction;
+                    whole += 1.0f;
+                } else {
+                    weight *= 1.0f - fraction;
+                }
+                bit++;
+            }
+            at[a] = whole <= 0.0f ? 0 : whole >= (float)n[a] - 1.0f ? n[a] - 1 : (size_t)whole;
+        }
+        bool own_corner;
+        sum += weight * class_density(job, at, &own_corner);
+        *own = *own || own_corner;
+    }
+    return sum;
+}
+
+/* The slice of the subvolume; false when nothing of the class is in it. Pixels beyond the faces repeat the face's densities. */
 static bool fill_image(const struct detect_job *job, size_t i_slice, float *image)
 {
     bool any = false;
-    size_t x[3];
-    x[job->axis] = i_slice;
     for (size_t v = 0; v < job->height; v++)
         for (size_t u = 0; u < job->width; u++, image++) {
-            size_t at = i_slice * job->stride_slice + u * job->stride_u + v * job->stride_v;
-            x[job->au] = u;
-            x[job->av] = v;
-            uint8_t m = job->mask[at];
-            bool own = (m >> job->axis & 1) != 0;
+            float x[3];
+            bool own;
+            size_t at[3];
+            slice_frame_point(job->frame, (float)u + 0.5f, (float)v + 0.5f, (float)i_slice + 0.5f, x);
+            bool inside = voxel_at(job->v->n, x, at);
+            if (!inside && (fabsf(x[0] - (float)at[0]) > 6.0f || fabsf(x[1] - (float)at[1]) > 6.0f ||
+                            fabsf(x[2] - (float)at[2]) > 6.0f)) {
+                *image = 0.0f;
+                continue;
+            }
+            *image = job->frame->index < 3 ? class_density(job, at, &own) : diagonal_density(job, x, &own);
             any = any || own;
-            *image = own || (m == 0 && !rim_of_others(job, at, x)) ? job->v->density[at] : 0.0f;
         }
     return any;
 }
@@ -156,24 +213,34 @@ static void refine_position(const struct detect_job *job, const float *response,
     offset[1] = fminf(1.0f, fmaxf(-1.0f, (uv * gu - uu * gv) / det));
 }
 
-/* Mean direction of the class's voxels within one voxel of (u, v), as slopes. False when there is none. */
+/* Mean direction of the class's voxels within one pixel of (u, v), as slopes. False when there is none, or the center lies
+ * outside of the volume. */
 static bool find_slope(const struct detect_job *job, size_t i_slice, struct center *c)
 {
-    float sum[3] = {0.0f, 0.0f, 0.0f};
-    long iu = (long)floorf(c->u), iv = (long)floorf(c->v);
-    for (long v = iv - 1; v <= iv + 1; v++)
-        for (long u = iu - 1; u <= iu + 1; u++) {
-            if (u < 0 || v < 0 || u >= (long)job->width || v >= (long)job->height) continue;
-            size_t at = i_slice * job->stride_slice + (size_t)u * job->stride_u + (size_t)v * job->stride_v;
-            if ((job->mask[at] >> job->axis & 1) == 0) continue;
-            float d[3];
-            direction_volume_get(job->d, at, d);
-            float sign = d[job->axis] < 0.0f ? -1.0f : 1.0f;
-            for (int a = 0; a < 3; a++) sum[a] += sign * d[a];
+    const struct slice_frame *f = job->frame;
+    float sum[3] = {0.0f, 0.0f, 0.0f}, x[3]; /* along u, v, w */
+    size_t at[3];
+    slice_frame_point(f, c->u, c->v, (float)i_slice + 0.5f, x);
+    if (!voxel_at(job->v->n, x, at)) return false;
+    for (int v = -1; v <= 1; v++)
+        for (int u = -1; u <= 1; u++) {
+            slice_frame_point(f, c->u + (float)u, c->v + (float)v, (float)i_slice + 0.5f, x);
+            if (!voxel_at(job->v->n, x, at)) continue;
+            size_t voxel = volume_index(job->v->n, at[0], at[1], at[2]);
+            if ((job->mask[voxel] >> f->index & 1) == 0) continue;
+            float d[3], local[3] = {0.0f, 0.0f, 0.0f};
+            direction_volume_get(job->d, voxel, d);
+            for (int a = 0; a < 3; a++) {
+                local[0] += d[a] * f->u[a];
+                local[1] += d[a] * f->v[a];
+                local[2] += d[a] * f->w[a];
+            }
+            float sign = local[2] < 0.0f ? -1.0f : 1.0f;
+            for (int a = 0; a < 3; a++) sum[a] += sign * local[a];
         }
-    if (!(sum[job->axis] > 0.0f)) return false;
-    c->slope_u = sum[job->au] / sum[job->axis];
-    c->slope_v = sum[job->av] / sum[job->axis];
+    if (!(sum[2] > 0.0f)) return false;
+    c->slope_u = sum[0] / sum[2];
+    c->slope_v = sum[1] / sum[2];
     return true;
 }
 
@@ -281,21 +348,15 @@ static status gather(struct detect_job *job, size_t n_slice, struct center_list 
     return STATUS_OK;
 }
 
-status centers_detect(const struct volume *v, const struct direction_volume *d, const uint8_t *mask, int axis,
-                      double diameter_voxel, struct thread_pool *pool, const struct progress *progress,
-                      struct center_list *list, struct error *err)
+status centers_detect(const struct volume *v, const struct direction_volume *d, const uint16_t *mask,
+                      const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
+                      const struct progress *progress, struct center_list *list, struct error *err)
 {
-    const size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]};
-    struct detect_job job = {.v = v, .d = d, .mask = mask, .axis = axis, .au = slice_axis_u(axis), .av = slice_axis_v(axis)};
-    size_t n_slice = v->n[axis], n_thread = thread_pool_n_thread(pool);
+    struct detect_job job = {.v = v, .d = d, .mask = mask, .frame = frame, .width = frame->width, .height = frame->height};
+    size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool);
     *list = (struct center_list){0};
     status s = vision_init(err);
     if (s != STATUS_OK) return s;
-    job.width = v->n[job.au];
-    job.height = v->n[job.av];
-    job.stride_u = stride[job.au];
-    job.stride_v = stride[job.av];
-    job.stride_slice = stride[axis];
     for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
     job.diameter = diameter_voxel;
     job.min_distance = MIN_SPACING * (float)diameter_voxel;

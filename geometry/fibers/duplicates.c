@@ -38,7 +38,7 @@ static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid 
                 size_t cell = (c[2] * g->n[1] + c[1]) * g->n[0] + c[0];
                 for (size_t e = g->first[cell]; e < g->first[cell + 1]; e++) {
                     size_t other = g->vertex[e], other_line = g->line_of[other];
-                    if (p->axis[other_line] == p->axis[line] || !wins(p, other_line, line)) continue;
+                    if (other_line == line || !wins(p, other_line, line)) continue;
                     float d[3], s[3], along = 0.0f, square = 0.0f, cosine = 0.0f;
                     tangent_at(p, other_line, other, s);
                     for (int a = 0; a < 3; a++) {
@@ -47,7 +47,7 @@ static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid 
                         square += d[a] * d[a];
                         cosine += s[a] * t[a];
                     }
-                    if (square <= reach * reach && square - along * along <= near * near && fabsf(cosine) > 0.8f) return true;
+                    if (square <= reach * reach && square - along * along <= near * near) return true;
                 }
             }
     return false;
@@ -58,7 +58,7 @@ status polylines_remove_duplicates(const struct polyline_set *lines, const size_
                                    struct error *err)
 {
     struct vertex_grid g = {0};
-    float near = (float)fmax(1.0, 0.3 * diameter_voxel);
+    float near = (float)fmax(1.0, 0.5 * diameter_voxel);
     status s = vertex_grid_init(&g, lines, n_voxel, (float)fmax(3.0, diameter_voxel), err);
     counts->n_duplicate = 0;
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {

@@ -82,7 +82,7 @@ static float join_cost(const struct line_end *a, const struct line_end *b, float
         ahead_b -= g[c] * b->t[c];
         cosine -= a->t[c] * b->t[c];
     }
-    float longest = fmaxf(6.0f, 2.5f * diameter), length = sqrtf(length2);
+    float longest = fmaxf(4.0f, 1.5f * diameter), length = sqrtf(length2);
     if (length > longest || cosine < 0.75f) return INFINITY;
     if (ahead_a < -0.5f * diameter || ahead_b < -0.5f * diameter) return INFINITY;
     float side_a = sqrtf(fmaxf(0.0f, length2 - ahead_a * ahead_a)), side_b = sqrtf(fmaxf(0.0f, length2 - ahead_b * ahead_b));
@@ -119,7 +119,7 @@ static status find_joins(const struct line_end *end, size_t n_end, const struct 
 {
     struct polyline_set points;
     struct vertex_grid g = {0};
-    float reach = fmaxf(6.0f, 2.5f * diameter);
+    float reach = fmaxf(4.0f, 1.5f * diameter);
     polyline_set_init(&points);
     status s = polyline_begin(&points, 0, err);
     for (size_t e = 0; e < n_end && s == STATUS_OK; e++) s = polyline_add(&points, end[e].x, err);

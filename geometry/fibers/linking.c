@@ -67,14 +67,7 @@ static void match(struct edge_list *edges, uint32_t *next, uint32_t *previous)
     }
 }
 
-static void center_position(const struct center *c, int axis, size_t slice, float x[3])
-{
-    x[axis] = (float)slice + 0.5f;
-    x[slice_axis_u(axis)] = c->u;
-    x[slice_axis_v(axis)] = c->v;
-}
-
-static status emit_chains(const struct center_list *list, int axis, size_t min_vertex, const uint32_t *next,
+static status emit_chains(const struct center_list *list, const struct slice_frame *frame, size_t min_vertex, const uint32_t *next,
                           const uint32_t *previous, struct polyline_set *lines, size_t *n_chain, struct error *err)
 {
     status s = STATUS_OK;
@@ -85,17 +78,17 @@ static status emit_chains(const struct center_list *list, int axis, size_t min_v
             for (uint32_t c = (uint32_t)i; c != NONE; c = next[c]) length++;
             *n_chain += length > 1;
             if (length < min_vertex) continue;
-            s = polyline_begin(lines, (uint8_t)axis, err);
+            s = polyline_begin(lines, (uint8_t)frame->index, err);
             for (uint32_t c = (uint32_t)i; c != NONE && s == STATUS_OK; c = next[c], slice++) {
                 float x[3];
-                center_position(&list->center[c], axis, slice, x);
+                slice_frame_point(frame, list->center[c].u, list->center[c].v, (float)slice + 0.5f, x);
                 s = polyline_add(lines, x, err);
             }
         }
     return s;
 }
 
-status centers_link(const struct center_list *list, int axis, double sigma_voxel, double diameter_voxel, size_t min_vertex,
+status centers_link(const struct center_list *list, const struct slice_frame *frame, double sigma_voxel, double diameter_voxel, size_t min_vertex,
                     struct polyline_set *lines, size_t *n_chain, struct error *err)
 {
     size_t n = list->first[list->n_slice];
@@ -110,7 +103,7 @@ status centers_link(const struct center_list *list, int axis, double sigma_voxel
         if (!candidate_edges(list, k, reach, &edges)) goto no_memory;
         match(&edges, next, previous);
     }
-    s = emit_chains(list, axis, min_vertex, next, previous, lines, n_chain, err);
+    s = emit_chains(list, frame, min_vertex, next, previous, lines, n_chain, err);
     goto out;
 no_memory:
     s = error_set(err, STATUS_NO_MEMORY, "cannot link fiber centers: out of memory");

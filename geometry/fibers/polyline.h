@@ -11,7 +11,7 @@ struct polyline_set {
     size_t n_line, n_vertex, line_capacity, vertex_capacity;
     size_t *first;      /* n_line + 1 */
     float (*vertex)[3];
-    uint8_t *axis;      /* n_line: subvolume that the line was found in */
+    uint8_t *axis;      /* n_line: subvolume (slice frame) that the line was found in, later the axis class */
 };
 
 void polyline_set_init(struct polyline_set *p);

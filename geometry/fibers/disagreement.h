@@ -1,0 +1,14 @@
+/* Pieces of polylines that do not run along the measured fiber directions are cut out: chains that hop from fiber to fiber, or
+ * take a row of touching sections for a fiber. */
+#ifndef SELVEDGE_GEOMETRY_DISAGREEMENT_H
+#define SELVEDGE_GEOMETRY_DISAGREEMENT_H
+
+#include "geometry/fibers/polyline.h"
+#include "geometry/volume/volume.h"
+
+/* Vertices where the angle between line and direction volume, averaged (mean squared sine) over nine vertices, exceeds max_angle_rad are
+ * removed; what remains of a line goes to result (initialised, empty) in pieces of at least min_vertex. *n_cut: vertices removed. */
+status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d, double max_angle_rad,
+                                 size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err);
+
+#endif
