@@ -41,7 +41,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps test check bench demo clean help layers format asan bench-geometry bench-transport bench-fit fuzz
+.PHONY: all deps test check bench demo clean help layers format asan bench-geometry bench-transport bench-fit fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -118,6 +118,27 @@ layers:            ## includes go one way: base <- geometry <- renderer <- optim
 asan:              ## unit and physics tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build build/asan
+
+# one libFuzzer program per file tests/fuzz/fuzz_*.c (fuzz_input.c is what they share)
+FUZZ_SECONDS ?= 600
+FUZZ ?=
+FUZZ_C := $(filter-out tests/fuzz/fuzz_input.c,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_BINS := $(patsubst %.c,$(BUILD)/%,$(FUZZ_C))
+FUZZ_LIBS := $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(FUZZ_BINS): $(BUILD)/%: $(BUILD)/obj/%.c.o $(BUILD)/obj/tests/fuzz/fuzz_input.c.o $(FUZZ_LIBS)
+	@mkdir -p $(@D)
+	@echo "  LINK $@"
+	@$(CC) $(LDFLAGS) -fsanitize=fuzzer -o $@ $^ $(LINK_OPTIMIZER)
+$(BUILD)/tests/fuzz/make_fuzz_seeds: $(BUILD)/obj/tests/fuzz/make_fuzz_seeds.c.o $(FUZZ_LIBS)
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
+fuzz-programs: $(FUZZ_BINS) $(BUILD)/tests/fuzz/make_fuzz_seeds
+
+fuzz: | deps       ## every parser under libFuzzer for FUZZ_SECONDS (600) each
+	@./config/install-dependencies fuzz
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/fuzz CC=clang CXX=clang++ WERROR=-w OPTIMIZE=-O1 \
+		SANITIZE=fuzzer-no-link,address,undefined,float-cast-overflow CFLAGS=-fno-sanitize-recover=all fuzz-programs
+	@tests/fuzz/run_fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ)
 
 format:            ## clang-format the C sources
 	@find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp' | xargs clang-format -i

@@ -1,0 +1,117 @@
+/* make_fuzz_seeds DIR: small valid files for every harness, DIR/PARSER/NAME, by the library's own writers. */
+#include "geometry/fibers/fiber_set.h"
+#include "geometry/phantom/phantom.h"
+#include "geometry/volume/vol_file.h"
+#include "renderer/image/image.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <zlib.h>
+
+static const char *root;
+
+static const char *seed_path(const char *parser, const char *name)
+{
+    static char path[2][1024];
+    static int turn;
+    char *p = path[turn = 1 - turn];
+    snprintf(p, sizeof path[0], "%s/%s", root, parser);
+    mkdir(p, 0777);
+    snprintf(p, sizeof path[0], "%s/%s/%s", root, parser, name);
+    return p;
+}
+
+static void must(bool ok, const char *what)
+{
+    if (ok) return;
+    fprintf(stderr, "make_fuzz_seeds: cannot write %s\n", what);
+    exit(1);
+}
+
+static void put(const char *parser, const char *name, const char *text, const void *data, size_t n_data)
+{
+    FILE *file = fopen(seed_path(parser, name), "wb");
+    must(file != NULL && fwrite(text, 1, strlen(text), file) == strlen(text) && fwrite(data, 1, n_data, file) == n_data, name);
+    must(fclose(file) == 0, name);
+}
+
+static void volume_seeds(void)
+{
+    static const size_t n[3] = {6, 5, 4};
+    static const double voxel[3] = {2e-6, 2e-6, 2e-6};
+    struct volume v;
+    struct direction_volume d;
+    must(volume_init(&v, n, voxel, NULL) == STATUS_OK && direction_volume_init(&d, n, voxel, NULL) == STATUS_OK, "memory");
+    for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = (float)(i % 7) / 7.0f;
+    struct phantom_file_option o;
+    phantom_file_option_default(&o);
+    must(phantom_write_tiff(&v, &o, seed_path("tiff", "u16-deflate.tif"), NULL) == STATUS_OK, "TIFF");
+    o.bits = 8;
+    o.void_value = 10.0;
+    o.fiber_value = 200.0;
+    o.deflate = false;
+    must(phantom_write_tiff(&v, &o, seed_path("tiff", "u8.tif"), NULL) == STATUS_OK, "TIFF");
+    must(vol_write_density(seed_path("vol", "f32.vol"), &v, VOL_FLOAT32, NULL) == STATUS_OK, ".vol");
+    must(vol_write_density(seed_path("vol", "u8.vol"), &v, VOL_UINT8, NULL) == STATUS_OK, ".vol");
+    must(vol_write_direction(seed_path("vol", "direction.vol"), &d, VOL_QUANTISED, NULL) == STATUS_OK, ".vol");
+    volume_release(&v);
+    direction_volume_release(&d);
+}
+
+static void header_seeds(void)
+{
+    uint8_t data[120], packed[256];
+    uLongf n_packed = sizeof packed;
+    for (size_t i = 0; i < sizeof data; i++) data[i] = (uint8_t)(i * 3);
+    must(compress(packed, &n_packed, data, sizeof data) == Z_OK, "zlib");
+    put("metaimage", "u8.mha", "ObjectType = Image\nNDims = 3\nDimSize = 6 5 4\nElementSpacing = 0.002 0.002 0.002\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n", data, 120);
+    put("metaimage", "u16z.mha", "NDims = 3\nDimSize = 5 4 3\nElementType = MET_USHORT\nElementByteOrderMSB = True\nCompressedData = True\nElementDataFile = LOCAL\n", packed, n_packed);
+    put("nrrd", "u8.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 6 5 4\nencoding: raw\nspacings: 0.002 0.002 0.002\n\n", data, 120);
+    put("nrrd", "f32.nrrd", "NRRD0005\n# c\ntype: float\ndimension: 3\nsizes: 5 3 2\nendian: big\nencoding: raw\nspace: left-posterior-superior\nspace directions: (2,0,0) (0,2,0) (0,0,2)\nspace units: \"um\" \"um\" \"um\"\n\n", data, 120);
+    put("nrrd", "u16z.nrrd", "NRRD0004\ntype: ushort\ndimension: 3\nsizes: 5 4 2\nendian: little\nencoding: gzip\nbyte skip: 40\nline skip: 1\n\nline\n", packed, n_packed);
+    put("raw", "u8", "\x06\x05\x04", "\0\0\0", 3);
+    uint8_t raw[126] = {5, 4, 3, 1, 2, 0};
+    memcpy(raw + 6, data, 120);
+    put("raw", "u16", "", raw, sizeof raw);
+    put("measurements", "table.csv", "# c\nset,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b,r_se,g_se,b_se,weight,name\nfit,0,20,0,20,180,0,0.0222,0.0247,0.0564,0,0,0,1,a\nheld-out,1,60,0,60,90,90,0.0187,0.0201,0.0467,1e-3,1e-3,1e-3,2,b\n", "", 0);
+}
+
+static void fiber_seeds(void)
+{
+    struct fiber_set f;
+    fiber_set_init(&f);
+    must(fiber_set_reserve(&f, 2, 5, NULL) == STATUS_OK, "memory");
+    f.first_vertex[1] = 2;
+    f.first_vertex[2] = 5;
+    f.tile_size_m[0] = f.tile_size_m[1] = 1e-3;
+    for (size_t i = 0; i < 15; i++) f.position_m[i] = (float)i * 1e-5f;
+    for (size_t i = 0; i < 2; i++) f.radius_m[i] = 1e-5f;
+    fiber_set_classify(&f);
+    must(fiber_set_write_hair(&f, seed_path("hair", "two.hair"), NULL) == STATUS_OK, ".hair");
+    must(fiber_set_write_text(&f, seed_path("fiber_text", "two.txt"), NULL) == STATUS_OK, "text");
+    fiber_set_release(&f);
+}
+
+static void photograph_seeds(void)
+{
+    struct image im;
+    must(image_init(&im, 8, 8, 3, NULL) == STATUS_OK, "memory");
+    for (size_t i = 0; i < 192; i++) im.pixel[i] = 0.1f + (float)(i % 5) * 0.1f;
+    must(image_write_exr(&im, seed_path("exr", "rgb.exr"), NULL) == STATUS_OK, "OpenEXR");
+    must(image_write_png(&im, 1.0, seed_path("png", "rgb.png"), NULL) == STATUS_OK, "PNG");
+    image_release(&im);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc != 2) return 2;
+    root = argv[1];
+    mkdir(root, 0777);
+    volume_seeds();
+    header_seeds();
+    fiber_seeds();
+    photograph_seeds();
+    return 0;
+}

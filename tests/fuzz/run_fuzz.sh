@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# run_fuzz.sh BUILD SECONDS [PARSER...]: each harness for SECONDS from seeds made now. Ends with status 1 when there is a finding, whose
+# input stays in BUILD/fuzz/findings. A finding is a crash, a sanitizer's report, over 10 s, or over 1 GiB.
+set -euo pipefail
+build=$1 seconds=$2
+shift 2
+work=$build/fuzz
+mkdir -p "$work/findings" "$work/corpus"
+"$build/tests/fuzz/make_fuzz_seeds" "$work/seeds"
+mkdir -p "$work/seeds/job_document"
+cp config/examples/*.json "$work/seeds/job_document/"
+if [ $# -eq 0 ]; then
+    set -- $(for p in "$build"/tests/fuzz/fuzz_*; do basename "${p#*/fuzz_}" | sed 's/^fuzz_//'; done)
+fi
+bad=0
+for parser; do
+    mkdir -p "$work/corpus/$parser"
+    dictionary=tests/fuzz/$parser.dict
+    if nice "$build/tests/fuzz/fuzz_$parser" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1024 -malloc_limit_mb=512 -max_len=16384 \
+        -artifact_prefix="$work/findings/$parser-" -print_final_stats=1 $([ -f "$dictionary" ] && echo "-dict=$dictionary") \
+        "$work/corpus/$parser" "$work/seeds/$parser" >"$work/$parser.log" 2>&1; then
+        echo "fuzz $parser: ok, $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/$parser.log") inputs in $seconds s"
+    else
+        bad=1
+        echo "fuzz $parser: FINDING, see $work/$parser.log"
+        grep -m1 -E 'ERROR: |runtime error' "$work/$parser.log" || true
+    fi
+done
+exit $bad
