@@ -1,0 +1,50 @@
+/* The fiber frame in world coordinates, and small vector arithmetic that both tracers use. */
+#ifndef SELVEDGE_RENDERER_FIBER_FRAME_H
+#define SELVEDGE_RENDERER_FIBER_FRAME_H
+
+#include <math.h>
+#include <string.h>
+
+/* Fiber frame: u along the fiber, v and w any two perpendicular to it (Duff et al. 2017, "Building an orthonormal
+ * basis, revisited"). */
+struct fiber_frame {
+    float u[3], v[3], w[3];
+};
+
+static inline void fiber_frame_from(struct fiber_frame *f, const float u[3])
+{
+    float sign = copysignf(1, u[2]), a = -1 / (sign + u[2]), b = u[0] * u[1] * a;
+    memcpy(f->u, u, sizeof f->u);
+    f->v[0] = 1 + sign * u[0] * u[0] * a;
+    f->v[1] = sign * b;
+    f->v[2] = -sign * u[0];
+    f->w[0] = b;
+    f->w[1] = sign + u[1] * u[1] * a;
+    f->w[2] = -u[1];
+}
+
+static inline float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static inline void to_local(const struct fiber_frame *f, const float d[3], float out[3])
+{
+    out[0] = dot(f->u, d);
+    out[1] = dot(f->v, d);
+    out[2] = dot(f->w, d);
+}
+
+static inline void to_world(const struct fiber_frame *f, const float d[3], float out[3])
+{
+    for (int a = 0; a < 3; a++) out[a] = d[0] * f->u[a] + d[1] * f->v[a] + d[2] * f->w[a];
+    float inv = 1 / sqrtf(dot(out, out));
+    for (int a = 0; a < 3; a++) out[a] *= inv;
+}
+
+static inline float cos_theta(const float local[3]) { return sqrtf(local[1] * local[1] + local[2] * local[2]); }
+
+static inline float power_heuristic(float a, float b)
+{
+    float r = b / a;
+    return 1 / (1 + r * r);
+}
+
+#endif
