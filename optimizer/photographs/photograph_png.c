@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 struct png_failure {
     char text[160];
@@ -64,6 +65,11 @@ static status check_size(FILE *f, const char *name, size_t limit_pixel, struct e
         return error_set(err, STATUS_TOO_LARGE,
                          "cannot read photograph '%s': %zu x %zu pixels, the limit is %zu in all", name, width, height,
                          limit_pixel);
+    struct stat st; /* a row has at least a bit a pixel; deflate cannot do better than 1 : 1032 */
+    if (fstat(fileno(f), &st) != 0) return error_set_errno(err, "cannot read photograph '%s'", name);
+    if ((width / 8 + 1) * height / 1100 > (size_t)st.st_size)
+        return error_set(err, STATUS_FORMAT, "cannot read photograph '%s': its header promises %zu x %zu pixels, the file has %lld bytes",
+                         name, width, height, (long long)st.st_size);
     rewind(f);
     return STATUS_OK;
 }

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* What the library last complained about: its texts are better than its codes. */
@@ -163,6 +164,12 @@ static status read_header(struct reader *rd, size_t limit_pixel, struct error *e
     if (width > INT32_MAX / 16 || height > INT32_MAX / 16 || (uint64_t)width * (uint64_t)height > limit_pixel)
         return error_set(err, STATUS_TOO_LARGE, "cannot read image '%s': %lld x %lld pixels, at most %zu are allowed",
                          rd->path, (long long)width, (long long)height, limit_pixel);
+    /* a small file that promises a huge picture: no compression makes a photograph 4096 pixels a byte */
+    struct stat file;
+    if (stat(rd->path, &file) != 0) return error_set_errno(err, "cannot read image '%s'", rd->path);
+    if ((uint64_t)width * (uint64_t)height / 4096 > (uint64_t)file.st_size)
+        return error_set(err, STATUS_FORMAT, "cannot read image '%s': its header promises %lld x %lld pixels, the file has %lld bytes",
+                         rd->path, (long long)width, (long long)height, (long long)file.st_size);
     rd->width = (int32_t)width;
     rd->height = (int32_t)height;
     rd->min_y = w.min.y;

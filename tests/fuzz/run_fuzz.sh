@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # run_fuzz.sh BUILD SECONDS [PARSER...]: each harness for SECONDS from seeds made now. Ends with status 1 when there is a finding, whose
-# input stays in BUILD/fuzz/findings. A finding is a crash, a sanitizer's report, over 10 s, or over 1 GiB.
+# input stays in BUILD/fuzz/findings. A finding is a crash, a sanitizer's report, over 10 s, or over 512 MB in one piece.
 set -euo pipefail
+export ASAN_OPTIONS=quarantine_size_mb=16:malloc_context_size=8:allocator_release_to_os_interval_ms=500 # freed memory must not look like use
 build=$1 seconds=$2
 shift 2
 work=$build/fuzz
@@ -16,7 +17,7 @@ bad=0
 for parser; do
     mkdir -p "$work/corpus/$parser"
     dictionary=tests/fuzz/$parser.dict
-    if nice "$build/tests/fuzz/fuzz_$parser" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1024 -malloc_limit_mb=512 -max_len=16384 \
+    if nice "$build/tests/fuzz/fuzz_$parser" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1500 -malloc_limit_mb=512 -max_len=16384 \
         -artifact_prefix="$work/findings/$parser-" -print_final_stats=1 $([ -f "$dictionary" ] && echo "-dict=$dictionary") \
         "$work/corpus/$parser" "$work/seeds/$parser" >"$work/$parser.log" 2>&1; then
         echo "fuzz $parser: ok, $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/$parser.log") inputs in $seconds s"

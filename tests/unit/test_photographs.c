@@ -149,12 +149,38 @@ static void test_truncated_png(void **state)
     free(bytes);
 }
 
+/* Headers that promise hundreds of millions of pixels in a file of some hundred bytes: refused before memory is taken. */
+static void test_small_files_of_huge_pictures(void **state)
+{
+    uint8_t rgb[8 * 8 * 3] = {0};
+    const struct job_photograph p = {.scale = 1.0};
+    struct photograph_mean m;
+    struct error err = {0};
+    size_t n, at = 0;
+    write_exr(scratch_path(state, "small.exr"), 16, ramp);
+    char *bytes = scratch_read(scratch_path(state, "small.exr"), &n);
+    while (memcmp(bytes + at, "dataWindow", 11) != 0) at++;
+    memcpy(bytes + at + 29, "\x5f\xea\0\0\xb7\x0b\0\0", 8); /* after "box2i", its length and the lower corner: 60000 x 3000 */
+    scratch_write(scratch_path(state, "huge.exr"), bytes, n);
+    free(bytes);
+    assert_int_equal(photograph_measure(scratch_path(state, "huge.exr"), &p, &m, &err), STATUS_FORMAT);
+    if (strstr(err.text, "60000 x 3000") == NULL) fail_msg("%s", err.text);
+    assert_int_equal(image_write_png_rgb8(rgb, 8, 8, scratch_path(state, "small.png"), NULL), STATUS_OK);
+    bytes = scratch_read(scratch_path(state, "small.png"), &n);
+    memcpy(bytes + 16, "\0\0\xea\x60\0\0\x0b\xb8", 8);
+    scratch_write(scratch_path(state, "huge.png"), bytes, n);
+    free(bytes);
+    assert_int_equal(photograph_measure(scratch_path(state, "huge.png"), &p, &m, &err), STATUS_FORMAT);
+    if (strstr(err.text, "60000 x 3000") == NULL) fail_msg("%s", err.text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_mean),    cmocka_unit_test(test_error_of_texture),
         cmocka_unit_test(test_refused), cmocka_unit_test(test_not_uniform),
         cmocka_unit_test(test_png),     cmocka_unit_test(test_truncated_png),
+        cmocka_unit_test(test_small_files_of_huge_pictures),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
