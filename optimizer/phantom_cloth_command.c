@@ -26,6 +26,9 @@ static const char usage[] =
     "  --cover C               yarn width over spacing, 0.5 .. 1.3                                        [1.05; knit 1]\n"
     "  --twist T               turns a tile, rounded to sixths                                            [0.333]\n"
     "  --migration M           relative radial wandering of fibers, 0 .. 0.5                              [0.05]\n"
+    "  --yarn FILE             plied yarns by a file of measured parameters, in place of --fibers-per-yarn,\n"
+    "                          --twist, --migration and --flyaways; sets --packing 0.5 and --flatness 1\n"
+    "  --yarn-true-size        keep the file's lengths; else the yarn is scaled to --packing\n"
     "  --flyaways N            hairs leaving each yarn                                                    [0]\n"
     "  --pile-um H             velvet: height of the pile                                                 [200]\n"
     "  --felt-tile-um S, --felt-thickness-um H                                                           [320, 120]\n"
@@ -43,7 +46,7 @@ static const char usage[] =
     "  --threads N             0: one per processor                                                       [0]\n";
 
 struct cloth {
-    const char *out;
+    const char *out, *yarn; /* yarn: NULL or a file of parameters */
     struct phantom_option phantom;
     struct phantom_scan_option scan;
     struct phantom_file_option file;
@@ -65,11 +68,18 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
 {
     const char *weave_name = "twill";
     enum phantom_weave weave;
-    for (int i = 1; i + 1 < argc; i++) /* the weave sets the other defaults */
+    bool plied = false;
+    for (int i = 1; i + 1 < argc; i++) { /* weave and yarn set the other defaults */
         if (strcmp(argv[i], "--weave") == 0) weave_name = argv[i + 1];
+        if (strcmp(argv[i], "--yarn") == 0) plied = true;
+    }
     status st = phantom_weave_find(weave_name, &weave, err);
     if (st != STATUS_OK) return st;
     phantom_option_default(&c->phantom, weave);
+    if (plied) {
+        c->phantom.packing = 0.5;
+        c->phantom.flatness = 1.0;
+    }
     phantom_scan_option_default(&c->scan);
     phantom_file_option_default(&c->file);
     double voxel_um = 2.0, diameter[3] = {7.0, 7.0, 7.0}, pile_um = 200.0, felt_um[2] = {320.0, 120.0};
@@ -86,6 +96,8 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "cover", .kind = OPTION_NUMBER, .to = &c->phantom.cover},
         {.name = "twist", .kind = OPTION_NUMBER, .to = &c->phantom.twist_turns},
         {.name = "migration", .kind = OPTION_NUMBER, .to = &c->phantom.migration},
+        {.name = "yarn", .kind = OPTION_TEXT, .to = &c->yarn},
+        {.name = "yarn-true-size", .kind = OPTION_FLAG, .to = &c->phantom.yarn_true_size},
         {.name = "flyaways", .kind = OPTION_COUNT, .to = &c->phantom.n_flyaway_per_yarn},
         {.name = "pile-um", .kind = OPTION_NUMBER, .to = &pile_um},
         {.name = "felt-tile-um", .kind = OPTION_NUMBER, .to = &felt_um[0]},
@@ -102,6 +114,8 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "threads", .kind = OPTION_COUNT, .to = &c->n_thread},
     };
     st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
+    if (st != STATUS_OK) return st;
+    if (c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
     if (st != STATUS_OK) return st;
     if (c->out == NULL) return error_set(err, STATUS_INVALID, "--out is missing");
     if (bits != 8 && bits != 16) return error_set(err, STATUS_INVALID, "option --bits takes 8 or 16");
@@ -165,6 +179,12 @@ static status write_pictures(struct cloth *c, struct error *err)
     return st;
 }
 
+static const char *path_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
 static json_t *describe(const struct cloth *c)
 {
     const struct phantom_option *o = &c->phantom;
@@ -185,6 +205,16 @@ static json_t *describe(const struct cloth *c)
                              "yarn_spacing_um", um * r->yarn_spacing_m[0], um * r->yarn_spacing_m[1], "n_fiber", (int)c->fibers.n_fiber,
                              "n_vertex", (int)c->fibers.n_vertex, "length_mm", 1e3 * fiber_set_length_m(&c->fibers), "cover", r->cover,
                              "volume_fraction", r->volume_fraction, "overlap_mean", r->overlap_mean, "overlap_max", r->overlap_max);
+    const struct phantom_plied *p = &r->plied;
+    if (o->yarn.n_ply > 0 && cloth != NULL) {
+        json_object_del(cloth, "migration"); /* of the lattice yarn */
+        json_object_del(cloth, "flyaways_per_yarn");
+        json_object_set_new(cloth, "yarn",
+                            json_pack("{s:s,s:i,s:i,s:f,s:[f,f],s:[f,f],s:[f,f],s:i,s:i}", "file", path_name(c->yarn), "plies", (int)o->yarn.n_ply,
+                                      "fibers_per_ply", (int)o->yarn.n_fiber, "scale", p->scale, "ply_turns", p->ply_turns[0], p->ply_turns[1],
+                                      "ply_turns_unrounded", p->wanted_ply_turns[0], p->wanted_ply_turns[1], "fiber_turns", p->fiber_turns[0],
+                                      p->fiber_turns[1], "hairs", (int)p->n_hair, "loops", (int)p->n_loop));
+    }
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
 }
 

@@ -58,6 +58,8 @@ static status check(struct phantom_option *o, struct error *err)
             return error_set_field(err, STATUS_INVALID, "n_yarn", "%zu yarns a tile: a %s wants a multiple of %zu, at most 1000",
                                    o->n_yarn[k], weave_info[o->weave].name, repeat);
     }
+    if (o->yarn.n_ply > 0 && (o->weave == PHANTOM_FELT || o->weave == PHANTOM_VELVET))
+        return error_set_field(err, STATUS_INVALID, "yarn", "a %s takes no plied yarn", weave_info[o->weave].name);
     if (o->vertex_spacing_m == 0.0) o->vertex_spacing_m = 1.5 * o->voxel_size_m;
     if (o->margin_m == 0.0) o->margin_m = 4.0 * o->voxel_size_m;
     const struct {
@@ -111,6 +113,10 @@ static status report_fill(const struct phantom_option *o, const struct fiber_set
     r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * (high - low));
     r->twist_turns = o->weave == PHANTOM_FELT ? 0.0 : round(6.0 * o->twist_turns) / 6.0;
     r->n_fiber_per_yarn = o->weave == PHANTOM_FELT ? 0 : 1 + (o->n_fiber_per_yarn + 4) / 6 * 6;
+    if (o->yarn.n_ply > 0 && o->weave != PHANTOM_FELT) {
+        r->twist_turns = r->plied.ply_turns[0];
+        r->n_fiber_per_yarn = o->yarn.n_ply * o->yarn.n_fiber;
+    }
     size_t size[2];
     return phantom_top_view(f, o->voxel_size_m, size, NULL, &r->cover, err);
 }
@@ -123,6 +129,7 @@ status phantom_generate(const struct phantom_option *option, struct thread_pool 
     *report = (struct phantom_report){0};
     status st = check(&o, err);
     if (st == STATUS_OK) st = make(&s, &o, report, err);
+    report->plied = s.plied;
     if (st == STATUS_OK) st = strand_relax(&s, o.n_relax, pool, progress, &report->overlap_mean, &report->overlap_max, err);
     if (st == STATUS_OK) st = strand_emit(&s, o.vertex_spacing_m, o.margin_m, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);

@@ -4,7 +4,8 @@
  * another) at the opposite face. Weaves and knits are made of yarns: fibers on a hexagonal lattice in a flattened section, turned about
  * the yarn's path by a whole number of sixths of a turn per tile (the lattice maps to itself, so the tile closes). All fibers are then
  * pushed apart until they hardly interpenetrate. Yarn model after Zhao et al. 2016, "Fitting procedural yarn models for realistic cloth
- * rendering" (section 3: packing, twist, migration, fly-aways), without plies; the loop of the knit after Peirce's jersey.
+ * rendering" (section 3: packing, twist, migration, fly-aways), without plies; with the parameters of a real yarn (phantom_yarn_read)
+ * the yarns are plied by the laws of that paper instead; the loop of the knit after Peirce's jersey.
  * Everything follows from the options and the seed: the same numbers for any number of threads.
  */
 #ifndef SELVEDGE_GEOMETRY_PHANTOM_H
@@ -32,6 +33,22 @@ const char *phantom_weave_name(enum phantom_weave w);
 /* STATUS_INVALID listing the names. */
 status phantom_weave_find(const char *name, enum phantom_weave *w, struct error *err);
 
+/* A real yarn: plies about the yarn's centre, fibers about their ply. Lengths are the yarn's own; pairs are mean and standard deviation.
+ * Pitches are lengths of one turn, negative clockwise. */
+struct phantom_yarn_law {
+    size_t n_ply, n_fiber;          /* n_ply 0: no such yarn; fibers a ply */
+    double ply_pitch_m, fiber_pitch_m;
+    double ply_distance_m;          /* of the plies' centres from the yarn's */
+    double ellipse_m[2];            /* half axes of a ply's section: around the yarn, and towards its centre */
+    double epsilon, beta, r_max;    /* radial density of fibers */
+    double migration_waves, rho_min, rho_max; /* waves a turn of the fiber */
+    double hair_per_m, hair_length_m[2], hair_start_m[2], hair_reach_m[2], hair_turn_rad[2]; /* a ply */
+    double loop_per_m, loop_radius_m[2];
+};
+
+/* A parameter file as published for the CT fits of Zhao et al. 2016 ("key: value", centimetres). STATUS_FORMAT names the line. */
+status phantom_yarn_read(const char *path, struct phantom_yarn_law *yarn, struct error *err);
+
 struct phantom_option {
     enum phantom_weave weave;
     uint64_t seed;
@@ -46,6 +63,8 @@ struct phantom_option {
     double twist_turns;        /* turns a tile; rounded to sixths; negative turns the other way */
     double migration;          /* relative amplitude of the radial wandering of fibers, 0 .. 0.5 */
     size_t n_flyaway_per_yarn;
+    struct phantom_yarn_law yarn; /* n_ply > 0: it replaces fibers a yarn, twist, migration and fly-aways */
+    bool yarn_true_size;       /* keep the yarn's lengths; else it is scaled as a whole so that `packing` of a ply's section is fiber */
     double pile_height_m;      /* velvet: above the ground */
     double felt_tile_m;        /* felt: edge of the tile */
     double felt_thickness_m;
@@ -61,7 +80,11 @@ struct phantom_report {
     size_t n_voxel[3];            /* grid that holds one tile */
     double yarn_spacing_m[2], yarn_width_m, yarn_height_m; /* zero without yarns; yarns as designed, before pushing apart */
     size_t n_fiber_per_yarn;
-    double twist_turns;           /* after rounding */
+    double twist_turns;           /* after rounding; plied: of the weft's plies */
+    struct phantom_plied {        /* of a real yarn; 0 weft, 1 warp */
+        double scale, ply_turns[2], wanted_ply_turns[2], fiber_turns[2]; /* turns a tile, rounded so that it closes, and before */
+        size_t n_hair, n_loop;
+    } plied;
     double overlap_mean, overlap_max; /* depth of interpenetration over the diameter: mean over all fiber points, and the largest */
     double cover;                 /* share of the tile's area under at least one fiber, looking along z */
     double volume_fraction;       /* fiber volume over tile area x thickness */

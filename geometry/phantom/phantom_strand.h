@@ -27,6 +27,7 @@ struct strand_set {
     size_t n_node, node_capacity;
     double (*start)[3]; /* where the design put the node */
     double (*p)[3];     /* where it is now */
+    struct phantom_plied plied; /* what was made of a real yarn */
 };
 
 void strand_set_release(struct strand_set *s);
@@ -50,6 +51,21 @@ struct yarn {
     enum strand_cut cut;
     uint32_t number;     /* names its random stream */
 };
+
+/* How a section is mapped to space. */
+struct yarn_section {
+    double wide, high; /* area-preserving flattening */
+    double twist_turns, length_m;
+};
+
+double yarn_length_m(const struct yarn *y);
+/* The point (u, v) of the section before flattening, s tiles along the yarn: u in the cloth's plane, v upwards. */
+void yarn_point(const struct yarn *y, const struct yarn_section *c, double s, double u_m, double v_m, double out[3]);
+
+/* The same as the two below for yarns with plies; scale of the yarn's lengths. */
+double plied_scale(const struct phantom_option *o, double fiber_radius_m);
+double plied_section_radius_m(const struct phantom_option *o, double fiber_radius_m);
+status plied_yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, struct error *err);
 
 /* Radius of a yarn's round section (to the outermost fiber's surface). */
 double yarn_section_radius_m(const struct phantom_option *o, double fiber_radius_m);

@@ -44,6 +44,7 @@ static size_t n_orbit_of(const struct phantom_option *o) { return (o->n_fiber_pe
 
 double yarn_section_radius_m(const struct phantom_option *o, double fiber_radius_m)
 {
+    if (o->yarn.n_ply > 0) return plied_section_radius_m(o, fiber_radius_m);
     size_t n = n_orbit_of(o);
     if (n == 0) return fiber_radius_m;
     struct orbit *orbit = calloc(n, sizeof *orbit);
@@ -84,7 +85,7 @@ static void path_at(const struct yarn *y, double s, double point[3], double b[3]
     n[2] = t[0] * b[1] - t[1] * b[0];
 }
 
-static double path_length_m(const struct yarn *y)
+double yarn_length_m(const struct yarn *y)
 {
     double length = 0.0;
     for (size_t i = 0; i < y->n; i++) {
@@ -98,27 +99,26 @@ static double path_length_m(const struct yarn *y)
     return length;
 }
 
-struct section {
-    double wide, high; /* area-preserving flattening */
-    double twist_turns;
-    double length_m;
-};
-
-/* A point at lattice position (rho_m, angle) of the section, s tiles along the yarn. */
-static void section_point(const struct yarn *y, const struct section *c, double s, double rho_m, double angle, double out[3])
+void yarn_point(const struct yarn *y, const struct yarn_section *c, double s, double u_m, double v_m, double out[3])
 {
     double point[3], b[3], n[3];
     double whole = floor(s);
     path_at(y, s - whole, point, b, n);
+    for (int a = 0; a < 3; a++)
+        out[a] = point[a] + u_m * c->wide * b[a] + v_m * c->high * n[a] + (a < 2 ? whole * y->shift[a] : 0.0);
+}
+
+/* A point at lattice position (rho_m, angle) of the section, s tiles along the yarn. */
+static void section_point(const struct yarn *y, const struct yarn_section *c, double s, double rho_m, double angle, double out[3])
+{
     double turned = angle + 2.0 * M_PI * c->twist_turns * s;
-    double u = rho_m * cos(turned) * c->wide, v = rho_m * sin(turned) * c->high;
-    for (int a = 0; a < 3; a++) out[a] = point[a] + u * b[a] + v * n[a] + (a < 2 ? whole * y->shift[a] : 0.0);
+    yarn_point(y, c, s, rho_m * cos(turned), rho_m * sin(turned), out);
 }
 
 static size_t greatest_divisor(size_t a, size_t b) { return b == 0 ? a : greatest_divisor(b, a % b); }
 
 /* The strands that one orbit of lattice points makes: turning by k sixths a tile, a fiber meets itself after 6 / gcd(k, 6) tiles. */
-static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, const struct section *c,
+static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, const struct yarn_section *c,
                         double rho_m, double angle, struct rng *rng, struct error *err)
 {
     size_t fold = rho_m > 0.0 ? LATTICE_FOLD : 1;
@@ -144,7 +144,7 @@ static status add_orbit(struct strand_set *s, const struct phantom_option *o, co
 
 /* A hair that leaves the yarn's surface and bends away from it. Lengths relative to the yarn after the fits in Zhao et al. 2016:
  * reach about half a yarn radius, with wide scatter. */
-static status add_flyaway(struct strand_set *s, const struct yarn *y, const struct section *c,
+static status add_flyaway(struct strand_set *s, const struct yarn *y, const struct yarn_section *c,
                           double section_radius_m, struct rng *rng, struct error *err)
 {
     double normal[2];
@@ -167,11 +167,12 @@ static status add_flyaway(struct strand_set *s, const struct yarn *y, const stru
 
 status yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, struct error *err)
 {
+    if (o->yarn.n_ply > 0) return plied_yarn_add(s, o, y, err);
     size_t n_orbit = n_orbit_of(o);
     struct orbit *orbit = calloc(n_orbit + 1, sizeof *orbit);
     if (orbit == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
     n_orbit = lattice_orbits(orbit, n_orbit);
-    struct section c = {.wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = path_length_m(y),
+    struct yarn_section c = {.wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = yarn_length_m(y),
                         .twist_turns = round(LATTICE_FOLD * o->twist_turns) / LATTICE_FOLD};
     const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN}, fly_key = {.seed = o->seed, .iteration = STREAM_FLYAWAY};
     struct rng rng;

@@ -333,10 +333,110 @@ static void test_metaimage(void **state)
     volume_release(&v);
 }
 
+static const char yarn_text[] =
+    "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: 0\nfiber_clock_wise: 1\nyarn_alpha: 0.45\nalpha: 0.36\n"
+    "yarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: 0.2\nR_max: 1\nuse_migration: 1\ns_i: 1\n"
+    "rho_min: 0.85\nrho_max: 1\nuse_flyaways: 1\nflyaway_hair_density: 30\nflyaway_hair_ze: 0.002 0.06\nflyaway_hair_r0: 0.02 0.005\n"
+    "flyaway_hair_re: 0.016 0.009\nflyaway_hair_pe: 0.39 0.34\nflyaway_loop_density: 19\nflyaway_loop_r1: 0.025 0.005\n";
+
+/* A yarn file to a tile: every weave of yarns, twists that close it, a seam that every cut fiber crosses. */
+static void test_plied_yarns(void **state)
+{
+    static const enum phantom_weave weave[] = {PHANTOM_PLAIN, PHANTOM_KNIT};
+    const char *path = scratch_path(state, "yarn.txt");
+    scratch_write(path, yarn_text, sizeof yarn_text - 1);
+    for (size_t w = 0; w < 2; w++) {
+        struct phantom_option o;
+        struct phantom_report r;
+        struct fiber_set f;
+        phantom_option_default(&o, weave[w]);
+        o.flatness = 1.0;
+        o.packing = 0.4;
+        o.n_relax = 40;
+        assert_int_equal(phantom_yarn_read(path, &o.yarn, NULL), STATUS_OK);
+        assert_true(o.yarn.n_ply == 3 && o.yarn.n_fiber == 12 && o.yarn.fiber_pitch_m < 0.0 && fabs(o.yarn.ellipse_m[1] - 2e-4) < 1e-12);
+        make(&o, 2, &f, &r);
+        assert_int_equal(r.n_fiber_per_yarn, 36);
+        assert_true(r.plied.n_hair > 0 && r.plied.n_loop > 0);
+        double turns = r.plied.ply_turns[0]; /* thirds, within a sixth of the yarn's own */
+        assert_true(fabs(3.0 * turns - round(3.0 * turns)) < 1e-9 && fabs(turns - r.plied.wanted_ply_turns[0]) < 1.0 / 6.0 + 1e-9);
+        assert_true(turns * r.plied.fiber_turns[0] <= 0.0); /* opposite senses */
+        size_t n_end[2] = {0, 0}; /* of weft fibers at x = 0 and at x = tile */
+        for (size_t i = 0; i < f.n_fiber; i++)
+            for (int e = 0; e < 2; e++) {
+                size_t k = e == 0 ? f.first_vertex[i] : f.first_vertex[i + 1] - 1;
+                double x = (double)f.position_m[3 * k];
+                n_end[0] += fabs(x) < 1e-9;
+                n_end[1] += fabs(x - f.tile_size_m[0]) < 1e-9;
+            }
+        assert_int_equal(n_end[0], n_end[1]);
+        if (weave[w] == PHANTOM_PLAIN) assert_true(n_end[0] >= o.n_yarn[0] * 36 && n_end[0] >= 72);
+        assert_true(r.overlap_mean < 0.12);
+        fiber_set_release(&f);
+    }
+}
+
+/* The four measured yarns, true to the file's lengths or scaled, have the designed share of fiber. */
+static void test_real_yarn_files(void **state)
+{
+    static const char *const name[] = {"cotton1", "polyester1", "rayon1", "silk1"};
+    const char *data = getenv("SELVEDGE_DATA");
+    (void)state;
+    for (size_t i = 0; i < 4; i++) {
+        char path[1024];
+        struct phantom_yarn_law y;
+        struct error err = {0};
+        snprintf(path, sizeof path, "%s/yarns/%s.txt", data != NULL ? data : "../shared/data", name[i]);
+        status s = phantom_yarn_read(path, &y, &err);
+        if (s == STATUS_IO || s == STATUS_NOT_FOUND) {
+            print_message("real data absent: %s (set SELVEDGE_DATA)\n", path);
+            skip();
+        }
+        if (s != STATUS_OK) fail_msg("%s", err.text);
+        assert_true(y.n_ply >= 2 && y.n_fiber >= 33 && y.hair_per_m > 0.0);
+    }
+}
+
+static void test_wrong_yarn_files(void **state)
+{
+    static const struct {
+        const char *from, *to, *part;
+    } change[] = {
+        {"ply_num: 3", "ply_num: 0", "line 1: out of range: 'ply_num'"}, {"alpha: 0.36", "alfa: 0.36", "unknown key 'alfa'"},
+        {"alpha: 0.36", "", "'alpha' is missing"},                        {"beta: 0.2", "beta: nan", "a number is missing after 'beta'"},
+        {"R_max: 1", "R_max: 1 2", "more than a value after 'R_max'"},    {"0.016 0.009", "0.016 -1", "negative: 'flyaway_hair_re'"},
+        {"epsilon: 0.1", "epsilon 0.1", "not 'key: value'"},
+    };
+    const char *path = scratch_path(state, "wrong.txt");
+    for (size_t i = 0; i < sizeof change / sizeof *change; i++) {
+        char text[2048];
+        struct phantom_yarn_law y;
+        struct error err = {0};
+        const char *at = strstr(yarn_text, change[i].from);
+        while (strcmp(change[i].from, "alpha: 0.36") == 0 && at[-1] != '\n') at = strstr(at + 1, change[i].from);
+        int n = snprintf(text, sizeof text, "%.*s%s%s", (int)(at - yarn_text), yarn_text, change[i].to, at + strlen(change[i].from));
+        scratch_write(path, text, (size_t)n);
+        assert_int_equal(phantom_yarn_read(path, &y, &err), STATUS_FORMAT);
+        if (strstr(err.text, change[i].part) == NULL) fail_msg("'%s' is not in '%s'", change[i].part, err.text);
+    }
+    struct phantom_option o;
+    struct phantom_report r;
+    struct fiber_set f;
+    struct error err = {0};
+    phantom_option_default(&o, PHANTOM_FELT);
+    o.yarn.n_ply = 2;
+    fiber_set_init(&f);
+    assert_int_equal(phantom_generate(&o, NULL, NULL, &f, &r, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "yarn");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_weave_is_a_valid_tile),
+        cmocka_unit_test(test_plied_yarns),
+        cmocka_unit_test(test_real_yarn_files),
+        cmocka_unit_test(test_wrong_yarn_files),
         cmocka_unit_test(test_same_fibers_for_any_number_of_threads),
         cmocka_unit_test(test_twill_has_no_seam),
         cmocka_unit_test(test_wrong_options_are_named),
