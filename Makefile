@@ -16,7 +16,8 @@ endif
 
 PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt lapacke openblas zlib libzstd libarchive libpng libcurl
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ') -isystem /usr/include/opencv4
-WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-format-truncation
+# fields left out of an initialiser are zero, and zero is made to mean the usual thing
+WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-format-truncation -Wno-missing-field-initializers
 WARN_C := $(WARN) -Wconversion -Wstrict-prototypes
 WERROR ?= -Werror
 COMMON := -g $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. $(PKG_CFLAGS) $(WERROR)
@@ -111,6 +112,10 @@ demo: | deps       ## the main job, end to end, against a daemon started here
 bench: | deps      ## every figure, one JSON object a line
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BENCH_BINS) >&2
 	@/usr/bin/python3 tests/bench/run_bench.py --build $(BUILD)
+
+bench-transport: | deps ## the renderer's figures (paths a second, time to a given standard error, memory)
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
+	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
 
 layers:            ## includes go one way: base <- geometry <- renderer <- optimizer
 	@/usr/bin/python3 tests/check_layers.py

@@ -16,7 +16,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { SCATTERING_MAX_PARAM = 16 };
+enum {
+    SCATTERING_MAX_PARAM = 16, /* of one model */
+    SCATTERING_MAX_SET = 8,    /* parameter sets in a mixed cloth (scene.h: material groups) */
+    SCATTERING_MAX_FLAT = 64   /* parameters of all sets together */
+};
 
 /* One flat parameter slot. */
 struct param_info {

@@ -1,14 +1,28 @@
-/* One geometric configuration of lamp, camera and cloth: what a photograph was taken under.
+/* One geometric configuration of lamp, camera and cloth: what a photograph was taken under. Fields that a caller leaves
+ * zero below the crop mean a square lamp, no other light and a perspective camera.
  *
  * World frame: the orbit centre is the origin on the cloth's top surface, z the cloth normal, +x the weft at rotation
  * 0. theta is measured from the normal, phi from +x towards +y. Turning the cloth by cloth_rotation_rad turns it about
  * z, counter- clockwise seen from the camera side, under fixed lamp and camera.
  *
  * Radiance unit everywhere in Selvedge: the lamp is scaled so that a perfect white diffuser at the orbit centre FACING
- * the lamp would have radiance 1 (irradiance pi from a lamp at the same distance).
+ * the lamp would have radiance 1 (irradiance pi from a lamp at the same distance). Environments are plain radiance in that unit.
  */
 #ifndef SELVEDGE_RENDERER_CONFIGURATION_H
 #define SELVEDGE_RENDERER_CONFIGURATION_H
+
+struct environment; /* renderer/transport/environment.h */
+
+enum configuration_light {
+    LIGHT_SQUARE_LAMP = 0,
+    LIGHT_DIRECTIONAL, /* parallel light from (light_theta, light_phi) with irradiance pi; no distance, no side */
+    LIGHT_NO_LAMP      /* only the environment, if any */
+};
+
+enum configuration_camera {
+    CAMERA_PERSPECTIVE = 0,
+    CAMERA_FAR_FIELD /* orthographic: every ray runs along the view direction; no distance */
+};
 
 struct configuration {
     double light_theta_rad,
@@ -19,6 +33,13 @@ struct configuration {
     double lamp_side_m;       /* 0.10: square lamp, facing the orbit centre, one edge horizontal */
     double camera_distance_m; /* perspective camera; default 1.0 */
     double crop_m; /* 0.01: edge of the square crop, measured at the orbit centre perpendicular to the view */
+
+    double crop_aspect; /* width over height of the crop, whose width is crop_m; 0: 1 */
+    double environment_rgb[3]; /* radiance of a constant environment, besides the lamp; 0: none */
+    const struct environment *environment; /* an image around the scene, fixed to the world (not turned with the cloth),
+                                              besides the lamp; not owned; NULL: none */
+    enum configuration_light light;
+    enum configuration_camera camera;
 };
 
 #endif

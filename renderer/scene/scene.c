@@ -77,6 +77,26 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
     return STATUS_OK;
 }
 
+static status copy_groups(struct scene *s, const struct fiber_set *f, const struct scene_option *o, struct error *err)
+{
+    const uint8_t *group = o->fiber_group != NULL ? o->fiber_group : o->group_by_axis_class ? f->axis_class : NULL;
+    s->n_group = 1;
+    if (group == NULL) return STATUS_OK;
+    s->segment_group = malloc(s->n_segment);
+    if (s->segment_group == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu segments", s->n_segment);
+    for (size_t i = 0; i < s->n_segment; i++) {
+        uint8_t g = group[s->segment_fiber[i]];
+        if (g >= SCENE_MAX_GROUP)
+            return error_set_field(err, STATUS_INVALID, "fiber_group",
+                                   "cannot build scene: fiber %u has material group %u, allowed are 0 to %d",
+                                   s->segment_fiber[i], g, SCENE_MAX_GROUP - 1);
+        s->segment_group[i] = g;
+        if (g >= s->n_group) s->n_group = (size_t)g + 1;
+    }
+    return STATUS_OK;
+}
+
 /* How far a local origin in the centre tile may travel before the block's copies no longer cover it. */
 static status choose_block(struct scene *s, const struct fiber_set *f, struct error *err)
 {
@@ -150,6 +170,7 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
     s->black_sheet = o->black_sheet;
     st = copy_fibers(s, f, err);
+    if (st == STATUS_OK) st = copy_groups(s, f, o, err);
     if (st != STATUS_OK) goto out;
     st = choose_block(s, f, err);
     if (st != STATUS_OK) goto out;
@@ -187,6 +208,7 @@ void scene_free(struct scene *s)
     free(s->segment_vertex);
     free(s->segment_fiber);
     free(s->segment_flag);
+    free(s->segment_group);
     free(s);
 }
 
@@ -194,10 +216,15 @@ size_t scene_memory_bytes(const struct scene *s)
 {
     long long device = atomic_load(&s->device_bytes);
     return sizeof *s + (device > 0 ? (size_t)device : 0) + s->n_vertex * sizeof *s->vertex +
-           s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1);
+           s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1 + (s->segment_group != NULL));
 }
 
 size_t scene_n_segment(const struct scene *s) { return s->n_segment; }
 uint32_t scene_fiber_of(const struct scene *s, uint32_t i_segment) { return s->segment_fiber[i_segment]; }
+uint32_t scene_group_of(const struct scene *s, uint32_t i_segment)
+{
+    return s->segment_group == NULL ? 0 : s->segment_group[i_segment];
+}
+size_t scene_n_group(const struct scene *s) { return s->n_group; }
 bool scene_has_black_sheet(const struct scene *s) { return s->black_sheet; }
 double scene_thickness_mm(const struct scene *s) { return -(double)s->bottom_mm; }

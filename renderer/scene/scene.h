@@ -9,11 +9,17 @@
 #include "geometry/fibers/fiber_set.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
 struct scene;
 
+/* Fibers may belong to material groups (yarn classes), each with scattering parameters of its own. */
+enum { SCENE_MAX_GROUP = 8 };
+
 struct scene_option {
     bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
+    bool group_by_axis_class; /* group = the fiber's axis class (weft, warp, pile); otherwise all fibers are group 0 */
+    const uint8_t *fiber_group; /* n_fiber groups below SCENE_MAX_GROUP instead; copied; NULL: none given */
 };
 
 /* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_INVALID. */
@@ -21,5 +27,7 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
 void scene_free(struct scene *scene);
 size_t scene_memory_bytes(const struct scene *scene);
 size_t scene_n_segment(const struct scene *scene);
+/* The highest group of any fiber, plus 1. */
+size_t scene_n_group(const struct scene *scene);
 
 #endif

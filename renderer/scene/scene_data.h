@@ -21,6 +21,8 @@ struct scene {
     uint32_t *segment_vertex; /* first of two */
     uint32_t *segment_fiber;
     unsigned char *segment_flag;
+    uint8_t *segment_group; /* NULL: all 0 */
+    size_t n_group;
     double tile_mm[2];
     int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
     float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */

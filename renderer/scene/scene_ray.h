@@ -43,6 +43,8 @@ bool scene_ray_enter(const struct scene *scene, const double origin_mm[3], const
 
 /* Index in the fiber set of a hit segment's fiber. */
 uint32_t scene_fiber_of(const struct scene *scene, uint32_t i_segment);
+/* Material group of that fiber. */
+uint32_t scene_group_of(const struct scene *scene, uint32_t i_segment);
 
 bool scene_has_black_sheet(const struct scene *scene);
 /* z of the lowest fiber surface (the top is 0). */

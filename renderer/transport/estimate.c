@@ -9,10 +9,10 @@
 
 enum { BLOCK_PATHS = 256, TASKS_PER_CONFIGURATION = 1024, N_VALUE = 3 + PATH_N_DERIVATIVE };
 
-/* Sums over the paths of one task, in path order. */
+/* Sums over the paths of one task, in path order: n_value sums and n_value sums of squares. */
 struct task_sum {
-    double x[N_VALUE], x2[N_VALUE];
     uint64_t n_path, n_vertex;
+    double *x, *x2;
 };
 
 struct task {
@@ -27,6 +27,8 @@ struct run {
     struct task *task;
     size_t n_task;
     struct task_sum *sum; /* per task */
+    double *sum_storage;
+    size_t n_flat, n_value; /* derivatives of a channel; radiance and derivatives */
 };
 
 static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t i_block, struct task_sum *sum)
@@ -34,7 +36,7 @@ static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t 
     const struct estimate_request *q = r->q;
     const struct path_setting *s = &r->setting[i_configuration];
     const struct rng_key key = {q->seed, q->iteration, q->replica, i_configuration};
-    size_t n_jac = q->want_jacobian ? 3 * q->model->n_param : 0;
+    size_t n_jac = r->n_value - 3;
     for (uint32_t i = 0; i < BLOCK_PATHS; i++) {
         struct rng rng;
         struct scene_ray ray;
@@ -88,12 +90,29 @@ static status make_tasks(struct run *r, struct error *err)
         if (pass == 0) {
             r->task = malloc((n + 1) * sizeof *r->task);
             r->sum = calloc(n + 1, sizeof *r->sum);
-            if (r->task == NULL || r->sum == NULL)
+            r->sum_storage = calloc(n + 1, 2 * r->n_value * sizeof *r->sum_storage);
+            if (r->task == NULL || r->sum == NULL || r->sum_storage == NULL)
                 return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu tasks", n);
         }
     }
     r->n_task = n;
+    for (size_t i = 0; i < n; i++) {
+        r->sum[i].x = r->sum_storage + 2 * r->n_value * i;
+        r->sum[i].x2 = r->sum[i].x + r->n_value;
+    }
     return STATUS_OK;
+}
+
+static bool configuration_makes_sense(const struct configuration *c)
+{
+    double sum =
+        c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
+    bool lamp = c->light != LIGHT_SQUARE_LAMP || (c->light_distance_m > 0 && c->lamp_side_m > 0);
+    bool environment = true;
+    for (int k = 0; k < 3; k++) environment &= c->environment_rgb[k] >= 0 && isfinite(c->environment_rgb[k]);
+    return isfinite(sum) && c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2 && lamp && environment &&
+           c->light <= LIGHT_NO_LAMP && c->camera <= CAMERA_FAR_FIELD && c->crop_m > 0 && c->crop_aspect >= 0 &&
+           isfinite(c->crop_aspect) && (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0);
 }
 
 static status check_request(const struct estimate_request *q, struct error *err)
@@ -108,12 +127,9 @@ static status check_request(const struct estimate_request *q, struct error *err)
                                q->replica);
     for (size_t i = 0; i < q->n_configuration; i++) {
         const struct configuration *c = &q->configuration[i];
-        double sum =
-            c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
-        if (!isfinite(sum) || !(c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2) ||
-            !(c->light_distance_m > 0) || !(c->lamp_side_m > 0) || !(c->camera_distance_m > 0) || !(c->crop_m > 0))
+        if (!configuration_makes_sense(c))
             return error_set_field(err, STATUS_INVALID, "configuration",
-                                   "cannot estimate configuration %zu: angles or distances make no sense", i);
+                                   "cannot estimate configuration %zu: angles, distances or lights make no sense", i);
     }
     return STATUS_OK;
 }
@@ -127,13 +143,13 @@ static double mean_variance(double x, double x2, double n)
 static status reduce(const struct run *r, struct estimate *out, struct error *err)
 {
     const struct estimate_request *q = r->q;
-    size_t n_jac = q->want_jacobian ? 3 * q->model->n_param : 0, i_task = 0;
+    size_t i_task = 0;
     for (size_t i = 0; i < q->n_configuration; i++) {
-        struct task_sum total;
-        memset(&total, 0, sizeof total);
+        double x[N_VALUE] = {0}, x2[N_VALUE] = {0};
+        struct task_sum total = {0, 0, x, x2};
         for (; i_task < r->n_task && r->task[i_task].i_configuration == i; i_task++) {
             const struct task_sum *s = &r->sum[i_task];
-            for (size_t k = 0; k < 3 + n_jac; k++) {
+            for (size_t k = 0; k < r->n_value; k++) {
                 total.x[k] += s->x[k];
                 total.x2[k] += s->x2[k];
             }
@@ -146,12 +162,12 @@ static status reduce(const struct run *r, struct estimate *out, struct error *er
         e->n_vertex = total.n_vertex;
         if (total.n_path == 0) continue;
         double n = (double)total.n_path;
-        for (size_t k = 0; k < 3 + n_jac; k++) {
+        for (size_t k = 0; k < r->n_value; k++) {
+            const char *name = k < 3 ? "" : q->model->param[(k - 3) % q->model->n_param].name;
             if (!isfinite(total.x2[k]))
-                return error_set_field(
-                    err, STATUS_NUMERIC, k < 3 ? "" : q->model->param[(k - 3) % q->model->n_param].name,
-                    "scattering model '%s' gave a value that is not finite in configuration %zu (%s)", q->model->id, i,
-                    k < 3 ? "radiance" : q->model->param[(k - 3) % q->model->n_param].name);
+                return error_set_field(err, STATUS_NUMERIC, name,
+                                       "scattering model '%s' gave a value that is not finite in configuration %zu (%s)",
+                                       q->model->id, i, k < 3 ? "radiance" : name);
             double mean = total.x[k] / n, var = mean_variance(total.x[k], total.x2[k], n);
             if (k < 3) {
                 e->mean[k] = mean;
@@ -168,12 +184,14 @@ static status reduce(const struct run *r, struct estimate *out, struct error *er
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,
                     struct estimate *out, struct error *err)
 {
-    struct scattering_state *state = NULL;
+    struct parameter_sets sets;
     struct run r = {.q = q, .progress = progress};
     status st = check_request(q, err);
     if (st != STATUS_OK) return st;
-    st = q->model->prepare(q->param, &state, err);
-    if (st != STATUS_OK) return st;
+    st = parameter_sets_init(&sets, q->scene, q->model, q->param, q->n_set, err);
+    if (st != STATUS_OK) goto out;
+    r.n_flat = sets.n * q->model->n_param;
+    r.n_value = 3 + (q->want_jacobian ? 3 * r.n_flat : 0);
     r.setting = malloc((q->n_configuration + 1) * sizeof *r.setting);
     r.camera = malloc((q->n_configuration + 1) * sizeof *r.camera);
     if (r.setting == NULL || r.camera == NULL) {
@@ -181,7 +199,7 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
         goto out;
     }
     for (size_t i = 0; i < q->n_configuration; i++) {
-        path_setting_init(&r.setting[i], q->scene, q->model, state, &q->configuration[i], q->want_jacobian);
+        path_setting_init_sets(&r.setting[i], q->scene, &sets, &q->configuration[i], q->want_jacobian);
         camera_init(&r.camera[i], &q->configuration[i]);
     }
     st = make_tasks(&r, err);
@@ -195,9 +213,10 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
     st = reduce(&r, out, err);
 out:
     free(r.sum);
+    free(r.sum_storage);
     free(r.task);
     free(r.camera);
     free(r.setting);
-    q->model->release(state);
+    parameter_sets_release(&sets);
     return st;
 }

@@ -16,24 +16,27 @@
 struct estimate_request {
     const struct scene *scene;
     const struct scattering_model *model;
-    const double *param; /* model->n_param, internal units */
+    const double *param; /* model->n_param for each set, internal units */
     const struct configuration *configuration;
     size_t n_configuration;
     const size_t *n_path; /* per configuration; rounded up to whole blocks of 256; 0: skip, result n_path = 0 */
     uint64_t seed;
     uint32_t iteration, replica; /* rng.h; configuration i uses stream configuration = i */
     bool want_jacobian;
+    size_t n_set; /* parameter sets for the scene's material groups; 0 and 1: one set for all fibers */
 };
 
 /* rgb means in radiance units. */
 struct estimate {
     double mean[3], var[3];               /* var: of the mean */
-    double jac[3 * SCATTERING_MAX_PARAM]; /* d mean[c] / d param p at [c * n_param + p], by internal unit */
-    double jac_var[3 * SCATTERING_MAX_PARAM];
+    double jac[3 * SCATTERING_MAX_FLAT];  /* d mean[c] / d flat param p at [c * n_flat + p], by internal unit, with
+                                             n_flat = n_param of the model * number of sets */
+    double jac_var[3 * SCATTERING_MAX_FLAT];
     uint64_t n_path, n_vertex;
 };
 
-/* out: n_configuration estimates. STATUS_CANCELLED, STATUS_NUMERIC (naming model and configuration when a NaN appears).
+/* out: n_configuration estimates. STATUS_INVALID (a configuration, a parameter, fewer sets than groups),
+ * STATUS_CANCELLED, STATUS_NUMERIC (naming model and configuration when a NaN appears).
  */
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,
                     struct estimate *out, struct error *err);

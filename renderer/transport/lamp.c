@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#define DIRECTIONAL_PER_SR 0x1p60f
+
 static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 void lamp_init(struct lamp *l, const struct configuration *c)
@@ -18,6 +20,11 @@ void lamp_init(struct lamp *l, const struct configuration *c)
         l->edge[0][a] = (float)horizontal[a];
         l->edge[1][a] = (float)other[a];
     }
+    l->directional = c->light == LIGHT_DIRECTIONAL;
+    if (l->directional) {
+        l->radiance = (float)M_PI * DIRECTIONAL_PER_SR;
+        return;
+    }
     l->half_side_mm = (float)(500 * c->lamp_side_m);
     /* irradiance at the orbit centre per radiance, in closed form: a square seen from its axis */
     double x = 0.5 * c->lamp_side_m / c->light_distance_m, y = x / sqrt(1 + x * x);
@@ -27,6 +34,11 @@ void lamp_init(struct lamp *l, const struct configuration *c)
 bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u[2], float direction[3],
                  float *pdf_per_sr)
 {
+    if (l->directional) {
+        for (int a = 0; a < 3; a++) direction[a] = -l->normal[a];
+        *pdf_per_sr = DIRECTIONAL_PER_SR;
+        return true;
+    }
     float x = (2 * u[0] - 1) * l->half_side_mm, y = (2 * u[1] - 1) * l->half_side_mm, to[3];
     for (int a = 0; a < 3; a++) to[a] = l->centre_mm[a] + x * l->edge[0][a] + y * l->edge[1][a] - position_mm[a];
     float r2 = dot(to, to), r = sqrtf(r2), cos_r = -dot(to, l->normal);
@@ -39,7 +51,7 @@ bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u
 float lamp_pdf(const struct lamp *l, const float position_mm[3], const float direction[3])
 {
     float to[3], cos_l = -dot(direction, l->normal);
-    if (!(cos_l > 0)) return 0;
+    if (!(cos_l > 0) || l->directional) return 0;
     for (int a = 0; a < 3; a++) to[a] = l->centre_mm[a] - position_mm[a];
     float t = -dot(to, l->normal) / cos_l;
     if (!(t > 0)) return 0;

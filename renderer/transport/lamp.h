@@ -1,6 +1,8 @@
-/* The square lamp of a configuration, in the frame of the (turned) cloth: millimetres, orbit centre at the origin.
- * It faces the orbit centre, one edge is horizontal, and it shines from its front side only. Its radiance makes the
+/* The lamp of a configuration, square or directional, in the frame of the (turned) cloth: millimetres, orbit centre at the origin.
+ * The square one faces the orbit centre, one edge is horizontal, and it shines from its front side only. Its radiance makes the
  * irradiance on a surface at the orbit centre that faces the lamp exactly pi (configuration.h).
+ * The directional one is treated as a lamp of 2^-60 sr: its weight against scattering samples rounds to 1, and they
+ * never meet it.
  */
 #ifndef SELVEDGE_RENDERER_LAMP_H
 #define SELVEDGE_RENDERER_LAMP_H
@@ -15,6 +17,7 @@ struct lamp {
     float normal[3];  /* unit, towards the orbit centre */
     float half_side_mm;
     float radiance;
+    bool directional;
 };
 
 void lamp_init(struct lamp *lamp, const struct configuration *c);

@@ -1,5 +1,7 @@
 #include "renderer/transport/path_tracer.h"
 
+#include "renderer/transport/fiber_frame.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -16,53 +18,27 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     memset(s, 0, sizeof *s);
     s->scene = scene;
     s->model = model;
-    s->state = state;
-    lamp_init(&s->lamp, c);
-    s->has_lamp = true;
+    s->state[0] = state;
+    s->n_set = 1;
+    s->has_lamp = c->light != LIGHT_NO_LAMP;
+    if (s->has_lamp) lamp_init(&s->lamp, c);
+    for (int k = 0; k < 3; k++) {
+        s->environment[k] = (float)c->environment_rgb[k];
+        if (s->environment[k] > 0) s->has_environment = true;
+    }
+    s->image = c->environment;
+    s->image_turn[0] = (float)cos(c->cloth_rotation_rad);
+    s->image_turn[1] = (float)sin(c->cloth_rotation_rad);
     s->roulette_below = ROULETTE_BELOW;
     s->want_jacobian = want_jacobian;
 }
 
-/* Fiber frame: u along the fiber, v and w any two perpendicular to it (Duff et al. 2017, "Building an orthonormal
- * basis, revisited"). */
-struct frame {
-    float u[3], v[3], w[3];
-};
-
-static inline void frame_from(struct frame *f, const float u[3])
+void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
+                            const struct configuration *c, bool want_jacobian)
 {
-    float sign = copysignf(1, u[2]), a = -1 / (sign + u[2]), b = u[0] * u[1] * a;
-    memcpy(f->u, u, sizeof f->u);
-    f->v[0] = 1 + sign * u[0] * u[0] * a;
-    f->v[1] = sign * b;
-    f->v[2] = -sign * u[0];
-    f->w[0] = b;
-    f->w[1] = sign + u[1] * u[1] * a;
-    f->w[2] = -u[1];
-}
-
-static inline float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static inline void to_local(const struct frame *f, const float d[3], float out[3])
-{
-    out[0] = dot(f->u, d);
-    out[1] = dot(f->v, d);
-    out[2] = dot(f->w, d);
-}
-
-static inline void to_world(const struct frame *f, const float d[3], float out[3])
-{
-    for (int a = 0; a < 3; a++) out[a] = d[0] * f->u[a] + d[1] * f->v[a] + d[2] * f->w[a];
-    float inv = 1 / sqrtf(dot(out, out));
-    for (int a = 0; a < 3; a++) out[a] *= inv;
-}
-
-static inline float cos_theta(const float local[3]) { return sqrtf(local[1] * local[1] + local[2] * local[2]); }
-
-static inline float power_heuristic(float a, float b)
-{
-    float r = b / a;
-    return 1 / (1 + r * r);
+    path_setting_init(s, scene, sets->model, sets->state[0], c, want_jacobian);
+    s->n_set = sets->n;
+    for (size_t i = 0; i < sets->n; i++) s->state[i] = sets->state[i];
 }
 
 static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
@@ -78,10 +54,11 @@ struct walk {
     struct rng *rng;
     struct path_result *out;
     struct path_step *step; /* being recorded, or NULL */
-    size_t n_score;
+    const struct scattering_state *state; /* of the fiber that was hit */
+    size_t i_set;                         /* its parameter set */
     float throughput[3];
-    float h[PATH_N_DERIVATIVE]; /* running score sums */
-    float score[PATH_N_DERIVATIVE];
+    float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
+    float h[PATH_N_DERIVATIVE];            /* running score sums, laid out as path_result's derivatives */
 };
 
 /* Adds value * (1, H + score) to the result; score NULL: the last step's are in H already. */
@@ -89,10 +66,12 @@ static inline void add_light(struct walk *w, const float value[3], const float *
 {
     for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
     if (!w->s->want_jacobian) return;
-    size_t n = w->s->model->n_param;
+    size_t n = w->s->model->n_param, i = 0;
     for (size_t c = 0; c < 3; c++)
-        for (size_t p = c * n; p < (c + 1) * n; p++)
-            w->out->jac[p] += value[c] * (w->h[p] + (score != NULL ? score[p] : 0));
+        for (size_t k = 0; k < w->s->n_set; k++) {
+            const float *own = score != NULL && k == w->i_set ? score + c * n : NULL;
+            for (size_t p = 0; p < n; p++, i++) w->out->jac[i] += value[c] * (w->h[i] + (own != NULL ? own[p] : 0));
+        }
 }
 
 /* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
@@ -103,7 +82,7 @@ static void keep_nan(struct walk *w, const float value[3])
 
 /* Next-event estimation: one point on the lamp. */
 static void connect_lamp(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
-                         const struct frame *f, const float wo[3])
+                         const struct fiber_frame *f, const float wo[3])
 {
     const struct path_setting *s = w->s;
     float position[3], u[2], direction[3], pdf_lamp, wi[3], s_rgb[3];
@@ -113,7 +92,7 @@ static void connect_lamp(struct walk *w, const struct scene_ray *ray, const stru
     if (!lamp_sample(&s->lamp, position, u, direction, &pdf_lamp)) return;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
     to_local(f, direction, wi);
-    float pdf = s->model->eval_pdf(s->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float light = s->lamp.radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
     for (int c = 0; c < 3; c++) {
         value[c] = w->throughput[c] * s_rgb[c] * light;
@@ -139,6 +118,64 @@ static void connect_lamp(struct walk *w, const struct scene_ray *ray, const stru
     }
 }
 
+/* About the cloth normal, from the cloth's frame to the world's and back. */
+static inline void turn(const float by[2], float sign, const float d[3], float out[3])
+{
+    out[0] = by[0] * d[0] - sign * by[1] * d[1];
+    out[1] = sign * by[1] * d[0] + by[0] * d[1];
+    out[2] = d[2];
+}
+
+/* Next-event estimation: one direction of the image environment. */
+static void connect_image(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
+                          const struct fiber_frame *f, const float wo[3])
+{
+    const struct path_setting *s = w->s;
+    float u[2], world[3], direction[3], radiance[3], pdf_image, wi[3], s_rgb[3], value[3], most = 0;
+    u[0] = rng_float(w->rng);
+    u[1] = rng_float(w->rng);
+    if (!environment_sample(s->image, u, world, radiance, &pdf_image)) return;
+    if (world[2] <= 0 && scene_has_black_sheet(s->scene)) return;
+    turn(s->image_turn, -1, world, direction);
+    to_local(f, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float weight = cos_theta(wi) / pdf_image * power_heuristic(pdf_image, pdf);
+    for (int c = 0; c < 3; c++) {
+        radiance[c] *= weight;
+        value[c] = w->throughput[c] * s_rgb[c] * radiance[c];
+        most = value[c] > most ? value[c] : most;
+    }
+    if (!(most > 0)) {
+        keep_nan(w, value);
+        return;
+    }
+    if (most < SHADOW_BELOW) {
+        float survival = most / SHADOW_BELOW;
+        if (rng_float(w->rng) >= survival) return;
+        for (int c = 0; c < 3; c++) {
+            radiance[c] /= survival;
+            value[c] /= survival;
+        }
+    }
+    struct scene_ray shadow;
+    scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
+    if (scene_occluded(s->scene, &shadow)) return;
+    add_light(w, value, w->score);
+    if (w->step != NULL) {
+        memcpy(w->step->image_wi, wi, sizeof wi);
+        memcpy(w->step->image, radiance, sizeof radiance);
+    }
+}
+
+static void add_image(const struct path_setting *s, const float direction[3], float pdf, float beyond[3])
+{
+    float world[3], radiance[3];
+    turn(s->image_turn, 1, direction, world);
+    float pdf_image = environment_at(s->image, world, radiance);
+    float share = pdf > 0 ? power_heuristic(pdf, pdf_image) : 1;
+    for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
+}
+
 /* Radiance that a ray meets beyond the cloth. pdf: of the scattering sample that made it, 0 for a camera ray. */
 static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 {
@@ -153,20 +190,30 @@ static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
         for (int c = 0; c < 3; c++) beyond[c] = share;
     }
     for (int c = 0; c < 3 && s->has_environment; c++) beyond[c] += s->environment[c];
+    if (s->image != NULL) add_image(s, ray->direction, pdf, beyond);
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * beyond[c];
     if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
     if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
 }
 
+static inline void add_scores(struct walk *w)
+{
+    size_t n = w->s->model->n_param;
+    for (size_t c = 0; c < 3; c++) {
+        float *h = w->h + (c * w->s->n_set + w->i_set) * n;
+        for (size_t p = 0; p < n; p++) h[p] += w->score[c * n + p];
+    }
+}
+
 /* Scatters the ray at the hit. False: roulette (or a dark fiber) ends the path. */
-static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hit *hit, const struct frame *f,
+static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hit *hit, const struct fiber_frame *f,
                     const float wo[3], float *pdf_out)
 {
     const struct path_setting *s = w->s;
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
-    s->model->sample(s->state, wo, w->throughput, u, wi);
-    float pdf = s->model->eval_pdf(s->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    s->model->sample(w->state, wo, w->throughput, u, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = cos_theta(wi) / pdf, most = 0, next[3];
     for (int c = 0; c < 3; c++) {
         next[c] = w->throughput[c] * s_rgb[c] * weight;
@@ -181,8 +228,7 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
         if (rng_float(w->rng) >= survival) return false;
     }
     for (int c = 0; c < 3; c++) w->throughput[c] = next[c] / survival;
-    if (s->want_jacobian)
-        for (size_t p = 0; p < w->n_score; p++) w->h[p] += w->score[p];
+    if (s->want_jacobian) add_scores(w);
     if (w->step != NULL) {
         memcpy(w->step->wi, wi, sizeof wi);
         w->step->weight = weight / survival;
@@ -203,11 +249,29 @@ static struct path_step *next_step(struct path_record *r)
     return &r->step[i];
 }
 
+static void walk_start(struct walk *w, const struct path_setting *s, struct rng *rng, struct path_result *out)
+{
+    w->s = s;
+    w->rng = rng;
+    w->out = out;
+    w->step = NULL;
+    w->state = s->state[0];
+    w->i_set = 0;
+    for (int c = 0; c < 3; c++) {
+        w->throughput[c] = 1;
+        out->radiance[c] = 0;
+    }
+    out->n_vertex = 0;
+}
+
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record)
 {
-    struct walk w = {.s = s, .rng = rng, .out = out, .n_score = 3 * s->model->n_param, .throughput = {1, 1, 1}};
-    memset(out, 0, sizeof *out);
+    struct walk w; /* large: only what is used is set */
+    size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0;
+    walk_start(&w, s, rng, out);
+    memset(w.h, 0, n_flat * sizeof *w.h);
+    memset(out->jac, 0, n_flat * sizeof *out->jac);
     float pdf = 0;
     for (uint32_t i = 0; i < PATH_MAX_VERTEX; i++) {
         struct scene_hit hit;
@@ -217,12 +281,20 @@ void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng 
         }
         out->n_vertex++;
         w.step = next_step(record);
-        struct frame f;
-        frame_from(&f, hit.tangent);
+        struct fiber_frame f;
+        fiber_frame_from(&f, hit.tangent);
         float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
         to_local(&f, back, wo);
-        if (w.step != NULL) memcpy(w.step->wo, wo, sizeof wo);
+        if (s->n_set > 1) {
+            w.i_set = scene_group_of(s->scene, hit.i_segment);
+            w.state = s->state[w.i_set];
+        }
+        if (w.step != NULL) {
+            memcpy(w.step->wo, wo, sizeof wo);
+            w.step->i_group = scene_group_of(s->scene, hit.i_segment);
+        }
         if (s->has_lamp) connect_lamp(&w, ray, &hit, &f, wo);
+        if (s->image != NULL) connect_image(&w, ray, &hit, &f, wo);
         if (!scatter(&w, ray, &hit, &f, wo, &pdf)) return;
     }
 }

@@ -9,39 +9,51 @@
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scene/scene_ray.h"
+#include "renderer/transport/environment.h"
 #include "renderer/transport/lamp.h"
+#include "renderer/transport/parameter_sets.h"
 
-enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_PARAM };
+enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT };
 
 struct path_setting {
     const struct scene *scene;
     const struct scattering_model *model;
-    const struct scattering_state *state;
+    const struct scattering_state *state[SCATTERING_MAX_SET]; /* by material group */
+    size_t n_set;                                            /* 1: the first serves all groups */
     struct lamp lamp;
     bool has_lamp;
     bool has_environment;
     float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
+    const struct environment *image; /* or NULL */
+    float image_turn[2]; /* cosine and sine of the angle from the cloth's frame to the world's */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     bool want_jacobian;
 };
 
-/* Roulette at the usual place, the configuration's lamp, no environment. */
+/* Roulette at the usual place, the configuration's lights, one parameter set. */
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
                        const struct scattering_state *state, const struct configuration *c, bool want_jacobian);
 
+/* The same with a parameter set for each material group; they must outlive the setting. */
+void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
+                            const struct configuration *c, bool want_jacobian);
+
+/* Only the first 3 * n_set * n_param derivatives are set. */
 struct path_result {
     float radiance[3];
-    float jac[PATH_N_DERIVATIVE]; /* [c * n_param + p] */
+    float jac[PATH_N_DERIVATIVE]; /* [c * n_set * n_param + i_set * n_param + p] */
     uint32_t n_vertex;
 };
 
-/* All that a path's value depends on besides S: value = sum over steps of T S(light_wi, wo) light + T' escape with
- * T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
+/* All that a path's value depends on besides S: value = sum over steps of
+ * T (S(light_wi, wo) light + S(image_wi, wo) image) + T' escape with T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
 struct path_step {
     float wo[3], wi[3];
     float weight; /* cos th_i / (density * survival) */
     float light_wi[3];
     float light;     /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
+    float image_wi[3], image[3]; /* the same for a sample of the image environment, rgb */
+    uint32_t i_group;            /* material group: S is that group's */
     float escape[3]; /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
 };
 

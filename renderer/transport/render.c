@@ -18,14 +18,14 @@ struct run {
     struct path_setting setting;
     struct camera camera;
     struct image *im;
-    size_t pixels_per_task, n_pixel;
+    size_t pixels_per_task, n_pixel, n_flat;
 };
 
 static void render_pixel(struct run *r, size_t i_pixel)
 {
     const struct render_request *q = r->q;
     const struct rng_key key = {q->seed, RENDER_ITERATION, RENDER_REPLICA, q->stream};
-    size_t n_jac = q->want_derivative ? 3 * q->model->n_param : 0;
+    size_t n_flat = r->n_flat, n_jac = q->want_derivative ? 3 * n_flat : 0;
     double x[3 + PATH_N_DERIVATIVE] = {0}, x2[3] = {0}, n = (double)q->n_sample;
     for (size_t i = 0; i < q->n_sample; i++) {
         struct rng rng;
@@ -48,8 +48,7 @@ static void render_pixel(struct run *r, size_t i_pixel)
         out[k] = (float)mean;
         out[3 + k] = q->n_sample > 1 ? (float)(fmax(0, x2[k] - x[k] * mean) / (n * (n - 1))) : INFINITY;
     }
-    size_t n_param = q->model->n_param;
-    for (size_t k = 0; k < n_jac; k++) out[6 + 3 * (k % n_param) + k / n_param] = (float)(x[3 + k] / n);
+    for (size_t k = 0; k < n_jac; k++) out[6 + 3 * (k % n_flat) + k / n_flat] = (float)(x[3 + k] / n);
 }
 
 static void run_task(void *context, size_t i_task, size_t i_thread)
@@ -61,7 +60,7 @@ static void run_task(void *context, size_t i_task, size_t i_thread)
 }
 
 /* One block: the array of pointers, then the texts. */
-static status name_channels(struct image *im, const struct scattering_model *m, struct error *err)
+static status name_channels(struct image *im, const struct scattering_model *m, size_t n_set, struct error *err)
 {
     static const char channel[] = "RGB";
     size_t n = im->n_channel;
@@ -74,8 +73,11 @@ static status name_channels(struct image *im, const struct scattering_model *m, 
             snprintf(text, NAME_BYTES, "%c", channel[i]);
         else if (i < 6)
             snprintf(text, NAME_BYTES, "var.%c", channel[i - 3]);
-        else
+        else if (n_set == 1)
             snprintf(text, NAME_BYTES, "d_%s.%c", m->param[(i - 6) / 3].name, channel[i % 3]);
+        else
+            snprintf(text, NAME_BYTES, "d_set%zu.%s.%c", (i - 6) / 3 / m->n_param, m->param[(i - 6) / 3 % m->n_param].name,
+                     channel[i % 3]);
         name[i] = text;
     }
     im->channel_name = name;
@@ -97,20 +99,24 @@ static status check_finite(const struct image *im, const struct scattering_model
 status render_run(const struct render_request *q, struct thread_pool *pool, const struct progress *progress,
                   struct image *im, struct error *err)
 {
-    struct scattering_state *state = NULL;
+    struct parameter_sets sets;
     memset(im, 0, sizeof *im);
     if (q->n_sample == 0 || q->n_sample > UINT32_MAX || q->width == 0 || q->height == 0 || q->width > 65536 ||
         q->height > 65536 || q->stream > 4095)
         return error_set(err, STATUS_INVALID, "cannot render %zu x %zu pixels with %zu samples in stream %u", q->width,
                          q->height, q->n_sample, q->stream);
-    status st = q->model->prepare(q->param, &state, err);
-    if (st != STATUS_OK) return st;
+    status st = parameter_sets_init(&sets, q->scene, q->model, q->param, q->n_set, err);
+    if (st != STATUS_OK) {
+        parameter_sets_release(&sets);
+        return st;
+    }
     struct run r = {.q = q, .progress = progress, .im = im, .n_pixel = q->width * q->height};
+    r.n_flat = sets.n * q->model->n_param;
     r.pixels_per_task = q->n_sample < TASK_SAMPLES ? TASK_SAMPLES / q->n_sample : 1;
-    path_setting_init(&r.setting, q->scene, q->model, state, q->configuration, q->want_derivative);
+    path_setting_init_sets(&r.setting, q->scene, &sets, q->configuration, q->want_derivative);
     camera_init(&r.camera, q->configuration);
-    st = image_init(im, q->width, q->height, 6 + (q->want_derivative ? 3 * q->model->n_param : 0), err);
-    if (st == STATUS_OK) st = name_channels(im, q->model, err);
+    st = image_init(im, q->width, q->height, 6 + (q->want_derivative ? 3 * r.n_flat : 0), err);
+    if (st == STATUS_OK) st = name_channels(im, q->model, sets.n, err);
     if (st == STATUS_OK) {
         st = thread_pool_run(pool, (r.n_pixel + r.pixels_per_task - 1) / r.pixels_per_task, run_task, &r, progress);
         if (st == STATUS_OK && progress_cancelled(progress)) st = STATUS_CANCELLED;
@@ -118,6 +124,6 @@ status render_run(const struct render_request *q, struct thread_pool *pool, cons
     }
     if (st == STATUS_OK) st = check_finite(im, q->model, err);
     if (st != STATUS_OK) image_release(im);
-    q->model->release(state);
+    parameter_sets_release(&sets);
     return st;
 }
