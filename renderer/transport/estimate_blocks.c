@@ -1,0 +1,173 @@
+#include "renderer/transport/estimate_blocks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BLOCK_PATHS = 256, TASKS_PER_CONFIGURATION = 1024, N_VALUE = 3 + 3 * SCATTERING_MAX_PARAM };
+
+/* Sums over the paths of one task, in path order. */
+struct task_sum {
+    double x[N_VALUE], x2[N_VALUE];
+    uint64_t n_path, n_vertex;
+};
+
+struct task {
+    uint32_t i_configuration, first_block, n_block;
+};
+
+struct run {
+    const struct estimate_blocks *b;
+    const struct progress *progress;
+    struct task *task;
+    size_t n_task;
+    struct task_sum *sum; /* per task */
+};
+
+static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t i_block, struct task_sum *sum)
+{
+    const struct estimate_blocks *b = r->b;
+    const struct rng_key key = {b->seed, b->iteration, b->replica, i_configuration};
+    size_t n_value = 3 + b->n_jac;
+    for (uint32_t i = 0; i < BLOCK_PATHS; i++) {
+        struct rng rng;
+        float value[N_VALUE];
+        memset(value, 0, n_value * sizeof *value);
+        rng_start(&rng, &key, i_block, i);
+        double x = rng_double(&rng), y = rng_double(&rng);
+        sum->n_vertex += b->trace(b->context, i_configuration, x, y, &rng, value);
+        sum->n_path++;
+        for (size_t k = 0; k < n_value; k++) {
+            double v = (double)value[k];
+            sum->x[k] += v;
+            sum->x2[k] += v * v;
+        }
+    }
+}
+
+static void run_task(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    struct run *r = context;
+    const struct task *t = &r->task[i_task];
+    for (uint32_t b = 0; b < t->n_block && !progress_cancelled(r->progress); b++)
+        trace_block(r, t->i_configuration, t->first_block + b, &r->sum[i_task]);
+}
+
+/* Tasks of whole blocks; how many depends on the counts alone, so that sums do not depend on the threads. */
+static status make_tasks(struct run *r, struct error *err)
+{
+    const struct estimate_blocks *q = r->b;
+    size_t n = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        n = 0;
+        for (size_t i = 0; i < q->n_configuration; i++) {
+            uint64_t n_block = ((uint64_t)q->n_path[i] + BLOCK_PATHS - 1) / BLOCK_PATHS;
+            if (n_block > UINT32_MAX)
+                return error_set_field(err, STATUS_TOO_LARGE, "n_path",
+                                       "cannot trace %zu paths for configuration %zu: too many", q->n_path[i], i);
+            uint64_t per_task = 1 + n_block / TASKS_PER_CONFIGURATION;
+            for (uint64_t b = 0; b < n_block; b += per_task, n++)
+                if (pass == 1)
+                    r->task[n] = (struct task){(uint32_t)i, (uint32_t)b,
+                                               (uint32_t)(n_block - b < per_task ? n_block - b : per_task)};
+        }
+        if (pass == 0) {
+            r->task = malloc((n + 1) * sizeof *r->task);
+            r->sum = calloc(n + 1, sizeof *r->sum);
+            if (r->task == NULL || r->sum == NULL)
+                return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu tasks", n);
+        }
+    }
+    r->n_task = n;
+    return STATUS_OK;
+}
+
+static double mean_variance(double x, double x2, double n)
+{
+    double mean = x / n, v = (x2 - x * mean) / (n - 1);
+    return (v > 0 ? v : 0) / n;
+}
+
+static status reduce(const struct run *r, struct estimate *out, size_t *bad_configuration, size_t *bad_value,
+                     struct error *err)
+{
+    const struct estimate_blocks *q = r->b;
+    size_t i_task = 0;
+    for (size_t i = 0; i < q->n_configuration; i++) {
+        struct task_sum total;
+        memset(&total, 0, sizeof total);
+        for (; i_task < r->n_task && r->task[i_task].i_configuration == i; i_task++) {
+            const struct task_sum *s = &r->sum[i_task];
+            for (size_t k = 0; k < 3 + q->n_jac; k++) {
+                total.x[k] += s->x[k];
+                total.x2[k] += s->x2[k];
+            }
+            total.n_path += s->n_path;
+            total.n_vertex += s->n_vertex;
+        }
+        struct estimate *e = &out[i];
+        memset(e, 0, sizeof *e);
+        e->n_path = total.n_path;
+        e->n_vertex = total.n_vertex;
+        if (total.n_path == 0) continue;
+        double n = (double)total.n_path;
+        for (size_t k = 0; k < 3 + q->n_jac; k++) {
+            if (!isfinite(total.x2[k])) {
+                *bad_configuration = i;
+                *bad_value = k;
+                return error_set(err, STATUS_NUMERIC, "a path gave a value that is not finite in configuration %zu", i);
+            }
+            double mean = total.x[k] / n, var = mean_variance(total.x[k], total.x2[k], n);
+            if (k < 3) {
+                e->mean[k] = mean;
+                e->var[k] = var;
+            } else {
+                e->jac[k - 3] = mean;
+                e->jac_var[k - 3] = var;
+            }
+        }
+    }
+    return STATUS_OK;
+}
+
+status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *pool, const struct progress *progress,
+                           struct estimate *out, size_t *bad_configuration, size_t *bad_value, struct error *err)
+{
+    struct run r = {.b = b, .progress = progress};
+    status st = make_tasks(&r, err);
+    if (st != STATUS_OK) goto out;
+    st = thread_pool_run(pool, r.n_task, run_task, &r, progress);
+    if (st == STATUS_OK && progress_cancelled(progress)) st = STATUS_CANCELLED; /* a task may have stopped early */
+    if (st != STATUS_OK) {
+        error_set(err, st, "radiance estimate was cancelled");
+        goto out;
+    }
+    st = reduce(&r, out, bad_configuration, bad_value, err);
+out:
+    free(r.sum);
+    free(r.task);
+    return st;
+}
+
+status estimate_check_configurations(const struct configuration *configuration, size_t n_configuration,
+                                     uint32_t iteration, uint32_t replica, struct error *err)
+{
+    if (n_configuration > 4096)
+        return error_set_field(err, STATUS_INVALID, "n_configuration",
+                               "cannot estimate %zu configurations: at most 4096 have random numbers of their own",
+                               n_configuration);
+    if (iteration > 65535 || replica > 15)
+        return error_set_field(err, STATUS_INVALID, "iteration",
+                               "cannot estimate iteration %u, replica %u: at most 65535 and 15", iteration, replica);
+    for (size_t i = 0; i < n_configuration; i++) {
+        const struct configuration *c = &configuration[i];
+        double sum =
+            c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
+        if (!isfinite(sum) || !(c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2) ||
+            !(c->light_distance_m > 0) || !(c->lamp_side_m > 0) || !(c->camera_distance_m > 0) || !(c->crop_m > 0))
+            return error_set_field(err, STATUS_INVALID, "configuration",
+                                   "cannot estimate configuration %zu: angles or distances make no sense", i);
+    }
+    return STATUS_OK;
+}

@@ -1,0 +1,51 @@
+/* An endless cloth as a volume: the density and direction of every voxel, periodic in x and y, a slab in z, empty
+ * outside.
+ *
+ * Frame: the cloth frame in millimetres, z shifted so that the top of the highest layer that holds anything is z = 0
+ * (as with fibers, up to a voxel). Inside, positions are in voxels. Immutable: shared by threads. Memory: the direction
+ * volume is used as it is stored (5 bytes a voxel) and must outlive the scene; beside it there is nothing that grows
+ * with it.
+ */
+#ifndef SELVEDGE_RENDERER_VOLUME_SCENE_H
+#define SELVEDGE_RENDERER_VOLUME_SCENE_H
+
+#include "geometry/volume/volume.h"
+
+#include <stdbool.h>
+
+struct volume_scene {
+    const struct direction_volume *volume;
+    float n_voxel[2]; /* across the tile */
+    float voxel_mm[3];
+    float low, high;       /* z of the slab, in voxels */
+    float largest_density; /* in [0, 1] */
+    bool black_sheet;
+};
+
+struct volume_scene_option {
+    bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
+};
+
+/* STATUS_INVALID for a volume without anything in it, or with more than 2^24 voxels along an edge. */
+status volume_scene_init(struct volume_scene *scene, const struct direction_volume *v,
+                         const struct volume_scene_option *o, struct error *err);
+/* Everything the scene needs, the volume included. */
+size_t volume_scene_memory_bytes(const struct volume_scene *scene);
+double volume_scene_thickness_mm(const struct volume_scene *scene);
+
+/* A point on its way through the cloth. */
+struct volume_ray {
+    double offset_mm[2]; /* whole tiles */
+    float at[3];         /* voxels, x and y within the tile */
+    float direction[3];  /* unit, in the cloth frame */
+    float per_mm[3];     /* voxels a millimetre along it */
+};
+
+/* Ray from a point above (mm), brought to the top of the slab. False when it does not go down. */
+bool volume_ray_enter(const struct volume_scene *scene, const double origin_mm[3], const double direction[3],
+                      struct volume_ray *ray);
+void volume_ray_turn(const struct volume_scene *scene, const float direction[3], struct volume_ray *ray);
+/* Where the ray really is. */
+void volume_ray_position_mm(const struct volume_scene *scene, const struct volume_ray *ray, float position_mm[3]);
+
+#endif
