@@ -1,0 +1,170 @@
+/* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
+ * bits for any number of threads. */
+#include "renderer/transport/volume_estimate.h"
+#include "tests/support/hand_volume.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define DEG (M_PI / 180)
+
+enum { N_CONFIGURATION = 2 };
+
+struct cloth {
+    struct direction_volume v;
+    struct volume_scene scene;
+    struct thread_pool *pool;
+    struct configuration c[N_CONFIGURATION];
+};
+
+static void cloth_init(struct cloth *k, size_t n_thread)
+{
+    const size_t n[3] = {32, 32, 14};
+    memset(k, 0, sizeof *k);
+    hand_volume_weave(&k->v, n, 10e-6, 0.4);
+    assert_int_equal(volume_scene_init(&k->scene, &k->v, &(struct volume_scene_option){.black_sheet = true}, NULL),
+                     STATUS_OK);
+    assert_int_equal(thread_pool_new(n_thread, &k->pool, NULL), STATUS_OK);
+    for (int i = 0; i < N_CONFIGURATION; i++)
+        k->c[i] = (struct configuration){.light_theta_rad = (i ? 78 : 20) * DEG, /* one at grazing angles */
+                                         .light_phi_rad = i ? M_PI : 0.3,
+                                         .camera_theta_rad = (i ? 70 : 10) * DEG,
+                                         .cloth_rotation_rad = 0.4,
+                                         .light_distance_m = 0.61,
+                                         .lamp_side_m = 0.1,
+                                         .camera_distance_m = 1,
+                                         .crop_m = 0.01};
+}
+
+static void cloth_release(struct cloth *k)
+{
+    thread_pool_free(k->pool);
+    direction_volume_release(&k->v);
+}
+
+static void run(const struct cloth *k, const struct phase_model *m, const double *param, double d, size_t n_path,
+                uint32_t iteration, bool want_jacobian, struct estimate *e)
+{
+    const size_t n[N_CONFIGURATION] = {n_path, n_path};
+    struct error err = {0};
+    const struct volume_estimate_request q = {&k->scene, m,  param,     d, k->c,         N_CONFIGURATION,
+                                              n,         61, iteration, 0, want_jacobian};
+    if (volume_estimate_run(&q, k->pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+}
+
+/* The derivative against a difference, channels together: the sum over channels, whose standard error is at most the
+ * sum of theirs. Steps are wide, so the difference carries some curvature: 3 % of itself is allowed beside the noise.
+ */
+static void compare(const char *model, const char *name, size_t p, size_t n_param, int channel, double step,
+                    const struct estimate *low, const struct estimate *high, const struct estimate *at, size_t *n,
+                    size_t *n_beyond)
+{
+    double jac = 0, jac_se = 0, fd = 0, fd_se = 0;
+    for (int c = 0; c < 3; c++) {
+        if (channel >= 0 && c != channel) continue;
+        jac += at->jac[(size_t)c * n_param + p];
+        jac_se += sqrt(at->jac_var[(size_t)c * n_param + p]);
+        fd += (high->mean[c] - low->mean[c]) / step;
+        fd_se += sqrt(high->var[c] + low->var[c]) / step;
+    }
+    double se = hypot(jac_se, fd_se), off = fabs(jac - fd) / (se + 0.03 * fabs(fd) / 2.5);
+    print_message("%s %-9s: %9.4g +- %.2g, difference %9.4g +- %.2g%s\n", model, name, jac, jac_se, fd, fd_se,
+                  off > 2.5 ? "  *" : "");
+    (*n)++;
+    *n_beyond += off > 2.5;
+    if (off > 4.5) fail_msg("%s, %s", model, name);
+}
+
+static void traced_again(void **state)
+{
+    (void)state;
+    struct cloth k;
+    size_t n = 0, n_beyond = 0;
+    cloth_init(&k, 0);
+    const double d = 4e4;
+    for (size_t i = 0; phase_registry()[i] != NULL; i++) {
+        const struct phase_model *m = phase_registry()[i];
+        struct estimate at[N_CONFIGURATION], low[N_CONFIGURATION], high[N_CONFIGURATION];
+        double param[SCATTERING_MAX_PARAM], moved[SCATTERING_MAX_PARAM];
+        for (size_t p = 0; p < m->n_param; p++) {
+            const struct param_info *info = &m->param[p];
+            param[p] = info->channel < 0 ? info->start * 1.5 : info->start + 0.1 * (1 - info->start) * info->channel;
+        }
+        uint32_t iteration = 0;
+        run(&k, m, param, d, 400000, iteration++, true, at);
+        for (size_t p = 0; p <= m->n_param; p++) {
+            /* a colour moves in all three channels with one run, each channel with its own */
+            int channel = p < m->n_param ? m->param[p].channel : -1;
+            if (channel > 0) continue;
+            double h = p == m->n_param ? 0.15 * d : channel == 0 ? 0.05 : 0.15 * param[p];
+            for (int side = 0; side < 2; side++) {
+                memcpy(moved, param, sizeof moved);
+                for (size_t q = p; q < m->n_param && q < p + (channel == 0 ? 3 : 1); q++) moved[q] += side ? h : -h;
+                double d_moved = p == m->n_param ? d + (side ? h : -h) : d;
+                run(&k, m, moved, d_moved, 200000, iteration++, false, side ? high : low);
+            }
+            for (int j = 0; j < N_CONFIGURATION; j++)
+                for (size_t q = p; q < (p == m->n_param ? p + 1 : p + (channel == 0 ? 3 : 1)); q++)
+                    compare(m->id, q == m->n_param ? "d" : m->param[q].name, q, m->n_param + 1,
+                            q == m->n_param ? -1 : m->param[q].channel, 2 * h, &low[j], &high[j], &at[j], &n,
+                            &n_beyond);
+        }
+    }
+    cloth_release(&k);
+    print_message("%zu of %zu comparisons beyond 2.5 standard errors\n", n_beyond, n);
+    assert_true(n_beyond <= 1 + n / 20); /* 1.2 % are expected */
+}
+
+static void same_bits_for_any_thread_count(void **state)
+{
+    (void)state;
+    struct estimate e[3][N_CONFIGURATION];
+    const struct phase_model *m = phase_find("phase_two_lobe.v1");
+    double param[SCATTERING_MAX_PARAM];
+    for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
+    for (size_t i = 0; i < 3; i++) {
+        struct cloth k;
+        memset(e[i], 0, sizeof e[i]);
+        cloth_init(&k, i + 1);
+        run(&k, m, param, 4e4, 5000, 7, true, e[i]);
+        cloth_release(&k);
+        assert_memory_equal(e[i], e[0], sizeof e[0]);
+    }
+    assert_true(e[0][0].mean[0] > 0 && e[0][0].n_path == 5120);
+}
+
+static void nonsense_is_refused(void **state)
+{
+    (void)state;
+    struct cloth k;
+    struct error err = {0};
+    struct estimate e[N_CONFIGURATION];
+    cloth_init(&k, 1);
+    const size_t n[N_CONFIGURATION] = {256, 256};
+    const struct phase_model *m = phase_find("microflake.v1");
+    const double param[4] = {0.5, 0.5, 0.5, 0.3}, bad[4] = {0.5, 0.5, 0.5, NAN};
+    struct volume_estimate_request q = {&k.scene, m, param, NAN, k.c, N_CONFIGURATION, n, 1, 0, 0, true};
+    assert_int_equal(volume_estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "d");
+    q.multiplier_per_m = 1e4;
+    q.param = bad;
+    assert_int_equal(volume_estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "gamma");
+    memset(k.v.density, 0, volume_n_voxel(k.v.n));
+    assert_int_equal(volume_scene_init(&k.scene, &k.v, &(struct volume_scene_option){.black_sheet = true}, &err),
+                     STATUS_INVALID);
+    cloth_release(&k);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(nonsense_is_refused),
+                                       cmocka_unit_test(same_bits_for_any_thread_count),
+                                       cmocka_unit_test(traced_again)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
