@@ -16,6 +16,7 @@
 
 enum {
     MIN_PIECE = 4, /* centers in a chain before joining */
+    N_MEND = 2,    /* rounds of growing and cutting */
     MAX_GROWTH = 64 /* voxels that an end may grow */
 };
 
@@ -171,11 +172,16 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     status s = find_chains(job, &part[0], err);
     enter_part(job, 0.6, 0.65);
     if (s == STATUS_OK) s = mend(job, &part[0], false, &part[1], &counts, err);
-    if (s == STATUS_OK) s = relax(job, &part[1], 2, err);
-    if (s == STATUS_OK) s = mend(job, &part[1], true, &part[2], &counts, err);
+    for (int round = 0; round < N_MEND && s == STATUS_OK; round++) { /* grow and join, then cut what went astray */
+        s = relax(job, &part[1], 2, err);
+        if (s == STATUS_OK) s = mend(job, &part[1], true, &part[2], &counts, err);
+        if (s == STATUS_OK) s = relax(job, &part[2], 2, err);
+        if (s == STATUS_OK) s = mend(job, &part[2], false, &part[1], &counts, err);
+    }
+    if (s == STATUS_OK) s = mend(job, &part[1], true, &part[0], &counts, err);
     if (s == STATUS_OK) {
-        classify(&part[2]); /* from subvolumes to axes */
-        s = smooth_and_drop(job, &part[2], lines, err);
+        classify(&part[0]); /* from subvolumes to axes */
+        s = smooth_and_drop(job, &part[0], lines, err);
     }
     if (s == STATUS_OK) s = relax(job, lines, 3, err);
     if (s == STATUS_OK) {
@@ -196,16 +202,16 @@ static status find_radius(struct fiber_job *job, const struct polyline_set *line
     if (h == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     double voxel_m = job->v->voxel_size_m[0];
     enter_part(job, 0.65, 1.0);
-    status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.0 * job->diameter), job->pool, &job->inner,
+    status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool, &job->inner,
                                           h, err);
     if (s == STATUS_OK) {
-        double score, dice, all = radius_best_score(h, 7u, &score, &dice);
-        job->report->dice = dice;
+        double all = radius_from_mass(h, 7u, radius_best_score(h, 7u));
         for (unsigned a = 0; a < 3; a++) {
-            double own_score = score, r = job->o->radius_per_axis ? radius_best_score(h, 1u << a, &own_score, &dice) : all;
+            unsigned classes = job->o->radius_per_axis ? 1u << a : 7u;
+            double r = job->o->radius_per_axis ? radius_from_mass(h, classes, radius_best_score(h, classes)) : all;
             if (isnan(job->o->radius_m[a])) job->o->radius_m[a] = (r > 0.0 ? r : all) * voxel_m;
             job->report->radius_m[a] = job->o->radius_m[a];
-            job->report->radius_score[a] = own_score;
+            job->report->radius_score[a] = radius_score(h, classes, job->o->radius_m[a] / voxel_m);
         }
     }
     free(h);

@@ -125,8 +125,9 @@ static bool disk_centroid(const struct walk *w, const float x[3], const float t[
                     core_n += 1.0f;
                 }
                 if (!mine || density <= FLOOR) continue;
-                sum += density - FLOOR;
-                for (int a = 0; a < 3; a++) offset[a] += (density - FLOOR) * (p[a] - along * t[a]);
+                float weight = (density - FLOOR);
+                sum += weight;
+                for (int a = 0; a < 3; a++) offset[a] += weight * (p[a] - along * t[a]);
             }
     if (!(sum > 0.0f) || !(core_n > 0.0f)) return false;
     for (int a = 0; a < 3; a++) offset[a] /= sum;
@@ -145,7 +146,7 @@ static float normalise(float t[3])
  * along a fiber of its own: nothing of it counts. */
 static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], float (*path)[3])
 {
-    float other[64][3], r = 0.6f * w->o->diameter_voxel, stop2 = 0.25f * w->o->diameter_voxel * w->o->diameter_voxel;
+    float other[64][3], r = 0.5f * w->o->diameter_voxel, stop2 = 0.25f * w->o->diameter_voxel * w->o->diameter_voxel;
     int n = 0;
     while (n < w->o->max_step && n < MAX_WALK) {
         float y[3], offset[3], core, least2;
@@ -166,7 +167,7 @@ static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], 
         }
         length = normalise(u);
         for (int a = 0; a < 3; a++) cosine += u[a] * t[a];
-        if (!(length > 0.3f) || cosine < 0.7f) break;
+        if (!(length > 0.3f) || cosine < 0.85f) break;
         for (int a = 0; a < 3; a++) t[a] = 0.75f * t[a] + 0.25f * u[a];
         normalise(t);
         memcpy(path[n++], y, sizeof *path);

@@ -1,6 +1,7 @@
 #include "geometry/fibers/radius.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,7 +52,9 @@ static void measure_brick(void *context, size_t i_brick, size_t i_thread)
                 float density = density_between_centres(job->v, x);
                 size_t bin = (size_t)(sqrtf(distance2[at]) * inverse_bin);
                 if (nearest[at] == UINT32_MAX || bin >= RADIUS_BINS) {
-                    h->inside_far += density >= job->eps_d;
+                    h->far_inside += density >= job->eps_d;
+                    h->far_count++;
+                    h->far_density_sum += (uint64_t)(255.0f * density + 0.5f);
                     continue;
                 }
                 uint8_t axis = job->bricks->segment[nearest[at]].axis;
@@ -68,7 +71,25 @@ static void add_histogram(struct distance_histogram *to, const struct distance_h
             to->outside[a][b] += from->outside[a][b];
             to->density_sum[a][b] += from->density_sum[a][b];
         }
-    to->inside_far += from->inside_far;
+    to->far_inside += from->far_inside;
+    to->far_count += from->far_count;
+    to->far_density_sum += from->far_density_sum;
+}
+
+/* Length of the segments inside of the volume. */
+static void add_lengths(const struct segment_bricks *bricks, struct distance_histogram *h)
+{
+    for (size_t i = 0; i < bricks->n_segment; i++) {
+        const struct segment *g = &bricks->segment[i];
+        double length2 = 0.0;
+        bool inside = true;
+        for (int a = 0; a < 3; a++) {
+            float middle = 0.5f * (g->a[a] + g->b[a]), d = g->b[a] - g->a[a];
+            inside = inside && middle >= 0.0f && middle <= (float)bricks->n_voxel[a];
+            length2 += (double)(d * d);
+        }
+        if (inside) h->length_voxel[g->axis] += sqrt(length2);
+    }
 }
 
 status distance_histogram_measure(const struct volume *v, const struct polyline_set *lines, double eps_d,
@@ -90,6 +111,7 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
         s = thread_pool_run(pool, segment_n_brick(&bricks), measure_brick, &job, progress);
         if (s != STATUS_OK) error_set(err, s, "measuring the fiber radius was cancelled");
         for (size_t t = 0; t < n_thread; t++) add_histogram(h, &job.histogram[t]);
+        add_lengths(&bricks, h);
     }
     free(job.histogram);
     free(job.distance2);
@@ -98,25 +120,78 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
     return s;
 }
 
-double radius_best_score(const struct distance_histogram *h, unsigned classes, double *score, double *dice)
+/* Points of the classes in bin b. */
+static void bin_points(const struct distance_histogram *h, unsigned classes, size_t b, double *in, double *out, double *density)
 {
-    double total = 0.0, in = 0.0, out = 0.0, best = -INFINITY, best_r = 0.0;
-    *score = *dice = 0.0;
+    *in = *out = *density = 0.0;
     for (unsigned a = 0; a < 3; a++)
-        for (size_t b = 0; (classes >> a & 1) != 0 && b < RADIUS_BINS; b++) total += (double)h->inside[a][b];
-    if (!(total > 0.0)) return 0.0;
-    for (size_t b = 0; b < RADIUS_BINS; b++) {
-        for (unsigned a = 0; a < 3; a++) {
-            if ((classes >> a & 1) == 0) continue;
-            in += (double)h->inside[a][b];
-            out += (double)h->outside[a][b];
+        if ((classes >> a & 1) != 0) {
+            *in += (double)h->inside[a][b];
+            *out += (double)h->outside[a][b];
+            *density += (double)h->density_sum[a][b] / 255.0;
         }
-        double r = (double)(b + 1) * h->bin_voxel, s = in - (out + (total - in));
-        if (r < 0.25 || s <= best) continue;
-        best = s;
-        best_r = r;
-        *score = s / total;
-        *dice = 2.0 * in / (in + out + total);
+}
+
+/* Bins with their middle between two distances. */
+static void sum_points(const struct distance_histogram *h, unsigned classes, double from, double to, double *in, double *out,
+                       double *density)
+{
+    *in = *out = *density = 0.0;
+    for (size_t b = 0; b < RADIUS_BINS; b++) {
+        double middle = ((double)b + 0.5) * h->bin_voxel, i, o, d;
+        if (middle < from || middle > to) continue;
+        bin_points(h, classes, b, &i, &o, &d);
+        *in += i;
+        *out += o;
+        *density += d;
     }
-    return best_r;
+}
+
+double radius_score(const struct distance_histogram *h, unsigned classes, double r_voxel)
+{
+    double in, out, density, total, rest;
+    sum_points(h, classes, 0.0, INFINITY, &total, &rest, &density);
+    sum_points(h, classes, 0.0, r_voxel, &in, &out, &density);
+    return total > 0.0 ? (in - (out + (total - in))) / total : 0.0;
+}
+
+double radius_best_score(const struct distance_histogram *h, unsigned classes)
+{
+    double sum = 0.0, best = -INFINITY, best_r = 0.0;
+    for (size_t b = 0; b < RADIUS_BINS; b++) {
+        double in, out, density, r = (double)(b + 1) * h->bin_voxel;
+        bin_points(h, classes, b, &in, &out, &density);
+        sum += 2.0 * in - out;
+        if (r < 0.25 || sum <= best) continue;
+        best = sum;
+        best_r = r;
+    }
+    return best > 0.0 ? best_r : 0.0;
+}
+
+/* Mean density of the points between two distances; fallback where there are none. */
+static double mean_density(const struct distance_histogram *h, unsigned classes, double from, double to, double fallback)
+{
+    double in, out, density;
+    sum_points(h, classes, from, to, &in, &out, &density);
+    return in + out > 0.0 ? density / (in + out) : fallback;
+}
+
+double radius_from_mass(const struct distance_histogram *h, unsigned classes, double r_start_voxel)
+{
+    double r = r_start_voxel, length = 0.0;
+    for (unsigned a = 0; a < 3; a++)
+        if ((classes >> a & 1) != 0) length += h->length_voxel[a];
+    if (!(r > 0.0) || !(length > 0.0)) return 0.0;
+    double nowhere = h->far_count > 1000 ? (double)h->far_density_sum / (255.0 * (double)h->far_count) : 0.0;
+    for (int round = 0; round < 6; round++) {
+        double in, out, density;
+        double solid = mean_density(h, classes, 0.0, 0.4 * r, 1.0), empty = fmin(nowhere, mean_density(h, classes, 1.6 * r, INFINITY, nowhere));
+        sum_points(h, classes, 0.0, 1.7 * r, &in, &out, &density);
+        const double points_per_voxel = (double)(RADIUS_UPSAMPLING * RADIUS_UPSAMPLING * RADIUS_UPSAMPLING);
+        double mass = (density - empty * (in + out)) / (solid - empty) / points_per_voxel;
+        if (!(solid > empty) || !(mass > 0.0)) return r;
+        r = fmin(1.5 * r_start_voxel, fmax(0.5 * r_start_voxel, sqrt(mass / (M_PI * length))));
+    }
+    return r;
 }

@@ -20,7 +20,8 @@ struct distance_histogram {
     uint64_t inside[3][RADIUS_BINS];         /* points of V */
     uint64_t outside[3][RADIUS_BINS];
     uint64_t density_sum[3][RADIUS_BINS];    /* sum of round(255 density) over all points of the bin */
-    uint64_t inside_far;                     /* points of V farther than the last bin from every polyline */
+    uint64_t far_inside, far_count, far_density_sum; /* points farther than the last bin from every polyline */
+    double length_voxel[3];                  /* of the polylines of each class */
 };
 
 /* eps_d: density that counts as material (the density is interpolated, so V has smooth surfaces). */
@@ -28,8 +29,15 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
                                   double farthest_voxel, struct thread_pool *pool, const struct progress *progress,
                                   struct distance_histogram *h, struct error *err);
 
-/* r of the best score in voxels over classes with bit set in `classes`, r from 0.25 to the end of the histogram; *score is
- * score(r) / |V| (within reach), *dice = 2 |C and V| / (|C| + |V|). 0 when the classes have no polyline. */
-double radius_best_score(const struct distance_histogram *h, unsigned classes, double *score, double *dice);
+/* score(r) / |V| over the classes with bit set in `classes`, V within reach of a polyline; and the r >= 0.25 voxels of the best score.
+ * 0 when the classes have no polyline. */
+double radius_score(const struct distance_histogram *h, unsigned classes, double r_voxel);
+double radius_best_score(const struct distance_histogram *h, unsigned classes);
+
+/* Past the paper. The best score lies where a third of the points at distance r are material, so everything that softens the surface (the
+ * scanner's blur, small errors of the polylines, gaps in a bundle that blur fills) makes fibers too thick. Mass does not care:
+ * pi r^2 times the length of the polylines is the amount of material around them, sum of (density - void) / (solid - void)
+ * over points nearer than 1.7 r (a few rounds, from r_start); solid is the density within 0.4 r of the polylines. */
+double radius_from_mass(const struct distance_histogram *h, unsigned classes, double r_start_voxel);
 
 #endif
