@@ -1,7 +1,42 @@
 #include "renderer/transport/volume_scene.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+
+#ifndef MADV_COLLAPSE
+#define MADV_COLLAPSE 25 /* Linux 6.1 */
+#endif
+
+/* Look-ups are all over the volume: large pages, where the system gives them, save it from looking up addresses too.
+ * Only whole pages inside the array are touched, and no content changes; failure does no harm. */
+static void use_large_pages(void *data, size_t n_bytes)
+{
+    const uintptr_t page = 2u << 20;
+    uintptr_t first = ((uintptr_t)data + page - 1) & ~(page - 1), last = ((uintptr_t)data + n_bytes) & ~(page - 1);
+    if (last <= first) return;
+    if (madvise((void *)first, last - first, MADV_HUGEPAGE) == 0) /* NOLINT: advice only */
+        madvise((void *)first, last - first, MADV_COLLAPSE);
+}
+
+static status fill_bricks(struct volume_scene *s, struct error *err)
+{
+    const size_t *n = s->volume->n;
+    for (int a = 0; a < 3; a++) s->n_brick[a] = (n[a] + (1u << VOLUME_BRICK_SHIFT) - 1) >> VOLUME_BRICK_SHIFT;
+    s->occupied = calloc((volume_n_voxel(s->n_brick) + 63) / 64, sizeof *s->occupied);
+    if (s->occupied == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot trace a volume: out of memory");
+    for (size_t k = 0; k < n[2]; k++)
+        for (size_t j = 0; j < n[1]; j++) {
+            const uint8_t *row = s->volume->density + volume_index(n, 0, j, k);
+            size_t first = ((k >> VOLUME_BRICK_SHIFT) * s->n_brick[1] + (j >> VOLUME_BRICK_SHIFT)) * s->n_brick[0];
+            for (size_t i = 0; i < n[0]; i++) {
+                size_t b = first + (i >> VOLUME_BRICK_SHIFT);
+                s->occupied[b >> 6] |= (uint64_t)(row[i] != 0) << (b & 63);
+            }
+        }
+    return STATUS_OK;
+}
 
 status volume_scene_init(struct volume_scene *s, const struct direction_volume *v, const struct volume_scene_option *o,
                          struct error *err)
@@ -29,12 +64,21 @@ status volume_scene_init(struct volume_scene *s, const struct direction_volume *
     s->high = (float)high;
     s->largest_density = (float)most / 255;
     s->black_sheet = o->black_sheet;
-    return STATUS_OK;
+    use_large_pages(v->density, volume_n_voxel(v->n) * sizeof *v->density);
+    use_large_pages(v->octahedral, 2 * volume_n_voxel(v->n) * sizeof *v->octahedral);
+    return fill_bricks(s, err);
+}
+
+void volume_scene_release(struct volume_scene *s)
+{
+    free(s->occupied);
+    s->occupied = NULL;
 }
 
 size_t volume_scene_memory_bytes(const struct volume_scene *s)
 {
-    return sizeof *s + volume_n_voxel(s->volume->n) * (sizeof *s->volume->density + 2 * sizeof *s->volume->octahedral);
+    return sizeof *s + (volume_n_voxel(s->n_brick) + 63) / 64 * sizeof *s->occupied +
+           volume_n_voxel(s->volume->n) * (sizeof *s->volume->density + 2 * sizeof *s->volume->octahedral);
 }
 
 double volume_scene_thickness_mm(const struct volume_scene *s) { return (double)((s->high - s->low) * s->voxel_mm[2]); }

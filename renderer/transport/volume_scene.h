@@ -19,6 +19,8 @@ struct volume_scene {
     float voxel_mm[3];
     float low, high;       /* z of the slab, in voxels */
     float largest_density; /* in [0, 1] */
+    uint64_t *occupied;    /* owned; one bit a brick, x fastest */
+    size_t n_brick[3];
     bool black_sheet;
 };
 
@@ -26,12 +28,23 @@ struct volume_scene_option {
     bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
 };
 
-/* STATUS_INVALID for a volume without anything in it, or with more than 2^24 voxels along an edge. */
+enum { VOLUME_BRICK_SHIFT = 2 };
+
+/* STATUS_NO_MEMORY; STATUS_INVALID for a volume without anything in it, or with more than 2^24 voxels along an edge. */
 status volume_scene_init(struct volume_scene *scene, const struct direction_volume *v,
                          const struct volume_scene_option *o, struct error *err);
+void volume_scene_release(struct volume_scene *scene);
 /* Everything the scene needs, the volume included. */
 size_t volume_scene_memory_bytes(const struct volume_scene *scene);
 double volume_scene_thickness_mm(const struct volume_scene *scene);
+
+/* False: this voxel and its neighbours in the brick are empty. */
+static inline bool volume_scene_may_hold(const struct volume_scene *s, size_t i, size_t j, size_t k)
+{
+    size_t b = ((k >> VOLUME_BRICK_SHIFT) * s->n_brick[1] + (j >> VOLUME_BRICK_SHIFT)) * s->n_brick[0] +
+               (i >> VOLUME_BRICK_SHIFT);
+    return (s->occupied[b >> 6] >> (b & 63) & 1) != 0;
+}
 
 /* A point on its way through the cloth. */
 struct volume_ray {

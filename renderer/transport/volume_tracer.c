@@ -5,6 +5,7 @@
 #define VOLUME_ROULETTE_BELOW 0.3f
 #define VOLUME_SHADOW_BELOW 0.02f
 #define VOLUME_HEADROOM 1.25f
+#define NO_VOXEL SIZE_MAX
 enum { VOLUME_MAX_LOOKUP = 200000 };
 
 void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
@@ -19,8 +20,12 @@ void volume_setting_init(struct volume_setting *s, const struct volume_scene *sc
     s->multiplier_per_m = (float)multiplier_per_m;
     s->majorant_density = VOLUME_HEADROOM * scene->largest_density * s->extinction->largest;
     s->majorant_per_mm = (float)(1e-3 * multiplier_per_m) * s->majorant_density;
-    s->has_lamp = c != NULL;
-    if (c != NULL) lamp_init(&s->lamp, c);
+    s->has_lamp = c != NULL && c->light != LIGHT_NO_LAMP;
+    if (s->has_lamp) lamp_init(&s->lamp, c);
+    for (int k = 0; k < 3 && c != NULL; k++) {
+        s->environment[k] = (float)c->environment_rgb[k];
+        if (s->environment[k] > 0) s->has_environment = true;
+    }
     s->roulette_below = VOLUME_ROULETTE_BELOW;
     s->shadow_below = VOLUME_SHADOW_BELOW;
     s->want_jacobian = want_jacobian;
@@ -56,13 +61,17 @@ static inline bool advance(const struct volume_scene *v, float step_mm, struct v
     return ray->at[2] >= v->low && ray->at[2] < v->high;
 }
 
+/* The voxel that the ray is in, or NO_VOXEL where there is nothing. */
 static inline size_t voxel_of(const struct volume_scene *v, const struct volume_ray *ray)
 {
-    const size_t *n = v->volume->n;
+    const struct direction_volume *volume = v->volume;
     size_t i = (size_t)ray->at[0], j = (size_t)ray->at[1], k = (size_t)ray->at[2];
-    i = i < n[0] ? i : n[0] - 1; /* rounding may put a wrapped point on the far face */
-    j = j < n[1] ? j : n[1] - 1;
-    return volume_index(n, i, j, k);
+    i = i < volume->n[0] ? i : volume->n[0] - 1; /* rounding may put a wrapped point on the far face */
+    j = j < volume->n[1] ? j : volume->n[1] - 1;
+    if (!volume_scene_may_hold(v, i, j, k)) return NO_VOXEL;
+    size_t at = volume_index(volume->n, i, j, k);
+    __builtin_prefetch(&volume->octahedral[2 * at]); /* wanted next, if there is something */
+    return volume->density[at] == 0 ? NO_VOXEL : at;
 }
 
 /* Extinction over the majorant at a voxel that is not empty, and its derivative by the parameter of s(w). */
@@ -91,7 +100,7 @@ static bool collide(struct walk *w, struct volume_ray *ray, float tangent[3])
         w->out->n_lookup++;
         if (!advance(s->scene, free_flight_mm(s, w->rng), ray)) return false;
         size_t i = voxel_of(s->scene, ray);
-        if (s->scene->volume->density[i] == 0) continue;
+        if (i == NO_VOXEL) continue;
         float d_ratio, ratio = ratio_at(s, i, ray->direction, tangent, &d_ratio);
         if (rng_float(w->rng) < ratio) {
             w->flight.ln_d += 1;
@@ -121,7 +130,7 @@ static float transmittance(struct walk *w, struct volume_ray ray, float worth, s
         w->out->n_lookup++;
         if (!advance(s->scene, free_flight_mm(s, w->rng), &ray)) return t;
         size_t i = voxel_of(s->scene, &ray);
-        if (s->scene->volume->density[i] == 0) continue;
+        if (i == NO_VOXEL) continue;
         float tangent[3], d_ratio, ratio = ratio_at(s, i, ray.direction, tangent, &d_ratio), inv = 1 / (1 - ratio);
         t *= 1 - ratio;
         score->ln_d -= ratio * inv;

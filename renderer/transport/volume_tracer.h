@@ -44,7 +44,7 @@ struct volume_setting {
     bool want_jacobian;
 };
 
-/* Roulette at the usual place, the configuration's lamp (NULL: none), no environment. */
+/* Roulette at the usual place, the configuration's lamp and constant environment (NULL: neither). */
 void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
                          const struct phase_state *state, double multiplier_per_m, const struct configuration *c,
                          bool want_jacobian);

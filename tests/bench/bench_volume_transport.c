@@ -94,6 +94,7 @@ int main(int argc, char **argv)
         print(set, ".vertices_per_path", vertex, "", "lower");
     }
     thread_pool_free(pool);
+    volume_scene_release(&scene);
     direction_volume_release(&v);
     return 0;
 }

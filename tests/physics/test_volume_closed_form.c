@@ -104,6 +104,7 @@ static void transmittance(void **state)
                   0.004 * tau * fabs((double)(d_s / s_w)));
         m->release(s);
     }
+    volume_scene_release(&scene);
     direction_volume_release(&v);
 }
 
@@ -146,6 +147,7 @@ static void single_scattering(void **state)
         assert_true(sample_mean_se(&value[0]) < 0.01 * once);
     }
     m->release(s);
+    volume_scene_release(&scene);
     direction_volume_release(&v);
 }
 
@@ -184,6 +186,7 @@ static void white_furnace(void **state)
         }
         m->release(s);
     }
+    volume_scene_release(&scene);
     direction_volume_release(&v);
 }
 
@@ -223,6 +226,7 @@ static void along_the_fiber(void **state)
         }
         m->release(s);
     }
+    volume_scene_release(&scene);
     direction_volume_release(&v);
 }
 
@@ -269,6 +273,7 @@ static void estimate_cloud(uint32_t i_cloud, const double *param, const struct c
     if (volume_estimate_run(&qv, pool, NULL, volume, &err) != STATUS_OK) fail_msg("%s", err.text);
     scene_free(scene);
     fiber_set_release(&f);
+    volume_scene_release(&coarse);
     direction_volume_release(&v);
 }
 

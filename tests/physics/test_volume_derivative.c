@@ -44,6 +44,7 @@ static void cloth_init(struct cloth *k, size_t n_thread)
 static void cloth_release(struct cloth *k)
 {
     thread_pool_free(k->pool);
+    volume_scene_release(&k->scene);
     direction_volume_release(&k->v);
 }
 
@@ -155,6 +156,7 @@ static void nonsense_is_refused(void **state)
     q.param = bad;
     assert_int_equal(volume_estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
     assert_string_equal(err.field, "gamma");
+    volume_scene_release(&k.scene);
     memset(k.v.density, 0, volume_n_voxel(k.v.n));
     assert_int_equal(volume_scene_init(&k.scene, &k.v, &(struct volume_scene_option){.black_sheet = true}, &err),
                      STATUS_INVALID);
