@@ -80,6 +80,7 @@ static void header_seeds(void)
 
 static void fiber_seeds(void)
 {
+    put("yarn_file", "yarn.txt", "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: 0\nfiber_clock_wise: 1\nyarn_alpha: 0.45\nalpha: 0.36\nyarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: 0.2\nR_max: 1\nflyaway_hair_ze: 0.002 0.06\n", "", 0);
     struct fiber_set f;
     fiber_set_init(&f);
     must(fiber_set_reserve(&f, 2, 5, NULL) == STATUS_OK, "memory");

@@ -1,4 +1,5 @@
 /* Readers of scans: golden bytes of NRRD, raw, MetaImage and .vol, and headers that lie. */
+#include "geometry/reconstruct.h"
 #include "geometry/volume/vol_file.h"
 #include "geometry/volume/volume_reader.h"
 #include "geometry/volume/volume_source.h"
@@ -287,12 +288,41 @@ static void test_vol(void **state)
     free(d);
 }
 
+/* A declaration goes through to the step that reads for the job; a voxel that is not a number is named there. */
+static void test_raw_in_a_job(void **state)
+{
+    enum { N = 12 };
+    static float value[N * N * N];
+    struct reconstruct_option o;
+    struct reconstruct_report report = {0};
+    struct volume v;
+    struct error err = {0};
+    struct thread_pool *pool = NULL;
+    const char *path = scratch_path(state, "job.raw");
+    for (size_t i = 0; i < N * N * N; i++) value[i] = i % N < 4 ? 300.0f : 100.0f;
+    scratch_write(path, value, sizeof value);
+    assert_int_equal(thread_pool_new(1, &pool, NULL), STATUS_OK);
+    for (int nan = 0; nan < 2; nan++) {
+        reconstruct_option_default(&o);
+        o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "float32"};
+        for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
+        status s = reconstruct_read(&path, 1, &o, 0, pool, NULL, &v, &report, &err);
+        if (s != (nan ? STATUS_INVALID : STATUS_OK) || (nan && strstr(err.text, "(4, 10, 4) is NaN") == NULL)) fail_msg("%s", err.text);
+        if (!nan) assert_true(v.n[2] == N && v.density[0] > 0.9f && v.density[8] < 0.1f);
+        volume_release(&v);
+        value[700] = NAN;
+        scratch_write(path, value, sizeof value);
+    }
+    thread_pool_free(pool);
+}
+
 int main(void)
 {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_nrrd_types_and_orders), cmocka_unit_test(test_nrrd_gzip_and_skips), cmocka_unit_test(test_nrrd_detached),
         cmocka_unit_test(test_nrrd_refused),          cmocka_unit_test(test_raw),                 cmocka_unit_test(test_wrong_byte_order),
         cmocka_unit_test(test_metaimage),             cmocka_unit_test(test_vol),
+        cmocka_unit_test(test_raw_in_a_job),
     };
     return cmocka_run_group_tests(test, scratch_folder_setup, scratch_folder_teardown);
 }
