@@ -1,6 +1,7 @@
 #include "renderer/transport/estimate.h"
 
 #include "renderer/transport/camera.h"
+#include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/path_tracer.h"
 
 #include <math.h>
@@ -103,37 +104,6 @@ static status make_tasks(struct run *r, struct error *err)
     return STATUS_OK;
 }
 
-static bool configuration_makes_sense(const struct configuration *c)
-{
-    double sum =
-        c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
-    bool lamp = c->light != LIGHT_SQUARE_LAMP || (c->light_distance_m > 0 && c->lamp_side_m > 0);
-    bool environment = true;
-    for (int k = 0; k < 3; k++) environment &= c->environment_rgb[k] >= 0 && isfinite(c->environment_rgb[k]);
-    return isfinite(sum) && c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2 && lamp && environment &&
-           c->light <= LIGHT_NO_LAMP && c->camera <= CAMERA_FAR_FIELD && c->crop_m > 0 && c->crop_aspect >= 0 &&
-           isfinite(c->crop_aspect) && (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0);
-}
-
-static status check_request(const struct estimate_request *q, struct error *err)
-{
-    if (q->n_configuration > 4096)
-        return error_set_field(err, STATUS_INVALID, "n_configuration",
-                               "cannot estimate %zu configurations: at most 4096 have random numbers of their own",
-                               q->n_configuration);
-    if (q->iteration > 65535 || q->replica > 15)
-        return error_set_field(err, STATUS_INVALID, "iteration",
-                               "cannot estimate iteration %u, replica %u: at most 65535 and 15", q->iteration,
-                               q->replica);
-    for (size_t i = 0; i < q->n_configuration; i++) {
-        const struct configuration *c = &q->configuration[i];
-        if (!configuration_makes_sense(c))
-            return error_set_field(err, STATUS_INVALID, "configuration",
-                                   "cannot estimate configuration %zu: angles, distances or lights make no sense", i);
-    }
-    return STATUS_OK;
-}
-
 static double mean_variance(double x, double x2, double n)
 {
     double mean = x / n, v = (x2 - x * mean) / (n - 1);
@@ -165,9 +135,10 @@ static status reduce(const struct run *r, struct estimate *out, struct error *er
         for (size_t k = 0; k < r->n_value; k++) {
             const char *name = k < 3 ? "" : q->model->param[(k - 3) % q->model->n_param].name;
             if (!isfinite(total.x2[k]))
-                return error_set_field(err, STATUS_NUMERIC, name,
-                                       "scattering model '%s' gave a value that is not finite in configuration %zu (%s)",
-                                       q->model->id, i, k < 3 ? "radiance" : name);
+                return error_set_field(
+                    err, STATUS_NUMERIC, name,
+                    "scattering model '%s' gave a value that is not finite in configuration %zu (%s)", q->model->id, i,
+                    k < 3 ? "radiance" : name);
             double mean = total.x[k] / n, var = mean_variance(total.x[k], total.x2[k], n);
             if (k < 3) {
                 e->mean[k] = mean;
@@ -186,7 +157,7 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
 {
     struct parameter_sets sets;
     struct run r = {.q = q, .progress = progress};
-    status st = check_request(q, err);
+    status st = estimate_check_configurations(q->configuration, q->n_configuration, q->iteration, q->replica, err);
     if (st != STATUS_OK) return st;
     st = parameter_sets_init(&sets, q->scene, q->model, q->param, q->n_set, err);
     if (st != STATUS_OK) goto out;

@@ -150,6 +150,18 @@ out:
     return st;
 }
 
+static bool configuration_makes_sense(const struct configuration *c)
+{
+    double sum =
+        c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
+    bool lamp = c->light != LIGHT_SQUARE_LAMP || (c->light_distance_m > 0 && c->lamp_side_m > 0);
+    bool environment = true;
+    for (int k = 0; k < 3; k++) environment &= c->environment_rgb[k] >= 0 && isfinite(c->environment_rgb[k]);
+    return isfinite(sum) && c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2 && lamp && environment &&
+           c->light <= LIGHT_NO_LAMP && c->camera <= CAMERA_FAR_FIELD && c->crop_m > 0 && c->crop_aspect >= 0 &&
+           isfinite(c->crop_aspect) && (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0);
+}
+
 status estimate_check_configurations(const struct configuration *configuration, size_t n_configuration,
                                      uint32_t iteration, uint32_t replica, struct error *err)
 {
@@ -161,13 +173,9 @@ status estimate_check_configurations(const struct configuration *configuration, 
         return error_set_field(err, STATUS_INVALID, "iteration",
                                "cannot estimate iteration %u, replica %u: at most 65535 and 15", iteration, replica);
     for (size_t i = 0; i < n_configuration; i++) {
-        const struct configuration *c = &configuration[i];
-        double sum =
-            c->light_theta_rad + c->light_phi_rad + c->camera_theta_rad + c->camera_phi_rad + c->cloth_rotation_rad;
-        if (!isfinite(sum) || !(c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2) ||
-            !(c->light_distance_m > 0) || !(c->lamp_side_m > 0) || !(c->camera_distance_m > 0) || !(c->crop_m > 0))
+        if (!configuration_makes_sense(&configuration[i]))
             return error_set_field(err, STATUS_INVALID, "configuration",
-                                   "cannot estimate configuration %zu: angles or distances make no sense", i);
+                                   "cannot estimate configuration %zu: angles, distances or lights make no sense", i);
     }
     return STATUS_OK;
 }

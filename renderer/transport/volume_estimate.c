@@ -54,6 +54,10 @@ status volume_estimate_run(const struct volume_estimate_request *q, struct threa
     if (!(q->multiplier_per_m > 0 && q->multiplier_per_m <= 1e9))
         return error_set_field(err, STATUS_INVALID, "d", "cannot trace with density multiplier %g per metre",
                                q->multiplier_per_m);
+    for (size_t i = 0; i < q->n_configuration; i++)
+        if (q->configuration[i].environment != NULL)
+            return error_set_field(err, STATUS_UNSUPPORTED, "configuration",
+                                   "cannot light a volume with an image environment (configuration %zu)", i);
     st = q->model->prepare(q->param, &state, err);
     if (st != STATUS_OK) return st;
     r.setting = malloc((q->n_configuration + 1) * sizeof *r.setting);

@@ -163,10 +163,30 @@ static void nonsense_is_refused(void **state)
     cloth_release(&k);
 }
 
+/* The tracer's decoding of directions is the volume's. */
+static void directions_are_decoded_alike(void **state)
+{
+    (void)state;
+    struct cloth k;
+    cloth_init(&k, 1);
+    for (size_t i = 0; i < volume_n_voxel(k.v.n); i++) {
+        float a[3], b[3], w[3];
+        double z = 2 * ((double)i + 0.5) / (double)volume_n_voxel(k.v.n) - 1, phi = 2.399963 * (double)i;
+        w[0] = (float)(sqrt(1 - z * z) * cos(phi));
+        w[1] = (float)(sqrt(1 - z * z) * sin(phi));
+        w[2] = (float)z;
+        direction_volume_set(&k.v, i, w);
+        direction_volume_get(&k.v, i, a);
+        volume_scene_direction(&k.scene, i, b);
+        for (int x = 0; x < 3; x++) assert_true(fabsf(a[x] - b[x]) < 1e-6f);
+    }
+    cloth_release(&k);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(nonsense_is_refused),
                                        cmocka_unit_test(same_bits_for_any_thread_count),
-                                       cmocka_unit_test(traced_again)};
+                                       cmocka_unit_test(directions_are_decoded_alike), cmocka_unit_test(traced_again)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
