@@ -42,11 +42,11 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps test check bench demo clean help layers format asan bench-geometry bench-transport bench-fit fuzz fuzz-programs
+.PHONY: all deps test check bench demo clean help layers format asan bench-geometry bench-transport bench-fit docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 20
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 20
 
 define part_rule
 $(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$(1)))
@@ -116,6 +116,12 @@ bench: | deps      ## every figure, one JSON object a line
 bench-transport: | deps ## the renderer's figures (paths a second, time to a given standard error, memory)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
+
+docs-pictures:     ## render docs/images/{twill,derivatives}.png anew (minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures
+	@mkdir -p docs/images
+	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
+	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
 
 layers:            ## includes go one way: base <- geometry <- renderer <- optimizer
 	@/usr/bin/python3 tests/check_layers.py
