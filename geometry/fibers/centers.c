@@ -75,6 +75,25 @@ static void mask_slice(void *context, size_t k, size_t i_thread)
     }
 }
 
+/* An emptied voxel shows its density in a frame unless all its kept neighbours belong to others (it is then the rim of such a fiber). */
+static void rim_slice(void *context, size_t k, size_t i_thread)
+{
+    (void)i_thread;
+    const struct mask_job *job = context;
+    const size_t *n = job->d->n, stride[3] = {1, n[0], n[0] * n[1]};
+    size_t x[3] = {0, 0, k}, at = k * stride[2];
+    for (x[1] = 0; x[1] < n[1]; x[1]++)
+        for (x[0] = 0; x[0] < n[0]; x[0]++, at++) {
+            if (job->d->density[at] > 0) continue;
+            unsigned seen = 0;
+            for (int a = 0; a < 3; a++) { /* kept neighbours only: their masks are not changed here */
+                if (x[a] > 0 && job->d->density[at - stride[a]] > 0) seen |= job->mask[at - stride[a]];
+                if (x[a] + 1 < n[a] && job->d->density[at + stride[a]] > 0) seen |= job->mask[at + stride[a]];
+            }
+            job->mask[at] = (uint16_t)((seen == 0 ? ~0u : seen) & ((1u << N_SLICE_FRAME) - 1u));
+        }
+}
+
 status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint16_t *mask, size_t n_class_voxel[3],
                   struct error *err)
 {
@@ -82,27 +101,13 @@ status class_mask(const struct direction_volume *d, struct thread_pool *pool, ui
     if (job.count == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot separate the axes: out of memory");
     for (int f = 0; f < N_SLICE_FRAME; f++) slice_frame_normal(f, job.normal[f]);
     status s = thread_pool_run(pool, d->n[2], mask_slice, &job, NULL);
+    if (s == STATUS_OK) s = thread_pool_run(pool, d->n[2], rim_slice, &job, NULL);
     for (int a = 0; a < 3; a++) {
         n_class_voxel[a] = 0;
         for (size_t k = 0; k < d->n[2]; k++) n_class_voxel[a] += job.count[k][a];
     }
     free(job.count);
     return s;
-}
-
-/* An emptied voxel shows its density unless all its kept neighbours belong to other slices (it is then the rim of such a fiber). */
-static bool rim_of_others(const struct detect_job *job, size_t at, const size_t x[3])
-{
-    const size_t *n = job->v->n, stride[3] = {1, n[0], n[0] * n[1]};
-    bool others = false;
-    for (int a = 0; a < 3; a++)
-        for (int side = 0; side < 2; side++) {
-            if (side == 0 ? x[a] == 0 : x[a] + 1 == n[a]) continue;
-            uint16_t m = job->mask[side == 0 ? at - stride[a] : at + stride[a]];
-            if ((m >> job->frame->index & 1) != 0) return false;
-            others = others || m != 0;
-        }
-    return others;
 }
 
 /* Voxel that holds point x; false (and the nearest voxel) when x lies outside of the volume. */
@@ -120,9 +125,9 @@ static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
 static float class_density(const struct detect_job *job, const size_t x[3], bool *own)
 {
     size_t at = volume_index(job->v->n, x[0], x[1], x[2]);
-    uint16_t m = job->mask[at];
-    *own = (m >> job->frame->index & 1) != 0;
-    return *own || (m == 0 && !rim_of_others(job, at, x)) ? job->v->density[at] : 0.0f;
+    uint16_t m = job->mask[at], visible = m >> job->frame->index & 1;
+    *own = visible != 0 && m >= CLASS_KEPT;
+    return visible != 0 ? job->v->density[at] : 0.0f;
 }
 
 /* Between voxels: bilinear in the plane of the two diagonal axes (the third stays on the grid). */
@@ -227,7 +232,7 @@ static bool find_slope(const struct detect_job *job, size_t i_slice, struct cent
             slice_frame_point(f, c->u + (float)u, c->v + (float)v, (float)i_slice + 0.5f, x);
             if (!voxel_at(job->v->n, x, at)) continue;
             size_t voxel = volume_index(job->v->n, at[0], at[1], at[2]);
-            if ((job->mask[voxel] >> f->index & 1) == 0) continue;
+            if ((job->mask[voxel] >> f->index & 1) == 0 || job->mask[voxel] < CLASS_KEPT) continue;
             float d[3], local[3] = {0.0f, 0.0f, 0.0f};
             direction_volume_get(job->d, voxel, d);
             for (int a = 0; a < 3; a++) {

@@ -2,7 +2,7 @@
  *
  * A subvolume shows the density of voxels whose direction is near to the normal of its slices, all others emptied. In the paper the
  * three subvolumes share out the voxels, and fibers that turn from one to another fall apart. Here there are nine slicing directions
- * (slice_frame.h), and a voxel belongs to all within CLASS_ANGLE, so that fibers between two are seen whole in both; duplicates
+ * (slice_frame.h), and a voxel belongs to all within 40 degrees (every direction is within 36 of one), so that fibers between two are seen whole in both; duplicates
  * are removed after linking.
  */
 #ifndef SELVEDGE_GEOMETRY_CENTERS_H
@@ -12,7 +12,9 @@
 #include "geometry/fibers/slice_frame.h"
 #include "geometry/volume/volume.h"
 
-#define CLASS_COSINE 0.7071f /* of CLASS_ANGLE, 45 degrees */
+#define CLASS_COSINE 0.77f /* of CLASS_ANGLE, 39.6 degrees */
+
+#define CLASS_KEPT 4096u
 
 struct center {
     float u, v;              /* in pixels of the frame: a pixel's centre is at (i + 1/2) */
@@ -29,7 +31,8 @@ struct center_list {
 
 void center_list_release(struct center_list *l);
 
-/* Two bytes a voxel: bit f set when the voxel belongs to slices of frame f, bits 12 + a for the nearest axis; 0 for emptied voxels.
+/* Two bytes a voxel: bit f set when the voxel shows in slices of frame f, bit 12 + a for the axis nearest to its direction;
+ * voxels emptied by the filter have none of the latter (mask < CLASS_KEPT).
  * mask has room for all voxels; n_class_voxel counts voxels by nearest axis. */
 status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint16_t *mask, size_t n_class_voxel[3],
                   struct error *err);

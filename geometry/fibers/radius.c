@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING };
+enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING, MAX_BRICK = 1500 };
 
 struct radius_job {
     const struct volume *v;
@@ -14,6 +14,7 @@ struct radius_job {
     struct distance_histogram *histogram; /* per thread */
     float *distance2;                     /* per thread: FINE^3 */
     uint32_t *nearest;
+    const uint32_t *chosen;               /* bricks */
 };
 
 /* Density between voxel centres, trilinear, edge values repeated. */
@@ -34,9 +35,10 @@ static float density_between_centres(const struct volume *v, const float x[3])
     return (1.0f - f[2]) * ((1.0f - f[0]) * a0 + f[0] * a1) + f[2] * ((1.0f - f[0]) * b0 + f[0] * b1);
 }
 
-static void measure_brick(void *context, size_t i_brick, size_t i_thread)
+static void measure_brick(void *context, size_t i_task, size_t i_thread)
 {
     struct radius_job *job = context;
+    size_t i_brick = job->chosen[i_task];
     struct distance_histogram *h = &job->histogram[i_thread];
     float *distance2 = job->distance2 + i_thread * FINE * FINE * FINE;
     uint32_t *nearest = job->nearest + i_thread * FINE * FINE * FINE;
@@ -76,19 +78,33 @@ static void add_histogram(struct distance_histogram *to, const struct distance_h
     to->far_density_sum += from->far_density_sum;
 }
 
-/* Length of the segments inside of the volume. */
-static void add_lengths(const struct segment_bricks *bricks, struct distance_histogram *h)
+/* Bricks with fibers near them, at most MAX_BRICK of them spread evenly: millions of fiber points are enough for a mean. */
+static size_t choose_bricks(const struct segment_bricks *b, uint32_t *chosen)
+{
+    size_t n = 0, kept = 0;
+    for (size_t i = 0; i < segment_n_brick(b); i++)
+        if (b->first[i + 1] > b->first[i]) chosen[n++] = (uint32_t)i;
+    if (n <= MAX_BRICK) return n;
+    for (size_t i = 0; i < n; i++) /* a multiplicative hash of the position picks MAX_BRICK of n on the average */
+        if ((uint64_t)(uint32_t)(chosen[i] * 2654435761u) * n < ((uint64_t)MAX_BRICK << 32)) chosen[kept++] = chosen[i];
+    return kept;
+}
+
+/* Length of the lines inside of the chosen bricks: each segment counts where its middle is. */
+static void add_lengths(const struct segment_bricks *bricks, const bool *is_chosen, struct distance_histogram *h)
 {
     for (size_t i = 0; i < bricks->n_segment; i++) {
         const struct segment *g = &bricks->segment[i];
         double length2 = 0.0;
         bool inside = true;
-        for (int a = 0; a < 3; a++) {
+        size_t brick = 0;
+        for (int a = 2; a >= 0; a--) {
             float middle = 0.5f * (g->a[a] + g->b[a]), d = g->b[a] - g->a[a];
-            inside = inside && middle >= 0.0f && middle <= (float)bricks->n_voxel[a];
+            inside = inside && middle >= 0.0f && middle < (float)bricks->n_voxel[a];
+            brick = brick * bricks->n_brick[a] + (inside ? (size_t)middle / bricks->edge : 0);
             length2 += (double)(d * d);
         }
-        if (inside) h->length_voxel[g->axis] += sqrt(length2);
+        if (inside && is_chosen[brick]) h->length_voxel[g->axis] += sqrt(length2);
     }
 }
 
@@ -104,15 +120,22 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
     job.histogram = calloc(n_thread, sizeof *job.histogram);
     job.distance2 = malloc(n_thread * FINE * FINE * FINE * sizeof *job.distance2);
     job.nearest = malloc(n_thread * FINE * FINE * FINE * sizeof *job.nearest);
-    if (s == STATUS_OK && (job.histogram == NULL || job.distance2 == NULL || job.nearest == NULL))
+    uint32_t *chosen = s == STATUS_OK ? malloc(segment_n_brick(&bricks) * sizeof *chosen) : NULL;
+    bool *is_chosen = s == STATUS_OK ? calloc(segment_n_brick(&bricks), sizeof *is_chosen) : NULL;
+    job.chosen = chosen;
+    if (s == STATUS_OK && (chosen == NULL || is_chosen == NULL || job.histogram == NULL || job.distance2 == NULL || job.nearest == NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     if (s == STATUS_OK) {
         for (size_t t = 0; t < n_thread; t++) job.histogram[t].bin_voxel = h->bin_voxel;
-        s = thread_pool_run(pool, segment_n_brick(&bricks), measure_brick, &job, progress);
+        size_t n_chosen = choose_bricks(&bricks, chosen);
+        for (size_t i = 0; i < n_chosen; i++) is_chosen[chosen[i]] = true;
+        s = thread_pool_run(pool, n_chosen, measure_brick, &job, progress);
         if (s != STATUS_OK) error_set(err, s, "measuring the fiber radius was cancelled");
         for (size_t t = 0; t < n_thread; t++) add_histogram(h, &job.histogram[t]);
-        add_lengths(&bricks, h);
+        add_lengths(&bricks, is_chosen, h);
     }
+    free(chosen);
+    free(is_chosen);
     free(job.histogram);
     free(job.distance2);
     free(job.nearest);

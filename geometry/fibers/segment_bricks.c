@@ -82,6 +82,8 @@ status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *
             memcpy(g->b, lines->vertex[i + 1], sizeof g->b);
             g->line = (uint32_t)l;
             g->axis = lines->axis[l];
+            g->is_first = i == lines->first[l];
+            g->is_last = i + 2 == lines->first[l + 1];
         }
     return file_all(s, err);
 }
@@ -100,6 +102,8 @@ status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_s
             }
             g->line = (uint32_t)l;
             g->axis = f->axis_class[l];
+            g->is_first = i == f->first_vertex[l];
+            g->is_last = i + 2 == f->first_vertex[l + 1];
         }
     return file_all(s, err);
 }
@@ -126,18 +130,62 @@ struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_
     return l;
 }
 
-/* Points of the lattice within reach of the segment, along each axis. False when there are none. */
-static bool lattice_range(const struct point_lattice *l, const struct segment *g, float reach, size_t from[3], size_t to[3])
+/* A segment seen from the lattice: what the inner loops need. */
+struct view {
+    float u[3], inverse2;      /* b - a, 1 / |u|^2 */
+    float from_voxel, to_voxel; /* slab along u, measured from a in voxels */
+    float across[3];           /* how far points at `reach` can lie beyond the segment's box on each axis */
+};
+
+static struct view view_of(const struct segment *g, float reach)
+{
+    struct view w = {.u = {g->b[0] - g->a[0], g->b[1] - g->a[1], g->b[2] - g->a[2]}};
+    float length2 = w.u[0] * w.u[0] + w.u[1] * w.u[1] + w.u[2] * w.u[2], length = sqrtf(length2);
+    w.inverse2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+    w.from_voxel = g->is_first || !(length2 > 0.0f) ? -reach : -1.0f;
+    w.to_voxel = length + (g->is_last || !(length2 > 0.0f) ? reach : 1.0f);
+    for (int a = 0; a < 3; a++) {
+        float c = length2 > 0.0f ? w.u[a] / length : 0.0f;
+        w.across[a] = g->is_first || g->is_last ? reach : fminf(reach, reach * sqrtf(fmaxf(0.0f, 1.0f - c * c)) + fabsf(c) + 0.1f);
+    }
+    return w;
+}
+
+/* Points of the lattice that the segment may be nearest to, along each axis. False when there are none. */
+static bool lattice_range(const struct point_lattice *l, const struct segment *g, const struct view *w, size_t from[3],
+                          size_t to[3])
 {
     for (int a = 0; a < 3; a++) {
-        float lo = (fminf(g->a[a], g->b[a]) - reach - l->origin[a]) / l->spacing - 0.5f;
-        float hi = (fmaxf(g->a[a], g->b[a]) + reach - l->origin[a]) / l->spacing - 0.5f;
+        float lo = (fminf(g->a[a], g->b[a]) - w->across[a] - l->origin[a]) / l->spacing - 0.5f;
+        float hi = (fmaxf(g->a[a], g->b[a]) + w->across[a] - l->origin[a]) / l->spacing - 0.5f;
         if (hi < 0.0f || lo > (float)(l->n[a] - 1)) return false;
         from[a] = lo <= 0.0f ? 0 : (size_t)ceilf(lo);
         to[a] = hi >= (float)(l->n[a] - 1) ? l->n[a] - 1 : (size_t)hi;
         if (from[a] > to[a]) return false;
     }
     return true;
+}
+
+/* Largest |x| in a row. */
+static float reach_of_row(float px0, float spacing, size_t n)
+{
+    return fmaxf(fabsf(px0), fabsf(px0 + spacing * (float)n));
+}
+
+/* The part of a row (n points from px0 on, relative to g->a) that lies in the slab. False when none does. */
+static bool slab_range(const struct view *w, float px0, float spacing, float py, float pz, size_t n, size_t *from, size_t *to)
+{
+    float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (py * w->u[1] + pz * w->u[2]) * scale;
+    *from = 0;
+    *to = n;
+    if (fabsf(c) < 0.05f) return fixed > w->from_voxel - reach_of_row(px0, spacing, n) * 0.05f &&
+                                 fixed < w->to_voxel + reach_of_row(px0, spacing, n) * 0.05f;
+    float x0 = (w->from_voxel - fixed) / c, x1 = (w->to_voxel - fixed) / c;
+    float lo = (fminf(x0, x1) - px0) / spacing, hi = (fmaxf(x0, x1) - px0) / spacing;
+    if (hi < 0.0f || lo > (float)(n - 1)) return false;
+    if (lo > 0.0f) *from = (size_t)ceilf(lo);
+    if (hi < (float)(n - 1)) *to = (size_t)hi + 1;
+    return *from < *to;
 }
 
 /* Squared distance of a point, relative to g->a, to the segment; comparisons in place of fminf so that loops are vectorised. */
@@ -179,19 +227,21 @@ void segment_distances(const struct segment_bricks *s, size_t i_brick, const str
     for (size_t e = s->first[i_brick]; e < s->first[i_brick + 1]; e++) {
         const struct segment *g = &s->segment[s->index[e]];
         size_t from[3], to[3];
-        if (!lattice_range(l, g, s->reach, from, to)) continue;
-        float u[3] = {g->b[0] - g->a[0], g->b[1] - g->a[1], g->b[2] - g->a[2]};
-        float length2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], inverse2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+        const struct view w = view_of(g, s->reach);
+        if (!lattice_range(l, g, &w, from, to)) continue;
         float px = l->origin[0] + ((float)from[0] + 0.5f) * l->spacing - g->a[0];
         for (size_t k = from[2]; k <= to[2]; k++)
             for (size_t j = from[1]; j <= to[1]; j++) {
-                size_t row = (k * l->n[1] + j) * l->n[0] + from[0], n = to[0] - from[0] + 1;
+                size_t row = (k * l->n[1] + j) * l->n[0] + from[0], i0, i1;
                 float py = l->origin[1] + ((float)j + 0.5f) * l->spacing - g->a[1];
                 float pz = l->origin[2] + ((float)k + 0.5f) * l->spacing - g->a[2];
+                if (!slab_range(&w, px, l->spacing, py, pz, to[0] - from[0] + 1, &i0, &i1)) continue;
+                float px0 = px + (float)i0 * l->spacing;
                 if (nearest == NULL)
-                    stamp_row(u, inverse2, px, l->spacing, py, pz, n, distance2 + row);
+                    stamp_row(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, distance2 + row + i0);
                 else
-                    stamp_row_nearest(u, inverse2, px, l->spacing, py, pz, n, s->index[e], distance2 + row, nearest + row);
+                    stamp_row_nearest(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, s->index[e], distance2 + row + i0,
+                                      nearest + row + i0);
             }
     }
 }

@@ -6,10 +6,13 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/fibers/polyline.h"
 
+#include <stdbool.h>
+
 struct segment {
     float a[3], b[3];
     uint32_t line;
     uint8_t axis;
+    bool is_first, is_last; /* of its line */
 };
 
 struct segment_bricks {
@@ -40,7 +43,8 @@ static inline size_t segment_n_brick(const struct segment_bricks *s) { return s-
 void segment_brick_box(const struct segment_bricks *s, size_t i_brick, size_t from[3], size_t n[3]);
 struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_t i_brick, size_t factor);
 /* distance2[point]: squared distance to the nearest segment, reach^2 where none is nearer; nearest[point] (may be NULL): its
- * index, UINT32_MAX where none. Points in the order (z, y, x). */
+ * index, UINT32_MAX where none. Points in the order (z, y, x). Lines are taken to bend by less than some 10 degrees a vertex: a segment
+ * is looked at from the slab between its ends and a voxel beyond, only the last ones of a line from all around. */
 void segment_distances(const struct segment_bricks *s, size_t i_brick, const struct point_lattice *lattice, float *distance2,
                        uint32_t *nearest);
 
