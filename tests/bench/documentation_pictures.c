@@ -140,7 +140,7 @@ int main(int argc, char **argv)
         return 2;
     }
     size_t n_sample = argc > 3 ? strtoul(argv[3], NULL, 10) : twill ? 256 : 512;
-    size_t width = argc > 4 ? strtoul(argv[4], NULL, 10) : 660;
+    size_t width = argc > 4 ? strtoul(argv[4], NULL, 10) : 600;
     struct thread_pool *pool = NULL;
     struct scene *scene = NULL;
     struct error err = {0};
