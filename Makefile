@@ -37,7 +37,7 @@ LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 
 PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom
 LINK_BASE := -lz -lm -pthread
-LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd) -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
+LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
