@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_FINE = 900, J_BINS = 512, MAX_STEP = 24 };
+enum { N_FINE = 900, MAX_STEP = 24 };
 #define J_UNIT (1.0 / 40000.0) /* J at ridges is kept as a share of J in solid material in 16 bits */
 
 struct orientation_job {
@@ -31,7 +31,6 @@ struct orientation_job {
     uint32_t *ridge;       /* per voxel of material: index of its ridge voxel */
     _Atomic uint8_t *is_ridge;
     uint16_t *j_ridge;     /* per ridge voxel, in J_UNIT * j_full */
-    size_t (*j_histogram)[J_BINS]; /* per slice; of J / j_full at ridges */
     float *scratch;        /* per thread */
     size_t scratch_per_thread;
     size_t *n_material, *n_kept; /* per slice */
@@ -136,7 +135,6 @@ static void ridge_slice(void *context, size_t k, size_t i_thread)
             least = descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, d0), d);
             double share = fmax(0.0, (double)least / o->j_full);
             o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
-            o->j_histogram[k][share * J_BINS >= J_BINS ? J_BINS - 1 : (size_t)(share * J_BINS)]++;
             direction_volume_set(o->d, at, d);
         }
 }
@@ -160,6 +158,12 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
     o->n_kept[k] = kept;
 }
 
+/* J in a block of density 1. */
+static double solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
+
+/* Axes of fibers have 0.9 of the J of solid material, those of thin and blurred ones 0.5; noise in void has below 0.2. */
+static const double EPS_J_SHARE = 0.35;
+
 /* Filter parameters from the fiber diameter. Over the six fabrics of thesis Table 5.2 s times the squared radius in voxels is
  * between 0.7 and 11, about 4 in the (geometric) mean; t is twice s for most. A line must be
  * some diameters long, or it fits into one fiber in many directions: h is about 2.8 diameters. */
@@ -173,25 +177,8 @@ static void choose_parameters(struct reconstruct_option *o, double diameter_voxe
         o->h = h < 9 ? 9 : h > 41 ? 41 : h;
     }
     if (isnan(o->eps_d)) o->eps_d = 0.5; /* half way between the modes of void and material */
+    if (isnan(o->eps_j)) o->eps_j = EPS_J_SHARE * solid_j(o->s, o->t, o->h);
 }
-
-/* Half of the J that the upper fifth of the ridges reaches; noise in void has near 0. */
-static void choose_eps_j(struct orientation_job *o, struct reconstruct_option *option)
-{
-    if (isnan(option->eps_j)) {
-        size_t total = 0, above = 0, bin = J_BINS, n_slice = o->v->n[2];
-        for (size_t k = 0; k < n_slice; k++)
-            for (size_t b = 0; b < J_BINS; b++) total += o->j_histogram[k][b];
-        while (bin > 0 && above * 5 <= total) {
-            bin--;
-            for (size_t k = 0; k < n_slice; k++) above += o->j_histogram[k][bin];
-        }
-        option->eps_j = 0.5 * o->j_full * ((double)bin + 0.5) / J_BINS;
-    }
-    o->eps_j = (float)option->eps_j;
-}
-
-static double solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
 
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
                       size_t n_thread, struct error *err)
@@ -207,14 +194,13 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     o->ridge = malloc(n_voxel * sizeof *o->ridge);
     o->is_ridge = calloc(n_voxel, sizeof *o->is_ridge);
     o->j_ridge = malloc(n_voxel * sizeof *o->j_ridge);
-    o->j_histogram = calloc(n[2], sizeof *o->j_histogram);
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
     o->n_material = calloc(n[2], sizeof *o->n_material);
     o->n_kept = calloc(n[2], sizeof *o->n_kept);
-    if (o->ridge == NULL || o->is_ridge == NULL || o->j_ridge == NULL || o->j_histogram == NULL ||
-        o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
+    if (o->ridge == NULL || o->is_ridge == NULL || o->j_ridge == NULL || o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     o->eps_d = (float)option->eps_d;
+    o->eps_j = (float)option->eps_j;
     o->j_full = solid_j(option->s, option->t, option->h);
     tensor_window_init(&o->window, 0.35 * diameter_voxel);
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
@@ -229,7 +215,6 @@ static void release(struct orientation_job *o)
     free(o->ridge);
     free(o->is_ridge);
     free(o->j_ridge);
-    free(o->j_histogram);
     free(o->scratch);
     free(o->n_material);
     free(o->n_kept);
@@ -268,7 +253,6 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     part = (struct part_progress){progress, 0.5, 0.5};
     if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], ridge_slice, &o, &inner);
     if (s == STATUS_OK) {
-        choose_eps_j(&o, option);
         s = thread_pool_run(pool, v->n[2], assign_slice, &o, NULL);
     }
     if (s != STATUS_OK) {

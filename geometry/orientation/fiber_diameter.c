@@ -10,6 +10,7 @@ static double scale_sigma(int i) { return 0.7 * pow(1.14, i); } /* 0.7 .. 8.4 vo
 
 /* 2 sqrt 2 = 2.83 for a lone cylinder; bundled ones answer at finer scales. Between the two, found on phantoms. */
 static const double DIAMETER_OVER_SIGMA = 3.25;
+static const float MIN_BLURRED = 0.35f;
 
 struct brick {
     size_t from[3], n[3];
@@ -56,7 +57,8 @@ static void blur(float *a, float *b, const size_t n[3], double sigma)
     memcpy(a, b, n[0] * n[1] * n[2] * sizeof *a);
 }
 
-/* Mean over inner voxels of max(0, -sigma^2 lap)^3. */
+/* Mean over inner voxels of max(0, -sigma^2 lap)^3, where there is material at this scale (noise in void must not count: a volume may
+ * be void for the most part). On the axis of a lone cylinder at its scale the blurred density is 0.63. */
 static double bright_energy(const float *a, const size_t n[3], double sigma)
 {
     size_t sy = n[0], sz = n[0] * n[1], margin = EDGE / 8, count = 0;
@@ -66,6 +68,7 @@ static double bright_energy(const float *a, const size_t n[3], double sigma)
         for (size_t j = 1; j + 1 < n[1]; j++)
             for (size_t i = 1; i + 1 < n[0]; i++, count++) {
                 const float *p = a + k * sz + j * sy + i;
+                if (p[0] < MIN_BLURRED) continue;
                 float lap = p[-1] + p[1] + p[-(ptrdiff_t)sy] + p[sy] + p[-(ptrdiff_t)sz] + p[sz] - 6.0f * p[0];
                 float bright = lap < 0.0f ? -s2 * lap : 0.0f;
                 sum += (double)(bright * bright * bright);

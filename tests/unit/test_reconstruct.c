@@ -1,0 +1,194 @@
+/* The whole chain on small volumes with straight fibers: from a TIFF to fibers, the same for any number of threads. */
+#include "geometry/reconstruct.h"
+#include "tests/support/scan_files.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <tiffio.h>
+
+#include <cmocka.h>
+
+enum { NX = 72, NY = 64, NZ = 48, N_CYLINDER = 5 };
+
+static const struct test_cylinder cylinder[N_CYLINDER] = {
+    {{0.0, 20.0, 12.0}, {1.0, 0.0, 0.0}, 3.5},   {{0.0, 27.2, 12.0}, {1.0, 0.0, 0.0}, 3.5},
+    {{36.0, 45.0, 12.0}, {1.0, 0.15, 0.05}, 3.5}, {{20.0, 32.0, 30.0}, {0.1, 1.0, 0.0}, 3.5},
+    {{50.0, 32.0, 32.0}, {0.0, 1.0, 0.9}, 3.5},
+};
+
+/* One layer along x, two fibers across it, as 16-bit pages; noise 0.2. */
+static void write_scan(const char *path)
+{
+    const size_t n[3] = {NX, NY, NZ};
+    static uint16_t pixel[NX * NY * NZ];
+    struct test_page page[NZ];
+    struct volume v;
+    assert_int_equal(volume_init(&v, n, (const double[3]){1.0, 1.0, 1.0}, NULL), STATUS_OK);
+    test_fill_cylinders(&v, cylinder, N_CYLINDER, 0.2, 9);
+    for (size_t i = 0; i < NX * NY * NZ; i++) pixel[i] = (uint16_t)lrintf(20000.0f + 10000.0f * v.density[i]);
+    for (size_t k = 0; k < NZ; k++) page[k] = (struct test_page){NX, NY, 16, pixel + k * NX * NY};
+    test_write_tiff(path, page, NZ, COMPRESSION_ADOBE_DEFLATE, TEST_STRIPS);
+    volume_release(&v);
+}
+
+struct result {
+    struct volume v;
+    struct direction_volume d;
+    struct fiber_set f;
+    struct reconstruct_option o;
+    struct reconstruct_report r;
+};
+
+static void run(const char *path, const char *axes, size_t n_thread, struct result *x)
+{
+    struct error err = {0};
+    struct thread_pool *pool;
+    memset(x, 0, sizeof *x);
+    reconstruct_option_default(&x->o);
+    snprintf(x->o.axes, sizeof x->o.axes, "%s", axes);
+    for (int a = 0; a < 3; a++) x->o.voxel_size_m[a] = 2e-6;
+    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
+    assert_int_equal(reconstruct_read(&path, 1, &x->o, 0, pool, NULL, &x->v, &x->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_orientation(&x->v, &x->o, pool, NULL, &x->d, &x->r, &err), STATUS_OK);
+    fiber_set_init(&x->f);
+    if (reconstruct_fibers(&x->v, &x->d, &x->o, pool, NULL, &x->f, &x->r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(reconstruct_transfer(&x->f, &x->d, pool, NULL, &x->r, &err), STATUS_OK);
+    thread_pool_free(pool);
+}
+
+static void release(struct result *x)
+{
+    volume_release(&x->v);
+    direction_volume_release(&x->d);
+    fiber_set_release(&x->f);
+}
+
+static char path[128];
+
+static int make_scan(void **state)
+{
+    (void)state;
+    char folder[64];
+    test_make_folder(folder);
+    snprintf(path, sizeof path, "%s/scan.tif", folder);
+    write_scan(path);
+    return 0;
+}
+
+/* Distance of vertices of fiber l from the nearest cylinder's axis, root mean square, voxels. */
+static double rms_from_axes(const struct fiber_set *f)
+{
+    double square = 0.0;
+    for (size_t i = 0; i < f->n_vertex; i++) {
+        double least = INFINITY;
+        for (int c = 0; c < N_CYLINDER; c++) {
+            double norm = 0.0, along = 0.0, d2 = 0.0;
+            for (size_t a = 0; a < 3; a++) norm += cylinder[c].direction[a] * cylinder[c].direction[a];
+            for (size_t a = 0; a < 3; a++) {
+                double p = (double)f->position_m[3 * i + a] / 2e-6 - cylinder[c].point[a];
+                along += p * cylinder[c].direction[a] / sqrt(norm);
+                d2 += p * p;
+            }
+            least = fmin(least, d2 - along * along);
+        }
+        square += least;
+    }
+    return sqrt(square / (double)f->n_vertex);
+}
+
+static void test_chain(void **state)
+{
+    (void)state;
+    struct result x;
+    run(path, "xyz", 2, &x);
+    print_message("low %.0f high %.0f noise %.3f diameter %.2f radius %.3f um (7.0) rms %.3f voxels length %.1f um dice %.3f change %.2f\n",
+                  x.r.density_low, x.r.density_high, x.r.noise_sd, x.r.fiber_diameter_voxel, x.r.radius_m[0] * 1e6,
+                  rms_from_axes(&x.f), x.r.total_length_m * 1e6, x.r.dice, x.r.direction_change_mean_deg);
+    assert_true(fabs(x.r.density_low - 20000.0) < 500.0 && fabs(x.r.density_high - 30000.0) < 1500.0);
+    assert_true(fabs(x.r.noise_sd - 0.2) < 0.04);
+    assert_int_equal(x.f.n_fiber, N_CYLINDER);
+    assert_true(rms_from_axes(&x.f) < 0.3);
+    assert_true(fabs(x.r.radius_m[0] / 7e-6 - 1.0) < 0.03);
+    assert_true(x.r.dice > 0.85);
+    for (size_t l = 0; l < N_CYLINDER; l++) { /* every fiber runs from face to face */
+        const float *a = x.f.position_m + 3 * x.f.first_vertex[l], *b = x.f.position_m + 3 * (x.f.first_vertex[l + 1] - 1);
+        int axis = x.f.axis_class[l];
+        double low = fmin((double)a[axis], (double)b[axis]) / 2e-6, high = fmax((double)a[axis], (double)b[axis]) / 2e-6;
+        double edge = axis == 0 ? NX : NY;
+        bool leaning = fabs((double)(a[2] - b[2])) > 60e-6; /* leaves through the top and the bottom */
+        assert_true(leaning || (low < 0.01 && high > edge - 0.01));
+    }
+    assert_true(fabs(x.f.tile_size_m[0] - NX * 2e-6) < 1e-12 && fabs(x.f.tile_size_m[1] - NY * 2e-6) < 1e-12);
+    uint8_t *rgb;
+    size_t width, height, red = 0;
+    assert_int_equal(reconstruct_slice_picture(&x.v, &x.f, 0, NX / 2, &rgb, &width, &height, NULL), STATUS_OK);
+    assert_true(width == 3 * NY && height == 3 * NZ);
+    for (size_t i = 0; i < width * height; i++) red += rgb[3 * i] == 255 && rgb[3 * i + 1] == 0;
+    assert_true(red >= 3 * 13); /* crosses of 13 pixels for the three fibers along x */
+    free(rgb);
+    assert_int_equal(reconstruct_slice_picture(&x.v, &x.f, 0, NX, &rgb, &width, &height, NULL), STATUS_INVALID);
+    release(&x);
+}
+
+static void test_threads(void **state)
+{
+    (void)state;
+    struct result one, three;
+    run(path, "xyz", 1, &one);
+    run(path, "xyz", 3, &three);
+    size_t n = (size_t)NX * NY * NZ;
+    assert_memory_equal(one.v.density, three.v.density, n * sizeof(float));
+    assert_memory_equal(one.d.density, three.d.density, n);
+    assert_memory_equal(one.d.octahedral, three.d.octahedral, 4 * n);
+    assert_int_equal(one.f.n_vertex, three.f.n_vertex);
+    assert_memory_equal(one.f.position_m, three.f.position_m, one.f.n_vertex * 3 * sizeof(float));
+    assert_memory_equal(one.f.radius_m, three.f.radius_m, one.f.n_fiber * sizeof(float));
+    release(&one);
+    release(&three);
+}
+
+/* A permuted file gives the permuted cloth: "zxy" takes file z for cloth x. */
+static void test_axes(void **state)
+{
+    (void)state;
+    struct result plain, turned;
+    run(path, "xyz", 2, &plain);
+    run(path, "zx-y", 2, &turned);
+    assert_true(turned.v.n[0] == NZ && turned.v.n[1] == NX && turned.v.n[2] == NY);
+    for (size_t k = 0; k < NZ; k += 5)
+        for (size_t j = 0; j < NY; j += 3)
+            for (size_t i = 0; i < NX; i += 7)
+                assert_true(plain.v.density[volume_index(plain.v.n, i, j, k)] ==
+                            turned.v.density[volume_index(turned.v.n, k, i, NY - 1 - j)]);
+    assert_int_equal(turned.f.n_fiber, N_CYLINDER);
+    assert_true(fabs(turned.r.total_length_m / plain.r.total_length_m - 1.0) < 0.01);
+    release(&plain);
+    release(&turned);
+}
+
+static void test_cancel(void **state)
+{
+    (void)state;
+    struct result x;
+    struct error err = {0};
+    atomic_bool cancel = true;
+    const struct progress progress = {.cancel = &cancel};
+    run(path, "xyz", 2, &x);
+    direction_volume_release(&x.d);
+    assert_int_equal(reconstruct_orientation(&x.v, &x.o, NULL, &progress, &x.d, &x.r, &err), STATUS_CANCELLED);
+    const char *list[1] = {path};
+    volume_release(&x.v);
+    assert_int_equal(reconstruct_read(list, 1, &x.o, 0, NULL, &progress, &x.v, &x.r, &err), STATUS_CANCELLED);
+    release(&x);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
+                                       cmocka_unit_test(test_cancel)};
+    return cmocka_run_group_tests(tests, make_scan, NULL);
+}
