@@ -22,7 +22,8 @@ enum {
 
 /* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for
  * it, as a share of those of the fit. */
-static const double validation_rel_se = 0.005, validation_share = 0.7;
+/* Budget: a share of the fit's paths, but enough for a fair judgement where the fit needed few. */
+static const double validation_rel_se = 0.005, validation_share = 0.7, validation_least_paths = 4e6;
 
 /* ---- the path tracer as an estimator ---- */
 
@@ -199,7 +200,9 @@ static void plan_validation(const struct pipeline_context *c, const struct estim
     double total = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
-    double shrink = fmin(1.0, validation_share * (double)c->fit.n_path / fmax(total, 1.0));
+    double least = c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
+    double budget = fmax(validation_share * (double)c->fit.n_path, least);
+    double shrink = fmin(1.0, budget / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
         double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
                    (validation_rel_se * validation_rel_se);
