@@ -86,14 +86,15 @@ def test_from_scan_to_results(real, finished):
     assert all(b >= a - 1e-9 for a, b in zip(fractions, fractions[1:])) and fractions[-1] == 1
     stages = [s["name"] for s in real.get("/v1/about").json()["stages"]]
     passed = [stages.index(s) for _, s, _ in seen if s]
-    assert passed == sorted(passed) and "fit" in [s for _, s, _ in seen]
+    assert passed == sorted(passed) and len(set(passed)) >= 2  # a short stage may pass between two looks
     j = real.job(job)
     assert j["parameters"] and all({"name", "value", "standard_error"} <= set(p) for p in j["parameters"])
     assert j["attempt"] == 1 and j["objective"] is not None
     series = real.get(f"/v1/jobs/{job}/series").json()["points"]
     assert series and all(math.isfinite(p["objective"]) and p["objective_se"] >= 0 for p in series)
     assert [p["step"] for p in series] == sorted({p["step"] for p in series})
-    assert "INFO" in real.get(f"/v1/jobs/{job}/log").text
+    log = real.get(f"/v1/jobs/{job}/log").text
+    assert [s for s in stages if f"stage {s}" in log] == stages
     names = [f["path"] for f in real.get(f"/v1/jobs/{job}/results").json()["files"]]
     archive = tarfile.open(fileobj=io.BytesIO(real.get(f"/v1/jobs/{job}/results.tar").content))
     assert archive.getnames() == names and "result.json" in names
