@@ -4,18 +4,23 @@
  * first climbs to its ridge (the densest place of the blurred volume within about one radius), J is minimised there, and the
  * voxel takes the ridge's direction and J. The descent starts from the structure tensor, which in dense bundles is not misled by the
  * rows of touching fibers that J takes for fibers, and ends on the paraboloid through J at the best node of a fine set of directions and
- * its neighbours. Nothing depends on how the work is divided. */
+ * its neighbours. Where the neighbourhood agrees on another direction that J likes almost as well, that one is taken. Nothing depends on how the work is divided. */
 #include "geometry/reconstruct.h"
 
+#include "geometry/orientation/consensus.h"
 #include "geometry/orientation/fiber_diameter.h"
 #include "geometry/orientation/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
+#include "geometry/volume/density_map.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_FINE = 900, MAX_STEP = 24 };
+enum { N_FINE = 900, MAX_STEP = 24, N_CONSENSUS_BLUR = 3 };
+
+#define J_TOLERANCE 0.07 /* minima of J that noise and touching fibers may exchange */
+#define AGREEMENT_COSINE 0.94f
 #define J_UNIT (1.0 / 40000.0) /* J at ridges is kept as a share of J in solid material in 16 bits */
 
 struct orientation_job {
@@ -30,6 +35,7 @@ struct orientation_job {
     int n_climb;           /* steps to the ridge */
     uint32_t *ridge;       /* per voxel of material: index of its ridge voxel */
     _Atomic uint8_t *is_ridge;
+    struct consensus consensus;
     uint16_t *j_ridge;     /* per ridge voxel, in J_UNIT * j_full */
     float *scratch;        /* per thread */
     size_t scratch_per_thread;
@@ -131,12 +137,59 @@ static void ridge_slice(void *context, size_t k, size_t i_thread)
             if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
             struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
             float d[3], least, d0[3];
-            structure_tensor_direction(&o->blurred, &o->window, i, j, k, d0, NULL);
+            structure_tensor_direction(&o->blurred, &o->window, i, j, k, d0);
             least = descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, d0), d);
             double share = fmax(0.0, (double)least / o->j_full);
             o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
             direction_volume_set(o->d, at, d);
         }
+}
+
+/* One layer of cells of the consensus. */
+static void collect_layer(void *context, size_t layer, size_t i_thread)
+{
+    (void)i_thread;
+    struct orientation_job *o = context;
+    const size_t *n = o->v->n;
+    for (size_t k = layer * o->consensus.cell; k < (layer + 1) * o->consensus.cell && k < n[2]; k++)
+        for (size_t j = 0; j < n[1]; j++)
+            for (size_t i = 0; i < n[0]; i++) {
+                size_t at = volume_index(n, i, j, k);
+                if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
+                float d[3], share = (float)(o->j_ridge[at] * J_UNIT);
+                direction_volume_get(o->d, at, d);
+                consensus_add(&o->consensus, i, j, k, d, share * share);
+            }
+}
+
+/* The direction that the neighbourhood agrees on, where J has a minimum near it that is almost as deep. */
+static void agree_slice(void *context, size_t k, size_t i_thread)
+{
+    struct orientation_job *o = context;
+    const size_t *n = o->v->n;
+    float *scratch = o->scratch + i_thread * o->scratch_per_thread;
+    for (size_t j = 0; j < n[1]; j++)
+        for (size_t i = 0; i < n[0]; i++) {
+            size_t at = volume_index(n, i, j, k);
+            float own[3], common[3], d[3];
+            if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
+            if (!consensus_direction(&o->consensus, i, j, k, common)) continue;
+            direction_volume_get(o->d, at, own);
+            if (fabsf(own[0] * common[0] + own[1] * common[1] + own[2] * common[2]) > AGREEMENT_COSINE) continue;
+            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
+            double share = (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, common), d) / o->j_full;
+            if (share < (1.0 - J_TOLERANCE) * o->j_ridge[at] * J_UNIT) continue;
+            o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
+            direction_volume_set(o->d, at, d);
+        }
+}
+
+static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, struct error *err)
+{
+    status s = thread_pool_run(pool, o->consensus.n[2], collect_layer, o, NULL);
+    if (s == STATUS_OK) s = consensus_blur(&o->consensus, N_CONSENSUS_BLUR, err);
+    if (s == STATUS_OK) s = thread_pool_run(pool, o->v->n[2], agree_slice, o, NULL);
+    return s;
 }
 
 static void assign_slice(void *context, size_t k, size_t i_thread)
@@ -167,8 +220,9 @@ static const double EPS_J_SHARE = 0.35;
 /* Filter parameters from the fiber diameter. Over the six fabrics of thesis Table 5.2 s times the squared radius in voxels is
  * between 0.7 and 11, about 4 in the (geometric) mean; t is twice s for most. A line must be
  * some diameters long, or it fits into one fiber in many directions: h is about 2.8 diameters. */
-static void choose_parameters(struct reconstruct_option *o, double diameter_voxel)
+static void choose_parameters(struct reconstruct_option *o, const struct volume *v, double diameter_voxel)
 {
+    struct density_modes modes;
     double radius = 0.5 * diameter_voxel;
     if (isnan(o->s)) o->s = fmin(2.0, 4.0 / (radius * radius));
     if (isnan(o->t)) o->t = 2.0 * o->s;
@@ -176,7 +230,8 @@ static void choose_parameters(struct reconstruct_option *o, double diameter_voxe
         size_t h = 2 * (size_t)lrint(1.4 * diameter_voxel) + 1;
         o->h = h < 9 ? 9 : h > 41 ? 41 : h;
     }
-    if (isnan(o->eps_d)) o->eps_d = 0.5; /* half way between the modes of void and material */
+    if (isnan(o->eps_d)) /* half way between the modes of void and material */
+        o->eps_d = density_modes_find(v, &modes, NULL) == STATUS_OK ? fmin(0.6, fmax(0.25, modes.half)) : 0.5;
     if (isnan(o->eps_j)) o->eps_j = EPS_J_SHARE * solid_j(o->s, o->t, o->h);
 }
 
@@ -190,6 +245,8 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     status s = direction_set_init(&o->fine, N_FINE, err);
     if (s == STATUS_OK) s = line_filter_new(&o->fine, option->h, n, &o->filter, err);
     if (s != STATUS_OK) return s;
+    s = consensus_init(&o->consensus, n, (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5), err);
+    if (s != STATUS_OK) return s;
     o->scratch_per_thread = line_filter_scratch(o->filter);
     o->ridge = malloc(n_voxel * sizeof *o->ridge);
     o->is_ridge = calloc(n_voxel, sizeof *o->is_ridge);
@@ -202,7 +259,7 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     o->eps_d = (float)option->eps_d;
     o->eps_j = (float)option->eps_j;
     o->j_full = solid_j(option->s, option->t, option->h);
-    tensor_window_init(&o->window, 0.35 * diameter_voxel);
+    tensor_window_init(&o->window, 0.28 * diameter_voxel);
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
     return STATUS_OK;
 }
@@ -212,6 +269,7 @@ static void release(struct orientation_job *o)
     volume_release(&o->blurred);
     direction_set_release(&o->fine);
     line_filter_free(o->filter);
+    consensus_release(&o->consensus);
     free(o->ridge);
     free(o->is_ridge);
     free(o->j_ridge);
@@ -241,7 +299,7 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     *d = (struct direction_volume){0};
     status s = fiber_diameter_measure(v, pool, &inner, &report->fiber_diameter_voxel, err);
     if (s != STATUS_OK) return s;
-    choose_parameters(option, report->fiber_diameter_voxel);
+    choose_parameters(option, v, report->fiber_diameter_voxel);
     s = prepare(&o, option, report->fiber_diameter_voxel, thread_pool_n_thread(pool), err);
     if (s == STATUS_OK) s = direction_volume_init(d, v->n, v->voxel_size_m, err);
     if (s != STATUS_OK) goto out;
@@ -252,9 +310,8 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     s = thread_pool_run(pool, v->n[2], climb_slice, &o, &inner);
     part = (struct part_progress){progress, 0.5, 0.5};
     if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], ridge_slice, &o, &inner);
-    if (s == STATUS_OK) {
-        s = thread_pool_run(pool, v->n[2], assign_slice, &o, NULL);
-    }
+    if (s == STATUS_OK) s = seek_agreement(&o, pool, err);
+    if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], assign_slice, &o, NULL);
     if (s != STATUS_OK) {
         s = error_set(err, s, "finding fiber directions was cancelled");
         goto out;

@@ -109,18 +109,11 @@ static void jacobi(double m[3][3], double e[3][3])
             }
 }
 
-void structure_tensor_direction(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k,
-                                float d[3], float eigen[3])
+void symmetric_eigen(double m[3][3], float vector[3][3], float value[3])
 {
-    double sum[6] = {0.0};
-    size_t r = (size_t)w->reach + 1, centre[3] = {i, j, k};
-    if (i >= r && j >= r && k >= r && i + r + LANES < v->n[0] && j + r < v->n[1] && k + r < v->n[2])
-        collect_inner(v, w, i, j, k, sum);
-    else
-        collect_border(v, w, centre, sum);
-    double m[3][3] = {{sum[0], sum[3], sum[4]}, {sum[3], sum[1], sum[5]}, {sum[4], sum[5], sum[2]}}, e[3][3];
-    jacobi(m, e);
+    double e[3][3];
     int order[3] = {0, 1, 2};
+    jacobi(m, e);
     for (int a = 0; a < 2; a++)
         for (int b = 0; b < 2 - a; b++)
             if (m[order[b]][order[b]] > m[order[b + 1]][order[b + 1]]) {
@@ -128,8 +121,22 @@ void structure_tensor_direction(const struct volume *v, const struct tensor_wind
                 order[b] = order[b + 1];
                 order[b + 1] = t;
             }
-    for (int a = 0; a < 3; a++) {
-        d[a] = (float)e[a][order[0]];
-        if (eigen != NULL) eigen[a] = (float)m[order[a]][order[a]];
+    for (int k = 0; k < 3; k++) {
+        value[k] = (float)m[order[k]][order[k]];
+        for (int a = 0; a < 3; a++) vector[k][a] = (float)e[a][order[k]];
     }
+}
+
+void structure_tensor_direction(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k, float d[3])
+{
+    double sum[6] = {0.0};
+    size_t r = (size_t)w->reach + 1, centre[3] = {i, j, k};
+    if (i >= r && j >= r && k >= r && i + r + LANES < v->n[0] && j + r < v->n[1] && k + r < v->n[2])
+        collect_inner(v, w, i, j, k, sum);
+    else
+        collect_border(v, w, centre, sum);
+    double m[3][3] = {{sum[0], sum[3], sum[4]}, {sum[3], sum[1], sum[5]}, {sum[4], sum[5], sum[2]}};
+    float vector[3][3], value[3];
+    symmetric_eigen(m, vector, value);
+    memcpy(d, vector[0], sizeof vector[0]);
 }

@@ -6,6 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Solid is not the mode of the material but what 90 % of it stay below: of two yarns the denser one must keep its texture. */
+static const double DENSE_SHARE = 0.9;
+
 enum { N_BIN = 1024, N_SAMPLE = 1 << 22 };
 
 struct histogram {
@@ -137,6 +140,16 @@ static double mean_bin(const struct histogram *h, size_t from, size_t to)
     return w > 0.0 ? s / w : 0.5 * (double)(from + to);
 }
 
+/* Bin below which `share` of the counts from..to-1 lie. */
+static size_t quantile_bin(const struct histogram *h, size_t from, size_t to, double share)
+{
+    double total = 0.0, sum = 0.0;
+    for (size_t b = from; b < to; b++) total += h->count[b];
+    for (size_t b = from; b < to; b++)
+        if ((sum += h->count[b]) >= share * total) return b;
+    return to - 1;
+}
+
 status density_modes_find(const struct volume *v, struct density_modes *m, struct error *err)
 {
     float least = 0.0f, most = 0.0f;
@@ -149,12 +162,14 @@ status density_modes_find(const struct volume *v, struct density_modes *m, struc
                                "cannot find densities: %zu x %zu x %zu voxels are too few", v->n[0], v->n[1], v->n[2]);
     trim_range(&h, total);
     collect(v, &h);
-    size_t threshold = otsu(&h, &m->separability);
+    size_t threshold = otsu(&h, &m->separability), dense = quantile_bin(&h, threshold, N_BIN, DENSE_SHARE);
     smooth_histogram(&h, 8.0);
     /* A peak next to the threshold is the other side's tail: then that side has no mode of its own and its mean must do. */
     size_t low = peak(&h, 0, threshold), high = peak(&h, threshold, N_BIN);
     double low_bin = low + 2 < threshold ? (double)low : mean_bin(&h, 0, threshold);
     double high_bin = high > threshold + 2 ? (double)high : mean_bin(&h, threshold, N_BIN);
+    m->half = h.first + (0.5 * (low_bin + high_bin) + 0.5) * h.width;
+    if ((double)dense > high_bin) high_bin = (double)dense;
     m->low = h.first + (low_bin + 0.5) * h.width;
     m->high = h.first + (high_bin + 0.5) * h.width;
     m->threshold = h.first + (double)threshold * h.width;

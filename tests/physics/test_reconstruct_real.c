@@ -1,0 +1,150 @@
+/* Real scans. fiber-ct: github.com/libenke/CT_FiberSegmentation, demo_data (GPL-3.0), fibers in a polymer.
+ * weave-ct: github.com/nasa/puma, python/pumapy/data (NOSA 1.3), a woven textile with labelled tows; single fibers are barely
+ * resolved there, so only the directions are judged. Pictures of slices go to the folder named by SELVEDGE_PICTURES, if set. */
+#include "base/clock.h"
+#include "geometry/reconstruct.h"
+#include "geometry/volume/volume_source.h"
+
+#include <math.h>
+#include <png.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+struct scan {
+    struct volume v;
+    struct direction_volume d;
+    struct fiber_set f;
+    struct reconstruct_option o;
+    struct reconstruct_report r;
+    double seconds;
+};
+
+static void data_path(char path[512], const char *name)
+{
+    const char *folder = getenv("SELVEDGE_DATA");
+    snprintf(path, 512, "%s/%s", folder != NULL ? folder : "../shared/data", name);
+    if (access(path, R_OK) == 0) return;
+    print_message("real data '%s' is not there, test skipped\n", name);
+    skip();
+}
+
+static void save_pictures(const struct scan *s, const char *name)
+{
+    const char *folder = getenv("SELVEDGE_PICTURES");
+    for (int axis = 0; folder != NULL && axis < 3; axis++) {
+        char path[512];
+        uint8_t *rgb;
+        size_t width, height;
+        snprintf(path, sizeof path, "%s/%s_%c.png", folder, name, "xyz"[axis]);
+        assert_int_equal(reconstruct_slice_picture(&s->v, &s->f, axis, s->v.n[axis] / 2, &rgb, &width, &height, NULL), STATUS_OK);
+        png_image image = {.version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height, .format = PNG_FORMAT_RGB};
+        assert_true(png_image_write_to_file(&image, path, 0, rgb, 0, NULL));
+        free(rgb);
+    }
+}
+
+static void reconstruct_scan(const char *path, const char *axes, const char *name, struct scan *s)
+{
+    struct error err = {0};
+    struct thread_pool *pool;
+    memset(s, 0, sizeof *s);
+    reconstruct_option_default(&s->o);
+    snprintf(s->o.axes, sizeof s->o.axes, "%s", axes);
+    for (int a = 0; a < 3; a++) s->o.voxel_size_m[a] = 2e-6;
+    assert_int_equal(thread_pool_new(0, &pool, &err), STATUS_OK);
+    double start = clock_monotonic_s();
+    assert_int_equal(reconstruct_read(&path, 1, &s->o, 0, pool, NULL, &s->v, &s->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_orientation(&s->v, &s->o, pool, NULL, &s->d, &s->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_fibers(&s->v, &s->d, &s->o, pool, NULL, &s->f, &s->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_transfer(&s->f, &s->d, pool, NULL, &s->r, &err), STATUS_OK);
+    s->seconds = clock_monotonic_s() - start;
+    thread_pool_free(pool);
+    save_pictures(s, name);
+    print_message("%s: %zu fibers, %zu vertices, %.1f mm, radius %.2f um at %.1f um voxels (diameter %.1f voxels), dice %.3f, %zu gaps, "
+                  "%zu joins, direction change %.1f deg, %.1f s\n",
+                  name, s->f.n_fiber, s->f.n_vertex, s->r.total_length_m * 1e3, s->r.radius_m[0] * 1e6, s->v.voxel_size_m[0] * 1e6,
+                  2.0 * s->r.radius_m[0] / s->v.voxel_size_m[0], s->r.dice, s->r.n_gap_bridged, s->r.n_joined,
+                  s->r.direction_change_mean_deg, s->seconds);
+}
+
+static void release(struct scan *s)
+{
+    volume_release(&s->v);
+    direction_volume_release(&s->d);
+    fiber_set_release(&s->f);
+}
+
+static void test_fiber_ct(void **state)
+{
+    (void)state;
+    char path[512];
+    struct scan s;
+    data_path(path, "fiber-ct/crop256.tif");
+    reconstruct_scan(path, "xyz", "fiber_ct", &s);
+    double diameter = 2.0 * s.r.radius_m[0] / s.v.voxel_size_m[0];
+    assert_true(diameter > 4.0 && diameter < 9.0);
+    assert_true(s.r.dice > 0.8);
+    /* Fibers of the fitted radius hold as much material as the scan shows. */
+    double model = M_PI * s.r.radius_m[0] * s.r.radius_m[0] * s.r.total_length_m;
+    double voxel_m3 = s.v.voxel_size_m[0] * s.v.voxel_size_m[1] * s.v.voxel_size_m[2];
+    assert_true(fabs(model / ((double)s.r.n_kept_voxel * voxel_m3) - 1.0) < 0.25);
+    release(&s);
+}
+
+/* Share of labelled voxels (1: tows along the file's z, cloth x; 2: along its x, cloth y) whose direction is nearest to their tow's axis. */
+static double class_accuracy(const struct scan *s, const char *label_path, double *kept)
+{
+    struct error err = {0};
+    struct volume_source *source;
+    const char *list[1] = {label_path};
+    size_t n[3], right = 0, total = 0, n_kept = 0;
+    assert_int_equal(volume_source_open(list, 1, &source, &err), STATUS_OK);
+    memcpy(n, volume_source_describe(source)->n, sizeof n);
+    float *label = malloc(volume_n_voxel(n) * sizeof *label);
+    assert_int_equal(volume_source_read(source, 0, n[2], label, &err), STATUS_OK);
+    volume_source_close(source);
+    for (size_t z = 0; z < n[2]; z++)
+        for (size_t y = 0; y < n[1]; y++)
+            for (size_t x = 0; x < n[0]; x++) {
+                int tow = (int)label[volume_index(n, x, y, z)] - 1;
+                size_t at = volume_index(s->v.n, z, x, y); /* axes "zxy" */
+                if (tow != 0 && tow != 1) continue;
+                total++;
+                if (s->d.density[at] == 0) continue;
+                float d[3];
+                direction_volume_get(&s->d, at, d);
+                n_kept++;
+                right += fabsf(d[tow]) >= fabsf(d[1 - tow]) && fabsf(d[tow]) >= fabsf(d[2]);
+            }
+    free(label);
+    *kept = (double)n_kept / (double)total;
+    return (double)right / (double)n_kept;
+}
+
+static void test_weave_ct(void **state)
+{
+    (void)state;
+    char path[512], labels[512];
+    struct scan s;
+    double kept;
+    data_path(path, "weave-ct/small_weave.tif");
+    data_path(labels, "weave-ct/labels.tif");
+    reconstruct_scan(path, "zxy", "weave_ct", &s);
+    double accuracy = class_accuracy(&s, labels, &kept);
+    print_message("weave_ct: %.1f %% of the labelled tow voxels kept, %.1f %% of those in the right axis class\n", 100.0 * kept, 100.0 * accuracy);
+    assert_true(accuracy >= 0.9);
+    assert_true(kept >= 0.9);
+    release(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_fiber_ct), cmocka_unit_test(test_weave_ct)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
