@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK_PATHS = 256, TASKS_PER_CONFIGURATION = 1024, N_VALUE = 3 + 3 * SCATTERING_MAX_PARAM };
+enum { BLOCK_PATHS = 256, TASKS_PER_CONFIGURATION = 1024, N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT };
 
-/* Sums over the paths of one task, in path order. */
+/* Sums over the paths of one task, in path order: 3 + n_jac sums and as many sums of squares. */
 struct task_sum {
-    double x[N_VALUE], x2[N_VALUE];
     uint64_t n_path, n_vertex;
+    double *x, *x2;
 };
 
 struct task {
@@ -22,6 +22,7 @@ struct run {
     struct task *task;
     size_t n_task;
     struct task_sum *sum; /* per task */
+    double *sum_storage;
 };
 
 static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t i_block, struct task_sum *sum)
@@ -58,7 +59,7 @@ static void run_task(void *context, size_t i_task, size_t i_thread)
 static status make_tasks(struct run *r, struct error *err)
 {
     const struct estimate_blocks *q = r->b;
-    size_t n = 0;
+    size_t n = 0, n_value = 3 + q->n_jac;
     for (int pass = 0; pass < 2; pass++) {
         n = 0;
         for (size_t i = 0; i < q->n_configuration; i++) {
@@ -75,11 +76,16 @@ static status make_tasks(struct run *r, struct error *err)
         if (pass == 0) {
             r->task = malloc((n + 1) * sizeof *r->task);
             r->sum = calloc(n + 1, sizeof *r->sum);
-            if (r->task == NULL || r->sum == NULL)
+            r->sum_storage = calloc(n + 1, 2 * n_value * sizeof *r->sum_storage);
+            if (r->task == NULL || r->sum == NULL || r->sum_storage == NULL)
                 return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu tasks", n);
         }
     }
     r->n_task = n;
+    for (size_t i = 0; i < n; i++) {
+        r->sum[i].x = r->sum_storage + 2 * n_value * i;
+        r->sum[i].x2 = r->sum[i].x + n_value;
+    }
     return STATUS_OK;
 }
 
@@ -95,8 +101,8 @@ static status reduce(const struct run *r, struct estimate *out, size_t *bad_conf
     const struct estimate_blocks *q = r->b;
     size_t i_task = 0;
     for (size_t i = 0; i < q->n_configuration; i++) {
-        struct task_sum total;
-        memset(&total, 0, sizeof total);
+        double x[N_VALUE] = {0}, x2[N_VALUE] = {0};
+        struct task_sum total = {0, 0, x, x2};
         for (; i_task < r->n_task && r->task[i_task].i_configuration == i; i_task++) {
             const struct task_sum *s = &r->sum[i_task];
             for (size_t k = 0; k < 3 + q->n_jac; k++) {
@@ -145,6 +151,7 @@ status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *
     }
     st = reduce(&r, out, bad_configuration, bad_value, err);
 out:
+    free(r.sum_storage);
     free(r.sum);
     free(r.task);
     return st;

@@ -11,7 +11,7 @@ struct estimate_blocks {
     const size_t *n_path; /* per configuration; rounded up to whole blocks; 0: skip */
     uint64_t seed;
     uint32_t iteration, replica;
-    size_t n_jac; /* 3 * number of parameters, 0 without derivatives; at most 3 * SCATTERING_MAX_PARAM */
+    size_t n_jac; /* 3 * number of parameters, 0 without derivatives; at most 3 * SCATTERING_MAX_FLAT */
     /* One path: x and y in [0, 1) of the crop, value[3 + n_jac] preset to 0; result: number of vertices. */
     uint32_t (*trace)(void *context, size_t i_configuration, double x, double y, struct rng *rng, float *value);
     void *context;
