@@ -83,14 +83,5 @@ status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
 status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
                           char path[WORKER_PATH_BYTES], struct error *err);
-/* The path tracer as an estimator over a set of observations. The scene, model and pool are those of c. */
-struct trace_context {
-    struct pipeline_context *pipeline;
-    struct configuration *configuration; /* owned by the user of this struct: free() */
-    size_t n_configuration;
-};
-status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o,
-                          struct error *err);
-struct estimator trace_estimator(struct trace_context *t);
 
 #endif

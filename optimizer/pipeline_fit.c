@@ -1,7 +1,7 @@
 /* Stages "fit" and "validation": the path tracer behind a journal, a method of descent, and fresh estimates at its
  * result. */
-#include "base/clock.h"
 #include "optimizer/descent/estimate_journal.h"
+#include "optimizer/descent/trace_estimator.h"
 #include "optimizer/pipeline_context.h"
 #include "optimizer/work_file.h"
 #include "optimizer/worker_series.h"
@@ -25,44 +25,20 @@ enum {
 /* Budget: a share of the fit's paths, but enough for a fair judgement where the fit needed few. */
 static const double validation_rel_se = 0.005, validation_share = 0.7, validation_least_paths = 4e6;
 
-/* ---- the path tracer as an estimator ---- */
+/* ---- the path tracer as an estimator, shared by both stages ---- */
 
-status trace_context_init(struct trace_context *t, struct pipeline_context *c, const struct observation_set *o,
-                          struct error *err)
+/* configuration: owned by t (free it). */
+static status trace_init(struct trace_estimator *t, const struct pipeline_context *c, const struct appearance *model,
+                         const struct observation_set *o, struct error *err)
 {
-    *t = (struct trace_context){.pipeline = c, .n_configuration = o->n};
-    t->configuration = malloc((o->n > 0 ? o->n : 1) * sizeof *t->configuration);
-    if (t->configuration == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
-    for (size_t i = 0; i < o->n; i++) t->configuration[i] = o->item[i].configuration;
-    return STATUS_OK;
-}
-
-static status trace(void *context, const struct estimator_call *call, const struct progress *progress,
-                    struct estimate *out, double *wall_s, struct error *err)
-{
-    const struct trace_context *t = context;
-    const struct pipeline_context *c = t->pipeline;
-    struct estimate_request q = {.scene = c->scene,
-                                 .model = c->model,
-                                 .param = call->param,
-                                 .configuration = t->configuration,
-                                 .n_configuration = t->n_configuration,
-                                 .n_path = call->n_path,
-                                 .seed = c->doc->seed,
-                                 .iteration = call->iteration,
-                                 .replica = call->replica,
-                                 .want_jacobian = call->want_jacobian};
-    double start_s = clock_monotonic_s();
-    status s = estimate_run(&q, c->pool, progress, out, err);
-    *wall_s = clock_monotonic_s() - start_s;
-    return s;
-}
-
-struct estimator trace_estimator(struct trace_context *t)
-{
-    return (struct estimator){
-        .context = t, .n_configuration = t->n_configuration, .n_param = t->pipeline->model->n_param, .run = trace};
+    *t = (struct trace_estimator){.model = model,
+                                  .scene = {.fibers = c->scene},
+                                  .pool = c->pool,
+                                  .seed = c->doc->seed,
+                                  .configuration = trace_configurations(o),
+                                  .n_configuration = o->n};
+    return t->configuration != NULL ? STATUS_OK
+                                    : error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
 }
 
 static status may_write(void *context, struct error *err)
@@ -146,14 +122,16 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
 
 status stage_fit(struct pipeline_context *c, struct error *err)
 {
-    struct trace_context trace_c = {0};
+    struct appearance model;
+    struct trace_estimator trace = {0};
     struct fit_listener listener = {.pipeline = c};
     char path[WORKER_PATH_BYTES];
     struct estimator live, estimator;
-    status s = trace_context_init(&trace_c, c, &c->fitted, err);
+    appearance_from_surface(c->model, &model);
+    status s = trace_init(&trace, c, &model, &c->fitted, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "fit", "estimates.journal", path, err);
     if (s != STATUS_OK) goto out;
-    live = trace_estimator(&trace_c);
+    live = trace_estimator(&trace);
     s = estimate_journal_open(path, fit_fingerprint(c), &live, may_write, c, &listener.journal, err);
     if (s == STATUS_OK) s = worker_series_open(c->folder, &listener.series, err);
     if (s != STATUS_OK) goto out;
@@ -174,7 +152,7 @@ status stage_fit(struct pipeline_context *c, struct error *err)
 out:
     worker_series_close(listener.series);
     estimate_journal_close(listener.journal);
-    free(trace_c.configuration);
+    free((void *)(uintptr_t)trace.configuration);
     return s;
 }
 
@@ -311,17 +289,19 @@ status stage_validation_load(struct pipeline_context *c, struct error *err)
 
 status stage_validation(struct pipeline_context *c, struct error *err)
 {
-    struct trace_context trace_c = {0};
+    struct appearance model;
+    struct trace_estimator trace = {0};
     struct estimate_journal *journal = NULL;
     struct estimator live, estimator;
     char path[WORKER_PATH_BYTES];
     size_t *n_path = calloc(c->observation.n, sizeof *n_path);
     status s = n_path != NULL ? allocate_validation(c, err)
                               : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
-    if (s == STATUS_OK) s = trace_context_init(&trace_c, c, &c->observation, err);
+    appearance_from_surface(c->model, &model);
+    if (s == STATUS_OK) s = trace_init(&trace, c, &model, &c->observation, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.journal", path, err);
     if (s != STATUS_OK) goto out;
-    live = trace_estimator(&trace_c);
+    live = trace_estimator(&trace);
     s = estimate_journal_open(path, fit_fingerprint(c), &live, may_write, c, &journal, err);
     if (s != STATUS_OK) goto out;
     estimator = estimate_journal_estimator(journal);
@@ -335,7 +315,7 @@ status stage_validation(struct pipeline_context *c, struct error *err)
     s = store_validation(c, err);
 out:
     estimate_journal_close(journal);
-    free(trace_c.configuration);
+    free((void *)(uintptr_t)trace.configuration);
     free(n_path);
     return s;
 }

@@ -26,9 +26,9 @@ enum {
 struct param_info {
     const char *name;           /* "C_R.r", "beta_TT": unique in the model */
     const char *symbol;         /* group name: "C_R" */
-    const char *unit;           /* "" or "deg" (how files and users see it) */
+    const char *unit;           /* "", "deg" or "1/cm" (how files and users see it) */
     int channel;                /* 0 r, 1 g, 2 b; -1 acts on all channels */
-    double lower, upper, start; /* internal unit: radians for "deg" */
+    double lower, upper, start; /* internal unit: radians for "deg", 1/m for "1/cm" */
 };
 
 /* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by

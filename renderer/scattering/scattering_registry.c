@@ -28,14 +28,18 @@ int scattering_param_index(const struct scattering_model *m, const char *name)
     return -1;
 }
 
-double param_from_file_unit(const struct param_info *p, double value)
+/* Internal units per unit of files. */
+static double file_unit(const struct param_info *p)
 {
-    return strcmp(p->unit, "deg") == 0 ? value * (M_PI / 180) : value;
+    if (strcmp(p->unit, "deg") == 0) return M_PI / 180;
+    return strcmp(p->unit, "1/cm") == 0 ? 100 : 1;
 }
+
+double param_from_file_unit(const struct param_info *p, double value) { return value * file_unit(p); }
 
 double param_to_file_unit(const struct param_info *p, double value)
 {
-    return strcmp(p->unit, "deg") == 0 ? value * (180 / M_PI) : value;
+    return strcmp(p->unit, "deg") == 0 ? value * (180 / M_PI) : value / file_unit(p);
 }
 
 status scattering_check_param(const struct scattering_model *m, const double *param, struct error *err)

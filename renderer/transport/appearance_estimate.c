@@ -1,0 +1,46 @@
+#include "renderer/transport/appearance_estimate.h"
+
+#include "renderer/transport/volume_estimate.h"
+
+static status estimate_surface(const struct appearance_request *q, struct thread_pool *pool,
+                               const struct progress *progress, struct estimate *out, struct error *err)
+{
+    const struct estimate_request request = {.scene = q->scene.fibers,
+                                             .model = q->model->surface,
+                                             .param = q->param,
+                                             .configuration = q->configuration,
+                                             .n_configuration = q->n_configuration,
+                                             .n_path = q->n_path,
+                                             .seed = q->seed,
+                                             .iteration = q->iteration,
+                                             .replica = q->replica,
+                                             .want_jacobian = q->want_jacobian};
+    return estimate_run(&request, pool, progress, out, err);
+}
+
+static status estimate_volume(const struct appearance_request *q, struct thread_pool *pool,
+                              const struct progress *progress, struct estimate *out, struct error *err)
+{
+    const struct volume_estimate_request request = {.scene = q->scene.volume,
+                                                    .model = q->model->volume,
+                                                    .param = q->param,
+                                                    .multiplier_per_m = q->param[q->model->n_param - 1],
+                                                    .configuration = q->configuration,
+                                                    .n_configuration = q->n_configuration,
+                                                    .n_path = q->n_path,
+                                                    .seed = q->seed,
+                                                    .iteration = q->iteration,
+                                                    .replica = q->replica,
+                                                    .want_jacobian = q->want_jacobian};
+    return volume_estimate_run(&request, pool, progress, out, err);
+}
+
+status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
+                               const struct progress *progress, struct estimate *out, struct error *err)
+{
+    bool surface = q->model->kind == APPEARANCE_SURFACE;
+    if (surface ? q->scene.fibers == NULL : q->scene.volume == NULL)
+        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s': the cloth has no %s",
+                               q->model->id, surface ? "fibers" : "density volume");
+    return surface ? estimate_surface(q, pool, progress, out, err) : estimate_volume(q, pool, progress, out, err);
+}

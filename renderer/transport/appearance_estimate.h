@@ -1,0 +1,33 @@
+/* Estimates of mean radiance for either kind of cloth: estimate.h or volume_estimate.h, as the model asks. Same result,
+ * units and rules; derivatives are by the flat parameters of the appearance, jac[c * model->n_param + p].
+ */
+#ifndef SELVEDGE_RENDERER_APPEARANCE_ESTIMATE_H
+#define SELVEDGE_RENDERER_APPEARANCE_ESTIMATE_H
+
+#include "renderer/scattering/appearance.h"
+#include "renderer/transport/estimate.h"
+#include "renderer/transport/volume_scene.h"
+
+/* One cloth in the forms that there are of it. */
+struct appearance_scene {
+    const struct scene *fibers;        /* NULL: no surface model can be estimated */
+    const struct volume_scene *volume; /* NULL: no volume model can be estimated */
+};
+
+struct appearance_request {
+    struct appearance_scene scene;
+    const struct appearance *model;
+    const double *param; /* model->n_param, internal units */
+    const struct configuration *configuration;
+    size_t n_configuration;
+    const size_t *n_path; /* per configuration */
+    uint64_t seed;
+    uint32_t iteration, replica;
+    bool want_jacobian;
+};
+
+/* What estimate_run or volume_estimate_run give; STATUS_INVALID when the cloth lacks the form that the model needs. */
+status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
+                               const struct progress *progress, struct estimate *out, struct error *err);
+
+#endif

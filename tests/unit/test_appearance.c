@@ -1,0 +1,126 @@
+/* The list of models that a fit can choose from, and the estimates behind it: the same figures as from the tracers
+ * themselves. */
+#include "renderer/scattering/appearance.h"
+#include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/volume_estimate.h"
+#include "tests/support/hand_volume.h"
+#include "tests/support/hand_weave.h"
+#include "tests/support/orbit_configurations.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void test_ids_are_unique_and_found(void **unused)
+{
+    (void)unused;
+    struct appearance a, b;
+    size_t n = 0;
+    for (; appearance_at(n, &a); n++) {
+        assert_true(appearance_find(a.id, &b));
+        assert_string_equal(a.id, b.id); /* a second model of the same id would be found instead of this one */
+        assert_int_equal(a.kind, b.kind);
+        assert_ptr_equal(a.surface, b.surface);
+        assert_ptr_equal(a.volume, b.volume);
+        assert_true(a.n_param >= 1 && a.n_param <= SCATTERING_MAX_PARAM);
+        for (size_t p = 0; p < a.n_param; p++) {
+            assert_int_equal(appearance_param_index(&a, a.param[p].name), p);
+            assert_true(a.param[p].lower < a.param[p].upper);
+            assert_true(a.param[p].start >= a.param[p].lower && a.param[p].start <= a.param[p].upper);
+        }
+    }
+    assert_true(n >= 4);
+    assert_false(appearance_find("no_such_model.v1", &b));
+    assert_int_equal(appearance_param_index(&a, "no_such_parameter"), -1);
+}
+
+static void test_volume_models_end_with_the_density_multiplier(void **unused)
+{
+    (void)unused;
+    struct appearance a;
+    for (size_t i = 0; appearance_at(i, &a); i++) {
+        int d = appearance_param_index(&a, APPEARANCE_DENSITY_MULTIPLIER);
+        if (a.kind == APPEARANCE_SURFACE) {
+            assert_int_equal(d, -1);
+            continue;
+        }
+        assert_int_equal(d, a.n_param - 1);
+        assert_true(param_to_file_unit(&a.param[d], a.param[d].start) == 4000.0); /* per cm */
+        assert_true(param_from_file_unit(&a.param[d], 4000.0) == 4e5);            /* per m */
+    }
+}
+
+static void request_init(struct appearance_request *q, const struct appearance *a, double *param,
+                         const struct configuration *c, const size_t *n_path)
+{
+    for (size_t p = 0; p < a->n_param; p++) param[p] = a->param[p].start;
+    *q = (struct appearance_request){.model = a, .param = param, .configuration = c, .n_configuration = 2,
+                                     .n_path = n_path, .seed = 3, .want_jacobian = true};
+}
+
+static void test_same_figures_as_the_tracers(void **unused)
+{
+    (void)unused;
+    struct thread_pool *pool = NULL;
+    struct fiber_set f;
+    struct direction_volume v;
+    struct scene *scene = NULL;
+    struct volume_scene volume;
+    struct configuration c[16];
+    struct appearance a;
+    struct appearance_request q;
+    struct estimate here[2], there[2];
+    double param[SCATTERING_MAX_PARAM];
+    const size_t n_path[2] = {512, 256}, n[3] = {16, 16, 8};
+    const struct scene_option option = {.black_sheet = true};
+    const struct volume_scene_option volume_option = {.black_sheet = true};
+    orbit_configurations_16(c);
+    hand_weave_small(&f);
+    hand_volume_weave(&v, n, 4e-6, 0.4);
+    assert_int_equal(thread_pool_new(1, &pool, NULL), STATUS_OK);
+    assert_int_equal(scene_new(&f, &option, &scene, NULL), STATUS_OK);
+    assert_int_equal(volume_scene_init(&volume, &v, &volume_option, NULL), STATUS_OK);
+
+    appearance_at(0, &a);
+    request_init(&q, &a, param, c, n_path);
+    q.scene.fibers = scene;
+    const struct estimate_request surface = {.scene = scene, .model = a.surface, .param = param, .configuration = c,
+                                             .n_configuration = 2, .n_path = n_path, .seed = 3, .want_jacobian = true};
+    assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, NULL), STATUS_OK);
+    assert_int_equal(estimate_run(&surface, pool, NULL, there, NULL), STATUS_OK);
+    assert_memory_equal(here, there, sizeof here);
+
+    appearance_from_volume(phase_registry()[0], &a);
+    request_init(&q, &a, param, c, n_path);
+    struct error err;
+    assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, &err), STATUS_INVALID); /* no volume given */
+    assert_non_null(strstr(err.text, a.id));
+    q.scene.volume = &volume;
+    const struct volume_estimate_request volumetric = {.scene = &volume, .model = a.volume, .param = param,
+                                                       .multiplier_per_m = 4e5, .configuration = c,
+                                                       .n_configuration = 2, .n_path = n_path, .seed = 3,
+                                                       .want_jacobian = true};
+    assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, NULL), STATUS_OK);
+    assert_int_equal(volume_estimate_run(&volumetric, pool, NULL, there, NULL), STATUS_OK);
+    assert_memory_equal(here, there, sizeof here);
+
+    volume_scene_release(&volume);
+    scene_free(scene);
+    thread_pool_free(pool);
+    fiber_set_release(&f);
+    direction_volume_release(&v);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_ids_are_unique_and_found),
+        cmocka_unit_test(test_volume_models_end_with_the_density_multiplier),
+        cmocka_unit_test(test_same_figures_as_the_tracers),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
