@@ -2,6 +2,41 @@
 #include "renderer/scattering/gauss_polynomial.h"
 #include "renderer/scattering/two_lobe_core.h"
 
+/* What a uniform environment brings to th_o through each lobe, before colours. */
+static void lobe_energy(const struct scattering_state *s, float theta_o, float energy[3])
+{
+    enum { N = 24 };
+    float unused[2], sum[2][2] = {{0}};
+    for (int k = 0; k < 2; k++) {
+        float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]),
+              hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
+        float step = (hi - lo) / N;
+        for (int i = 0; i < N; i++) {
+            float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2];
+            two_lobe_scale_at(s, false, t, scale, unused);
+            float m = s->peak[k] * expf(-x * x * s->inv_2var[k]) * scale[k] * cos_t * cos_t * step;
+            sum[k][0] += m;
+            sum[k][1] += m * two_lobe_schlick(cos_t);
+        }
+    }
+    energy[0] = sum[TWO_LOBE_R][0];
+    energy[1] = sum[TWO_LOBE_R][1];
+    energy[2] = sum[TWO_LOBE_TT][0] - sum[TWO_LOBE_TT][1];
+}
+
+static void fill_energy(struct scattering_state *s)
+{
+    enum { STRIDE = 16 };
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE)
+        lobe_energy(s, (float)(i * (M_PI_2 / TWO_LOBE_N_TABLE)), s->sampling[i].energy);
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
+        int i0 = i / STRIDE * STRIDE;
+        float t = (float)(i - i0) / STRIDE;
+        for (int k = 0; k < 3 && i != i0; k++)
+            s->sampling[i].energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
+    }
+}
+
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
     status st = scattering_check_param(&scattering_two_lobe, param, err);
@@ -15,7 +50,8 @@ static status prepare(const double *param, struct scattering_state **state, stru
             s->normal[i].value[k] = (float)g;
             s->normal[i].d_beta[k] = (float)d_beta;
         }
-    two_lobe_fill_sampling(s, false);
+    fill_energy(s);
+    two_lobe_fill_reach(s);
     *state = s;
     return STATUS_OK;
 }

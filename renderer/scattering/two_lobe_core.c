@@ -38,47 +38,14 @@ struct scattering_state *two_lobe_state_new(const double *param)
     return s;
 }
 
-/* What a uniform environment brings to th_o through each lobe, before colours. */
-static void lobe_energy(const struct scattering_state *s, bool balanced, float theta_o, float energy[3])
+void two_lobe_fill_reach(struct scattering_state *s)
 {
-    enum { N = 24 };
-    float scale_o[2] = {1, 1}, unused[2], sum[2][2] = {{0}};
-    if (balanced) two_lobe_scale_at(s, true, theta_o, scale_o, unused);
-    for (int k = 0; k < 2; k++) {
-        float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]),
-              hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
-        float step = (hi - lo) / N;
-        for (int i = 0; i < N; i++) {
-            float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2];
-            two_lobe_scale_at(s, balanced, t, scale, unused);
-            float schlick = two_lobe_schlick(balanced ? cosf(0.5f * (t - theta_o)) : cos_t);
-            float m = s->peak[k] * expf(-x * x * s->inv_2var[k]) * scale[k] * scale_o[k] * cos_t * cos_t * step;
-            sum[k][0] += m;
-            sum[k][1] += m * schlick;
-        }
-    }
-    energy[0] = sum[TWO_LOBE_R][0];
-    energy[1] = sum[TWO_LOBE_R][1];
-    energy[2] = sum[TWO_LOBE_TT][0] - sum[TWO_LOBE_TT][1];
-}
-
-void two_lobe_fill_sampling(struct scattering_state *s, bool balanced)
-{
-    enum { STRIDE = 16 };
     const double step = M_PI_2 / TWO_LOBE_N_TABLE;
-    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE)
-        lobe_energy(s, balanced, (float)(i * step), s->sampling[i].energy);
-    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
-        struct two_lobe_sampling_entry *e = &s->sampling[i];
-        int i0 = i / STRIDE * STRIDE;
-        float t = (float)(i - i0) / STRIDE;
-        for (int k = 0; k < 3 && i != i0; k++)
-            e->energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++)
         for (int k = 0; k < 2; k++) {
-            e->near[k] = (float)erf((M_PI_2 - i * step) / (M_SQRT2 * (double)s->beta[k]));
-            e->far[k] = (float)erf((M_PI_2 + i * step) / (M_SQRT2 * (double)s->beta[k]));
+            s->sampling[i].near[k] = (float)erf((M_PI_2 - i * step) / (M_SQRT2 * (double)s->beta[k]));
+            s->sampling[i].far[k] = (float)erf((M_PI_2 + i * step) / (M_SQRT2 * (double)s->beta[k]));
         }
-    }
 }
 
 float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)

@@ -4,6 +4,7 @@
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
  *     published: th_f = th_i, scale = 1 / G(-th_i, beta);  balanced: th_f = (th_i - th_o) / 2, scale = a(th_i) a(th_o)
+ *                (R) and b(th_i) b(th_o) (TT), of which b depends on both widths (two_lobe_balanced.c)
  *
  * Sampling of wi: a lobe by its energy at th_o and what the channels are worth, th_i from the normal density about
  * -th_o cut to +-pi/2, azimuth uniform or von Mises. pdf() is the exact density of that. All functions are inlined with
@@ -28,7 +29,7 @@ enum {
     TWO_LOBE_P_GAMMA_TT = 8
 };
 
-struct two_lobe_normal_entry { /* by |th|: G or a, and its derivative by beta */
+struct two_lobe_normal_entry { /* by |th|: G or the balanced scale, and its derivative by the lobe's own beta */
     float value[2], d_beta[2];
 };
 
@@ -48,14 +49,15 @@ struct scattering_state {
     struct von_mises azimuth;
     struct two_lobe_normal_entry normal[TWO_LOBE_N_TABLE + 1];
     struct two_lobe_sampling_entry sampling[TWO_LOBE_N_TABLE + 1];
+    float cross[TWO_LOBE_N_TABLE + 1]; /* balanced only, by |th|: d ln of TT's scale / d beta_R */
 };
 
 extern const struct param_info two_lobe_param[TWO_LOBE_N_PARAM];
 
 /* Everything but the tables; NULL without memory. */
 struct scattering_state *two_lobe_state_new(const double *param);
-/* The sampling table, once the normal table is there. */
-void two_lobe_fill_sampling(struct scattering_state *s, bool balanced);
+/* near and far of the sampling table. */
+void two_lobe_fill_reach(struct scattering_state *s);
 
 static inline float two_lobe_table_position(float theta_rad, int *i)
 {
@@ -84,6 +86,13 @@ static inline float two_lobe_schlick(float cos_theta)
 {
     float x = 1 - cos_theta, x2 = x * x;
     return x2 * x2 * x;
+}
+
+static inline float two_lobe_cross_at(const struct scattering_state *s, float theta_rad)
+{
+    int i;
+    float t = two_lobe_table_position(theta_rad, &i);
+    return two_lobe_mix(s->cross[i], s->cross[i + 1], t);
 }
 
 struct two_lobe_terms {
@@ -135,6 +144,7 @@ static inline void two_lobe_eval_terms(const struct scattering_state *s, bool ba
 
     float d_width[2];
     for (int j = 0; j < 2; j++) d_width[j] = t->x2 * s->inv_cube[j] - s->inv[j] + d_scale[j];
+    float d_cross = balanced ? two_lobe_cross_at(s, di->theta_rad) + two_lobe_cross_at(s, dout->theta_rad) : 0;
     float d_gamma = s->azimuth.score_at_peak - s->azimuth.score_slope * t->one_minus_cos;
     for (int j = 0; j < 3 * TWO_LOBE_N_PARAM; j++) score[j] = 0;
     for (int c = 0; c < 3; c++) {
@@ -142,7 +152,7 @@ static inline void two_lobe_eval_terms(const struct scattering_state *s, bool ba
         float inv = s_rgb[c] > 1e-30f ? 1 / s_rgb[c] : 0; /* nothing scattered: no weight, no score */
         h[TWO_LOBE_P_C_R + c] = (1 - k) * (a - s->c_tt[c] * b) * inv;
         h[TWO_LOBE_P_C_TT + c] = part_tt[c] / s->c_tt[c] * inv;
-        h[TWO_LOBE_P_BETA_R] = part_r[c] * inv * d_width[TWO_LOBE_R];
+        h[TWO_LOBE_P_BETA_R] = (part_r[c] * d_width[TWO_LOBE_R] + part_tt[c] * d_cross) * inv;
         h[TWO_LOBE_P_BETA_TT] = part_tt[c] * inv * d_width[TWO_LOBE_TT];
         h[TWO_LOBE_P_GAMMA_TT] = part_tt[c] * inv * d_gamma;
     }
