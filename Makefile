@@ -117,6 +117,10 @@ bench-transport: | deps ## the renderer's figures (paths a second, time to a giv
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
 
+bench-geometry: | deps ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2
+	@for b in $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)); do $$b || exit 1; done
+
 docs-pictures:     ## render docs/images/{twill,derivatives}.png anew (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures
 	@mkdir -p docs/images

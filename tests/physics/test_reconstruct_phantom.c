@@ -1,8 +1,5 @@
 /* Reconstruction of phantoms measured against the truth: fiber diameter 7 voxels, blur 0.7 voxels, signal-to-noise 5. */
-#include "geometry/phantom/compare.h"
-#include "geometry/phantom/phantom.h"
-#include "geometry/reconstruct.h"
-#include "geometry/volume/density_map.h"
+#include "tests/support/phantom_reconstruction.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -15,41 +12,18 @@
 static void reconstruct_phantom(enum phantom_weave weave, struct compare_report *c)
 {
     struct error err = {0};
-    struct thread_pool *pool;
     struct phantom_option o;
-    struct phantom_scan_option scan;
-    struct phantom_report report;
-    struct reconstruct_option option;
-    struct reconstruct_report r = {0};
-    struct fiber_set truth, found;
-    struct volume v;
-    struct direction_volume d;
-    struct density_modes m;
-    fiber_set_init(&truth);
+    struct phantom_reconstruction r = {0};
     phantom_option_default(&o, weave);
-    phantom_scan_option_default(&scan);
-    reconstruct_option_default(&option);
-    scan.voxel_size_m = o.voxel_size_m;
-    scan.snr = 5.0;
-    assert_int_equal(thread_pool_new(0, &pool, &err), STATUS_OK);
-    assert_int_equal(phantom_generate(&o, pool, NULL, &truth, &report, &err), STATUS_OK);
-    assert_int_equal(phantom_scan(&truth, report.n_voxel, &scan, pool, NULL, &v, &err), STATUS_OK);
-    assert_int_equal(density_modes_find(&v, &m, &err), STATUS_OK);
-    assert_int_equal(density_map_apply(&v, m.low, m.high, pool, &err), STATUS_OK);
-    assert_int_equal(reconstruct_orientation(&v, &option, pool, NULL, &d, &r, &err), STATUS_OK);
-    assert_int_equal(reconstruct_fibers(&v, &d, &option, pool, NULL, &found, &r, &err), STATUS_OK);
-    const struct compare_option co = {.voxel_size_m = o.voxel_size_m};
-    assert_int_equal(compare_fibers(&truth, &found, &co, c, &err), STATUS_OK);
+    reconstruct_option_default(&r.option);
+    assert_int_equal(phantom_reconstruct(&o, 5.0, &r, &err), STATUS_OK);
+    *c = r.compare;
     print_message("%s, diameter %.1f voxels, signal-to-noise 5: %zu fibers found, %zu true; precision %.3f recall %.3f rms %.2f voxel "
                   "length recovered %.3f (found/true %.3f) fragments %.2f merges %.3f direction %.1f deg (95 %%: %.1f) radius %+.1f %%\n",
                   phantom_weave_name(weave), c->fiber_diameter_voxel, c->n_found, c->n_true, c->center_precision, c->center_recall,
                   c->centerline_rms_voxel, c->length_recovered, c->length_found_m / c->length_true_m, c->fragments_per_fiber,
                   c->merges_per_fiber, c->direction_mean_deg, c->direction_p95_deg, c->radius_bias_percent);
-    volume_release(&v);
-    direction_volume_release(&d);
-    fiber_set_release(&truth);
-    fiber_set_release(&found);
-    thread_pool_free(pool);
+    phantom_reconstruction_release(&r);
 }
 
 static void test_twill(void **state)

@@ -3,7 +3,7 @@
  * resolved there, so only the directions are judged. Pictures of slices go to the folder named by SELVEDGE_PICTURES, if set. */
 #include "base/clock.h"
 #include "geometry/reconstruct.h"
-#include "geometry/volume/volume_source.h"
+#include "tests/support/weave_labels.h"
 
 #include <math.h>
 #include <png.h>
@@ -97,46 +97,16 @@ static void test_fiber_ct(void **state)
     release(&s);
 }
 
-/* Share of labelled voxels (1: tows along the file's z, cloth x; 2: along its x, cloth y) whose direction is nearest to their tow's axis. */
-static double class_accuracy(const struct scan *s, const char *label_path, double *kept)
-{
-    struct error err = {0};
-    struct volume_source *source;
-    const char *list[1] = {label_path};
-    size_t n[3], right = 0, total = 0, n_kept = 0;
-    assert_int_equal(volume_source_open(list, 1, &source, &err), STATUS_OK);
-    memcpy(n, volume_source_describe(source)->n, sizeof n);
-    float *label = malloc(volume_n_voxel(n) * sizeof *label);
-    assert_int_equal(volume_source_read(source, 0, n[2], label, &err), STATUS_OK);
-    volume_source_close(source);
-    for (size_t z = 0; z < n[2]; z++)
-        for (size_t y = 0; y < n[1]; y++)
-            for (size_t x = 0; x < n[0]; x++) {
-                int tow = (int)label[volume_index(n, x, y, z)] - 1;
-                size_t at = volume_index(s->v.n, z, x, y); /* axes "zxy" */
-                if (tow != 0 && tow != 1) continue;
-                total++;
-                if (s->d.density[at] == 0) continue;
-                float d[3];
-                direction_volume_get(&s->d, at, d);
-                n_kept++;
-                right += fabsf(d[tow]) >= fabsf(d[1 - tow]) && fabsf(d[tow]) >= fabsf(d[2]);
-            }
-    free(label);
-    *kept = (double)n_kept / (double)total;
-    return (double)right / (double)n_kept;
-}
-
 static void test_weave_ct(void **state)
 {
     (void)state;
     char path[512], labels[512];
     struct scan s;
-    double kept;
+    double accuracy, kept;
     data_path(path, "weave-ct/small_weave.tif");
     data_path(labels, "weave-ct/labels.tif");
     reconstruct_scan(path, "zxy", "weave_ct", &s);
-    double accuracy = class_accuracy(&s, labels, &kept);
+    assert_int_equal(weave_label_accuracy(&s.d, labels, &accuracy, &kept, NULL), STATUS_OK);
     print_message("weave_ct: %.1f %% of the labelled tow voxels kept, %.1f %% of those in the right axis class\n", 100.0 * kept, 100.0 * accuracy);
     assert_true(accuracy >= 0.9);
     assert_true(kept >= 0.9);
