@@ -53,16 +53,21 @@ static struct job_document *document_new(void)
     d->density_low = d->density_high = d->filter_s = d->filter_t = d->filter_eps_d = d->filter_eps_j = NAN;
     d->link_sigma_voxel = d->radius_um = NAN;
     fill_nan(d->tile_mm, 2);
+    d->voxel_um = NAN;
     d->lamp_side_cm = 10.0;
     d->lamp_distance_cm = 61.0;
     d->camera_distance_cm = 100.0;
     d->crop_cm = 1.0;
     d->black_sheet = true;
-    snprintf(d->model, sizeof d->model, "%s", "two_lobe.v1");
     snprintf(d->method, sizeof d->method, "%s", method_name_list()[0]);
     d->seed = 1;
-    fill_nan(d->fixed, JOB_MAX_PARAM);
-    fill_nan(d->start, JOB_MAX_PARAM);
+    d->n_model = 1;
+    snprintf(d->model[0].id, sizeof d->model[0].id, "%s", "two_lobe.v1");
+    for (size_t i = 0; i < JOB_MAX_MODEL; i++) {
+        fill_nan(d->model[i].fixed, JOB_MAX_PARAM);
+        fill_nan(d->model[i].start, JOB_MAX_PARAM);
+    }
+    d->density_multiplier_per_cm = NAN;
     d->render_px = 96;
     d->render_sample = 16;
     return d;

@@ -11,7 +11,8 @@
  *     "filter": {"s":, "t":, "h":, "eps_d":, "eps_J":},   all optional: chosen from the data
  *     "link_sigma_voxel":, "min_vertices":, "radius_um": v, "radius_per_axis": bool
  *   },
- *   "fibers": {"file": "cloth.hair", "tile_mm": [x, y]},  instead of "volume"
+ *   "fibers": {"file": "cloth.hair", "tile_mm": [x, y],   instead of "volume"
+ *              "voxel_um": v},                            of the density that volume models see; default: half a radius
  *   "lamp": {"side_cm": 10, "distance_cm": 61},           optional
  *   "camera": {"distance_cm": 100, "crop_cm": 1},         optional
  *   "black_sheet": true,                                  optional
@@ -19,9 +20,13 @@
  *   "photographs": [                                      ... or this
  *     {"file":"p00.exr","set":"fit"|"held-out","light_theta_deg":,"light_phi_deg":,"camera_theta_deg":,"camera_phi_deg":,
  *      "cloth_rotation_deg":, "scale": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
- *   "fit": {"model": "two_lobe.v1", "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
- *           "max_iterations": n, "path_budget": n, "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},
- * "render_px": 128, "render_samples": 64}
+ *   "fit": {"model": "two_lobe.v1" or "models": ["two_lobe.v1", "phase_two_lobe.v1", ...],   ids of appearance.h; several
+ *                                                         are fitted one after the other and compared
+ *           "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
+ *           "max_iterations": n, "path_budget": n,        of each model
+ *           "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},   for every model that has the parameter
+ *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
+ *           "render_px": 128, "render_samples": 64}
  * }
  * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path
  * such as "photographs[3].light_theta_deg" and a text that says what is allowed. Limits: see job_limits.
@@ -39,7 +44,14 @@ enum {
     JOB_MAX_PHOTOGRAPH = 1024,
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
-    JOB_MAX_PARAM = 16
+    JOB_MAX_PARAM = 16,
+    JOB_MAX_MODEL = 8
+};
+
+/* One model to be fitted. */
+struct job_model {
+    char id[64];
+    double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, flat; NaN: not given */
 };
 
 enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
@@ -75,6 +87,7 @@ struct job_document {
     /* fibers */
     char fiber_file[JOB_MAX_NAME_BYTES];
     double tile_mm[2]; /* NaN: from the file */
+    double voxel_um;   /* NaN: chosen from the radius */
     /* set-up */
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
     bool black_sheet;
@@ -83,11 +96,15 @@ struct job_document {
     size_t n_photograph;
     struct job_photograph *photograph;
     /* fit */
-    char model[64], method[64];
+    size_t n_model;
+    struct job_model model[JOB_MAX_MODEL];
+    char method[64];
     uint64_t seed;
     size_t max_iteration;                              /* 0: the method's default */
     uint64_t path_budget;                              /* 0: the method's default */
-    double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, flat; NaN: not given */
+    /* volume models: d is a parameter, the last one; its entries in fixed and start follow from these two */
+    double density_multiplier_per_cm; /* NaN: the model's default */
+    bool fit_density;
     size_t render_px, render_sample;
 };
 

@@ -178,10 +178,11 @@ status job_parse_volume(const struct json_field *f, struct job_document *doc, st
 
 status job_parse_fibers(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"file", "tile_mm", NULL};
+    static const char *const key[] = {"file", "tile_mm", "voxel_um", NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = job_parse_file_name(f, "file", doc->fiber_file, err);
     if (s == STATUS_OK) s = json_field_number_array(f, "tile_mm", 2, 0.01, 10000.0, doc->tile_mm, err);
+    if (s == STATUS_OK) s = json_field_number(f, "voxel_um", 0.05, 1000.0, &doc->voxel_um, err);
     return s;
 }
 

@@ -16,9 +16,11 @@
  *   "error":null|{"code":"format","field":"volume.file","text":"..."}, "peak_rss_bytes":n}
  * Rewritten at least every second while the worker lives.
  *
- * Series record: {"step":0,"phase":"gauss_newton","wall_s":t,"n_path":n (this
- * step),"n_path_total":n,"objective":f,"objective_se":f, "parameter":[...] (file units, order of the model),
- * "parameter_se":[...]|null,"rel_rms":f, "rendered":[[r,g,b],...] (one a fitted photograph),"note":"..."}
+ * Series record: {"step":0 (through all models of the job), "model":"two_lobe.v1", "i_model":0, "model_step":0,
+ * "phase":"gauss_newton", "wall_s":t, "n_path":n (this step), "n_path_total":n (of this model), "objective":f,
+ * "objective_se":f, "parameter":[...] (file units, order of the model), "parameter_se":[...]|null, "rel_rms":f,
+ * "rendered":[[r,g,b],...] (one a fitted photograph), "damping", "noise", "note":"..."}; the first record of a model
+ * also says what its parameters are: "parameters":[{"name","unit","lower","upper","fixed"},...].
  *
  * Worker exit codes: 0 succeeded, 1 failed (status.json says why), 2 usage, 3 cancelled (SIGTERM), 4 stale token or
  * folder locked.

@@ -49,8 +49,10 @@ void pipeline_context_release(struct pipeline_context *c)
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);
     scene_free(c->scene);
-    free(c->validation.replica[0]);
-    free(c->validation.replica[1]);
+    if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
+    for (size_t i = 0; i < c->n_model; i++)
+        for (int q = 0; q < 2; q++) free(c->model[i].validation.replica[q]);
+    free(c->model);
 }
 
 status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
@@ -64,6 +66,35 @@ status pipeline_work_path(const struct pipeline_context *c, const char *stage, c
     return s;
 }
 
+status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
+                           char path[WORKER_PATH_BYTES], struct error *err)
+{
+    char numbered[128];
+    const char *dot = strrchr(name, '.');
+    int n = dot != NULL ? (int)(dot - name) : (int)strlen(name);
+    if (i_model == 0)
+        snprintf(numbered, sizeof numbered, "%s", name);
+    else
+        snprintf(numbered, sizeof numbered, "%.*s-%zu%s", n, name, i_model, name + n);
+    return pipeline_work_path(c, stage, numbered, path, err);
+}
+
+struct appearance_scene pipeline_scene(const struct pipeline_context *c)
+{
+    return (struct appearance_scene){.fibers = c->scene, .volume = c->has_volume_scene ? &c->volume_scene : NULL};
+}
+
+size_t pipeline_best_model(const struct pipeline_context *c)
+{
+    size_t best = 0;
+    for (size_t i = 1; i < c->n_model; i++) {
+        const struct validation *a = &c->model[i].validation, *b = &c->model[best].validation;
+        bool held_out = isfinite(a->held_out.rel_rms) && isfinite(b->held_out.rel_rms);
+        if (held_out ? a->held_out.rel_rms < b->held_out.rel_rms : a->fit.rel_rms < b->fit.rel_rms) best = i;
+    }
+    return best;
+}
+
 /* ---- inputs ---- */
 
 static void warn_observation(void *context, const char *text)
@@ -72,14 +103,12 @@ static void warn_observation(void *context, const char *text)
     worker_status_warn(c->status, text);
 }
 
-static status set_parameters(struct pipeline_context *c, struct error *err)
+static void set_parameters(const struct job_model *given, struct pipeline_model *m)
 {
-    c->model = scattering_find(c->doc->model);
-    if (c->model == NULL) return error_set_field(err, STATUS_INVALID, "fit.model", "unknown model '%s'", c->doc->model);
-    for (size_t p = 0; p < c->model->n_param; p++) {
-        const struct param_info *info = &c->model->param[p];
-        struct fit_parameter *k = &c->parameter[p];
-        double fixed = c->doc->fixed[p], start = c->doc->start[p];
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        const struct param_info *info = &m->appearance.param[p];
+        struct fit_parameter *k = &m->parameter[p];
+        double fixed = given->fixed[p], start = given->start[p];
         k->lower = info->lower;
         k->upper = info->upper;
         k->fixed = !isnan(fixed);
@@ -89,7 +118,33 @@ static status set_parameters(struct pipeline_context *c, struct error *err)
         k->start =
             fmin(fmax(k->start, k->lower), k->upper); /* degrees to radians may step over a bound by one rounding */
     }
+}
+
+static status set_models(struct pipeline_context *c, struct error *err)
+{
+    c->model = calloc(c->doc->n_model, sizeof *c->model);
+    if (c->model == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
+    c->n_model = c->doc->n_model;
+    for (size_t i = 0; i < c->n_model; i++) {
+        if (!appearance_find(c->doc->model[i].id, &c->model[i].appearance))
+            return error_set_field(err, STATUS_INVALID, "fit.model", "unknown model '%s'", c->doc->model[i].id);
+        set_parameters(&c->doc->model[i], &c->model[i]);
+    }
     return STATUS_OK;
+}
+
+static void warn_few_rows(struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->n_model; i++) {
+        size_t n_free = 0;
+        char warning[300];
+        for (size_t p = 0; p < c->model[i].appearance.n_param; p++) n_free += !c->model[i].parameter[p].fixed;
+        if (3 * c->fitted.n >= n_free) continue;
+        snprintf(warning, sizeof warning,
+                 "%zu fitted rows give %zu numbers for %zu parameters of model '%s': some will stay undetermined",
+                 c->fitted.n, 3 * c->fitted.n, n_free, c->model[i].appearance.id);
+        worker_status_warn(c->status, warning);
+    }
 }
 
 struct input_sum {
@@ -131,18 +186,12 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     s = job_document_parse(text, n, &c->doc, err);
     c->fingerprint = crc32(0, (const unsigned char *)text, (unsigned)n);
     free(text);
-    if (s == STATUS_OK) s = set_parameters(c, err);
+    if (s == STATUS_OK) s = set_models(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
     if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
-    if (s == STATUS_OK && 3 * c->fitted.n < c->model->n_param) {
-        char warning[200];
-        snprintf(warning, sizeof warning,
-                 "%zu fitted rows give %zu numbers for %zu parameters: some will stay undetermined", c->fitted.n,
-                 3 * c->fitted.n, c->model->n_param);
-        worker_status_warn(c->status, warning);
-    }
+    if (s == STATUS_OK) warn_few_rows(c);
     return s;
 }
 

@@ -16,7 +16,9 @@
 #include "optimizer/pipeline.h"
 #include "optimizer/worker_folder.h"
 #include "optimizer/worker_status.h"
+#include "renderer/scattering/appearance.h"
 #include "renderer/scene/scene.h"
+#include "renderer/transport/appearance_estimate.h"
 
 /* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */
 struct validation {
@@ -24,6 +26,14 @@ struct validation {
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
     double
         worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
+};
+
+/* One model of the job: what is fitted and what came out. */
+struct pipeline_model {
+    struct appearance appearance;
+    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct fit_result fit;
+    struct validation validation;
 };
 
 struct pipeline_context {
@@ -38,8 +48,8 @@ struct pipeline_context {
     uint64_t fingerprint;               /* of the job document's text */
     struct observation_set observation; /* all */
     struct observation_set fitted;      /* those of the set "fit" */
-    const struct scattering_model *model;
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    size_t n_model;
+    struct pipeline_model *model; /* in the order of the document */
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;
@@ -47,8 +57,8 @@ struct pipeline_context {
     struct direction_volume direction;
     struct fiber_set fiber;
     struct scene *scene;
-    struct fit_result fit;
-    struct validation validation;
+    struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */
+    bool has_volume_scene;
     double stage_wall_s[16]; /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
 };
 
@@ -83,5 +93,12 @@ status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
 status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
                           char path[WORKER_PATH_BYTES], struct error *err);
+/* As above, with a number for all models but the first: "estimates.journal", "estimates-1.journal". */
+status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
+                           char path[WORKER_PATH_BYTES], struct error *err);
+/* The cloth in all forms that there are. */
+struct appearance_scene pipeline_scene(const struct pipeline_context *c);
+/* The model with the lowest error over the held-out rows (the fitted rows when there are none). After validation. */
+size_t pipeline_best_model(const struct pipeline_context *c);
 
 #endif

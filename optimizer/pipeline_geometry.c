@@ -260,12 +260,31 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
 
 /* ---- scene ---- */
 
+static bool wants_volume_scene(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->n_model; i++)
+        if (c->model[i].appearance.kind == APPEARANCE_VOLUME) return true;
+    return false;
+}
+
+static status make_volume_scene(struct pipeline_context *c, struct error *err)
+{
+    const struct volume_scene_option option = {.black_sheet = c->doc->black_sheet};
+    status s = volume_scene_init(&c->volume_scene, &c->direction, &option, err);
+    c->has_volume_scene = s == STATUS_OK;
+    if (s == STATUS_OK)
+        log_info(c->log, "volume: %zu x %zu x %zu voxels of %.3g um, %.0f MB", c->direction.n[0], c->direction.n[1],
+                 c->direction.n[2], c->direction.voxel_size_m[0] / um,
+                 (double)volume_scene_memory_bytes(&c->volume_scene) / 1e6);
+    return s;
+}
+
 status stage_scene(struct pipeline_context *c, struct error *err)
 {
     struct scene_option option = {.black_sheet = c->doc->black_sheet};
     status s = scene_new(&c->fiber, &option, &c->scene, err);
-    if (s == STATUS_OK)
-        log_info(c->log, "scene: %zu fibers, %zu segments, %.0f MB", c->fiber.n_fiber, scene_n_segment(c->scene),
-                 (double)scene_memory_bytes(c->scene) / 1e6);
-    return s;
+    if (s != STATUS_OK) return s;
+    log_info(c->log, "scene: %zu fibers, %zu segments, %.0f MB", c->fiber.n_fiber, scene_n_segment(c->scene),
+             (double)scene_memory_bytes(c->scene) / 1e6);
+    return wants_volume_scene(c) ? make_volume_scene(c, err) : s;
 }

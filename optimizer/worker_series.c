@@ -76,8 +76,23 @@ void worker_series_close(struct worker_series *s)
 
 static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(); }
 
-static char *record_text(const struct fit_step *step, const struct param_info *info)
+/* What the numbers in "parameter" are: with the first step of each model. */
+static json_t *parameters_json(const struct worker_series_model *model)
 {
+    json_t *list = json_array();
+    for (size_t p = 0; p < model->appearance->n_param; p++) {
+        const struct param_info *info = &model->appearance->param[p];
+        const struct fit_parameter *k = &model->parameter[p];
+        json_array_append_new(list, json_pack("{s:s, s:s, s:f, s:f, s:b}", "name", info->name, "unit", info->unit,
+                                              "lower", param_to_file_unit(info, k->lower), "upper",
+                                              param_to_file_unit(info, k->upper), "fixed", (int)k->fixed));
+    }
+    return list;
+}
+
+static char *record_text(const struct fit_step *step, const struct worker_series_model *model)
+{
+    const struct param_info *info = model->appearance->param;
     json_t *parameter = json_array(), *parameter_se = step->param_se != NULL ? json_array() : json_null(),
            *rendered = json_array();
     for (size_t p = 0; p < step->n_param; p++) {
@@ -91,19 +106,22 @@ static char *record_text(const struct fit_step *step, const struct param_info *i
             json_array_append_new(rgb, number(0.5 * (step->replica[0][i].mean[c] + step->replica[1][i].mean[c])));
         json_array_append_new(rendered, rgb);
     }
-    json_t *json = json_pack("{s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}", "step",
-                             (json_int_t)step->step, "phase", step->phase, "wall_s", step->wall_s, "n_path",
-                             (json_int_t)step->n_path, "n_path_total", (json_int_t)step->n_path_total, "objective",
-                             number(step->objective.value), "objective_se", number(step->objective.se), "parameter",
-                             parameter, "parameter_se", parameter_se, "rel_rms", number(step->objective.rel_rms),
-                             "rendered", rendered, "damping", number(step->damping), "noise", number(step->noise),
-                             "note", step->note != NULL ? step->note : "");
+    json_t *json = json_pack("{s:I, s:s, s:I, s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}",
+                             "step", (json_int_t)(model->step_base + step->step), "model", model->appearance->id,
+                             "i_model", (json_int_t)model->i_model, "model_step", (json_int_t)step->step, "phase",
+                             step->phase, "wall_s", step->wall_s, "n_path", (json_int_t)step->n_path, "n_path_total",
+                             (json_int_t)step->n_path_total, "objective", number(step->objective.value),
+                             "objective_se", number(step->objective.se), "parameter", parameter, "parameter_se",
+                             parameter_se, "rel_rms", number(step->objective.rel_rms), "rendered", rendered, "damping",
+                             number(step->damping), "noise", number(step->noise), "note",
+                             step->note != NULL ? step->note : "");
+    if (json != NULL && step->step == 0) json_object_set_new(json, "parameters", parameters_json(model));
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(9) | JSON_COMPACT) : NULL;
     json_decref(json);
     return text;
 }
 
-status worker_series_add(struct worker_series *s, const struct fit_step *step, const struct param_info *info,
+status worker_series_add(struct worker_series *s, const struct fit_step *step, const struct worker_series_model *model,
                          bool replayed, struct error *err)
 {
     if (replayed && s->i_next < s->n_record) {
@@ -116,7 +134,7 @@ status worker_series_add(struct worker_series *s, const struct fit_step *step, c
         s->n_record = s->i_next;
     }
     if (result != STATUS_OK) return result;
-    char *text = record_text(step, info);
+    char *text = record_text(step, model);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write to the series: out of memory");
     result = record_append(s->path, text, true, err);
     uint64_t before = s->n_record > 0 ? s->end[s->n_record - 1] : 0;

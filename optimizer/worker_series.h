@@ -6,14 +6,22 @@
 
 #include "optimizer/descent/descent.h"
 #include "optimizer/worker_folder.h"
+#include "renderer/scattering/appearance.h"
 
 struct worker_series;
+
+/* The model that a step belongs to. The series counts steps of all models through. */
+struct worker_series_model {
+    const struct appearance *appearance;
+    const struct fit_parameter *parameter;
+    size_t i_model, step_base; /* steps of the models before */
+};
 
 /* Reads what is there and cuts a torn tail. */
 status worker_series_open(const struct worker_folder *folder, struct worker_series **series, struct error *err);
 void worker_series_close(struct worker_series *s);
 /* replayed: the step is one that an earlier attempt has made. */
-status worker_series_add(struct worker_series *s, const struct fit_step *step, const struct param_info *info,
+status worker_series_add(struct worker_series *s, const struct fit_step *step, const struct worker_series_model *model,
                          bool replayed, struct error *err);
 
 #endif

@@ -66,51 +66,97 @@ double result_png_exposure(const struct observation_set *o)
 
 /* ---- parts ---- */
 
-static json_t *at_bound(const struct pipeline_context *c, size_t p)
+static json_t *at_bound(const struct pipeline_model *m, size_t p)
 {
-    if (!c->fit.uncertainty.at_bound[p]) return json_null();
-    const struct fit_parameter *k = &c->parameter[p];
-    return json_string(c->fit.param[p] - k->lower < k->upper - c->fit.param[p] ? "lower" : "upper");
+    if (!m->fit.uncertainty.at_bound[p]) return json_null();
+    const struct fit_parameter *k = &m->parameter[p];
+    return json_string(m->fit.param[p] - k->lower < k->upper - m->fit.param[p] ? "lower" : "upper");
 }
 
-static json_t *parameters_json(const struct pipeline_context *c)
+static json_t *parameters_json(const struct pipeline_model *m)
 {
     json_t *list = json_array();
-    for (size_t p = 0; p < c->model->n_param; p++) {
-        const struct param_info *info = &c->model->param[p];
-        const struct fit_parameter *k = &c->parameter[p];
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        const struct param_info *info = &m->appearance.param[p];
+        const struct fit_parameter *k = &m->parameter[p];
         json_array_append_new(
             list, json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit",
-                            info->unit, "value", number(param_to_file_unit(info, c->fit.param[p])), "standard_error",
-                            number(param_to_file_unit(info, c->fit.uncertainty.se_param[p])), "lower",
+                            info->unit, "value", number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
+                            number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
                             param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
-                            param_to_file_unit(info, k->start), "at_bound", at_bound(c, p), "determined",
-                            (int)c->fit.uncertainty.determined[p], "fixed", (int)k->fixed));
+                            param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
+                            (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed));
     }
     return list;
 }
 
-static json_t *correlation_json(const struct pipeline_context *c)
+static json_t *correlation_json(const struct pipeline_model *m)
 {
-    size_t n = c->model->n_param;
+    size_t n = m->appearance.n_param;
     json_t *list = json_array();
     for (size_t p = 0; p < n; p++)
-        json_array_append_new(list, number_list(c->fit.uncertainty.correlation + p * n, n, 1.0));
+        json_array_append_new(list, number_list(m->fit.uncertainty.correlation + p * n, n, 1.0));
     return list;
 }
 
-static json_t *row_json(const struct pipeline_context *c, size_t i, const char *picture)
+/* Rendered mean and its standard error, from both replicas. */
+static void rendered_mean(const struct validation *v, size_t i, double mean[3], double se[3])
+{
+    for (int q = 0; q < 3; q++) {
+        mean[q] = 0.5 * (v->replica[0][i].mean[q] + v->replica[1][i].mean[q]);
+        se[q] = 0.5 * sqrt(v->replica[0][i].var[q] + v->replica[1][i].var[q]);
+    }
+}
+
+/* Everything that a fit and its validation gave. */
+static void put_fit(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    uint64_t n_path = 0;
+    for (size_t i = 0; i < c->observation.n; i++)
+        n_path += m->validation.replica[0][i].n_path + m->validation.replica[1][i].n_path;
+    json_object_set_new(json, "converged", json_boolean(m->fit.converged));
+    json_object_set_new(json, "reason", json_string(m->fit.reason));
+    json_object_set_new(json, "parameters", parameters_json(m));
+    json_object_set_new(json, "correlation", correlation_json(m));
+    json_object_set_new(json, "objective", number(m->validation.fit.value));
+    json_object_set_new(json, "objective_se", number(m->validation.fit.se));
+    json_object_set_new(json, "fit_rel_rms", number(m->validation.fit.rel_rms));
+    json_object_set_new(json, "heldout_rel_rms", number(m->validation.held_out.rel_rms));
+    json_object_set_new(json, "misfit_rel_rms", number(sqrt(m->fit.uncertainty.misfit_var)));
+    json_object_set_new(json, "validation_worst_rel_se", number(m->validation.worst_rel_se));
+    json_object_set_new(json, "n_path_fit", json_integer((json_int_t)m->fit.n_path));
+    json_object_set_new(json, "n_step", count(m->fit.n_step));
+    json_object_set_new(json, "fit_wall_s", number(m->fit.wall_s));
+    json_object_set_new(json, "n_path_validation", json_integer((json_int_t)n_path));
+}
+
+/* One entry of "models". */
+static json_t *model_json(const struct pipeline_context *c, size_t i_model)
+{
+    const struct pipeline_model *m = &c->model[i_model];
+    bool surface = m->appearance.kind == APPEARANCE_SURFACE;
+    json_t *json = json_pack("{s:s, s:s, s:s, s:b}", "id", m->appearance.id, "title", m->appearance.title, "kind",
+                             surface ? "surface" : "volume", "best", (int)(i_model == pipeline_best_model(c)));
+    json_t *rows = json_array();
+    put_fit(json, c, m);
+    for (size_t i = 0; i < c->observation.n; i++) {
+        double mean[3], se[3];
+        rendered_mean(&m->validation, i, mean, se);
+        json_array_append_new(rows, json_pack("{s:o, s:o}", "rendered", number_list(mean, 3, 1.0), "rendered_se",
+                                              number_list(se, 3, 1.0)));
+    }
+    json_object_set_new(json, "rows", rows);
+    return json;
+}
+
+static json_t *row_json(const struct pipeline_context *c, const struct validation *v, size_t i, const char *picture)
 {
     const struct observation *o = &c->observation.item[i];
     const struct configuration *k = &o->configuration;
-    const struct estimate *a = &c->validation.replica[0][i], *b = &c->validation.replica[1][i];
     const double deg = 180.0 / M_PI;
     double rendered[3], se[3];
     char png[200], exr[200], photograph[200];
-    for (int q = 0; q < 3; q++) {
-        rendered[q] = 0.5 * (a->mean[q] + b->mean[q]);
-        se[q] = 0.5 * sqrt(a->var[q] + b->var[q]);
-    }
+    rendered_mean(v, i, rendered, se);
     snprintf(png, sizeof png, "renderings/%s.png", picture);
     snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
     snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
@@ -190,30 +236,18 @@ static json_t *stages_json(const struct pipeline_context *c)
 
 static json_t *result_json(struct pipeline_context *c, picture_name *picture)
 {
-    uint64_t n_path = 0;
-    json_t *rows = json_array();
-    for (size_t i = 0; i < c->observation.n; i++) {
-        json_array_append_new(rows, row_json(c, i, picture[i]));
-        n_path += c->validation.replica[0][i].n_path + c->validation.replica[1][i].n_path;
-    }
-    json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I, s:b, s:s}", "format", 1, "sample", c->doc->sample, "model",
-                             c->model->id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed, "converged",
-                             (int)c->fit.converged, "reason", c->fit.reason);
-    json_object_set_new(json, "parameters", parameters_json(c));
-    json_object_set_new(json, "correlation", correlation_json(c));
-    json_object_set_new(json, "objective", number(c->validation.fit.value));
-    json_object_set_new(json, "objective_se", number(c->validation.fit.se));
-    json_object_set_new(json, "fit_rel_rms", number(c->validation.fit.rel_rms));
-    json_object_set_new(json, "heldout_rel_rms", number(c->validation.held_out.rel_rms));
-    json_object_set_new(json, "misfit_rel_rms", number(sqrt(c->fit.uncertainty.misfit_var)));
-    json_object_set_new(json, "validation_worst_rel_se", number(c->validation.worst_rel_se));
+    const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
+    json_t *rows = json_array(), *models = json_array();
+    for (size_t i = 0; i < c->observation.n; i++)
+        json_array_append_new(rows, row_json(c, &best->validation, i, picture[i]));
+    for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
+    json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", c->doc->sample, "model",
+                             best->appearance.id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed);
+    put_fit(json, c, best);
     json_object_set_new(json, "rows", rows);
+    json_object_set_new(json, "models", models);
     json_object_set_new(json, "geometry", geometry_json(c));
     json_object_set_new(json, "png_exposure", number(result_png_exposure(&c->observation)));
-    json_object_set_new(json, "n_path_fit", json_integer((json_int_t)c->fit.n_path));
-    json_object_set_new(json, "n_step", count(c->fit.n_step));
-    json_object_set_new(json, "fit_wall_s", number(c->fit.wall_s));
-    json_object_set_new(json, "n_path_validation", json_integer((json_int_t)n_path));
     json_object_set_new(json, "stages", stages_json(c));
     json_object_set_new(json, "warnings", warnings_json(c));
     json_object_set_new(json, "program", json_string(RESULT_PROGRAM));

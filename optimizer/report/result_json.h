@@ -11,6 +11,10 @@
  *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg",
  *           "weight","measured":[r,g,b],"measured_se":[3],"rendered":[3],"rendered_se":[3],
  *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null}],
+ *  "models":[{"id","title","kind":"surface"|"volume","best":bool, all of "converged" to "validation_worst_rel_se" and
+ *             "n_path_fit" to "n_path_validation", "rows":[{"rendered":[3],"rendered_se":[3]}] in the order of "rows"}],
+ *             in the order of the job document; all the rest is of the best model: the one with the lowest error over
+ *             the held-out rows (over the fitted rows when none are held out)
  *  "geometry":{...reconstruct_report, "input":"volume"|"fibers", "options":{...}},
  *  "png_exposure",                                    all PNG pictures show radiance x this, sRGB
  *  "n_path_fit", "n_step", "fit_wall_s", "n_path_validation", "stages":[{"name","wall_s":number|null}],

@@ -7,23 +7,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void print_parameters(const struct pipeline_context *c, FILE *out)
+static void print_parameters(const struct pipeline_model *m, FILE *out)
 {
-    fprintf(out, "%-12s %10s %10s  %-22s %s\n", "parameter", "value", "std error", "allowed", "remarks");
-    for (size_t p = 0; p < c->model->n_param; p++) {
-        const struct param_info *info = &c->model->param[p];
-        const struct fit_parameter *k = &c->parameter[p];
-        const struct uncertainty *u = &c->fit.uncertainty;
+    fprintf(out, "%-18s %10s %10s  %-22s %s\n", "parameter", "value", "std error", "allowed", "remarks");
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        const struct param_info *info = &m->appearance.param[p];
+        const struct fit_parameter *k = &m->parameter[p];
+        const struct uncertainty *u = &m->fit.uncertainty;
         char allowed[64];
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
                  param_to_file_unit(info, k->upper), info->unit);
-        fprintf(out, "%-12s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, c->fit.param[p]),
+        fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, m->fit.param[p]),
                 param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : "",
                 u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these photographs");
     }
 }
 
-static void print_rows(const struct pipeline_context *c, FILE *out)
+static void print_rows(const struct pipeline_context *c, const struct validation *v, FILE *out)
 {
     const double deg = 180.0 / M_PI;
     fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi",
@@ -33,7 +33,7 @@ static void print_rows(const struct pipeline_context *c, FILE *out)
         const struct configuration *k = &o->configuration;
         double r[3], error = 0.0;
         for (int q = 0; q < 3; q++) {
-            r[q] = 0.5 * (c->validation.replica[0][i].mean[q] + c->validation.replica[1][i].mean[q]);
+            r[q] = 0.5 * (v->replica[0][i].mean[q] + v->replica[1][i].mean[q]);
             error += (r[q] - o->mean_rgb[q]) * (r[q] - o->mean_rgb[q]) / 3.0;
         }
         fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6.1f   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
@@ -43,22 +43,40 @@ static void print_rows(const struct pipeline_context *c, FILE *out)
     }
 }
 
+/* All models side by side, when there are several. */
+static void print_comparison(const struct pipeline_context *c, FILE *out)
+{
+    fprintf(out, "%-24s %10s %10s %9s %9s  %s\n", "model", "fitted", "held out", "paths", "time", "");
+    for (size_t i = 0; i < c->n_model; i++) {
+        const struct pipeline_model *m = &c->model[i];
+        char held_out[32] = "-";
+        if (isfinite(m->validation.held_out.rel_rms))
+            snprintf(held_out, sizeof held_out, "%.2f %%", 100.0 * m->validation.held_out.rel_rms);
+        fprintf(out, "%-24s %8.2f %% %10s %9.3g %7.0f s  %s%s\n", m->appearance.id,
+                100.0 * m->validation.fit.rel_rms, held_out, (double)m->fit.n_path, m->fit.wall_s,
+                i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
+    }
+    fprintf(out, "relative RMS errors; what follows is of the best model\n\n");
+}
+
 static void print_summary(struct pipeline_context *c, FILE *out)
 {
     char text[600];
-    fprintf(out, "%s\n\nmodel    %s (%s)\nmethod   %s\n", c->doc->sample, c->model->id, c->model->title,
-            c->doc->method);
-    fprintf(out, "fit      %s: %s\n", c->fit.converged ? "converged" : "NOT CONVERGED", c->fit.reason);
-    fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", c->fit.n_step, (double)c->fit.n_path, c->fit.wall_s);
+    const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
+    fprintf(out, "%s\n\n", c->doc->sample);
+    if (c->n_model > 1) print_comparison(c, out);
+    fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
+    fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
+    fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
-    fprintf(out, "relative RMS error over the fitted rows    %.2f %%\n", 100.0 * c->validation.fit.rel_rms);
-    if (isfinite(c->validation.held_out.rel_rms))
-        fprintf(out, "relative RMS error over the held-out rows  %.2f %%\n", 100.0 * c->validation.held_out.rel_rms);
+    fprintf(out, "relative RMS error over the fitted rows    %.2f %%\n", 100.0 * m->validation.fit.rel_rms);
+    if (isfinite(m->validation.held_out.rel_rms))
+        fprintf(out, "relative RMS error over the held-out rows  %.2f %%\n", 100.0 * m->validation.held_out.rel_rms);
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
-            c->validation.fit.value, c->validation.fit.se, 100.0 * c->validation.worst_rel_se);
-    print_parameters(c, out);
-    print_rows(c, out);
+            m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
+    print_parameters(m, out);
+    print_rows(c, &m->validation, out);
     for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
         fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
 }

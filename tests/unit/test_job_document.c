@@ -51,12 +51,12 @@ static void test_defaults(void **state)
     assert_string_equal(d->volume_file[0], "scan.tif");
     assert_true(d->voxel_size_um[2] == 2.0);
     assert_string_equal(d->axes, "xyz");
-    assert_true(isnan(d->density_low) && isnan(d->filter_s) && isnan(d->radius_um) && isnan(d->fixed[0]) &&
-                isnan(d->start[8]));
+    assert_true(isnan(d->density_low) && isnan(d->filter_s) && isnan(d->radius_um) && isnan(d->model[0].fixed[0]) &&
+                isnan(d->model[0].start[8]));
     assert_true(d->lamp_side_cm == 10.0 && d->lamp_distance_cm == 61.0 && d->camera_distance_cm == 100.0 &&
                 d->crop_cm == 1.0);
     assert_true(d->black_sheet);
-    assert_string_equal(d->model, "two_lobe.v1");
+    assert_string_equal(d->model[0].id, "two_lobe.v1");
     assert_string_equal(d->method, METHOD_GAUSS_NEWTON);
     assert_int_equal(d->n_photograph, 0);
     assert_string_equal(d->measurement_file, "a.csv");
@@ -87,11 +87,11 @@ static void test_everything_given(void **state)
     assert_false(d->black_sheet);
     assert_int_equal(d->photograph[1].set, JOB_SET_HELD_OUT);
     assert_true(d->photograph[1].srgb && d->photograph[1].scale == 2.0 && d->photograph[1].light_theta_deg == 150.0);
-    const struct scattering_model *m = scattering_find(d->model);
-    assert_true(d->start[scattering_param_index(m, "C_TT.b")] == 0.3);
-    assert_true(isnan(d->start[scattering_param_index(m, "C_R.b")]));
-    assert_true(d->fixed[scattering_param_index(m, "C_R.g")] == 0.5);
-    assert_true(d->fixed[scattering_param_index(m, "beta_R")] == 5.0);
+    const struct scattering_model *m = scattering_find(d->model[0].id);
+    assert_true(d->model[0].start[scattering_param_index(m, "C_TT.b")] == 0.3);
+    assert_true(isnan(d->model[0].start[scattering_param_index(m, "C_R.b")]));
+    assert_true(d->model[0].fixed[scattering_param_index(m, "C_R.g")] == 0.5);
+    assert_true(d->model[0].fixed[scattering_param_index(m, "beta_R")] == 5.0);
     job_document_free(d);
 }
 
@@ -183,9 +183,9 @@ static void test_bounds_are_values(void **state)
 {
     (void)state;
     struct job_document *d = parse(FIT_OF("{\"start\":{\"beta_TT\":45,\"gamma_TT\":1},\"fixed\":{\"C_TT\":0.999}}"));
-    const struct scattering_model *m = scattering_find(d->model);
-    assert_true(fabs(d->start[scattering_param_index(m, "beta_TT")] - 45.0) < 1e-9);
-    assert_true(d->fixed[scattering_param_index(m, "C_TT.g")] == 0.999);
+    const struct scattering_model *m = scattering_find(d->model[0].id);
+    assert_true(fabs(d->model[0].start[scattering_param_index(m, "beta_TT")] - 45.0) < 1e-9);
+    assert_true(d->model[0].fixed[scattering_param_index(m, "C_TT.g")] == 0.999);
     job_document_free(d);
 }
 

@@ -94,6 +94,10 @@ static void add_steps(struct worker_series *s, size_t first, size_t n, bool repl
 {
     static struct estimate estimate[2];
     double param[FAKE_N_PARAM] = {0};
+    struct appearance appearance = {.id = "fake", .n_param = FAKE_N_PARAM};
+    struct fit_parameter parameter[FAKE_N_PARAM] = {{0.0, 1.0, 0.5, false}};
+    const struct worker_series_model model = {&appearance, parameter, 0, 0};
+    memcpy(appearance.param, fake_param, sizeof fake_param);
     for (size_t i = first; i < first + n; i++) {
         struct fit_step step = {.step = i,
                                 .phase = "p",
@@ -101,7 +105,7 @@ static void add_steps(struct worker_series *s, size_t first, size_t n, bool repl
                                 .n_configuration = 1,
                                 .param = param,
                                 .replica = {&estimate[0], &estimate[1]}};
-        assert_int_equal(worker_series_add(s, &step, fake_param, replayed, NULL), STATUS_OK);
+        assert_int_equal(worker_series_add(s, &step, &model, replayed, NULL), STATUS_OK);
     }
 }
 

@@ -1,0 +1,174 @@
+/* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
+ * rows apart. */
+#include "optimizer/pipeline_trace.h"
+#include "optimizer/work_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
+
+/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for
+ * it: a share of the fit's, but enough for a fair judgement where the fit needed few. */
+static const double validation_rel_se = 0.005, validation_share = 0.7, validation_least_paths = 4e6;
+
+static double brightness(const struct observation *o)
+{
+    return fmax((o->mean_rgb[0] + o->mean_rgb[1] + o->mean_rgb[2]) / 3.0, OBJECTIVE_TAU);
+}
+
+/* Relative variance of one path, from a pilot run. */
+static double relative_path_variance(const struct observation *o, const struct estimate *pilot)
+{
+    double a = brightness(o), largest = 0.0;
+    for (int c = 0; c < 3; c++) largest = fmax(largest, pilot->var[c]);
+    return (double)pilot->n_path * largest / (a * a);
+}
+
+/* Paths a replica, so that both together reach the standard error asked for; all rows give way alike when the budget is
+ * short. */
+static void plan_validation(const struct pipeline_context *c, const struct pipeline_model *m,
+                            const struct estimate *pilot, size_t *n_path)
+{
+    double total = 0.0;
+    for (size_t i = 0; i < c->observation.n; i++)
+        total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
+    double least = c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
+    double budget = fmax(validation_share * (double)m->fit.n_path, least);
+    double shrink = fmin(1.0, budget / fmax(total, 1.0));
+    for (size_t i = 0; i < c->observation.n; i++) {
+        double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
+                   (validation_rel_se * validation_rel_se);
+        n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
+        n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
+    }
+}
+
+static void evaluate_set(const struct pipeline_context *c, const struct validation *v, enum job_set set,
+                         struct objective_value *value)
+{
+    struct observation_set part;
+    size_t n = c->observation.n, n_part = 0;
+    struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
+    observation_set_init(&part);
+    *value = (struct objective_value){NAN, NAN, NAN};
+    if (a != NULL && observation_set_select(&c->observation, set, &part, NULL) == STATUS_OK && part.n > 0) {
+        for (size_t i = 0; i < n; i++) {
+            if (c->observation.item[i].set != set) continue;
+            a[n_part] = v->replica[0][i];
+            b[n_part++] = v->replica[1][i];
+        }
+        objective_evaluate(&part, a, b, value);
+    }
+    observation_set_release(&part);
+    free(a);
+}
+
+static void score_validation(const struct pipeline_context *c, struct validation *v)
+{
+    evaluate_set(c, v, JOB_SET_FIT, &v->fit);
+    evaluate_set(c, v, JOB_SET_HELD_OUT, &v->held_out);
+    v->worst_rel_se = 0.0;
+    for (size_t i = 0; i < c->observation.n; i++)
+        for (int k = 0; k < 3; k++)
+            v->worst_rel_se = fmax(v->worst_rel_se, 0.5 * sqrt(v->replica[0][i].var[k] + v->replica[1][i].var[k]) /
+                                                        brightness(&c->observation.item[i]));
+}
+
+static status allocate_validations(struct pipeline_context *c, struct error *err)
+{
+    for (size_t i = 0; i < 2 * c->n_model; i++) {
+        struct estimate **replica = &c->model[i / 2].validation.replica[i % 2];
+        free(*replica);
+        *replica = calloc(c->observation.n, sizeof **replica);
+        if (*replica == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    }
+    return STATUS_OK;
+}
+
+/* Pilot, then two replicas, each through a journal: an interrupted validation does not start over. */
+static status estimate_validation(struct pipeline_context *c, struct pipeline_model *m, const struct estimator *e,
+                                  const struct progress *whole, size_t *n_path, struct error *err)
+{
+    struct pipeline_part part;
+    struct progress progress = pipeline_sub_progress(&part, whole, 0.0, 0.1);
+    struct estimator_call call = {m->fit.param, n_path, 0, REPLICA_FINAL_A, false};
+    double wall_s;
+    double pilot = 0.05 * (double)m->fit.n_path / (double)c->observation.n;
+    for (size_t i = 0; i < c->observation.n; i++)
+        n_path[i] = (size_t)fmin(fmax(pilot, VALIDATION_LEAST), VALIDATION_PILOT);
+    status s = e->run(e->context, &call, &progress, m->validation.replica[0], &wall_s, err);
+    if (s != STATUS_OK) return s;
+    plan_validation(c, m, m->validation.replica[0], n_path);
+    for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
+        progress = pipeline_sub_progress(&part, whole, 0.1 + 0.45 * q, 0.45);
+        call.iteration = 1;
+        call.replica = q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B;
+        s = e->run(e->context, &call, &progress, m->validation.replica[q], &wall_s, err);
+    }
+    return s;
+}
+
+static status validate_model(struct pipeline_context *c, size_t i_model, size_t *n_path, struct error *err)
+{
+    struct pipeline_model *m = &c->model[i_model];
+    struct pipeline_trace trace;
+    struct pipeline_part part;
+    struct progress progress = pipeline_part_progress(&part, c, i_model);
+    struct estimator estimator;
+    status s = pipeline_trace_open(&trace, c, "validation", i_model, &c->observation, err);
+    if (s != STATUS_OK) goto out;
+    estimator = estimate_journal_estimator(trace.journal);
+    s = estimate_validation(c, m, &estimator, &progress, n_path, err);
+    if (s != STATUS_OK) goto out;
+    score_validation(c, &m->validation);
+    log_info(c->log,
+             "validation of %s: relative RMS error %.4f over the fitted rows, %.4f over the held-out rows; rendered "
+             "means have a standard error below %.2f %%",
+             m->appearance.id, m->validation.fit.rel_rms, m->validation.held_out.rel_rms,
+             100.0 * m->validation.worst_rel_se);
+out:
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+static void estimate_sections(struct pipeline_context *c, struct work_section section[2 * JOB_MAX_MODEL])
+{
+    for (size_t i = 0; i < 2 * c->n_model; i++)
+        section[i] = (struct work_section){c->model[i / 2].validation.replica[i % 2],
+                                           c->observation.n * sizeof(struct estimate)};
+}
+
+static status store_validations(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct work_section section[2 * JOB_MAX_MODEL];
+    estimate_sections(c, section);
+    status s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    return s == STATUS_OK ? work_file_write(path, "validation.1", section, 2 * c->n_model, err) : s;
+}
+
+status stage_validation_load(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct work_section section[2 * JOB_MAX_MODEL];
+    status s = allocate_validations(c, err);
+    if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
+    if (s != STATUS_OK) return s;
+    estimate_sections(c, section);
+    s = work_file_read(path, "validation.1", section, 2 * c->n_model, err);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) score_validation(c, &c->model[i].validation);
+    return s;
+}
+
+status stage_validation(struct pipeline_context *c, struct error *err)
+{
+    size_t *n_path = calloc(c->observation.n, sizeof *n_path);
+    status s = n_path != NULL ? allocate_validations(c, err)
+                              : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = validate_model(c, i, n_path, err);
+    if (s == STATUS_OK) s = store_validations(c, err);
+    free(n_path);
+    return s;
+}
