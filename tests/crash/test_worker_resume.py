@@ -78,6 +78,8 @@ def outcome(folder):
     result = read_json(folder, "results/result.json")
     for key in ("fit_wall_s", "stages", "warnings"):
         result.pop(key)
+    for model in result["models"]:
+        model.pop("fit_wall_s")
     with open(os.path.join(folder, "series.rec")) as f:
         series = [json.loads(line[9:]) for line in f]
     for record in series:
