@@ -164,6 +164,7 @@ static json_t *report_json(const struct compare_report *r)
         {"radius_bias_percent", r->radius_bias_percent},
     };
     json_object_set_new(j, "n_true", json_integer((json_int_t)r->n_true));
+    json_object_set_new(j, "n_true_piece", json_integer((json_int_t)r->n_true_piece));
     json_object_set_new(j, "n_found", json_integer((json_int_t)r->n_found));
     for (size_t i = 0; i < sizeof figure / sizeof *figure; i++) set_number(j, figure[i].name, figure[i].value);
     return j;

@@ -14,6 +14,7 @@ struct sample {
     uint32_t fiber;      /* own */
     uint32_t other;      /* fiber met, NONE when unmatched */
     uint32_t voxel;      /* place met on the other fiber, in voxels from its start */
+    uint32_t piece, other_piece; /* parts between faces, of own and other */
     float distance_m, cosine;
 };
 
@@ -23,7 +24,7 @@ struct walk {
     struct sample *sample;
     size_t n;
     double tensor[9];
-    size_t n_tensor;
+    size_t n_tensor, n_piece;
 };
 
 struct job {
@@ -32,6 +33,7 @@ struct job {
     const double *tile_m;
     const struct compare_option *o;
     const double *arc_m; /* arc length at the vertices of the other set */
+    const uint32_t *piece, *other_piece; /* per vertex */
     bool own_is_truth;
     double limit_m;
 };
@@ -45,15 +47,16 @@ static bool near_face(const struct job *j, const double p[3])
     return false;
 }
 
-static void add_sample(const struct job *j, size_t i_fiber, const double p[3], const double d[3], struct walk *w)
+static void add_sample(const struct job *j, size_t i_fiber, size_t i_vertex, const double p[3], const double d[3], struct walk *w)
 {
     if (near_face(j, p)) return;
     struct segment_hit hit;
-    struct sample s = {.fiber = (uint32_t)i_fiber, .other = NONE};
+    struct sample s = {.fiber = (uint32_t)i_fiber, .other = NONE, .piece = j->piece[i_vertex]};
     double limit_m = j->own_is_truth ? (double)j->own->radius_m[i_fiber] : j->limit_m;
     if (segment_grid_nearest(j->grid, p, limit_m, &hit) &&
         (j->own_is_truth || hit.distance_m <= (double)j->other->radius_m[hit.i_fiber])) {
         s.other = (uint32_t)hit.i_fiber;
+        s.other_piece = j->other_piece[hit.i_vertex];
         s.distance_m = (float)hit.distance_m;
         s.cosine = (float)fmin(1.0, fabs(d[0] * hit.direction[0] + d[1] * hit.direction[1] + d[2] * hit.direction[2]));
         double arc = j->arc_m[hit.i_vertex] + hit.t * (j->arc_m[hit.i_vertex + 1] - j->arc_m[hit.i_vertex]);
@@ -81,7 +84,7 @@ static void walk_fiber(const struct job *j, size_t i, struct walk *w)
         for (int k = 0; k < 3; k++) d[k] /= length;
         for (; to_next <= length; to_next += step) {
             double p[3] = {a[0] + to_next * d[0], a[1] + to_next * d[1], a[2] + to_next * d[2]};
-            add_sample(j, i, p, d, w);
+            add_sample(j, i, v, p, d, w);
         }
         to_next -= length;
     }
@@ -103,6 +106,36 @@ static double *arc_lengths(const struct fiber_set *f)
     return arc;
 }
 
+static bool in_tile(const float p[3], const double corner[2], const double tile_m[2], double beyond)
+{
+    for (int a = 0; a < 2; a++)
+        if (!((double)p[a] >= corner[a] - beyond && (double)p[a] <= corner[a] + tile_m[a] + beyond)) return false;
+    return true;
+}
+
+/* The scan is one tile and ends at its faces: a fiber that leaves it by more than its radius is cut at the face. Numbers the pieces of
+ * every fiber, per vertex; *n_piece of them. */
+static uint32_t *cut_at_faces(const struct fiber_set *f, const double tile_m[2], size_t *n_piece)
+{
+    uint32_t *piece = malloc((f->n_vertex + 1) * sizeof *piece);
+    *n_piece = 0;
+    for (size_t i = 0; i < f->n_fiber && piece != NULL; i++) {
+        double corner[2] = {NAN, NAN}; /* of the tile that the fiber is in */
+        size_t outside = f->first_vertex[i]; /* the first vertex since the fiber was last seen in it */
+        for (size_t v = f->first_vertex[i]; v < f->first_vertex[i + 1]; v++) {
+            const float *p = f->position_m + 3 * v;
+            if (!in_tile(p, corner, tile_m, (double)f->radius_m[i])) {
+                for (int a = 0; a < 2; a++) corner[a] = tile_m[a] * floor((double)p[a] / tile_m[a]);
+                for (; outside < v; outside++) piece[outside] = (uint32_t)*n_piece;
+                ++*n_piece;
+            }
+            piece[v] = (uint32_t)(*n_piece - 1);
+            if (in_tile(p, corner, tile_m, 0.0)) outside = v + 1;
+        }
+    }
+    return piece;
+}
+
 static double largest_radius_m(const struct fiber_set *f)
 {
     double r = 0.0;
@@ -113,22 +146,27 @@ static double largest_radius_m(const struct fiber_set *f)
 static status walk_all(const struct fiber_set *own, const struct fiber_set *other, const struct fiber_set *truth,
                        const struct compare_option *o, struct walk *w, struct error *err)
 {
+    size_t n_other_piece;
+    uint32_t *piece = cut_at_faces(own, truth->tile_size_m, &w->n_piece);
+    uint32_t *other_piece = cut_at_faces(other, truth->tile_size_m, &n_other_piece);
     struct segment_grid *grid = NULL;
     double *arc = arc_lengths(other), limit_m = largest_radius_m(truth);
     size_t n = (size_t)(fiber_set_length_m(own) / o->voxel_size_m) + own->n_fiber + 1;
     w->sample = calloc(n, sizeof *w->sample);
     status st = STATUS_OK;
-    if (arc == NULL || w->sample == NULL) {
+    if (arc == NULL || w->sample == NULL || piece == NULL || other_piece == NULL) {
         st = error_set(err, STATUS_NO_MEMORY, "cannot compare fibers: out of memory");
         goto out;
     }
     st = segment_grid_new(other, truth->tile_size_m, limit_m, &grid, err);
     if (st != STATUS_OK) goto out;
-    struct job job = {own, other, grid, truth->tile_size_m, o, arc, own == truth, limit_m};
+    struct job job = {own, other, grid, truth->tile_size_m, o, arc, piece, other_piece, own == truth, limit_m};
     for (size_t i = 0; i < own->n_fiber; i++) walk_fiber(&job, i, w);
 out:
     segment_grid_free(grid);
     free(arc);
+    free(piece);
+    free(other_piece);
     return st;
 }
 
@@ -160,8 +198,9 @@ static int by_place(const void *a, const void *b)
 static int by_pair(const void *a, const void *b)
 {
     const struct sample *x = a, *y = b;
-    if (x->fiber != y->fiber) return x->fiber < y->fiber ? -1 : 1;
-    return x->other < y->other ? -1 : x->other > y->other;
+    if (x->piece != y->piece) return x->piece < y->piece ? -1 : 1;
+    if ((x->other == NONE) != (y->other == NONE)) return x->other == NONE ? 1 : -1;
+    return x->other_piece < y->other_piece ? -1 : x->other_piece > y->other_piece;
 }
 
 /* What found samples tell. Changes their order. */
@@ -202,27 +241,35 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
 }
 
 /* Fragments and merges: pairs (found, true) with enough samples. */
-static status count_fragments(const struct fiber_set *truth, struct walk *w, size_t run_min, struct compare_report *r, struct error *err)
+static status count_fragments(const struct walk *of_truth, struct walk *w, size_t run_min, struct compare_report *r, struct error *err)
 {
-    bool *seen = calloc(truth->n_fiber, sizeof *seen);
-    if (seen == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot compare fibers: out of memory");
-    qsort(w->sample, w->n, sizeof *w->sample, by_pair);
+    bool *seen = calloc(of_truth->n_piece, sizeof *seen);
+    uint32_t *length = calloc(of_truth->n_piece, sizeof *length);
     size_t n_pair = 0, n_with_pair = 0, n_seen = 0;
     uint32_t last_found = NONE;
+    if (seen == NULL || length == NULL) {
+        free(seen);
+        free(length);
+        return error_set(err, STATUS_NO_MEMORY, "cannot compare fibers: out of memory");
+    }
+    for (size_t i = 0; i < of_truth->n; i++) length[of_truth->sample[i].piece]++;
+    for (size_t i = 0; i < of_truth->n_piece; i++) r->n_true_piece += length[i] >= run_min;
+    qsort(w->sample, w->n, sizeof *w->sample, by_pair);
     for (size_t i = 0, end; i < w->n; i = end) {
         const struct sample *s = &w->sample[i];
         for (end = i + 1; end < w->n && by_pair(s, &w->sample[end]) == 0; end++) {}
-        if (s->other == NONE || end - i < run_min) continue;
+        if (s->other == NONE || end - i < run_min || length[s->other_piece] < run_min) continue;
         n_pair++;
-        if (s->fiber != last_found) n_with_pair++;
-        last_found = s->fiber;
-        if (!seen[s->other]) n_seen++;
-        seen[s->other] = true;
+        if (s->piece != last_found) n_with_pair++;
+        last_found = s->piece;
+        if (!seen[s->other_piece]) n_seen++;
+        seen[s->other_piece] = true;
     }
-    r->merges_per_fiber = (double)(n_pair - n_with_pair) / (double)truth->n_fiber;
+    r->merges_per_fiber = (double)(n_pair - n_with_pair) / (double)r->n_true_piece;
     r->fragments_per_fiber = n_seen > 0 ? (double)n_pair / (double)n_seen : NAN;
-    r->missed = 1.0 - (double)n_seen / (double)truth->n_fiber;
+    r->missed = 1.0 - (double)n_seen / (double)r->n_true_piece;
     free(seen);
+    free(length);
     return STATUS_OK;
 }
 
@@ -301,7 +348,7 @@ status compare_fibers(const struct fiber_set *truth, const struct fiber_set *fou
     from_truth(&of_truth, &r);
     st = from_found(truth, found, o->voxel_size_m, &of_found, &r, err);
     if (st == STATUS_OK)
-        st = count_fragments(truth, &of_found, (size_t)ceil(o->run_min_voxel > 0.0 ? o->run_min_voxel : 5.0), &r, err);
+        st = count_fragments(&of_truth, &of_found, (size_t)ceil(o->run_min_voxel > 0.0 ? o->run_min_voxel : 5.0), &r, err);
     if (st == STATUS_OK) *report = r;
 out:
     free(arc);

@@ -3,6 +3,9 @@
  * Both sets are walked in steps of one voxel of arc length; a sample stands for one voxel of fiber. Distances are taken to the nearest
  * point of the other set's polylines, periodic in x and y with the truth's tile. A sample is matched when that point lies within one
  * radius of the true fiber concerned. Directions have no sign.
+ *
+ * Where fibers are counted (missed, fragments, merges) a fiber of either set that leaves the tile by more than its radius ends there, and is
+ * another one when it comes in on the other side: the scan shows one tile. True pieces of less than run_min_voxel are not counted.
  */
 #ifndef SELVEDGE_GEOMETRY_COMPARE_H
 #define SELVEDGE_GEOMETRY_COMPARE_H
@@ -17,6 +20,7 @@ struct compare_option {
 
 struct compare_report {
     size_t n_true, n_found;             /* fibers */
+    size_t n_true_piece;                /* true fibers as cut by the faces */
     double fiber_diameter_voxel;        /* of the truth, mean weighted by length */
     double length_true_m, length_found_m;
 

@@ -66,8 +66,8 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
     if (st == STATUS_OK && s->pictures != NULL) st = write_pictures(s->pictures, name, &r.v, &r.found, err);
     const struct compare_report *c = &r.compare;
     if (st == STATUS_OK) {
-        fprintf(stderr, "%s: %zu x %zu x %zu voxels, %zu true fibers, %zu found, %.1f s, diameter measured %.2f, radius %+.1f %%\n", name, r.v.n[0],
-                r.v.n[1], r.v.n[2], c->n_true, c->n_found, r.wall_s, r.report.fiber_diameter_voxel, c->radius_bias_percent);
+        fprintf(stderr, "%s: %zu x %zu x %zu voxels, %zu true fibers (%zu pieces), %zu found, %.1f s, diameter measured %.2f, radius %+.1f %%\n", name, r.v.n[0],
+                r.v.n[1], r.v.n[2], c->n_true, c->n_true_piece, c->n_found, r.wall_s, r.report.fiber_diameter_voxel, c->radius_bias_percent);
         print(name, "precision", c->center_precision, "1", "higher");
         print(name, "recall", c->center_recall, "1", "higher");
         print(name, "centerline_rms_voxel", c->centerline_rms_voxel, "voxel", "lower");

@@ -173,6 +173,32 @@ static void test_merged(void **state)
     check_near(r.direction_p95_deg, slope_deg, 0.01);
 }
 
+/* A fiber that leaves through a face and comes in through the opposite one is two fibers in a scan; one that grazes the face is not. */
+static void test_faces_cut_fibers(void **state)
+{
+    (void)state;
+    struct piece truth[2] = {{0, 100, 90.0, 110.0, 20.0, 3.4}, {0, 100, 50.0, 50.0, 20.0, 3.4}};
+    struct piece found[3] = {{0, 50, 90.0, 100.0, 20.0, 3.4}, {50, 100, 0.0, 10.0, 20.0, 3.4}, truth[1]};
+    const struct compare_option o = {.voxel_size_m = voxel};
+    struct compare_report r;
+    struct fiber_set t = build(truth, 2), f = build(found, 3);
+    assert_int_equal(compare_fibers(&t, &f, &o, &r, NULL), STATUS_OK);
+    assert_int_equal(r.n_true, 2);
+    assert_int_equal(r.n_true_piece, 3);
+    check_near(r.center_recall, 1.0, 0);
+    check_near(r.fragments_per_fiber, 1.0, 0);
+    check_near(r.merges_per_fiber, 0.0, 0);
+    check_near(r.missed, 0.0, 0);
+    fiber_set_release(&t);
+    truth[0].y = 99.0; /* within a radius of the face all the way */
+    truth[0].y_end = 101.0;
+    t = build(truth, 2);
+    assert_int_equal(compare_fibers(&t, &f, &o, &r, NULL), STATUS_OK);
+    assert_int_equal(r.n_true_piece, 2);
+    fiber_set_release(&t);
+    fiber_set_release(&f);
+}
+
 static void test_double_hits_cost_precision(void **state)
 {
     (void)state;
@@ -300,6 +326,7 @@ int main(void)
         cmocka_unit_test(test_shift_by_a_tile_is_no_shift),
         cmocka_unit_test(test_cut_and_missing),
         cmocka_unit_test(test_merged),
+        cmocka_unit_test(test_faces_cut_fibers),
         cmocka_unit_test(test_double_hits_cost_precision),
         cmocka_unit_test(test_orientation_tensor),
         cmocka_unit_test(test_margin_and_errors),
