@@ -1,4 +1,5 @@
 /* Stages "volume" to "scene": from the scan, or from a fiber file, to a cloth ready for ray tracing. */
+#include "geometry/fibers/voxelise.h"
 #include "optimizer/job_folder.h"
 #include "optimizer/pipeline_context.h"
 #include "optimizer/work_file.h"
@@ -8,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { VOXELISE_MEMORY_SHARE = 4 };
 static const double um = 1e-6, mm = 1e-3;
 
 /* The document's options over the defaults. */
@@ -267,6 +269,30 @@ static bool wants_volume_scene(const struct pipeline_context *c)
     return false;
 }
 
+/* The cloth came as fibers: volume models get the density of those. Cheap enough to be done again after a resume. */
+static status voxelise(struct pipeline_context *c, struct error *err)
+{
+    const struct voxelise_option option = {.voxel_size_m = c->doc->voxel_um * um,
+                                           .limit_bytes = c->memory_limit_bytes / VOXELISE_MEMORY_SHARE};
+    double radius_m = 0.0, voxel_m;
+    char warning[300];
+    status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
+    if (s != STATUS_OK) {
+        if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, "fibers.voxel_um");
+        return s;
+    }
+    for (size_t i = 0; i < c->fiber.n_fiber; i++)
+        radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
+    if (isnan(option.voxel_size_m) && voxel_m > 0.51 * radius_m) {
+        snprintf(warning, sizeof warning,
+                 "volume models see the fibers in voxels of %.3g um instead of %.3g um (half a radius): finer ones do "
+                 "not fit into the memory setting",
+                 voxel_m / um, 0.5 * radius_m / um);
+        worker_status_warn(c->status, warning);
+    }
+    return STATUS_OK;
+}
+
 static status make_volume_scene(struct pipeline_context *c, struct error *err)
 {
     const struct volume_scene_option option = {.black_sheet = c->doc->black_sheet};
@@ -286,5 +312,7 @@ status stage_scene(struct pipeline_context *c, struct error *err)
     if (s != STATUS_OK) return s;
     log_info(c->log, "scene: %zu fibers, %zu segments, %.0f MB", c->fiber.n_fiber, scene_n_segment(c->scene),
              (double)scene_memory_bytes(c->scene) / 1e6);
-    return wants_volume_scene(c) ? make_volume_scene(c, err) : s;
+    if (!wants_volume_scene(c)) return STATUS_OK;
+    if (!c->doc->has_volume) s = voxelise(c, err);
+    return s == STATUS_OK ? make_volume_scene(c, err) : s;
 }

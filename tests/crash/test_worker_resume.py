@@ -87,9 +87,9 @@ def outcome(folder):
     return result, series
 
 
-def journal_bytes(folder, stage):
+def journal_bytes(folder, stage, number=""):
     try:
-        return os.path.getsize(os.path.join(folder, "work", stage, "estimates.journal"))
+        return os.path.getsize(os.path.join(folder, "work", stage, f"estimates{number}.journal"))
     except FileNotFoundError:
         return 0
 
@@ -108,9 +108,11 @@ def kill_when(folder, threads, condition, timeout_s=60):
     return killed
 
 
-@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1"])
+@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models"])
 def reference(request, tmp_path_factory):
     fit = {"method": request.param}
+    if request.param == "several_models":
+        fit = {"models": ["microflake.v1", "two_lobe.v1"], "path_budget": 60000}
     if request.param == "published_sgd.v1":
         fit.update(max_iterations=2, path_budget=300000)
     folder = make_job(str(tmp_path_factory.mktemp("reference") / "job"), **fit)
@@ -127,6 +129,8 @@ def test_killed_at_several_points(reference, tmp_path, threads):
     kills = int(first)
     for point in (3, 6, 9):
         kills += kill_when(folder, threads, lambda p=point: journal_bytes(folder, "fit") >= p * record)
+    if "models" in fit:
+        kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", "-1") >= 3 * record)
     kills += kill_when(folder, threads, lambda: journal_bytes(folder, "validation") > 20)
     assert kills >= 3, "the fit is too fast for this test"
     finish(folder, threads)
