@@ -1,5 +1,8 @@
 /* The chain from a scan to fibers, in the steps that the pipeline runs and checkpoints (fabric thesis, section 5.6).
  * Step functions take the options of the job and fill a part of the quality report.
+ *
+ * Memory: volumes and everything as large as they are come from the scratch space given to reconstruct_read (v->space); the steps
+ * walk through them in slabs and keep the process within its limit. Results do not depend on the limit.
  */
 #ifndef SELVEDGE_GEOMETRY_RECONSTRUCT_H
 #define SELVEDGE_GEOMETRY_RECONSTRUCT_H
@@ -53,8 +56,8 @@ struct reconstruct_report {
 /* Step "volume": read the file(s), honour axes/matrix/crop, map densities to [0, 1]. paths: one multi-page TIFF, one MetaImage
  * header (data file beside it), or TIFF slices in order. Errors name the file, and the field of the job document as
  * "volume.<field>": STATUS_FORMAT (truncated, pages of different size or depth), STATUS_INVALID (NaN voxels, empty: nothing
- * above the threshold, constant), STATUS_TOO_LARGE (over limit_bytes of memory). */
-status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, size_t limit_bytes,
+ * above the threshold, constant), STATUS_DISK_FULL (scratch space). space NULL: memory, without a limit. */
+status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, struct scratch_space *space,
                         struct thread_pool *pool, const struct progress *progress, struct volume *v,
                         struct reconstruct_report *report, struct error *err);
 

@@ -9,6 +9,7 @@
 
 #include "geometry/orientation/consensus.h"
 #include "geometry/orientation/fiber_diameter.h"
+#include "geometry/orientation/line_bound.h"
 #include "geometry/orientation/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
 #include "geometry/volume/density_map.h"
@@ -17,7 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_FINE = 900, MAX_STEP = 24, N_CONSENSUS_BLUR = 3 };
+enum { N_FINE = 900, MAX_STEP = 24, N_CONSENSUS_BLUR = 3, MAX_CLIMB = 19 };
 
 #define J_TOLERANCE 0.07 /* minima of J that noise and touching fibers may exchange */
 #define AGREEMENT_COSINE 0.94f
@@ -33,10 +34,10 @@ struct orientation_job {
     float eps_d, eps_j;
     double j_full;         /* J in solid material */
     int n_climb;           /* steps to the ridge */
-    uint32_t *ridge;       /* per voxel of material: index of its ridge voxel */
-    _Atomic uint8_t *is_ridge;
+    struct line_bound bound;
+    uint16_t *ridge;       /* per voxel of material: offset of its ridge voxel, packed */
+    _Atomic uint16_t *j_ridge; /* per voxel: 0 for no ridge; at ridges J in J_UNIT * j_full, at least 1 */
     struct consensus consensus;
-    uint16_t *j_ridge;     /* per ridge voxel, in J_UNIT * j_full */
     float *scratch;        /* per thread */
     size_t scratch_per_thread;
     size_t *n_material, *n_kept; /* per slice */
@@ -64,21 +65,50 @@ static void step_up(const struct volume *l, size_t x[3])
     memcpy(x, best, sizeof best);
 }
 
+/* An offset of at most n_climb along each axis in 16 bits. */
+static uint16_t pack_offset(const struct orientation_job *o, const size_t from[3], const size_t to[3])
+{
+    size_t code = 0, edge = 2 * (size_t)o->n_climb + 1;
+    for (int a = 2; a >= 0; a--) code = code * edge + (to[a] + (size_t)o->n_climb - from[a]);
+    return (uint16_t)code;
+}
+
+static size_t ridge_index(const struct orientation_job *o, size_t at)
+{
+    size_t code = o->ridge[at], climb = (size_t)o->n_climb, edge = 2 * climb + 1;
+    const size_t *n = o->v->n;
+    size_t dx = code % edge, dy = code / edge % edge, dz = code / (edge * edge);
+    return at + dx + dy * n[0] + dz * n[0] * n[1] - climb * (1 + n[0] + n[0] * n[1]);
+}
+
+static uint16_t get_j(const struct orientation_job *o, size_t at)
+{
+    return atomic_load_explicit(&o->j_ridge[at], memory_order_relaxed);
+}
+
+static void set_j(struct orientation_job *o, size_t at, double share)
+{
+    double units = fmin(fmax(1.0, share / J_UNIT), 65535.0);
+    atomic_store_explicit(&o->j_ridge[at], (uint16_t)units, memory_order_relaxed);
+}
+
 static void climb_slice(void *context, size_t k, size_t i_thread)
 {
     (void)i_thread;
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
     size_t material = 0;
+    scratch_keep_within(o->v->space);
     for (size_t j = 0; j < n[1]; j++)
         for (size_t i = 0; i < n[0]; i++) {
             size_t at = volume_index(n, i, j, k), x[3] = {i, j, k};
             if (o->v->density[at] < o->eps_d) continue;
             material++;
+            if (!line_bound_reaches(&o->bound, i, j, k)) continue;
+            const size_t from[3] = {i, j, k};
             for (int step = 0; step < o->n_climb; step++) step_up(&o->blurred, x);
-            size_t top = volume_index(n, x[0], x[1], x[2]);
-            o->ridge[at] = (uint32_t)top;
-            atomic_store_explicit(&o->is_ridge[top], 1, memory_order_relaxed);
+            o->ridge[at] = pack_offset(o, from, x);
+            set_j(o, volume_index(n, x[0], x[1], x[2]), 0.0);
         }
     o->n_material[k] = material;
 }
@@ -131,16 +161,16 @@ static void ridge_slice(void *context, size_t k, size_t i_thread)
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
+    scratch_keep_within(o->v->space);
     for (size_t j = 0; j < n[1]; j++)
         for (size_t i = 0; i < n[0]; i++) {
             size_t at = volume_index(n, i, j, k);
-            if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
+            if (get_j(o, at) == 0) continue;
             struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
             float d[3], least, d0[3];
             structure_tensor_direction(&o->blurred, &o->window, i, j, k, d0);
             least = descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, d0), d);
-            double share = fmax(0.0, (double)least / o->j_full);
-            o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
+            set_j(o, at, (double)least / o->j_full);
             direction_volume_set(o->d, at, d);
         }
 }
@@ -151,12 +181,14 @@ static void collect_layer(void *context, size_t layer, size_t i_thread)
     (void)i_thread;
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
+    scratch_keep_within(o->v->space);
     for (size_t k = layer * o->consensus.cell; k < (layer + 1) * o->consensus.cell && k < n[2]; k++)
         for (size_t j = 0; j < n[1]; j++)
             for (size_t i = 0; i < n[0]; i++) {
                 size_t at = volume_index(n, i, j, k);
-                if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
-                float d[3], share = (float)(o->j_ridge[at] * J_UNIT);
+                uint16_t units = get_j(o, at);
+                if (units == 0) continue;
+                float d[3], share = (float)(units * J_UNIT);
                 direction_volume_get(o->d, at, d);
                 consensus_add(&o->consensus, i, j, k, d, share * share);
             }
@@ -168,18 +200,19 @@ static void agree_slice(void *context, size_t k, size_t i_thread)
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
+    scratch_keep_within(o->v->space);
     for (size_t j = 0; j < n[1]; j++)
         for (size_t i = 0; i < n[0]; i++) {
             size_t at = volume_index(n, i, j, k);
             float own[3], common[3], d[3];
-            if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0) continue;
+            if (get_j(o, at) == 0) continue;
             if (!consensus_direction(&o->consensus, i, j, k, common)) continue;
             direction_volume_get(o->d, at, own);
             if (fabsf(own[0] * common[0] + own[1] * common[1] + own[2] * common[2]) > AGREEMENT_COSINE) continue;
             struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
             double share = (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, common), d) / o->j_full;
-            if (share < (1.0 - J_TOLERANCE) * o->j_ridge[at] * J_UNIT) continue;
-            o->j_ridge[at] = (uint16_t)fmin(share / J_UNIT, 65535.0);
+            if (share < (1.0 - J_TOLERANCE) * get_j(o, at) * J_UNIT) continue;
+            set_j(o, at, share);
             direction_volume_set(o->d, at, d);
         }
 }
@@ -187,7 +220,7 @@ static void agree_slice(void *context, size_t k, size_t i_thread)
 static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, struct error *err)
 {
     status s = thread_pool_run(pool, o->consensus.n[2], collect_layer, o, NULL);
-    if (s == STATUS_OK) s = consensus_blur(&o->consensus, N_CONSENSUS_BLUR, err);
+    if (s == STATUS_OK) s = consensus_blur(&o->consensus, N_CONSENSUS_BLUR, pool, err);
     if (s == STATUS_OK) s = thread_pool_run(pool, o->v->n[2], agree_slice, o, NULL);
     return s;
 }
@@ -197,16 +230,16 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
     (void)i_thread;
     struct orientation_job *o = context;
     size_t n = o->v->n[0] * o->v->n[1], kept = 0;
-    for (size_t at = k * n; at < (k + 1) * n; at++) {
+    scratch_keep_within(o->v->space);
+    for (size_t at = k * n; at < (k + 1) * n; at++) { /* densities are 0 from the start */
         float density = o->v->density[at];
-        o->d->density[at] = 0;
-        if (density < o->eps_d) continue;
-        if ((double)o->j_ridge[o->ridge[at]] * J_UNIT * o->j_full > (double)o->eps_j) continue;
+        if (density < o->eps_d || !line_bound_reaches(&o->bound, at % o->v->n[0], at % n / o->v->n[0], k)) continue;
+        size_t top = ridge_index(o, at);
+        if (get_j(o, top) * J_UNIT * o->j_full > (double)o->eps_j) continue;
         kept++;
         long byte = lrintf(255.0f * density);
         o->d->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
-        if (atomic_load_explicit(&o->is_ridge[at], memory_order_relaxed) == 0)
-            memcpy(o->d->octahedral + 2 * at, o->d->octahedral + 2 * (size_t)o->ridge[at], 2 * sizeof *o->d->octahedral);
+        if (get_j(o, at) == 0) memcpy(o->d->octahedral + 2 * at, o->d->octahedral + 2 * top, 2 * sizeof *o->d->octahedral);
     }
     o->n_kept[k] = kept;
 }
@@ -240,27 +273,29 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
 {
     const size_t *n = o->v->n;
     size_t n_voxel = volume_n_voxel(n);
-    if (n_voxel > UINT32_MAX)
-        return error_set(err, STATUS_TOO_LARGE, "cannot filter directions of %zu x %zu x %zu voxels", n[0], n[1], n[2]);
+    void *array = NULL;
     status s = direction_set_init(&o->fine, N_FINE, err);
     if (s == STATUS_OK) s = line_filter_new(&o->fine, option->h, n, &o->filter, err);
     if (s != STATUS_OK) return s;
-    s = consensus_init(&o->consensus, n, (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5), err);
+    s = consensus_init(&o->consensus, n, (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5), o->v->space, err);
+    if (s == STATUS_OK) s = scratch_new(o->v->space, n_voxel * sizeof *o->ridge, "the ridges of fibers", &array, err);
+    o->ridge = array;
+    array = NULL;
+    if (s == STATUS_OK) s = scratch_new(o->v->space, n_voxel * sizeof *o->j_ridge, "the ridges of fibers", &array, err);
+    o->j_ridge = array;
     if (s != STATUS_OK) return s;
     o->scratch_per_thread = line_filter_scratch(o->filter);
-    o->ridge = malloc(n_voxel * sizeof *o->ridge);
-    o->is_ridge = calloc(n_voxel, sizeof *o->is_ridge);
-    o->j_ridge = malloc(n_voxel * sizeof *o->j_ridge);
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
     o->n_material = calloc(n[2], sizeof *o->n_material);
     o->n_kept = calloc(n[2], sizeof *o->n_kept);
-    if (o->ridge == NULL || o->is_ridge == NULL || o->j_ridge == NULL || o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
+    if (o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     o->eps_d = (float)option->eps_d;
     o->eps_j = (float)option->eps_j;
     o->j_full = solid_j(option->s, option->t, option->h);
     tensor_window_init(&o->window, 0.28 * diameter_voxel);
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
+    if (o->n_climb > MAX_CLIMB) o->n_climb = MAX_CLIMB;
     return STATUS_OK;
 }
 
@@ -269,10 +304,10 @@ static void release(struct orientation_job *o)
     volume_release(&o->blurred);
     direction_set_release(&o->fine);
     line_filter_free(o->filter);
+    line_bound_release(&o->bound);
     consensus_release(&o->consensus);
-    free(o->ridge);
-    free(o->is_ridge);
-    free(o->j_ridge);
+    scratch_release(o->v->space, o->ridge);
+    scratch_release(o->v->space, (void *)o->j_ridge);
     free(o->scratch);
     free(o->n_material);
     free(o->n_kept);
@@ -301,10 +336,12 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     if (s != STATUS_OK) return s;
     choose_parameters(option, v, report->fiber_diameter_voxel);
     s = prepare(&o, option, report->fiber_diameter_voxel, thread_pool_n_thread(pool), err);
-    if (s == STATUS_OK) s = direction_volume_init(d, v->n, v->voxel_size_m, err);
+    if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
     if (s != STATUS_OK) goto out;
     part = (struct part_progress){progress, 0.1, 0.2};
     s = line_filter_blur(v, option->s, option->t, pool, &inner, &o.blurred, err);
+    if (s == STATUS_OK) /* the climb, half a line, and the taps of its interpolation */
+        s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2, -option->eps_j / (double)option->h, pool, err);
     if (s != STATUS_OK) goto out;
     part = (struct part_progress){progress, 0.3, 0.2};
     s = thread_pool_run(pool, v->n[2], climb_slice, &o, &inner);

@@ -31,7 +31,8 @@ static void cross(const struct canvas *c, double u, double v)
 static void fill_grey(const struct canvas *c, const struct volume *v, int axis, size_t i_slice)
 {
     int au = slice_axis_u(axis), av = slice_axis_v(axis);
-    for (size_t y = 0; y < c->height; y++)
+    for (size_t y = 0; y < c->height; y++) {
+        scratch_keep_within(v->space);
         for (size_t x = 0; x < c->width; x++) {
             size_t i[3];
             i[axis] = i_slice;
@@ -41,6 +42,7 @@ static void fill_grey(const struct canvas *c, const struct volume *v, int axis, 
             uint8_t *p = c->rgb + 3 * (y * c->width + x);
             p[0] = p[1] = p[2] = (uint8_t)lrintf(255.0f * d);
         }
+    }
 }
 
 status reconstruct_slice_picture(const struct volume *v, const struct fiber_set *f, int axis, size_t i_slice,

@@ -91,8 +91,7 @@ static status plan_crop(const struct reconstruct_option *o, struct plan *p, stru
     return STATUS_OK;
 }
 
-static status plan_read(const struct volume_source_info *info, struct reconstruct_option *o, size_t limit_bytes,
-                        struct plan *p, struct error *err)
+static status plan_read(const struct volume_source_info *info, struct reconstruct_option *o, struct plan *p, struct error *err)
 {
     *p = (struct plan){0};
     status s = axis_map_parse(o->axes, &p->map, err);
@@ -102,61 +101,59 @@ static status plan_read(const struct volume_source_info *info, struct reconstruc
     for (int a = 0; a < 3; a++) p->n_stored[a] = info->n[p->map.source[a]];
     memcpy(p->n_all, p->n_stored, sizeof p->n_all);
     if (p->resample) volume_resampled_shape(p->n_stored, p->spacing_m, p->voxel_m, p->n_all);
-    s = plan_crop(o, p, err);
-    if (s != STATUS_OK) return s;
-    double n_voxel = 0.0;
-    for (int pass = 0; pass < (p->resample ? 2 : 1); pass++) {
-        const size_t *box = pass == 0 ? p->box_stored : p->box;
-        n_voxel += (double)(box[3] - box[0]) * (double)(box[4] - box[1]) * (double)(box[5] - box[2]);
-    }
-    double bytes = sizeof(float) * (n_voxel + (double)info->n[0] * (double)info->n[1]);
-    if (limit_bytes > 0 && bytes > (double)limit_bytes)
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files",
-                               "cannot read the volume: its densities need %.0f MB, the limit is %.0f MB", bytes * 1e-6,
-                               (double)limit_bytes * 1e-6);
-    return STATUS_OK;
+    return plan_crop(o, p, err);
 }
 
-/* Puts slice i_slice of the file where it belongs in the stored grid; slice is n_file[1] x n_file[0]. */
-static void scatter_slice(const struct plan *p, const float *slice, size_t i_slice, struct volume *v)
+/* Puts n_slice slices of the file from i_slice on where they belong in the stored grid; block is n_slice x n_file[1] x n_file[0]. */
+static void scatter_slices(const struct plan *p, const float *block, size_t i_slice, size_t n_slice, struct volume *v)
 {
-    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, step[3];
-    ptrdiff_t sign[3], at = 0;
-    size_t from[3], to[3]; /* file indices that are kept */
+    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, from[3], to[3]; /* file indices that are kept */
+    ptrdiff_t step[3], first = 0;
     for (int a = 0; a < 3; a++) {
         int f = p->map.source[a];
         size_t lo = p->box_stored[a], hi = p->box_stored[3 + a], n = p->n_file[f];
         from[f] = p->map.flip[a] ? n - hi : lo;
         to[f] = p->map.flip[a] ? n - lo : hi;
-        step[f] = stride[a];
-        sign[f] = p->map.flip[a] ? -1 : 1;
-        if (p->map.flip[a]) at += (ptrdiff_t)((hi - lo - 1) * stride[a]);
+        step[f] = p->map.flip[a] ? -(ptrdiff_t)stride[a] : (ptrdiff_t)stride[a];
+        if (p->map.flip[a]) first += (ptrdiff_t)((hi - lo - 1) * stride[a]);
     }
-    if (i_slice < from[2] || i_slice >= to[2]) return;
-    at += sign[2] * (ptrdiff_t)((i_slice - from[2]) * step[2]);
-    for (size_t j = from[1]; j < to[1]; j++) {
-        const float *row = slice + j * p->n_file[0];
-        ptrdiff_t out = at + sign[1] * (ptrdiff_t)((j - from[1]) * step[1]), x_step = sign[0] * (ptrdiff_t)step[0];
-        for (size_t i = from[0]; i < to[0]; i++, out += x_step) v->density[out] = row[i];
+    size_t k0 = i_slice > from[2] ? i_slice : from[2], k1 = i_slice + n_slice < to[2] ? i_slice + n_slice : to[2];
+    size_t n_row = p->n_file[0], n_page = n_row * p->n_file[1];
+    bool inwards = p->map.source[0] == 2; /* the file's slices lie across rows: a row at a time of all of them keeps the writes together */
+    for (size_t outer = inwards ? from[1] : k0; outer < (inwards ? to[1] : k1); outer++) {
+        scratch_keep_within(v->space);
+        for (size_t i = from[0]; inwards && i < to[0]; i++) {
+            ptrdiff_t at = first + step[0] * (ptrdiff_t)(i - from[0]) + step[1] * (ptrdiff_t)(outer - from[1]);
+            for (size_t k = k0; k < k1; k++)
+                v->density[at + step[2] * (ptrdiff_t)(k - from[2])] = block[(k - i_slice) * n_page + outer * n_row + i];
+        }
+        for (size_t j = from[1]; !inwards && j < to[1]; j++) {
+            ptrdiff_t at = first + step[2] * (ptrdiff_t)(outer - from[2]) + step[1] * (ptrdiff_t)(j - from[1]);
+            const float *row = block + (outer - i_slice) * n_page + j * n_row;
+            for (size_t i = from[0]; i < to[0]; i++) v->density[at + step[0] * (ptrdiff_t)(i - from[0])] = row[i];
+        }
     }
 }
 
 static status read_slices(struct volume_source *source, const struct plan *p, const struct progress *progress,
                           struct volume *v, struct error *err)
 {
-    float *slice = malloc(p->n_file[0] * p->n_file[1] * sizeof *slice);
-    if (slice == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
+    size_t n_page = p->n_file[0] * p->n_file[1], n_block = 1;
+    if (p->map.source[0] == 2) n_block = scratch_buffer_bytes(v->space) / (n_page * sizeof(float));
+    n_block = n_block < 1 ? 1 : n_block > p->n_file[2] ? p->n_file[2] : n_block;
+    float *block = malloc(n_block * n_page * sizeof *block);
+    if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
     status s = STATUS_OK;
-    for (size_t k = 0; k < p->n_file[2] && s == STATUS_OK; k++) {
-        if (progress_cancelled(progress)) {
-            s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
-            break;
+    for (size_t k = 0; k < p->n_file[2] && s == STATUS_OK; k += n_block) {
+        size_t n = k + n_block <= p->n_file[2] ? n_block : p->n_file[2] - k;
+        for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+            if (progress_cancelled(progress)) s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
+            else s = volume_source_read(source, k + i, 1, block + i * n_page, err);
         }
-        s = volume_source_read(source, k, 1, slice, err);
-        if (s == STATUS_OK) scatter_slice(p, slice, k, v);
-        progress_report(progress, 0.8 * (double)(k + 1) / (double)p->n_file[2]);
+        if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
+        progress_report(progress, 0.8 * (double)(k + n) / (double)p->n_file[2]);
     }
-    free(slice);
+    free(block);
     return s;
 }
 
@@ -171,8 +168,12 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     s = density_map_apply(v, o->density_low, o->density_high, pool, err);
     if (s != STATUS_OK) return s;
     double threshold = isnan(o->eps_d) ? 0.5 : o->eps_d;
-    size_t n = volume_n_voxel(v->n), n_above = 0;
-    for (size_t i = 0; i < n; i++) n_above += (double)v->density[i] >= threshold;
+    size_t n_slice = v->n[0] * v->n[1], n_above = 0;
+    for (size_t k = 0; k < v->n[2]; k++) {
+        const float *slice = v->density + k * n_slice;
+        for (size_t i = 0; i < n_slice; i++) n_above += (double)slice[i] >= threshold;
+        scratch_keep_within(v->space);
+    }
     if (n_above == 0)
         return error_set_field(err, STATUS_INVALID, "volume.files",
                                "cannot use the volume: it is empty, no density reaches %g (scanner value %g)", threshold,
@@ -183,7 +184,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     return STATUS_OK;
 }
 
-status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, size_t limit_bytes,
+status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, struct scratch_space *space,
                         struct thread_pool *pool, const struct progress *progress, struct volume *v,
                         struct reconstruct_report *report, struct error *err)
 {
@@ -193,11 +194,11 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     *v = (struct volume){0};
     status s = volume_source_open_declared(path, n_path, &o->raw, &source, err);
     if (s != STATUS_OK) return s;
-    s = plan_read(volume_source_describe(source), o, limit_bytes, &p, err);
+    s = plan_read(volume_source_describe(source), o, &p, err);
     if (s != STATUS_OK) goto out;
     size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
-    s = volume_init(&stored, n, p.spacing_m, err);
+    s = volume_init_in(&stored, n, p.spacing_m, space, err);
     if (s == STATUS_OK) s = read_slices(source, &p, progress, &stored, err);
     if (s != STATUS_OK) goto out;
     if (p.resample) {

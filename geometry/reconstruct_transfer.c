@@ -55,6 +55,7 @@ static void transfer_brick(void *context, size_t i_brick, size_t i_thread)
     uint32_t *nearest = job->nearest + i_thread * BRICK * BRICK * BRICK;
     struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, 1);
     size_t from[3], n[3], p = 0;
+    scratch_keep_within(job->d->space);
     segment_brick_box(job->bricks, i_brick, from, n);
     segment_distances(job->bricks, i_brick, &l, distance2, nearest);
     for (size_t k = 0; k < n[2]; k++)

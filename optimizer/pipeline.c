@@ -48,6 +48,7 @@ void pipeline_context_release(struct pipeline_context *c)
     volume_release(&c->volume);
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);
+    scratch_space_free(c->space);
     scene_free(c->scene);
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
     for (size_t i = 0; i < c->n_model; i++)
@@ -233,6 +234,12 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
     double total = 0.0, done = 0.0;
     bool earlier_ran = false;
+    char work[WORKER_PATH_BYTES];
+    worker_folder_path(c->folder, JOB_FOLDER_WORK, NULL, work);
+    if (c->memory_limit_bytes > 0 && c->space == NULL) {
+        status s = scratch_space_new(work, c->memory_limit_bytes, &c->space, err);
+        if (s != STATUS_OK) return s;
+    }
     c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
     for (size_t i = 0; i < n_stage; i++)
         if (c->doc->has_volume || !stage_code[i].of_volume) total += info[i].weight;

@@ -6,6 +6,7 @@
 
 #include "base/log.h"
 #include "base/progress.h"
+#include "base/scratch_space.h"
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/reconstruct.h"
@@ -41,7 +42,8 @@ struct pipeline_context {
     struct worker_status *status;
     struct log *log;
     struct thread_pool *pool;
-    size_t memory_limit_bytes;
+    size_t memory_limit_bytes;          /* of the geometry stages; 0: none */
+    struct scratch_space *space;        /* of volumes: JOB/work beyond that limit; NULL without one */
     struct progress progress; /* of the running stage */
 
     struct job_document *doc;

@@ -54,7 +54,7 @@ static status read_volume(struct pipeline_context *c, struct error *err)
         worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text[i]);
         path[i] = text[i];
     }
-    s = reconstruct_read(path, n, &c->option, c->memory_limit_bytes, c->pool, &c->progress, &c->volume, &c->geometry,
+    s = reconstruct_read(path, n, &c->option, c->space, c->pool, &c->progress, &c->volume, &c->geometry,
                          err);
 out:
     free(path);
@@ -74,7 +74,7 @@ status stage_volume(struct pipeline_context *c, struct error *err)
                                      {&c->geometry, sizeof c->geometry},
                                      {c->volume.n, sizeof c->volume.n},
                                      {c->volume.voxel_size_m, sizeof c->volume.voxel_size_m},
-                                     {c->volume.density, volume_n_voxel(c->volume.n) * sizeof(float)}};
+                                     {c->volume.density, volume_n_voxel(c->volume.n) * sizeof(float), c->space}};
     return work_file_write(path, "volume.1", section, 5, err);
 }
 
@@ -82,14 +82,14 @@ static status load_volume(struct pipeline_context *c, struct reconstruct_option 
                           struct reconstruct_report *report, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct volume v = {0};
+    struct volume v = {.space = c->space};
     status s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s != STATUS_OK) return s;
     struct work_section section[] = {{option, sizeof *option},
                                      {report, sizeof *report},
                                      {v.n, sizeof v.n},
                                      {v.voxel_size_m, sizeof v.voxel_size_m},
-                                     {NULL, 0}};
+                                     {NULL, 0, c->space}};
     s = work_file_read(path, "volume.1", section, 5, err);
     if (s != STATUS_OK) return s;
     v.density = section[4].data;
@@ -124,23 +124,23 @@ static status store_direction(struct pipeline_context *c, const char *stage, str
                                      {&c->geometry, sizeof c->geometry},
                                      {d->n, sizeof d->n},
                                      {d->voxel_size_m, sizeof d->voxel_size_m},
-                                     {d->density, n},
-                                     {d->octahedral, 4 * n}};
+                                     {d->density, n, c->space},
+                                     {d->octahedral, 4 * n, c->space}};
     return work_file_write(path, "direction.1", section, 6, err);
 }
 
 static status load_direction(struct pipeline_context *c, const char *stage, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct direction_volume d = {0};
+    struct direction_volume d = {.space = c->space};
     status s = pipeline_work_path(c, stage, "direction.bin", path, err);
     if (s != STATUS_OK) return s;
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
                                      {d.n, sizeof d.n},
                                      {d.voxel_size_m, sizeof d.voxel_size_m},
-                                     {NULL, 0},
-                                     {NULL, 0}};
+                                     {NULL, 0, c->space},
+                                     {NULL, 0, c->space}};
     s = work_file_read(path, "direction.1", section, 6, err);
     if (s != STATUS_OK) return s;
     d.density = section[4].data;

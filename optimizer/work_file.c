@@ -10,6 +10,8 @@
 #include <unistd.h>
 #include <zlib.h>
 
+enum { CHUNK = 8 << 20 };
+
 static const char magic[8] = {'S', 'E', 'L', 'V', 'W', 'R', 'K', '1'};
 
 struct work_header {
@@ -23,6 +25,14 @@ struct work_header {
 static uint32_t checksum(uint32_t sum, const void *data, size_t n_bytes)
 {
     return (uint32_t)crc32_z(sum, data, n_bytes);
+}
+
+/* Sections go through in pieces, so that large ones need not be resident as a whole. */
+static size_t chunk(const struct work_section *s, size_t at)
+{
+    size_t left = s->n_bytes - at;
+    scratch_keep_within(s->space);
+    return left < CHUNK ? left : CHUNK;
 }
 
 status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section,
@@ -39,11 +49,12 @@ status work_file_write(const char *path, const char *tag, const struct work_sect
     if (f == NULL) return error_set_errno(err, "cannot write checkpoint '%s'", path);
     uint32_t sum = checksum(0, &h, sizeof h);
     bool ok = fwrite(&h, sizeof h, 1, f) == 1;
-    for (size_t i = 0; i < n_section && ok; i++) {
-        if (section[i].n_bytes == 0) continue;
-        sum = checksum(sum, section[i].data, section[i].n_bytes);
-        ok = fwrite(section[i].data, section[i].n_bytes, 1, f) == 1;
-    }
+    for (size_t i = 0; i < n_section && ok; i++)
+        for (size_t at = 0, n; at < section[i].n_bytes && ok; at += n) {
+            n = chunk(&section[i], at);
+            sum = checksum(sum, (const char *)section[i].data + at, n);
+            ok = fwrite((const char *)section[i].data + at, n, 1, f) == 1;
+        }
     ok = ok && fwrite(&sum, sizeof sum, 1, f) == 1 && fflush(f) == 0 && fsync(fileno(f)) == 0;
     if (!ok) s = error_set_errno(err, "cannot write checkpoint '%s'", path);
     if (fclose(f) != 0 && s == STATUS_OK) s = error_set_errno(err, "cannot write checkpoint '%s'", path);
@@ -58,18 +69,19 @@ static status read_sections(FILE *f, const char *path, const struct work_header 
     uint32_t sum = checksum(0, h, sizeof *h), stored;
     for (size_t i = 0; i < h->n_section; i++) {
         if (section[i].data == NULL) {
-            section[i].data = malloc(h->n_bytes[i] > 0 ? h->n_bytes[i] : 1);
+            status s = scratch_new(section[i].space, h->n_bytes[i], "a checkpoint", &section[i].data, err);
+            if (s != STATUS_OK) return s;
             section[i].n_bytes = h->n_bytes[i];
             mine[i] = true;
         }
-        if (section[i].data == NULL)
-            return error_set(err, STATUS_NO_MEMORY, "cannot read checkpoint '%s': out of memory", path);
         if (section[i].n_bytes != h->n_bytes[i])
             return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another program version", path);
-        if (h->n_bytes[i] == 0) continue;
-        if (fread(section[i].data, h->n_bytes[i], 1, f) != 1)
-            return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is truncated", path);
-        sum = checksum(sum, section[i].data, h->n_bytes[i]);
+        for (size_t at = 0, n; at < h->n_bytes[i]; at += n) {
+            n = chunk(&section[i], at);
+            if (fread((char *)section[i].data + at, n, 1, f) != 1)
+                return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is truncated", path);
+            sum = checksum(sum, (char *)section[i].data + at, n);
+        }
     }
     if (fread(&stored, sizeof stored, 1, f) != 1 || stored != sum)
         return error_set(err, STATUS_CHECKSUM, "cannot read checkpoint '%s': its checksum is wrong", path);
@@ -114,7 +126,7 @@ status work_file_read(const char *path, const char *tag, struct work_section *se
     fclose(f);
     for (size_t i = 0; s != STATUS_OK && i < n_section && i < WORK_FILE_MAX_SECTION; i++) {
         if (!mine[i]) continue;
-        free(section[i].data);
+        scratch_release(section[i].space, section[i].data);
         section[i].data = NULL;
     }
     return s;

@@ -2,21 +2,22 @@
 
 #include "geometry/orientation/structure_tensor.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct error *err)
+status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space, struct error *err)
 {
-    *c = (struct consensus){.cell = cell};
+    *c = (struct consensus){.cell = cell, .space = space};
     for (int a = 0; a < 3; a++) c->n[a] = (n_voxel[a] + cell - 1) / cell;
-    c->tensor = calloc(c->n[0] * c->n[1] * c->n[2], sizeof *c->tensor);
-    return c->tensor != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
+    void *tensor;
+    status s = scratch_new(space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor, "the directions of neighbourhoods", &tensor, err);
+    c->tensor = tensor;
+    return s;
 }
 
 void consensus_release(struct consensus *c)
 {
     if (c == NULL) return;
-    free(c->tensor);
+    scratch_release(c->space, c->tensor);
     *c = (struct consensus){0};
 }
 
@@ -36,25 +37,38 @@ void consensus_add(struct consensus *c, size_t i, size_t j, size_t k, const floa
     t[5] += weight * d[1] * d[2];
 }
 
-status consensus_blur(struct consensus *c, int n_pass, struct error *err)
+struct blur_job {
+    const struct consensus *c;
+    float (*out)[6];
+    int axis;
+};
+
+static void blur_layer(void *context, size_t layer, size_t i_thread)
 {
-    size_t total = c->n[0] * c->n[1] * c->n[2];
-    float(*other)[6] = malloc(total * sizeof *other);
-    if (other == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
-    const size_t stride[3] = {1, c->n[0], c->n[0] * c->n[1]};
-    for (int pass = 0; pass < 3 * n_pass; pass++) {
-        int a = pass % 3;
-        for (size_t i = 0; i < total; i++) {
-            size_t x = i / stride[a] % c->n[a];
-            const float *low = c->tensor[x > 0 ? i - stride[a] : i], *high = c->tensor[x + 1 < c->n[a] ? i + stride[a] : i];
-            for (int m = 0; m < 6; m++) other[i][m] = 0.25f * low[m] + 0.5f * c->tensor[i][m] + 0.25f * high[m];
-        }
-        float(*t)[6] = c->tensor;
-        c->tensor = other;
-        other = t;
+    (void)i_thread;
+    const struct blur_job *job = context;
+    const struct consensus *c = job->c;
+    size_t n_layer = c->n[0] * c->n[1], stride = job->axis == 0 ? 1 : job->axis == 1 ? c->n[0] : n_layer;
+    scratch_keep_within(c->space);
+    for (size_t i = layer * n_layer; i < (layer + 1) * n_layer; i++) {
+        size_t x = i / stride % c->n[job->axis];
+        const float *low = c->tensor[x > 0 ? i - stride : i], *high = c->tensor[x + 1 < c->n[job->axis] ? i + stride : i];
+        for (int m = 0; m < 6; m++) job->out[i][m] = 0.25f * low[m] + 0.5f * c->tensor[i][m] + 0.25f * high[m];
     }
-    free(other);
-    return STATUS_OK;
+}
+
+status consensus_blur(struct consensus *c, int n_pass, struct thread_pool *pool, struct error *err)
+{
+    void *other;
+    status s = scratch_new(c->space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor, "the directions of neighbourhoods", &other, err);
+    for (int pass = 0; pass < 3 * n_pass && s == STATUS_OK; pass++) {
+        struct blur_job job = {c, other, pass % 3};
+        s = thread_pool_run(pool, c->n[2], blur_layer, &job, NULL);
+        other = c->tensor;
+        c->tensor = job.out;
+    }
+    scratch_release(c->space, other);
+    return s;
 }
 
 bool consensus_direction(const struct consensus *c, size_t i, size_t j, size_t k, float d[3])

@@ -3,7 +3,8 @@
 #ifndef SELVEDGE_GEOMETRY_CONSENSUS_H
 #define SELVEDGE_GEOMETRY_CONSENSUS_H
 
-#include "base/status.h"
+#include "base/scratch_space.h"
+#include "base/thread_pool.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -12,14 +13,15 @@ struct consensus {
     size_t cell;        /* voxels */
     size_t n[3];        /* cells */
     float (*tensor)[6]; /* sum of weight d d^T: xx yy zz xy xz yz */
+    struct scratch_space *space; /* not owned; NULL: memory */
 };
 
-status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct error *err);
+status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space, struct error *err);
 void consensus_release(struct consensus *c);
 /* Adds to the cell of a voxel; threads keep to different layers of cells (k / cell). */
 void consensus_add(struct consensus *c, size_t i, size_t j, size_t k, const float d[3], float weight);
-/* n_pass times the binomial filter 1 2 1 along each axis. STATUS_NO_MEMORY. */
-status consensus_blur(struct consensus *c, int n_pass, struct error *err);
+/* n_pass times the binomial filter 1 2 1 along each axis. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status consensus_blur(struct consensus *c, int n_pass, struct thread_pool *pool, struct error *err);
 /* Main direction around a voxel; false where nothing was added. */
 bool consensus_direction(const struct consensus *c, size_t i, size_t j, size_t k, float d[3]);
 

@@ -81,6 +81,7 @@ static void measure_brick(void *context, size_t i_brick, size_t i_thread)
     struct job *job = context;
     struct brick *b = &job->brick[i_brick];
     float *a = job->scratch + i_thread * job->scratch_per_thread, *tmp = a + job->scratch_per_thread / 2;
+    scratch_keep_within(job->v->space);
     for (size_t k = 0; k < b->n[2]; k++)
         for (size_t j = 0; j < b->n[1]; j++)
             memcpy(a + (k * b->n[1] + j) * b->n[0],
@@ -109,6 +110,7 @@ static size_t choose_bricks(const struct volume *v, struct brick *chosen)
             b.from[a] = n_cell[a] == 1 ? 0 : cell[a] * (v->n[a] - b.n[a]) / (n_cell[a] - 1);
         }
         double sum = 0.0;
+        scratch_keep_within(v->space);
         for (size_t k = 0; k < b.n[2]; k += 3)
             for (size_t j = 0; j < b.n[1]; j += 3)
                 for (size_t i = 0; i < b.n[0]; i += 3)

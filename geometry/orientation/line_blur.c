@@ -14,7 +14,8 @@ struct kernel {
 
 struct blur_job {
     const struct volume *v;
-    float *half_done, *out; /* blurred in x and y; sum of both Gaussians */
+    float *half_done, *out; /* blurred in x and y, slice k at k % n_ring; sum of both Gaussians */
+    size_t n_ring, first;   /* first: slice of task 0 */
     struct kernel kernel;
     float factor;           /* of this Gaussian in the sum */
     bool add;
@@ -41,14 +42,16 @@ static void add_scaled(float *restrict to, const float *restrict from, float w, 
 }
 
 /* Rows along x with edge values repeated, then rows added along y. */
-static void blur_slice(void *context, size_t k, size_t i_thread)
+static void blur_slice(void *context, size_t i_task, size_t i_thread)
 {
     const struct blur_job *job = context;
+    size_t k = job->first + i_task;
+    scratch_keep_within(job->v->space);
     const struct kernel *q = &job->kernel;
     const size_t *n = job->v->n;
     float *padded = job->scratch + i_thread * job->scratch_per_thread, *rows = padded + n[0] + 2 * MAX_REACH;
     const float *in = job->v->density + k * n[0] * n[1];
-    float *out = job->half_done + k * n[0] * n[1];
+    float *out = job->half_done + k % job->n_ring * n[0] * n[1];
     memset(rows, 0, n[0] * n[1] * sizeof *rows);
     memset(out, 0, n[0] * n[1] * sizeof *out);
     for (size_t j = 0; j < n[1]; j++) {
@@ -65,10 +68,12 @@ static void blur_slice(void *context, size_t k, size_t i_thread)
             add_scaled(out + j * n[0], rows + (size_t)clamp_index((ptrdiff_t)j + t, n[1]) * n[0], q->weight[t + q->reach], n[0]);
 }
 
-static void blur_along_z(void *context, size_t k, size_t i_thread)
+static void blur_along_z(void *context, size_t i_task, size_t i_thread)
 {
     (void)i_thread;
     const struct blur_job *job = context;
+    size_t k = job->first + i_task;
+    scratch_keep_within(job->v->space);
     const struct kernel *q = &job->kernel;
     size_t n_slice = job->v->n[0] * job->v->n[1];
     float *out = job->out + k * n_slice;
@@ -78,24 +83,46 @@ static void blur_along_z(void *context, size_t k, size_t i_thread)
         size_t n = from + PART <= n_slice ? PART : n_slice - from;
         for (int t = -q->reach; t <= q->reach; t++) {
             size_t slice = (size_t)clamp_index((ptrdiff_t)k + t, job->v->n[2]);
-            add_scaled(out + from, job->half_done + slice * n_slice + from, job->factor * q->weight[t + q->reach], n);
+            add_scaled(out + from, job->half_done + slice % job->n_ring * n_slice + from, job->factor * q->weight[t + q->reach], n);
         }
     }
+}
+
+/* One Gaussian: slabs of as many slices as the buffer holds besides those that the kernel reaches. */
+static status blur_slabs(struct blur_job *job, size_t n_slab, struct thread_pool *pool, const struct progress *progress)
+{
+    size_t n = job->v->n[2], reach = (size_t)job->kernel.reach, ready = 0;
+    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    status s = STATUS_OK;
+    for (size_t k = 0; k < n && s == STATUS_OK; k += n_slab) {
+        size_t end = k + n_slab < n ? k + n_slab : n, wanted = end + reach < n ? end + reach : n;
+        job->first = ready;
+        s = thread_pool_run(pool, wanted - ready, blur_slice, job, &quiet);
+        ready = wanted;
+        job->first = k;
+        if (s == STATUS_OK) s = thread_pool_run(pool, end - k, blur_along_z, job, &quiet);
+        progress_report(progress, (job->add ? 0.5 : 0.0) + 0.5 * (double)end / (double)n);
+    }
+    return s;
 }
 
 status line_filter_blur(const struct volume *v, double s, double t, struct thread_pool *pool,
                         const struct progress *progress, struct volume *out, struct error *err)
 {
     struct blur_job job = {.v = v};
+    size_t n_slice = v->n[0] * v->n[1], n_slab = scratch_buffer_bytes(v->space) / (n_slice * sizeof(float));
     *out = (struct volume){0};
-    if (!(s > 0.0) || !(t > 0.0) || !make_kernel(s, &job.kernel) || !make_kernel(t, &job.kernel))
+    if (!(s > 0.0) || !(t > 0.0) || !make_kernel(fmax(s, t), &job.kernel) || !make_kernel(fmin(s, t), &job.kernel))
         return error_set(err, STATUS_INVALID, "cannot make the direction filter with s %g, t %g", s, t);
-    status st = volume_init(out, v->n, v->voxel_size_m, err);
+    if (n_slab < 4) n_slab = 4;
+    if (n_slab > v->n[2]) n_slab = v->n[2];
+    status st = volume_init_in(out, v->n, v->voxel_size_m, v->space, err);
     if (st != STATUS_OK) return st;
     job.out = out->density;
-    job.scratch_per_thread = v->n[0] * v->n[1] + v->n[0] + 2 * MAX_REACH;
+    job.n_ring = n_slab + 2 * (size_t)job.kernel.reach < v->n[2] ? n_slab + 2 * (size_t)job.kernel.reach : v->n[2]; /* of the wider Gaussian */
+    job.scratch_per_thread = n_slice + v->n[0] + 2 * MAX_REACH;
     job.scratch = malloc(thread_pool_n_thread(pool) * job.scratch_per_thread * sizeof *job.scratch);
-    job.half_done = malloc(volume_n_voxel(v->n) * sizeof *job.half_done);
+    job.half_done = malloc(job.n_ring * n_slice * sizeof *job.half_done);
     if (job.scratch == NULL || job.half_done == NULL)
         st = error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     const double width[2] = {s, t}, factor[2] = {2.0, -1.0};
@@ -103,8 +130,7 @@ status line_filter_blur(const struct volume *v, double s, double t, struct threa
         make_kernel(width[g], &job.kernel);
         job.factor = (float)(factor[g] * sqrt(width[g] / M_PI));
         job.add = g > 0;
-        st = thread_pool_run(pool, v->n[2], blur_slice, &job, g == 0 ? progress : NULL);
-        if (st == STATUS_OK) st = thread_pool_run(pool, v->n[2], blur_along_z, &job, NULL);
+        st = blur_slabs(&job, n_slab, pool, progress);
         if (st != STATUS_OK) error_set(err, st, "finding fiber directions was cancelled");
     }
     free(job.scratch);

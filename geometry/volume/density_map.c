@@ -31,9 +31,10 @@ static float mean27(const struct volume *v, size_t i, size_t j, size_t k)
 static status check_values(const struct volume *v, float *least, float *most, struct error *err)
 {
     float lo = INFINITY, hi = -INFINITY;
-    size_t n = volume_n_voxel(v->n);
+    size_t n = volume_n_voxel(v->n), n_slice = v->n[0] * v->n[1];
     for (size_t i = 0; i < n; i++) {
         float x = v->density[i];
+        if (i % n_slice == 0) scratch_keep_within(v->space);
         if (x == VOLUME_OUTSIDE) continue;
         if (!isfinite(x)) {
             size_t row = i / v->n[0];
@@ -63,7 +64,8 @@ static double collect(const struct volume *v, struct histogram *h)
 {
     double total = 0.0;
     size_t step = lattice_stride(v->n);
-    for (size_t k = 1; k + 1 < v->n[2]; k += step)
+    for (size_t k = 1; k + 1 < v->n[2]; k += step) {
+        scratch_keep_within(v->space);
         for (size_t j = 1; j + 1 < v->n[1]; j += step)
             for (size_t i = 1; i + 1 < v->n[0]; i += step) {
                 float x = mean27(v, i, j, k);
@@ -72,6 +74,7 @@ static double collect(const struct volume *v, struct histogram *h)
                 h->count[bin < N_BIN ? (size_t)bin : N_BIN - 1] += 1.0;
                 total += 1.0;
             }
+    }
     return total;
 }
 
@@ -185,6 +188,7 @@ static void map_slice(void *context, size_t k, size_t i_thread)
 {
     (void)i_thread;
     const struct mapping *m = context;
+    scratch_keep_within(m->v->space);
     size_t n = m->v->n[0] * m->v->n[1];
     float *d = m->v->density + k * n;
     for (size_t i = 0; i < n; i++) d[i] = fminf(1.0f, fmaxf(0.0f, (d[i] - m->low) * m->scale));
@@ -212,13 +216,15 @@ double density_noise_sd(const struct volume *v)
     float *value = malloc(MAX_VALUE * sizeof *value);
     if (value == NULL) return NAN;
     size_t n = 0, step = lattice_stride(v->n) + 1;
-    for (size_t k = 1; k + 1 < v->n[2]; k += step)
+    for (size_t k = 1; k + 1 < v->n[2]; k += step) {
+        scratch_keep_within(v->space);
         for (size_t j = 1; j + 1 < v->n[1]; j += step)
             for (size_t i = 1; i + 2 < v->n[0] && n < MAX_VALUE; i += step) {
                 float mean = mean27(v, i, j, k), x = v->density[volume_index(v->n, i, j, k)];
                 /* What is clamped at 0 or 1 has lost its noise; the other half is a half-normal distribution. */
                 if ((mean < 0.15f || mean > 0.85f) && x > 0.0f && x < 1.0f) value[n++] = fminf(x, 1.0f - x);
             }
+    }
     double sd = 0.0;
     if (n > 100) { /* its median is 0.6745 sd */
         qsort(value, n, sizeof *value, compare_float);

@@ -149,7 +149,7 @@ static void encode_direction_quantised(const void *volume, size_t first, size_t 
 }
 
 static status write_rows(const char *path, const uint8_t header[HEADER_BYTES], const void *volume, const size_t n[3],
-                         size_t bytes_per_voxel, encode_row encode, struct error *err)
+                         struct scratch_space *space, size_t bytes_per_voxel, encode_row encode, struct error *err)
 {
     struct vol_writer w = {0};
     uint8_t *row = malloc(n[0] * n[1] * bytes_per_voxel);
@@ -157,6 +157,7 @@ static status write_rows(const char *path, const uint8_t header[HEADER_BYTES], c
     status s = writer_open(&w, path, err);
     if (s == STATUS_OK) s = writer_put(&w, header, HEADER_BYTES, err);
     for (size_t k = 0; k < n[2] && s == STATUS_OK; k++) {
+        scratch_keep_within(space);
         encode(volume, volume_index(n, 0, 0, k), n[0] * n[1], row);
         s = writer_put(&w, row, n[0] * n[1] * bytes_per_voxel, err);
     }
@@ -171,8 +172,8 @@ status vol_write_density(const char *path, const struct volume *v, enum vol_enco
         return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for densities", path, (int)encoding);
     uint8_t header[HEADER_BYTES];
     fill_header(header, encoding, v->n, 1, v->voxel_size_m);
-    return encoding == VOL_FLOAT32 ? write_rows(path, header, v, v->n, 4, encode_density_f32, err)
-                                   : write_rows(path, header, v, v->n, 1, encode_density_u8, err);
+    return encoding == VOL_FLOAT32 ? write_rows(path, header, v, v->n, v->space, 4, encode_density_f32, err)
+                                   : write_rows(path, header, v, v->n, v->space, 1, encode_density_u8, err);
 }
 
 status vol_write_direction(const char *path, const struct direction_volume *d, enum vol_encoding encoding,
@@ -182,8 +183,21 @@ status vol_write_direction(const char *path, const struct direction_volume *d, e
         return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for directions", path, (int)encoding);
     uint8_t header[HEADER_BYTES];
     fill_header(header, encoding, d->n, 3, d->voxel_size_m);
-    return encoding == VOL_FLOAT32 ? write_rows(path, header, d, d->n, 12, encode_direction_f32, err)
-                                   : write_rows(path, header, d, d->n, 2, encode_direction_quantised, err);
+    return encoding == VOL_FLOAT32 ? write_rows(path, header, d, d->n, d->space, 12, encode_direction_f32, err)
+                                   : write_rows(path, header, d, d->n, d->space, 2, encode_direction_quantised, err);
+}
+
+static void copy_density(const void *volume, size_t first, size_t n, uint8_t *out)
+{
+    const struct direction_volume *v = volume;
+    memcpy(out, v->density + first, n);
+}
+
+status vol_write_kept_density(const char *path, const struct direction_volume *d, struct error *err)
+{
+    uint8_t header[HEADER_BYTES];
+    fill_header(header, VOL_UINT8, d->n, 1, d->voxel_size_m);
+    return write_rows(path, header, d, d->n, d->space, 1, copy_density, err);
 }
 
 static status bad_header(const char *name, struct error *err, const char *what)

@@ -24,6 +24,8 @@ struct vol_header {
 status vol_write_density(const char *path, const struct volume *v, enum vol_encoding encoding, struct error *err);
 status vol_write_direction(const char *path, const struct direction_volume *d, enum vol_encoding encoding,
                            struct error *err);
+/* The densities of a direction volume (0 where emptied) as VOL_UINT8. */
+status vol_write_kept_density(const char *path, const struct direction_volume *d, struct error *err);
 
 /* Header at the start of file, checked against the file's length. name is used in errors. STATUS_FORMAT. */
 status vol_read_header(FILE *file, const char *name, struct vol_header *header, struct error *err);

@@ -1,7 +1,6 @@
 #include "geometry/volume/volume.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 static status check_shape(const size_t n[3], struct error *err)
@@ -16,50 +15,59 @@ static status check_shape(const size_t n[3], struct error *err)
     return STATUS_OK;
 }
 
-status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err)
+status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space, struct error *err)
 {
-    *v = (struct volume){0};
+    *v = (struct volume){.space = space};
     status s = check_shape(n, err);
     if (s != STATUS_OK) return s;
     memcpy(v->n, n, sizeof v->n);
     memcpy(v->voxel_size_m, voxel_size_m, sizeof v->voxel_size_m);
-    v->density = calloc(volume_n_voxel(n), sizeof *v->density);
-    if (v->density == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot make volume of %zu x %zu x %zu voxels: out of memory", n[0], n[1],
-                         n[2]);
-    return STATUS_OK;
+    void *density;
+    s = scratch_new(space, volume_n_voxel(n) * sizeof *v->density, "densities", &density, err);
+    v->density = density;
+    return s;
+}
+
+status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err)
+{
+    return volume_init_in(v, n, voxel_size_m, NULL, err);
 }
 
 void volume_release(struct volume *v)
 {
     if (v == NULL) return;
-    free(v->density);
+    scratch_release(v->space, v->density);
     *v = (struct volume){0};
+}
+
+status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
+                                struct scratch_space *space, struct error *err)
+{
+    *v = (struct direction_volume){.space = space};
+    status s = check_shape(n, err);
+    if (s != STATUS_OK) return s;
+    memcpy(v->n, n, sizeof v->n);
+    memcpy(v->voxel_size_m, voxel_size_m, sizeof v->voxel_size_m);
+    void *density = NULL, *octahedral = NULL;
+    s = scratch_new(space, volume_n_voxel(n) * sizeof *v->density, "the densities of directions", &density, err);
+    v->density = density;
+    if (s == STATUS_OK) s = scratch_new(space, 2 * volume_n_voxel(n) * sizeof *v->octahedral, "directions", &octahedral, err);
+    v->octahedral = octahedral;
+    if (s != STATUS_OK) direction_volume_release(v);
+    return s;
 }
 
 status direction_volume_init(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                              struct error *err)
 {
-    *v = (struct direction_volume){0};
-    status s = check_shape(n, err);
-    if (s != STATUS_OK) return s;
-    memcpy(v->n, n, sizeof v->n);
-    memcpy(v->voxel_size_m, voxel_size_m, sizeof v->voxel_size_m);
-    v->density = calloc(volume_n_voxel(n), sizeof *v->density);
-    v->octahedral = calloc(2 * volume_n_voxel(n), sizeof *v->octahedral);
-    if (v->density == NULL || v->octahedral == NULL) {
-        direction_volume_release(v);
-        return error_set(err, STATUS_NO_MEMORY, "cannot make direction volume of %zu x %zu x %zu voxels: out of memory",
-                         n[0], n[1], n[2]);
-    }
-    return STATUS_OK;
+    return direction_volume_init_in(v, n, voxel_size_m, NULL, err);
 }
 
 void direction_volume_release(struct direction_volume *v)
 {
     if (v == NULL) return;
-    free(v->density);
-    free(v->octahedral);
+    scratch_release(v->space, v->density);
+    scratch_release(v->space, v->octahedral);
     *v = (struct direction_volume){0};
 }
 

@@ -3,11 +3,13 @@
  * Frame: the cloth frame. x along the weft, y along the warp, z out of the cloth towards camera and lamp. The centre of
  * voxel (i, j, k) is at (i + 1/2, j + 1/2, k + 1/2) * voxel_size_m; the grid's corner is the origin.
  * Index of voxel (i, j, k): (k * n[1] + j) * n[0] + i.
- * Ownership: init/release for the struct in the caller's memory; the arrays are malloc'ed and owned.
+ * Ownership: init/release for the struct in the caller's memory; the arrays are owned and come from the scratch space (which may hold
+ * them in files, base/scratch_space.h), or from malloc where space is NULL.
  */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_H
 #define SELVEDGE_GEOMETRY_VOLUME_H
 
+#include "base/scratch_space.h"
 #include "base/status.h"
 
 #include <stdint.h>
@@ -16,9 +18,12 @@ struct volume {
     size_t n[3];
     double voxel_size_m[3];
     float *density; /* n[0]*n[1]*n[2]; mapped to [0, 1] after volume_map_density, raw scanner values before */
+    struct scratch_space *space; /* not owned */
 };
 
+/* Voxels 0. STATUS_INVALID, STATUS_TOO_LARGE, STATUS_NO_MEMORY; with a space also STATUS_DISK_FULL. */
 status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err);
+status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space, struct error *err);
 void volume_release(struct volume *v);
 
 static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
@@ -31,10 +36,13 @@ struct direction_volume {
     double voxel_size_m[3];
     uint8_t *density;
     int16_t *octahedral; /* 2 per voxel */
+    struct scratch_space *space; /* not owned */
 };
 
 status direction_volume_init(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                              struct error *err);
+status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
+                                struct scratch_space *space, struct error *err);
 void direction_volume_release(struct direction_volume *v);
 /* Unit direction of a voxel; only meaningful where density > 0. Decoding error below 0.005 degrees. */
 void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3]);

@@ -61,13 +61,15 @@ static void resample_slice(void *context, size_t k, size_t i_thread)
     (void)i_thread;
     const struct resample *r = context;
     const size_t *n = r->out->n;
-    for (size_t j = 0; j < n[1]; j++)
+    for (size_t j = 0; j < n[1]; j++) {
+        scratch_keep_within(r->in->space);
         for (size_t i = 0; i < n[0]; i++) {
             double x[3];
             for (int a = 0; a < 3; a++)
                 x[a] = r->start[a] + (double)i * r->column[0][a] + (double)j * r->column[1][a] + (double)k * r->column[2][a];
             r->out->density[volume_index(n, i, j, k)] = trilinear(r->in, x);
         }
+    }
 }
 
 static bool invert(const double m[9], double inverse[9])
@@ -92,7 +94,7 @@ status volume_resample(const struct volume *in, const double matrix[9], double v
     size_t n_all[3], n[3];
     volume_resampled_shape(in->n, in->voxel_size_m, voxel_m, n_all);
     for (int a = 0; a < 3; a++) n[a] = box[3 + a] - box[a];
-    status s = volume_init(out, n, (double[3]){voxel_m, voxel_m, voxel_m}, err);
+    status s = volume_init_in(out, n, (double[3]){voxel_m, voxel_m, voxel_m}, in->space, err);
     if (s != STATUS_OK) return s;
     struct resample r = {.in = in, .out = out};
     for (int a = 0; a < 3; a++) { /* a: axis of in */

@@ -57,19 +57,13 @@ static status write_fibers(const struct pipeline_context *c, struct error *err)
 static status write_volumes(const struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
-    struct volume v;
     picture_paths(c, "", "direction", ".vol", path, temporary);
     status s = exists(path) ? STATUS_OK
                             : put_in_place(c, vol_write_direction(temporary, &c->direction, VOL_QUANTISED, err),
                                            temporary, path, err);
     picture_paths(c, "", "density", ".vol", path, temporary);
     if (s != STATUS_OK || exists(path)) return s;
-    s = volume_init(&v, c->direction.n, c->direction.voxel_size_m, err);
-    if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < volume_n_voxel(v.n); i++) v.density[i] = (float)c->direction.density[i] / 255.0f;
-    s = put_in_place(c, vol_write_density(temporary, &v, VOL_UINT8, err), temporary, path, err);
-    volume_release(&v);
-    return s;
+    return put_in_place(c, vol_write_kept_density(temporary, &c->direction, err), temporary, path, err);
 }
 
 static status write_slice(const struct pipeline_context *c, int axis, struct error *err)

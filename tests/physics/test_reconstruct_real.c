@@ -59,7 +59,7 @@ static void reconstruct_scan(const char *path, const char *axes, const char *nam
     for (int a = 0; a < 3; a++) s->o.voxel_size_m[a] = 2e-6;
     assert_int_equal(thread_pool_new(0, &pool, &err), STATUS_OK);
     double start = clock_monotonic_s();
-    assert_int_equal(reconstruct_read(&path, 1, &s->o, 0, pool, NULL, &s->v, &s->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_read(&path, 1, &s->o, NULL, pool, NULL, &s->v, &s->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_orientation(&s->v, &s->o, pool, NULL, &s->d, &s->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_fibers(&s->v, &s->d, &s->o, pool, NULL, &s->f, &s->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_transfer(&s->f, &s->d, pool, NULL, &s->r, &err), STATUS_OK);

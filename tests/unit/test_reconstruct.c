@@ -52,7 +52,7 @@ static void run(const char *path, const char *axes, size_t n_thread, struct resu
     snprintf(x->o.axes, sizeof x->o.axes, "%s", axes);
     for (int a = 0; a < 3; a++) x->o.voxel_size_m[a] = 2e-6;
     assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    assert_int_equal(reconstruct_read(&path, 1, &x->o, 0, pool, NULL, &x->v, &x->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_read(&path, 1, &x->o, NULL, pool, NULL, &x->v, &x->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_orientation(&x->v, &x->o, pool, NULL, &x->d, &x->r, &err), STATUS_OK);
     fiber_set_init(&x->f);
     if (reconstruct_fibers(&x->v, &x->d, &x->o, pool, NULL, &x->f, &x->r, &err) != STATUS_OK) fail_msg("%s", err.text);
@@ -182,7 +182,7 @@ static void test_cancel(void **state)
     assert_int_equal(reconstruct_orientation(&x.v, &x.o, NULL, &progress, &x.d, &x.r, &err), STATUS_CANCELLED);
     const char *list[1] = {path};
     volume_release(&x.v);
-    assert_int_equal(reconstruct_read(list, 1, &x.o, 0, NULL, &progress, &x.v, &x.r, &err), STATUS_CANCELLED);
+    assert_int_equal(reconstruct_read(list, 1, &x.o, NULL, NULL, &progress, &x.v, &x.r, &err), STATUS_CANCELLED);
     release(&x);
 }
 

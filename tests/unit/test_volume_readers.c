@@ -306,7 +306,7 @@ static void test_raw_in_a_job(void **state)
         reconstruct_option_default(&o);
         o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "float32"};
         for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
-        status s = reconstruct_read(&path, 1, &o, 0, pool, NULL, &v, &report, &err);
+        status s = reconstruct_read(&path, 1, &o, NULL, pool, NULL, &v, &report, &err);
         if (s != (nan ? STATUS_INVALID : STATUS_OK) || (nan && strstr(err.text, "(4, 10, 4) is NaN") == NULL)) fail_msg("%s", err.text);
         if (!nan) assert_true(v.n[2] == N && v.density[0] > 0.9f && v.density[8] < 0.1f);
         volume_release(&v);

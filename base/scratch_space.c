@@ -1,0 +1,175 @@
+#include "base/scratch_space.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+enum { LEAST_LIMIT = 1 << 20, HUGE_PAGE = 2 << 20 };
+
+struct array {
+    void *address;
+    size_t n_bytes;
+    bool in_file;
+    struct array *next;
+};
+
+struct scratch_space {
+    char *folder;
+    size_t limit_bytes, page_bytes;
+    int statm_fd; /* -1: residence is not known, every call drops */
+    pthread_mutex_t lock;
+    struct array *array;
+    size_t memory_bytes;         /* of arrays that are not in files */
+    atomic_size_t file_bytes;
+    atomic_bool dropping;
+};
+
+status scratch_space_new(const char *folder, size_t limit_bytes, struct scratch_space **space, struct error *err)
+{
+    *space = NULL;
+    if (limit_bytes < LEAST_LIMIT)
+        return error_set(err, STATUS_INVALID, "a memory limit of %zu bytes is too small: at least %d are needed", limit_bytes, LEAST_LIMIT);
+    struct scratch_space *s = calloc(1, sizeof *s);
+    if (s != NULL) s->folder = strdup(folder);
+    if (s == NULL || s->folder == NULL) {
+        free(s);
+        return error_set(err, STATUS_NO_MEMORY, "cannot use scratch folder '%s': out of memory", folder);
+    }
+    long page = sysconf(_SC_PAGESIZE);
+    s->page_bytes = page > 0 ? (size_t)page : 4096;
+    s->limit_bytes = limit_bytes;
+    s->statm_fd = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    pthread_mutex_init(&s->lock, NULL);
+    *space = s;
+    return STATUS_OK;
+}
+
+void scratch_space_free(struct scratch_space *s)
+{
+    if (s == NULL) return;
+    while (s->array != NULL) scratch_release(s, s->array->address);
+    if (s->statm_fd >= 0) close(s->statm_fd);
+    pthread_mutex_destroy(&s->lock);
+    free(s->folder);
+    free(s);
+}
+
+/* A file without a name, its blocks reserved, mapped; the descriptor is not kept. */
+static status map_file(struct scratch_space *s, size_t n_bytes, const char *what, void **address, struct error *err)
+{
+    status st = STATUS_OK;
+    char path[4096];
+    int fd = open(s->folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (fd < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == ENOENT || errno == EINVAL)) { /* file systems without O_TMPFILE */
+        snprintf(path, sizeof path, "%s/scratch-XXXXXX", s->folder);
+        fd = mkostemp(path, O_CLOEXEC);
+        if (fd >= 0) unlink(path);
+    }
+    if (fd < 0) return error_set_errno(err, "cannot keep %s in '%s'", what, s->folder);
+    int failed = posix_fallocate(fd, 0, (off_t)n_bytes);
+    if (failed != 0) {
+        errno = failed;
+        st = error_set_errno(err, "cannot reserve %zu MB on disk for %s in '%s'", n_bytes / 1000000, what, s->folder);
+    } else {
+        *address = mmap(NULL, n_bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+        if (*address == MAP_FAILED) st = error_set_errno(err, "cannot map %zu MB for %s (limit of the address space?)", n_bytes / 1000000, what);
+    }
+    close(fd);
+    return st;
+}
+
+static status map_memory(size_t n_bytes, const char *what, void **address, struct error *err)
+{
+    *address = mmap(NULL, n_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (*address == MAP_FAILED)
+        return error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
+    if (n_bytes >= 4 * (size_t)HUGE_PAGE) madvise(*address, n_bytes, MADV_HUGEPAGE); /* advice: failing does no harm */
+    return STATUS_OK;
+}
+
+status scratch_new(struct scratch_space *s, size_t n_bytes, const char *what, void **result, struct error *err)
+{
+    *result = NULL;
+    if (n_bytes == 0) n_bytes = 1;
+    if (s == NULL) {
+        *result = calloc(n_bytes, 1);
+        return *result != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
+    }
+    struct array *a = calloc(1, sizeof *a);
+    if (a == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
+    a->n_bytes = n_bytes;
+    pthread_mutex_lock(&s->lock);
+    a->in_file = n_bytes > s->limit_bytes / 2 || s->memory_bytes > s->limit_bytes / 2 - n_bytes;
+    if (!a->in_file) s->memory_bytes += n_bytes;
+    pthread_mutex_unlock(&s->lock);
+    status st = a->in_file ? map_file(s, n_bytes, what, &a->address, err) : map_memory(n_bytes, what, &a->address, err);
+    pthread_mutex_lock(&s->lock);
+    if (st == STATUS_OK) {
+        a->next = s->array;
+        s->array = a;
+        if (a->in_file) atomic_fetch_add(&s->file_bytes, n_bytes);
+        *result = a->address;
+    } else if (!a->in_file) {
+        s->memory_bytes -= n_bytes;
+    }
+    pthread_mutex_unlock(&s->lock);
+    if (st != STATUS_OK) free(a);
+    return st;
+}
+
+void scratch_release(struct scratch_space *s, void *address)
+{
+    if (address == NULL) return;
+    if (s == NULL) {
+        free(address);
+        return;
+    }
+    pthread_mutex_lock(&s->lock);
+    struct array **at = &s->array, *found;
+    while (*at != NULL && (*at)->address != address) at = &(*at)->next;
+    found = *at;
+    if (found != NULL) {
+        *at = found->next;
+        munmap(found->address, found->n_bytes);
+        if (found->in_file) atomic_fetch_sub(&s->file_bytes, found->n_bytes);
+        else s->memory_bytes -= found->n_bytes;
+    }
+    pthread_mutex_unlock(&s->lock);
+    free(found);
+}
+
+/* Resident bytes of the process; SIZE_MAX when the kernel does not say. */
+static size_t resident_bytes(const struct scratch_space *s)
+{
+    char text[128];
+    ssize_t n = s->statm_fd >= 0 ? pread(s->statm_fd, text, sizeof text - 1, 0) : -1;
+    if (n <= 0) return SIZE_MAX;
+    text[n] = '\0';
+    char *end;
+    strtoull(text, &end, 10); /* the first number is the address space */
+    return (size_t)strtoull(end, NULL, 10) * s->page_bytes;
+}
+
+void scratch_keep_within(struct scratch_space *s)
+{
+    if (s == NULL || atomic_load_explicit(&s->file_bytes, memory_order_relaxed) == 0) return;
+    if (resident_bytes(s) <= s->limit_bytes - s->limit_bytes / 8) return;
+    if (atomic_exchange(&s->dropping, true)) return; /* another thread does it */
+    pthread_mutex_lock(&s->lock);
+    for (struct array *a = s->array; a != NULL; a = a->next)
+        if (a->in_file) madvise(a->address, a->n_bytes, MADV_DONTNEED); /* of a shared mapping: the contents stay */
+    pthread_mutex_unlock(&s->lock);
+    atomic_store(&s->dropping, false);
+}
+
+size_t scratch_buffer_bytes(const struct scratch_space *s) { return s == NULL ? (size_t)256 << 20 : s->limit_bytes / 8; }
+
+size_t scratch_file_bytes(struct scratch_space *s) { return s == NULL ? 0 : atomic_load(&s->file_bytes); }
