@@ -39,7 +39,7 @@ static void render_pixel(struct run *r, size_t i_pixel)
         camera_origin(&r->camera, px, py, origin_mm);
         camera_direction(&r->camera, px, py, direction);
         if (!volume_ray_enter(q->scene.volume, origin_mm, direction, &ray)) continue;
-        volume_trace(&r->setting, &ray, &rng, &path);
+        volume_trace(&r->setting, &ray, &rng, &path, NULL);
         for (size_t k = 0; k < 3; k++) {
             x[k] += (double)path.radiance[k];
             x2[k] += (double)path.radiance[k] * (double)path.radiance[k];

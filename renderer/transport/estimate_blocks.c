@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK_PATHS = 256, TASKS_PER_CONFIGURATION = 1024, N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT };
+enum { BLOCK_PATHS = ESTIMATE_BLOCK_PATHS, TASKS_PER_CONFIGURATION = 1024, N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT };
 
 /* Sums over the paths of one task, in path order: 3 + n_jac sums and as many sums of squares. */
 struct task_sum {
@@ -25,25 +25,29 @@ struct run {
     double *sum_storage;
 };
 
-static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t i_block, struct task_sum *sum)
+static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t i_block, struct task_sum *sum,
+                        float *value)
 {
     const struct estimate_blocks *b = r->b;
     const struct rng_key key = {b->seed, b->iteration, b->replica, i_configuration};
     size_t n_value = 3 + b->n_jac;
+    struct rng rng[BLOCK_PATHS];
+    double xy[BLOCK_PATHS][2];
+    memset(value, 0, BLOCK_PATHS * n_value * sizeof *value);
     for (uint32_t i = 0; i < BLOCK_PATHS; i++) {
-        struct rng rng;
-        float value[N_VALUE];
-        memset(value, 0, n_value * sizeof *value);
-        rng_start(&rng, &key, i_block, i);
-        double x = rng_double(&rng), y = rng_double(&rng);
-        sum->n_vertex += b->trace(b->context, i_configuration, x, y, &rng, value);
-        sum->n_path++;
+        rng_start(&rng[i], &key, i_block, i);
+        for (int a = 0; a < 2; a++) xy[i][a] = rng_double(&rng[i]);
+        if (b->trace_block == NULL)
+            sum->n_vertex += b->trace(b->context, i_configuration, xy[i][0], xy[i][1], &rng[i], value + i * n_value);
+    }
+    if (b->trace_block != NULL) sum->n_vertex += b->trace_block(b->context, i_configuration, xy, rng, value);
+    sum->n_path += BLOCK_PATHS;
+    for (size_t i = 0; i < BLOCK_PATHS; i++)
         for (size_t k = 0; k < n_value; k++) {
-            double v = (double)value[k];
+            double v = (double)value[i * n_value + k];
             sum->x[k] += v;
             sum->x2[k] += v * v;
         }
-    }
 }
 
 static void run_task(void *context, size_t i_task, size_t i_thread)
@@ -51,8 +55,9 @@ static void run_task(void *context, size_t i_task, size_t i_thread)
     (void)i_thread;
     struct run *r = context;
     const struct task *t = &r->task[i_task];
+    float value[BLOCK_PATHS * N_VALUE];
     for (uint32_t b = 0; b < t->n_block && !progress_cancelled(r->progress); b++)
-        trace_block(r, t->i_configuration, t->first_block + b, &r->sum[i_task]);
+        trace_block(r, t->i_configuration, t->first_block + b, &r->sum[i_task], value);
 }
 
 /* Tasks of whole blocks; how many depends on the counts alone, so that sums do not depend on the threads. */

@@ -6,6 +6,8 @@
 #include "base/rng.h"
 #include "renderer/transport/estimate.h"
 
+enum { ESTIMATE_BLOCK_PATHS = 256 };
+
 struct estimate_blocks {
     size_t n_configuration;
     const size_t *n_path; /* per configuration; rounded up to whole blocks; 0: skip */
@@ -14,6 +16,10 @@ struct estimate_blocks {
     size_t n_jac; /* 3 * number of parameters, 0 without derivatives; at most 3 * SCATTERING_MAX_FLAT */
     /* One path: x and y in [0, 1) of the crop, value[3 + n_jac] preset to 0; result: number of vertices. */
     uint32_t (*trace)(void *context, size_t i_configuration, double x, double y, struct rng *rng, float *value);
+    /* In place of that, a whole block at once: xy[ESTIMATE_BLOCK_PATHS][2], a generator for each path (may be changed),
+     * value[ESTIMATE_BLOCK_PATHS][3 + n_jac] preset to 0; result: number of vertices. NULL: one by one. */
+    uint64_t (*trace_block)(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng,
+                            float *value);
     void *context;
 };
 

@@ -118,14 +118,6 @@ static void connect_lamp(struct walk *w, const struct scene_ray *ray, const stru
     }
 }
 
-/* About the cloth normal, from the cloth's frame to the world's and back. */
-static inline void turn(const float by[2], float sign, const float d[3], float out[3])
-{
-    out[0] = by[0] * d[0] - sign * by[1] * d[1];
-    out[1] = sign * by[1] * d[0] + by[0] * d[1];
-    out[2] = d[2];
-}
-
 /* Next-event estimation: one direction of the image environment. */
 static void connect_image(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
                           const struct fiber_frame *f, const float wo[3])
@@ -136,7 +128,7 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
     u[1] = rng_float(w->rng);
     if (!environment_sample(s->image, u, world, radiance, &pdf_image)) return;
     if (world[2] <= 0 && scene_has_black_sheet(s->scene)) return;
-    turn(s->image_turn, -1, world, direction);
+    turn_about_normal(s->image_turn, -1, world, direction);
     to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = cos_theta(wi) / pdf_image * power_heuristic(pdf_image, pdf);
@@ -170,7 +162,7 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
 static void add_image(const struct path_setting *s, const float direction[3], float pdf, float beyond[3])
 {
     float world[3], radiance[3];
-    turn(s->image_turn, 1, direction, world);
+    turn_about_normal(s->image_turn, 1, direction, world);
     float pdf_image = environment_at(s->image, world, radiance);
     float share = pdf > 0 ? power_heuristic(pdf, pdf_image) : 1;
     for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;

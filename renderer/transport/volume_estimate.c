@@ -14,20 +14,30 @@ struct run {
     struct camera *camera;
 };
 
-static uint32_t trace(void *context, size_t i_configuration, double x, double y, struct rng *rng, float *value)
+static uint64_t trace(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng, float *value)
 {
     const struct run *r = context;
     const struct camera *camera = &r->camera[i_configuration];
-    struct volume_ray ray;
-    struct volume_result path;
-    double origin_mm[3], direction[3];
-    camera_origin(camera, x, y, origin_mm);
-    camera_direction(camera, x, y, direction);
-    if (!volume_ray_enter(r->q->scene, origin_mm, direction, &ray)) return 0; /* sees nothing: adds 0 */
-    volume_trace(&r->setting[i_configuration], &ray, rng, &path);
-    memcpy(value, path.radiance, sizeof path.radiance);
-    if (r->q->want_jacobian) memcpy(value + 3, path.jac, 3 * (r->q->model->n_param + 1) * sizeof *value);
-    return path.n_vertex;
+    struct volume_ray ray[ESTIMATE_BLOCK_PATHS];
+    struct volume_result path[ESTIMATE_BLOCK_PATHS];
+    size_t n = 0, place[ESTIMATE_BLOCK_PATHS], n_jac = r->q->want_jacobian ? 3 * (r->q->model->n_param + 1) : 0;
+    uint64_t n_vertex = 0;
+    for (size_t i = 0; i < ESTIMATE_BLOCK_PATHS; i++) {
+        double origin_mm[3], direction[3];
+        camera_origin(camera, xy[i][0], xy[i][1], origin_mm);
+        camera_direction(camera, xy[i][0], xy[i][1], direction);
+        if (!volume_ray_enter(r->q->scene, origin_mm, direction, &ray[n])) continue; /* sees nothing: adds 0 */
+        rng[n] = rng[i];
+        place[n++] = i;
+    }
+    volume_trace_many(&r->setting[i_configuration], n, ray, rng, path);
+    for (size_t i = 0; i < n; i++) {
+        float *v = value + place[i] * (3 + n_jac);
+        memcpy(v, path[i].radiance, sizeof path[i].radiance);
+        memcpy(v + 3, path[i].jac, n_jac * sizeof *v);
+        n_vertex += path[i].n_vertex;
+    }
+    return n_vertex;
 }
 
 static status numeric_error(const struct volume_estimate_request *q, size_t i_configuration, size_t i_value,
@@ -54,10 +64,6 @@ status volume_estimate_run(const struct volume_estimate_request *q, struct threa
     if (!(q->multiplier_per_m > 0 && q->multiplier_per_m <= 1e9))
         return error_set_field(err, STATUS_INVALID, "d", "cannot trace with density multiplier %g per metre",
                                q->multiplier_per_m);
-    for (size_t i = 0; i < q->n_configuration; i++)
-        if (q->configuration[i].environment != NULL)
-            return error_set_field(err, STATUS_UNSUPPORTED, "configuration",
-                                   "cannot light a volume with an image environment (configuration %zu)", i);
     st = q->model->prepare(q->param, &state, err);
     if (st != STATUS_OK) return st;
     r.setting = malloc((q->n_configuration + 1) * sizeof *r.setting);
@@ -77,7 +83,7 @@ status volume_estimate_run(const struct volume_estimate_request *q, struct threa
                                            .iteration = q->iteration,
                                            .replica = q->replica,
                                            .n_jac = q->want_jacobian ? 3 * (q->model->n_param + 1) : 0,
-                                           .trace = trace,
+                                           .trace_block = trace,
                                            .context = &r};
     st = estimate_blocks_run(&blocks, pool, progress, out, &bad_configuration, &bad_value, err);
     if (st == STATUS_NUMERIC) st = numeric_error(q, bad_configuration, bad_value, err);

@@ -22,8 +22,8 @@ struct volume_estimate_request {
     bool want_jacobian;
 };
 
-/* out: n_configuration estimates; jac[c * (model->n_param + 1) + p], the last by d. STATUS_INVALID (d or a parameter),
- * STATUS_UNSUPPORTED (an image environment), STATUS_CANCELLED, STATUS_NUMERIC (naming model and configuration when a
+/* out: n_configuration estimates; jac[c * (model->n_param + 1) + p], the last by d. STATUS_INVALID (d or a parameter), STATUS_CANCELLED,
+ * STATUS_NUMERIC (naming model and configuration when a
  * NaN appears). */
 status volume_estimate_run(const struct volume_estimate_request *q, struct thread_pool *pool,
                            const struct progress *progress, struct estimate *out, struct error *err);

@@ -2,9 +2,12 @@
  * outside.
  *
  * Frame: the cloth frame in millimetres, z shifted so that the top of the highest layer that holds anything is z = 0
- * (as with fibers, up to a voxel). Inside, positions are in voxels. Immutable: shared by threads. Memory: the direction
- * volume is used as it is stored (5 bytes a voxel) and must outlive the scene; beside it there is nothing that grows
- * with it.
+ * (as with fibers, up to a voxel). Inside, positions are in voxels. Immutable: shared by threads.
+ *
+ * Storage, made for look-ups that are all over the volume: bricks of 4^3 voxels, a voxel in 4 bytes (8 bits of density,
+ * a direction of 12 + 12 bits, right within 0.035 degrees), a brick in 4 cache lines. Bricks that hold
+ * nothing are not stored; the table of bricks says instead how far around everything is empty, so that rays skip what
+ * cannot scatter. The direction volume (5 bytes a voxel) is not needed afterwards.
  */
 #ifndef SELVEDGE_RENDERER_VOLUME_SCENE_H
 #define SELVEDGE_RENDERER_VOLUME_SCENE_H
@@ -14,14 +17,25 @@
 #include <math.h>
 #include <stdbool.h>
 
+enum {
+    VOLUME_BRICK_SHIFT = 2,
+    VOLUME_BRICK_EDGE = 1 << VOLUME_BRICK_SHIFT,
+    VOLUME_BRICK_VOXELS = VOLUME_BRICK_EDGE * VOLUME_BRICK_EDGE * VOLUME_BRICK_EDGE,
+    VOLUME_EMPTY_MAX = 32
+};
+
 struct volume_scene {
-    const struct direction_volume *volume;
+    size_t n[3];
+    double voxel_size_m[3];
     float n_voxel[2]; /* across the tile */
     float voxel_mm[3];
     float low, high;       /* z of the slab, in voxels */
     float largest_density; /* in [0, 1] */
-    uint64_t *occupied;    /* owned; one bit a brick, x fastest */
-    size_t n_brick[3];
+    int32_t n_brick[3];
+    int32_t *brick;  /* owned; x fastest: number of the stored brick, or -e when it is empty and so are all bricks less
+                        than e away along every axis (the tile's edges count as empty) */
+    uint32_t *voxel; /* owned; VOLUME_BRICK_VOXELS a stored brick, x fastest: density << 24 | q << 12 | p */
+    size_t n_stored; /* bricks */
     bool black_sheet;
 };
 
@@ -29,37 +43,32 @@ struct volume_scene_option {
     bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
 };
 
-enum { VOLUME_BRICK_SHIFT = 2 };
-
-/* STATUS_NO_MEMORY; STATUS_INVALID for a volume without anything in it, or with more than 2^24 voxels along an edge. */
+/* v is copied and may be released. STATUS_NO_MEMORY; STATUS_INVALID for a volume without anything in it, or with more
+ * than 2^24 voxels along an edge or 2^31 bricks. */
 status volume_scene_init(struct volume_scene *scene, const struct direction_volume *v,
                          const struct volume_scene_option *o, struct error *err);
 void volume_scene_release(struct volume_scene *scene);
-/* Everything the scene needs, the volume included. */
+/* Everything that the scene holds. */
 size_t volume_scene_memory_bytes(const struct volume_scene *scene);
 double volume_scene_thickness_mm(const struct volume_scene *scene);
 
-/* False: this voxel and its neighbours in the brick are empty. */
-static inline bool volume_scene_may_hold(const struct volume_scene *s, size_t i, size_t j, size_t k)
-{
-    size_t b = ((k >> VOLUME_BRICK_SHIFT) * s->n_brick[1] + (j >> VOLUME_BRICK_SHIFT)) * s->n_brick[0] +
-               (i >> VOLUME_BRICK_SHIFT);
-    return (s->occupied[b >> 6] >> (b & 63) & 1) != 0;
-}
+/* Density in [0, 1] of a stored voxel, and its direction, unit. */
+static inline float volume_voxel_density(uint32_t voxel) { return (float)(voxel >> 24) * (1 / 255.0f); }
 
-/* direction_volume_get, in line for the inner loop (same map; divides by 32767 as a product). */
-static inline void volume_scene_direction(const struct volume_scene *s, size_t i_voxel, float d[3])
+/* (A direction and its opposite mean the same fiber, so all point up: the upper half of the octahedron, turned by 45
+ * degrees, fills the square of both coordinates.) */
+static inline void volume_voxel_direction(uint32_t voxel, float d[3])
 {
-    float u = (float)s->volume->octahedral[2 * i_voxel] * (1 / 32767.0f),
-          w = (float)s->volume->octahedral[2 * i_voxel + 1] * (1 / 32767.0f), z = 1 - fabsf(u) - fabsf(w);
-    float fold = z < 0 ? z : 0; /* below the equator the corners are folded in */
-    u += copysignf(1, u) * fold;
-    w += copysignf(1, w) * fold;
-    float scale = 1 / sqrtf(u * u + w * w + z * z);
+    float p = (float)((int32_t)(voxel & 4095) - 2047) * (0.5f / 2047),
+          q = (float)((int32_t)(voxel >> 12 & 4095) - 2047) * (0.5f / 2047);
+    float u = p + q, w = p - q, z = 1 - fabsf(u) - fabsf(w), scale = 1 / sqrtf(u * u + w * w + z * z);
     d[0] = u * scale;
     d[1] = w * scale;
     d[2] = z * scale;
 }
+
+/* Voxel (i, j, k) of the volume that the scene was made from; 0 when nothing is there. */
+uint32_t volume_scene_voxel(const struct volume_scene *scene, size_t i, size_t j, size_t k);
 
 /* A point on its way through the cloth. */
 struct volume_ray {

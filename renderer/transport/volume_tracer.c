@@ -1,13 +1,11 @@
 #include "renderer/transport/volume_tracer.h"
 
-#include "renderer/transport/fiber_frame.h"
+#include "renderer/transport/volume_flight.h"
 
 #define VOLUME_ROULETTE_BELOW 0.3f
 #define VOLUME_SHADOW_BELOW 0.02f
 #define VOLUME_HEADROOM 1.25f
-#define NO_VOXEL SIZE_MAX
-#define OUTSIDE (SIZE_MAX - 1)
-enum { VOLUME_MAX_LOOKUP = 200000, N_AHEAD = 4 }; /* 4 ahead: 10 % faster than 1, as fast as 8 */
+enum { VOLUME_MAX_LOOKUP = 200000, N_LANE = 16 };
 
 void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
                          const struct phase_state *state, double multiplier_per_m, const struct configuration *c,
@@ -27,6 +25,11 @@ void volume_setting_init(struct volume_setting *s, const struct volume_scene *sc
         s->environment[k] = (float)c->environment_rgb[k];
         if (s->environment[k] > 0) s->has_environment = true;
     }
+    if (c != NULL) {
+        s->image = c->environment;
+        s->image_turn[0] = (float)cos(c->cloth_rotation_rad);
+        s->image_turn[1] = (float)sin(c->cloth_rotation_rad);
+    }
     s->roulette_below = VOLUME_ROULETTE_BELOW;
     s->shadow_below = VOLUME_SHADOW_BELOW;
     s->want_jacobian = want_jacobian;
@@ -37,162 +40,85 @@ struct flight_score {
     float ln_d, param;
 };
 
-/* The state that a path carries. */
-struct walk {
-    const struct volume_setting *s;
-    struct rng *rng;
+enum connection { FLIGHT, LAMP, IMAGE }; /* what a ray is for: to scatter again, or to bring light to a vertex */
+
+/* One path under way. Its ray waits at a point whose place in the table of bricks, or whose voxel, has been asked for
+ * but not yet looked at. */
+struct lane {
+    struct volume_ray ray;
+    const int32_t *brick;
+    const uint32_t *voxel; /* NULL: the brick comes first */
+    enum connection purpose;
+    uint32_t n_lookup; /* of this ray */
+    struct rng rng;
     struct volume_result *out;
-    size_t n_score;
-    float throughput[3];
+    struct volume_record *record;
+    float throughput[3], pdf; /* of the last scattering sample; 0: camera ray */
+    float origin_mm[3];
     struct flight_score flight;
+
+    struct volume_ray vertex; /* the last one */
+    struct fiber_frame frame;
+    float wo[3];
+
+    float light_wi[3], light[3], worth; /* what the connection brings if nothing is in its way; the most of that */
+    float passed;                       /* share of it that got through so far */
+    struct flight_score shadow;
+
     float h[VOLUME_N_DERIVATIVE]; /* running score sums of the phase function, [c * n_param + p] */
-    float score[VOLUME_N_DERIVATIVE];
 };
 
-/* Moves by one tentative flight. False: out of the slab. */
-static inline bool advance(const struct volume_scene *v, float step_mm, struct volume_ray *ray)
+static struct volume_event *note(struct lane *l, int kind)
 {
-    for (int a = 0; a < 3; a++) ray->at[a] += step_mm * ray->per_mm[a];
-    for (int a = 0; a < 2; a++)
-        if (!(ray->at[a] >= 0 && ray->at[a] < v->n_voxel[a])) {
-            float tiles = floorf(ray->at[a] / v->n_voxel[a]);
-            ray->at[a] -= tiles * v->n_voxel[a];
-            ray->offset_mm[a] += (double)tiles * (double)v->n_voxel[a] * (double)v->voxel_mm[a];
-        }
-    return ray->at[2] >= v->low && ray->at[2] < v->high;
+    struct volume_record *r = l->record;
+    size_t i = r->n_event++;
+    static _Thread_local struct volume_event unused;
+    struct volume_event *e = i < r->capacity ? &r->event[i] : &unused;
+    memset(e, 0, sizeof *e);
+    e->kind = kind;
+    return e;
 }
 
-/* The voxel that the ray is in, or NO_VOXEL in an empty brick. Both loads that a voxel needs are started. */
-static inline size_t voxel_of(const struct volume_scene *v, const struct volume_ray *ray)
+static void note_lookup(struct lane *l, int kind, const struct lookup *k)
 {
-    const struct direction_volume *volume = v->volume;
-    size_t i = (size_t)ray->at[0], j = (size_t)ray->at[1], k = (size_t)ray->at[2];
-    i = i < volume->n[0] ? i : volume->n[0] - 1; /* rounding may put a wrapped point on the far face */
-    j = j < volume->n[1] ? j : volume->n[1] - 1;
-    if (!volume_scene_may_hold(v, i, j, k)) return NO_VOXEL;
-    size_t at = volume_index(volume->n, i, j, k);
-    __builtin_prefetch(&volume->density[at]);
-    __builtin_prefetch(&volume->octahedral[2 * at]);
-    return at;
+    if (l->record == NULL) return;
+    struct volume_event *e = note(l, kind);
+    e->density = k->density;
+    e->sine = k->sine;
 }
 
-/* Extinction over the majorant at a voxel that is not empty, and its derivative by the parameter of s(w). */
-static inline float ratio_at(const struct volume_setting *s, size_t i_voxel, const float w[3], float tangent[3],
-                             float *d_ratio)
+static void note_light(struct lane *l, int kind, const float *wi, const float weight[3])
 {
-    const struct direction_volume *v = s->scene->volume;
-    volume_scene_direction(s->scene, i_voxel, tangent);
-    float c = dot(tangent, w), d_value, scale = (float)v->density[i_voxel] / (255 * s->majorant_density);
-    float value = phase_extinction_at(s->extinction, sqrtf(fmaxf(0, 1 - c * c)), &d_value);
-    *d_ratio = scale * d_value;
-    return scale * value;
-}
-
-static inline float free_flight_mm(const struct volume_setting *s, struct rng *rng)
-{
-    return -logf(1 - rng_float(rng)) / s->majorant_per_mm;
-}
-
-/* The next tentative collisions along a ray, drawn together: where they lie does not depend on what is found there, and
- * memory answers all their loads at once. Those behind a real collision are never looked at; flights have no memory, so
- * leaving them changes nothing. */
-struct tentative {
-    struct volume_ray ray[N_AHEAD];
-    size_t voxel[N_AHEAD]; /* or NO_VOXEL, OUTSIDE */
-    uint32_t n;
-};
-
-static inline void draw_tentative(struct walk *w, const struct volume_ray *from, struct tentative *t)
-{
-    const struct volume_setting *s = w->s;
-    struct volume_ray ray = *from;
-    for (t->n = 0; t->n < N_AHEAD;) {
-        w->out->n_lookup++;
-        bool inside = advance(s->scene, free_flight_mm(s, w->rng), &ray);
-        t->ray[t->n] = ray;
-        t->voxel[t->n++] = inside ? voxel_of(s->scene, &ray) : OUTSIDE;
-        if (!inside) return;
-    }
-}
-
-/* Woodcock tracking to the next real collision. False: the ray leaves the cloth (or wanders between its planes without
- * end). */
-static bool collide(struct walk *w, struct volume_ray *ray, float tangent[3])
-{
-    const struct volume_setting *s = w->s;
-    for (uint32_t n = 0; n < VOLUME_MAX_LOOKUP; n += N_AHEAD) {
-        struct tentative t;
-        draw_tentative(w, ray, &t);
-        for (uint32_t k = 0; k < t.n; k++) {
-            size_t i = t.voxel[k];
-            if (i == OUTSIDE) return false;
-            if (i == NO_VOXEL || s->scene->volume->density[i] == 0) continue;
-            float d_ratio, ratio = ratio_at(s, i, ray->direction, tangent, &d_ratio);
-            if (rng_float(w->rng) < ratio) {
-                w->flight.ln_d += 1;
-                w->flight.param += d_ratio / ratio;
-                *ray = t.ray[k];
-                return true;
-            }
-            float inv = 1 / (1 - ratio);
-            w->flight.ln_d -= ratio * inv;
-            w->flight.param -= d_ratio * inv;
-        }
-        *ray = t.ray[N_AHEAD - 1];
-    }
-    return false;
-}
-
-/* Ratio tracking from a point to the edge of the cloth: an unbiased estimate of the transmittance, with the derivatives
- * of its logarithm. worth: what a transmittance of 1 would add; little light is thinned out at random. */
-static float transmittance(struct walk *w, struct volume_ray ray, float worth, struct flight_score *score)
-{
-    const struct volume_setting *s = w->s;
-    float t = 1;
-    *score = (struct flight_score){0, 0};
-    for (uint32_t n = 0; n < VOLUME_MAX_LOOKUP; n += N_AHEAD) {
-        if (t * worth < s->shadow_below) {
-            float survival = t * worth / s->shadow_below;
-            if (rng_float(w->rng) >= survival) return 0;
-            t /= survival;
-        }
-        struct tentative ahead;
-        draw_tentative(w, &ray, &ahead);
-        for (uint32_t k = 0; k < ahead.n; k++) {
-            size_t i = ahead.voxel[k];
-            if (i == OUTSIDE) return t;
-            if (i == NO_VOXEL || s->scene->volume->density[i] == 0) continue;
-            float tangent[3], d_ratio, ratio = ratio_at(s, i, ray.direction, tangent, &d_ratio), inv = 1 / (1 - ratio);
-            t *= 1 - ratio;
-            score->ln_d -= ratio * inv;
-            score->param -= d_ratio * inv;
-        }
-        ray = ahead.ray[N_AHEAD - 1];
-    }
-    return 0;
+    if (l->record == NULL) return;
+    struct volume_event *e = note(l, kind);
+    memcpy(e->weight, weight, sizeof e->weight);
+    if (wi == NULL) return;
+    memcpy(e->wi, wi, sizeof e->wi);
+    memcpy(e->wo, l->wo, sizeof e->wo);
 }
 
 /* Adds value * (1, H + scores) to the result; score NULL: the last step's are in H already. */
-static void add_light(struct walk *w, const float value[3], const float *score, const struct flight_score *shadow)
+static void add_light(const struct volume_setting *s, struct lane *l, const float value[3], const float *score,
+                      const struct flight_score *shadow)
 {
-    for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
-    if (!w->s->want_jacobian) return;
-    size_t n = w->s->model->n_param;
-    float ln_d = w->flight.ln_d + (shadow != NULL ? shadow->ln_d : 0);
-    float param = w->flight.param + (shadow != NULL ? shadow->param : 0);
+    for (int c = 0; c < 3; c++) l->out->radiance[c] += value[c];
+    if (!s->want_jacobian) return;
+    size_t n = s->model->n_param;
+    float ln_d = l->flight.ln_d + (shadow != NULL ? shadow->ln_d : 0);
+    float param = l->flight.param + (shadow != NULL ? shadow->param : 0);
     for (size_t c = 0; c < 3; c++) {
-        float *jac = w->out->jac + c * (n + 1);
-        const float *h = w->h + c * n;
+        float *jac = l->out->jac + c * (n + 1);
+        const float *h = l->h + c * n;
         for (size_t p = 0; p < n; p++) jac[p] += value[c] * (h[p] + (score != NULL ? score[c * n + p] : 0));
-        if (w->s->extinction->i_param >= 0) jac[w->s->extinction->i_param] += value[c] * param;
-        jac[n] += value[c] * ln_d / w->s->multiplier_per_m;
+        if (s->extinction->i_param >= 0) jac[s->extinction->i_param] += value[c] * param;
+        jac[n] += value[c] * ln_d / s->multiplier_per_m;
     }
 }
 
 /* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
-static void keep_nan(struct walk *w, const float value[3])
+static void keep_nan(struct lane *l, const float value[3])
 {
-    if (isnan(value[0] + value[1] + value[2])) w->out->radiance[0] = NAN;
+    if (isnan(value[0] + value[1] + value[2])) l->out->radiance[0] = NAN;
 }
 
 static float largest(const float value[3])
@@ -201,96 +127,247 @@ static float largest(const float value[3])
     return value[2] > most ? value[2] : most;
 }
 
-/* Next-event estimation: one point on the lamp. */
-static void connect_lamp(struct walk *w, const struct volume_ray *ray, const struct fiber_frame *f, const float wo[3])
+/* Radiance that the path's ray meets beyond the cloth. */
+static void add_beyond(const struct volume_setting *s, struct lane *l)
 {
-    const struct volume_setting *s = w->s;
-    float position[3], u[2], direction[3], pdf_lamp, wi[3], f_rgb[3], value[3];
-    volume_ray_position_mm(s->scene, ray, position);
-    u[0] = rng_float(w->rng);
-    u[1] = rng_float(w->rng);
-    if (!lamp_sample(&s->lamp, position, u, direction, &pdf_lamp)) return;
-    if (direction[2] <= 0 && s->scene->black_sheet) return;
-    to_local(f, direction, wi);
-    float pdf = s->model->eval_pdf(s->state, wi, wo, w->throughput, f_rgb, s->want_jacobian ? w->score : NULL);
-    float light = s->lamp.radiance / pdf_lamp * power_heuristic(pdf_lamp, pdf);
-    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * f_rgb[c] * light;
-    float most = largest(value);
-    if (!(most > 0)) {
-        keep_nan(w, value);
-        return;
-    }
-    struct volume_ray shadow = *ray;
-    struct flight_score score;
-    volume_ray_turn(s->scene, direction, &shadow);
-    float t = transmittance(w, shadow, most, &score);
-    if (!(t > 0)) return;
-    for (int c = 0; c < 3; c++) value[c] *= t;
-    add_light(w, value, w->score, &score);
-}
-
-/* Radiance that a ray meets beyond the cloth. origin: where it was scattered; pdf: of that sample, 0 for a camera ray.
- */
-static void add_beyond(struct walk *w, const float origin_mm[3], const float direction[3], float pdf)
-{
-    const struct volume_setting *s = w->s;
+    const float *direction = l->ray.direction;
     if (direction[2] < 0 && s->scene->black_sheet) return;
     float beyond[3] = {0, 0, 0}, value[3];
     if (s->has_lamp) {
-        float pdf_lamp = lamp_pdf(&s->lamp, origin_mm, direction);
-        float share = pdf_lamp > 0 ? s->lamp.radiance * (pdf > 0 ? power_heuristic(pdf, pdf_lamp) : 1) : 0;
+        float pdf_lamp = lamp_pdf(&s->lamp, l->origin_mm, direction);
+        float share = pdf_lamp > 0 ? s->lamp.radiance * (l->pdf > 0 ? power_heuristic(l->pdf, pdf_lamp) : 1) : 0;
         for (int c = 0; c < 3; c++) beyond[c] = share;
     }
     for (int c = 0; c < 3 && s->has_environment; c++) beyond[c] += s->environment[c];
-    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * beyond[c];
-    if (largest(value) > 0) add_light(w, value, NULL, NULL);
+    if (s->image != NULL) {
+        float world[3], radiance[3];
+        turn_about_normal(s->image_turn, 1, direction, world);
+        float pdf_image = environment_at(s->image, world, radiance);
+        float share = l->pdf > 0 ? power_heuristic(l->pdf, pdf_image) : 1;
+        for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
+    }
+    for (int c = 0; c < 3; c++) value[c] = l->throughput[c] * beyond[c];
+    if (!(largest(value) > 0)) return;
+    add_light(s, l, value, NULL, NULL);
+    note_light(l, VOLUME_BEYOND, NULL, beyond);
 }
 
-/* Scatters the ray where it is. False: roulette ends the path. */
-static bool scatter(struct walk *w, struct volume_ray *ray, const struct fiber_frame *f, const float wo[3],
-                    float *pdf_out)
+static bool connect(const struct volume_setting *s, struct lane *l, enum connection to);
+
+/* The ray is out of the cloth, or lost in it. False: so ends the path. */
+static bool leave(const struct volume_setting *s, struct lane *l, bool lost)
 {
-    const struct volume_setting *s = w->s;
-    float u[3], wi[3], f_rgb[3], direction[3], next[3], survival = 1;
-    for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
-    s->model->sample(s->state, wo, w->throughput, u, wi);
-    float pdf = s->model->eval_pdf(s->state, wi, wo, w->throughput, f_rgb, s->want_jacobian ? w->score : NULL);
-    for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * f_rgb[c] / pdf;
+    if (l->purpose == FLIGHT) {
+        add_beyond(s, l);
+        return false;
+    }
+    if (!lost && l->passed > 0) {
+        float value[3], score[VOLUME_N_DERIVATIVE], f_rgb[3];
+        for (int c = 0; c < 3; c++) value[c] = l->light[c] * l->passed;
+        if (s->want_jacobian) /* only now: few connections get here */
+            s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, score);
+        add_light(s, l, value, score, &l->shadow);
+    }
+    return connect(s, l, l->purpose + 1);
+}
+
+/* On by at least skip_mm to the next tentative collision. False: the path has ended. */
+static inline bool move_on(const struct volume_setting *s, struct lane *l, float skip_mm)
+{
+    l->voxel = NULL;
+    l->out->n_lookup++;
+    bool lost = ++l->n_lookup > VOLUME_MAX_LOOKUP;
+    float step_mm = minus_log_rest(rng_float(&l->rng)) / s->majorant_per_mm;
+    if (lost || !advance(s->scene, skip_mm + step_mm, &l->ray)) return leave(s, l, lost);
+    l->brick = brick_at(s->scene, &l->ray);
+    __builtin_prefetch(l->brick);
+    return true;
+}
+
+/* Sends a ray from the vertex. */
+static bool send(const struct volume_setting *s, struct lane *l, enum connection purpose, const float direction[3])
+{
+    l->purpose = purpose;
+    l->n_lookup = 0;
+    l->ray = l->vertex;
+    volume_ray_turn(s->scene, direction, &l->ray);
+    return move_on(s, l, 0);
+}
+
+/* Scatters the path at its vertex. False: roulette ends it. */
+static bool scatter(const struct volume_setting *s, struct lane *l)
+{
+    float u[3], wi[3], f_rgb[3], score[VOLUME_N_DERIVATIVE], direction[3], next[3], survival = 1;
+    for (int a = 0; a < 3; a++) u[a] = rng_float(&l->rng);
+    s->model->sample(s->state, l->wo, l->throughput, u, wi);
+    l->pdf = s->model->eval_pdf(s->state, wi, l->wo, l->throughput, f_rgb, s->want_jacobian ? score : NULL);
+    for (int c = 0; c < 3; c++) next[c] = l->throughput[c] * f_rgb[c] / l->pdf;
     float most = largest(next);
     if (!(most > 0)) {
-        keep_nan(w, next);
+        keep_nan(l, next);
         return false;
     }
     if (most < s->roulette_below) {
         survival = most / s->roulette_below;
-        if (rng_float(w->rng) >= survival) return false;
+        if (rng_float(&l->rng) >= survival) return false;
     }
-    for (int c = 0; c < 3; c++) w->throughput[c] = next[c] / survival;
-    if (s->want_jacobian)
-        for (size_t p = 0; p < w->n_score; p++) w->h[p] += w->score[p];
-    to_world(f, wi, direction);
-    volume_ray_turn(s->scene, direction, ray);
-    *pdf_out = pdf;
+    for (int c = 0; c < 3; c++) l->throughput[c] = next[c] / survival;
+    for (size_t p = 0; s->want_jacobian && p < 3 * s->model->n_param; p++) l->h[p] += score[p];
+    note_light(l, VOLUME_SCATTER, wi, (float[3]){1 / (l->pdf * survival), 0, 0});
+    to_world(&l->frame, wi, direction);
+    volume_ray_position_mm(s->scene, &l->vertex, l->origin_mm);
+    return send(s, l, FLIGHT, direction);
+}
+
+/* A direction of the lamp or the image, its radiance over its density, and that density. */
+static bool sample_light(const struct volume_setting *s, struct lane *l, enum connection to, float direction[3],
+                         float radiance[3], float *pdf)
+{
+    float u[2] = {rng_float(&l->rng), rng_float(&l->rng)}, position_mm[3], world[3];
+    if (to == LAMP) {
+        volume_ray_position_mm(s->scene, &l->vertex, position_mm);
+        if (!lamp_sample(&s->lamp, position_mm, u, direction, pdf)) return false;
+        for (int c = 0; c < 3; c++) radiance[c] = s->lamp.radiance;
+        return true;
+    }
+    if (!environment_sample(s->image, u, world, radiance, pdf)) return false;
+    turn_about_normal(s->image_turn, -1, world, direction);
     return true;
 }
 
-void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out)
+/* Next-event estimation: a ray to the lamp, one to the image, then the path goes on. False: it ends here. */
+static bool connect(const struct volume_setting *s, struct lane *l, enum connection to)
 {
-    struct walk w = {.s = s, .rng = rng, .out = out, .n_score = 3 * s->model->n_param, .throughput = {1, 1, 1}};
-    memset(out, 0, sizeof *out);
-    float pdf = 0, origin_mm[3], tangent[3];
-    for (uint32_t i = 0; i < VOLUME_MAX_VERTEX; i++) {
-        volume_ray_position_mm(s->scene, ray, origin_mm);
-        if (!collide(&w, ray, tangent)) {
-            add_beyond(&w, origin_mm, ray->direction, pdf);
-            return;
+    for (; to <= IMAGE; to++) {
+        float direction[3], radiance[3], pdf_light, f_rgb[3];
+        if (!(to == LAMP ? s->has_lamp : s->image != NULL)) continue;
+        if (!sample_light(s, l, to, direction, radiance, &pdf_light)) continue;
+        if (direction[2] <= 0 && s->scene->black_sheet) continue;
+        to_local(&l->frame, direction, l->light_wi);
+        float pdf = s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, NULL);
+        float heuristic = power_heuristic(pdf_light, pdf) / pdf_light;
+        for (int c = 0; c < 3; c++) {
+            radiance[c] *= heuristic;
+            l->light[c] = l->throughput[c] * f_rgb[c] * radiance[c];
         }
-        out->n_vertex++;
-        struct fiber_frame f;
-        fiber_frame_from(&f, tangent);
-        float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
-        to_local(&f, back, wo);
-        if (s->has_lamp) connect_lamp(&w, ray, &f, wo);
-        if (!scatter(&w, ray, &f, wo, &pdf)) return;
+        l->worth = largest(l->light);
+        if (!(l->worth > 0)) {
+            keep_nan(l, l->light);
+            continue;
+        }
+        l->passed = 1;
+        if (l->worth < s->shadow_below) { /* hardly any light: follow few of these rays, for more each */
+            l->passed = s->shadow_below / l->worth;
+            if (rng_float(&l->rng) * l->passed >= 1) continue;
+        }
+        note_light(l, VOLUME_CONNECT, l->light_wi, radiance);
+        l->shadow = (struct flight_score){0, 0};
+        return send(s, l, to, direction);
     }
+    return scatter(s, l);
+}
+
+/* A real collision: the path's next vertex. */
+static bool collide(const struct volume_setting *s, struct lane *l, const struct lookup *k)
+{
+    l->flight.ln_d += 1;
+    l->flight.param += k->d_ratio / k->ratio;
+    note_lookup(l, VOLUME_REAL, k);
+    if (++l->out->n_vertex >= VOLUME_MAX_VERTEX) return false;
+    float back[3] = {-l->ray.direction[0], -l->ray.direction[1], -l->ray.direction[2]};
+    fiber_frame_from(&l->frame, k->tangent);
+    to_local(&l->frame, back, l->wo);
+    l->vertex = l->ray;
+    return connect(s, l, LAMP);
+}
+
+/* A tentative collision on the way to a light: ratio tracking. */
+static bool pass(const struct volume_setting *s, struct lane *l, const struct lookup *k)
+{
+    float inv = 1 / (1 - k->ratio);
+    l->passed *= 1 - k->ratio;
+    l->shadow.ln_d -= k->ratio * inv;
+    l->shadow.param -= k->d_ratio * inv;
+    note_lookup(l, VOLUME_PASSED, k);
+    float worth = l->passed * l->worth;
+    if (worth < s->shadow_below) {
+        if (rng_float(&l->rng) * s->shadow_below >= worth) return connect(s, l, l->purpose + 1);
+        l->passed = s->shadow_below / l->worth;
+    }
+    return move_on(s, l, 0);
+}
+
+/* One look at memory. False: the path has ended. */
+static inline bool step(const struct volume_setting *s, struct lane *l)
+{
+    if (l->voxel == NULL) {
+        int32_t brick = *l->brick;
+        if (brick < 0) return move_on(s, l, empty_mm(s->scene, &l->ray, -brick));
+        l->voxel = voxel_at(s->scene, brick, &l->ray);
+        __builtin_prefetch(l->voxel);
+        return true;
+    }
+    uint32_t voxel = *l->voxel;
+    if (voxel >> 24 == 0) return move_on(s, l, 0);
+    struct lookup k = look_up(s->extinction, s->majorant_density, voxel, l->ray.direction);
+    if (l->purpose != FLIGHT) return pass(s, l, &k);
+    if (rng_float(&l->rng) < k.ratio) return collide(s, l, &k);
+    float inv = 1 / (1 - k.ratio);
+    l->flight.ln_d -= k.ratio * inv;
+    l->flight.param -= k.d_ratio * inv;
+    note_lookup(l, VOLUME_NULL, &k);
+    return move_on(s, l, 0);
+}
+
+/* False: the path ends at once. */
+static bool start(const struct volume_setting *s, struct lane *l, const struct volume_ray *ray, const struct rng *rng,
+                  struct volume_result *out, struct volume_record *record)
+{
+    size_t n = s->want_jacobian ? s->model->n_param : 0;
+    l->ray = *ray;
+    l->rng = *rng;
+    l->out = out;
+    l->record = record;
+    l->purpose = FLIGHT;
+    l->n_lookup = 0;
+    l->pdf = 0;
+    l->flight = (struct flight_score){0, 0};
+    volume_ray_position_mm(s->scene, ray, l->origin_mm);
+    for (int c = 0; c < 3; c++) l->throughput[c] = 1;
+    memset(l->h, 0, 3 * n * sizeof *l->h);
+    memset(out->radiance, 0, sizeof out->radiance);
+    memset(out->jac, 0, 3 * (n + 1) * sizeof *out->jac);
+    out->n_vertex = out->n_lookup = 0;
+    return move_on(s, l, 0);
+}
+
+void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out,
+                  struct volume_record *record)
+{
+    struct lane l;
+    if (start(s, &l, ray, rng, out, record))
+        while (step(s, &l)) continue;
+    *ray = l.ray;
+    *rng = l.rng;
+}
+
+void volume_trace_many(const struct volume_setting *s, size_t n, const struct volume_ray *ray, const struct rng *rng,
+                       struct volume_result *out)
+{
+    struct lane lane[N_LANE];
+    bool busy[N_LANE] = {false};
+    size_t next = 0, n_busy = 0;
+    do {
+        for (size_t i = 0; i < N_LANE; i++) {
+            if (busy[i]) {
+                busy[i] = step(s, &lane[i]);
+                n_busy -= !busy[i];
+            }
+            while (!busy[i] && next < n) {
+                busy[i] = start(s, &lane[i], &ray[next], &rng[next], &out[next], NULL);
+                n_busy += busy[i];
+                next++;
+            }
+        }
+    } while (n_busy > 0);
 }

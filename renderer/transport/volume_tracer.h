@@ -22,6 +22,7 @@
 #include "base/rng.h"
 #include "renderer/scattering/phase_model.h"
 #include "renderer/scene/configuration.h"
+#include "renderer/transport/environment.h"
 #include "renderer/transport/lamp.h"
 #include "renderer/transport/volume_scene.h"
 
@@ -39,12 +40,14 @@ struct volume_setting {
     bool has_lamp;
     bool has_environment;
     float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
+    const struct environment *image; /* or NULL */
+    float image_turn[2];             /* cosine and sine of the angle from the cloth's frame to the world's */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     float shadow_below;   /* light connections worth less are thinned out at random; 0: never */
     bool want_jacobian;
 };
 
-/* Roulette at the usual place, the configuration's lamp and constant environment (NULL: neither). */
+/* Roulette at the usual place, the configuration's lights (NULL: none). */
 void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
                          const struct phase_state *state, double multiplier_per_m, const struct configuration *c,
                          bool want_jacobian);
@@ -55,7 +58,32 @@ struct volume_result {
     uint32_t n_vertex, n_lookup;
 };
 
-/* ray: as volume_ray_enter made it; changed. */
-void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out);
+/* All that a path's value depends on besides the phase function and the extinction, in order. With r = sigma_t over the
+ * majorant it was traced with, now for the parameters of interest and then for those of tracing, a path's value is found
+ * from T = 1 by:
+ *   null       T *= (1 - r) / (1 - r_then)       real     T *= r / r_then
+ *   scatter    T *= f(wi, wo) weight[0]
+ *   connect    L = T f(wi, wo) weight            passed   L *= 1 - r
+ *   arrive     value += L weight[0]              beyond   value += T weight
+ * (a connection that does not arrive adds nothing). */
+struct volume_event {
+    enum { VOLUME_NULL, VOLUME_REAL, VOLUME_SCATTER, VOLUME_CONNECT, VOLUME_PASSED, VOLUME_ARRIVE, VOLUME_BEYOND } kind;
+    float density, sine; /* of a look-up: 0 to 1, and sine of the angle to the fiber */
+    float wi[3], wo[3], weight[3];
+};
+
+struct volume_record {
+    size_t n_event, capacity;
+    struct volume_event *event; /* the caller's; events beyond capacity are counted but not stored */
+};
+
+/* ray: as volume_ray_enter made it; changed, like rng. record: NULL, or n_event set to 0 by the caller. */
+void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out,
+                  struct volume_record *record);
+
+/* n paths, several of them under way at any time, so that one computes while the others wait for memory. Each has its
+ * ray and random numbers, and the result that volume_trace gives it. */
+void volume_trace_many(const struct volume_setting *s, size_t n, const struct volume_ray *ray, const struct rng *rng,
+                       struct volume_result *out);
 
 #endif

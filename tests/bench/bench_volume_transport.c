@@ -54,6 +54,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s\n", err.text);
         return 1;
     }
+    direction_volume_release(&v); /* the scene has what it needs */
     for (int i = 0; i < 16; i++) {
         n[i] = n_path;
         warm[i] = 256;
@@ -95,6 +96,5 @@ int main(int argc, char **argv)
     }
     thread_pool_free(pool);
     volume_scene_release(&scene);
-    direction_volume_release(&v);
     return 0;
 }

@@ -52,7 +52,7 @@ static void trace(const struct volume_setting *s, const double direction[3], siz
         rng_start(&rng, &key, 0, (uint32_t)i);
         double origin[3] = {rng_double(&rng), rng_double(&rng), 1};
         assert_true(volume_ray_enter(s->scene, origin, direction, &ray));
-        volume_trace(s, &ray, &rng, &path);
+        volume_trace(s, &ray, &rng, &path, NULL);
         for (int k = 0; k < 3; k++) sample_mean_add(&value[k], (double)path.radiance[k]);
         for (size_t k = 0; k < 3 * (s->model->n_param + 1); k++) sample_mean_add(&value[3 + k], (double)path.jac[k]);
     }
@@ -220,7 +220,7 @@ static void along_the_fiber(void **state)
             struct volume_ray ray = {.at = {1.5f, 2.5f, 3.5f}};
             rng_start(&rng, &(struct rng_key){52, 0, 0, 0}, (uint32_t)k, i);
             volume_ray_turn(&scene, way[i % 4], &ray);
-            volume_trace(&setting, &ray, &rng, &path);
+            volume_trace(&setting, &ray, &rng, &path, NULL);
             for (int x = 0; x < 3; x++) assert_true(isfinite(path.radiance[x]));
             for (size_t x = 0; x < 3 * (m->n_param + 1); x++) assert_true(isfinite(path.jac[x]));
         }

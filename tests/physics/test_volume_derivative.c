@@ -1,6 +1,7 @@
 /* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
  * bits for any number of threads. */
 #include "renderer/transport/volume_estimate.h"
+#include "renderer/transport/volume_tracer.h"
 #include "tests/support/hand_volume.h"
 
 #include <math.h>
@@ -163,23 +164,109 @@ static void nonsense_is_refused(void **state)
     cloth_release(&k);
 }
 
-/* The tracer's decoding of directions is the volume's. */
-static void directions_are_decoded_alike(void **state)
+/* What the tracer stores is the volume: densities exactly, directions within their 12 bits, nothing where nothing is,
+ * and no ray is told to skip what holds something. */
+static void stored_voxels_are_the_volume(void **state)
 {
     (void)state;
     struct cloth k;
     cloth_init(&k, 1);
+    volume_scene_release(&k.scene);
     for (size_t i = 0; i < volume_n_voxel(k.v.n); i++) {
-        float a[3], b[3], w[3];
+        float w[3];
         double z = 2 * ((double)i + 0.5) / (double)volume_n_voxel(k.v.n) - 1, phi = 2.399963 * (double)i;
         w[0] = (float)(sqrt(1 - z * z) * cos(phi));
         w[1] = (float)(sqrt(1 - z * z) * sin(phi));
         w[2] = (float)z;
         direction_volume_set(&k.v, i, w);
-        direction_volume_get(&k.v, i, a);
-        volume_scene_direction(&k.scene, i, b);
-        for (int x = 0; x < 3; x++) assert_true(fabsf(a[x] - b[x]) < 1e-6f);
+        k.v.density[i] = (uint8_t)(k.v.density[i] != 0 ? 1 + i % 255 : 0);
     }
+    assert_int_equal(volume_scene_init(&k.scene, &k.v, &(struct volume_scene_option){.black_sheet = true}, NULL),
+                     STATUS_OK);
+    double worst = 1;
+    for (size_t z = 0; z < k.v.n[2]; z++)
+        for (size_t y = 0; y < k.v.n[1]; y++)
+            for (size_t x = 0; x < k.v.n[0]; x++) {
+                size_t i = volume_index(k.v.n, x, y, z);
+                uint32_t voxel = volume_scene_voxel(&k.scene, x, y, z);
+                assert_int_equal(voxel >> 24, k.v.density[i]);
+                if (k.v.density[i] == 0) continue;
+                float a[3], b[3];
+                direction_volume_get(&k.v, i, a);
+                volume_voxel_direction(voxel, b);
+                double cross[3] = {(double)(a[1] * b[2] - a[2] * b[1]), (double)(a[2] * b[0] - a[0] * b[2]),
+                                   (double)(a[0] * b[1] - a[1] * b[0])};
+                worst = fmin(worst, 0.035 * DEG - sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]));
+            }
+    assert_true(worst > 0);
+    cloth_release(&k);
+}
+
+/* One voxel in a large empty volume whose edges are no whole number of bricks: the distances that rays skip, against
+ * all bricks. */
+static void empty_distances(void **state)
+{
+    (void)state;
+    const size_t n[3] = {75, 38, 61};
+    const float along[3] = {1, 0, 0};
+    struct direction_volume v;
+    struct volume_scene s;
+    hand_volume_uniform(&v, n, 1e-6, 0, along);
+    const size_t at[2][3] = {{70, 3, 9}, {2, 30, 58}};
+    for (int i = 0; i < 2; i++) v.density[volume_index(n, at[i][0], at[i][1], at[i][2])] = 200;
+    assert_int_equal(volume_scene_init(&s, &v, &(struct volume_scene_option){.black_sheet = true}, NULL), STATUS_OK);
+    for (int z = 0; z < s.n_brick[2]; z++)
+        for (int y = 0; y < s.n_brick[1]; y++)
+            for (int x = 0; x < s.n_brick[0]; x++) {
+                int nearest = VOLUME_EMPTY_MAX;
+                for (int i = 0; i < 2; i++) {
+                    int d[3] = {abs(x - (int)at[i][0] / 4), abs(y - (int)at[i][1] / 4), abs(z - (int)at[i][2] / 4)};
+                    int most = d[0] > d[1] ? d[0] : d[1];
+                    most = d[2] > most ? d[2] : most;
+                    nearest = most < nearest ? most : nearest;
+                }
+                int got = s.brick[(z * s.n_brick[1] + y) * s.n_brick[0] + x];
+                if (nearest == 0) assert_true(got >= 0);
+                else assert_int_equal(got, -nearest);
+            }
+    assert_int_equal(s.n_stored, 2);
+    volume_scene_release(&s);
+    direction_volume_release(&v);
+}
+
+/* Paths traced together are the paths traced one by one, and recording changes nothing. */
+static void interleaved_paths_are_the_same(void **state)
+{
+    (void)state;
+    enum { N = 500 };
+    static struct volume_ray ray[N];
+    static struct rng rng[N];
+    static struct volume_result one[N], many[N];
+    static struct volume_event event[100];
+    struct cloth k;
+    struct phase_state *ps;
+    struct volume_setting setting;
+    cloth_init(&k, 1);
+    const struct phase_model *m = phase_find("phase_two_lobe.v1");
+    double param[SCATTERING_MAX_PARAM];
+    for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
+    assert_int_equal(m->prepare(param, &ps, NULL), STATUS_OK);
+    volume_setting_init(&setting, &k.scene, m, ps, 4e4, &k.c[0], true);
+    for (uint32_t i = 0; i < N; i++) {
+        rng_start(&rng[i], &(struct rng_key){62, 0, 0, 0}, 0, i);
+        const double from[3] = {rng_double(&rng[i]), rng_double(&rng[i]), 1}, down[3] = {0.6, 0, -0.8};
+        assert_true(volume_ray_enter(&k.scene, from, down, &ray[i]));
+    }
+    memset(one, 0, sizeof one);
+    memset(many, 0, sizeof many);
+    volume_trace_many(&setting, N, ray, rng, many);
+    for (uint32_t i = 0; i < N; i++) {
+        struct volume_record record = {0, sizeof event / sizeof event[0], event};
+        volume_trace(&setting, &ray[i], &rng[i], &one[i], i % 2 ? &record : NULL);
+        if (i % 2) assert_true(record.n_event > 0 || one[i].n_vertex == 0);
+    }
+    assert_memory_equal(one, many, sizeof one);
+    m->release(ps);
     cloth_release(&k);
 }
 
@@ -187,6 +274,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(nonsense_is_refused),
                                        cmocka_unit_test(same_bits_for_any_thread_count),
-                                       cmocka_unit_test(directions_are_decoded_alike), cmocka_unit_test(traced_again)};
+                                       cmocka_unit_test(stored_voxels_are_the_volume),
+                                       cmocka_unit_test(empty_distances),
+                                       cmocka_unit_test(interleaved_paths_are_the_same),
+                                       cmocka_unit_test(traced_again)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
