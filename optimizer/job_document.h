@@ -26,7 +26,7 @@
  *           "max_iterations": n, "path_budget": n,        of each model
  *           "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},   for every model that has the parameter
  *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
- *           "render_px": 128, "render_samples": 64}
+ *           "render_px": 96, "render_samples": 16}
  * }
  * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path
  * such as "photographs[3].light_theta_deg" and a text that says what is allowed. Limits: see job_limits.

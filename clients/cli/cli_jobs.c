@@ -157,7 +157,8 @@ static void print_point(const json_t *point, FILE *out)
 {
     size_t i;
     const json_t *value;
-    fprintf(out, "%lld\t%s\t%.2f\t%.0f\t%.8g\t%.4g\t%.6g", (long long)json_integer_value(json_object_get(point, "step")),
+    fprintf(out, "%lld\t%s\t%s\t%.2f\t%.0f\t%.8g\t%.4g\t%.6g", (long long)json_integer_value(json_object_get(point, "step")),
+            json_string_value(json_object_get(point, "model")) == NULL ? "-" : json_string_value(json_object_get(point, "model")),
             json_string_value(json_object_get(point, "phase")) == NULL ? "-" : json_string_value(json_object_get(point, "phase")),
             json_number_value(json_object_get(point, "wall_s")), json_number_value(json_object_get(point, "n_path_total")),
             json_number_value(json_object_get(point, "objective")), json_number_value(json_object_get(point, "objective_se")),
@@ -182,7 +183,7 @@ status cli_series(struct cli *cli, int *exit_code, struct error *err)
         const json_t *points = json_object_get(page, "points");
         json_array_foreach(points, i, point) {
             if (cli->args->json) json_array_append(all, point);
-            if (!cli->args->json && first) fprintf(cli->out, "step\tphase\twall_s\tn_path_total\tobjective\tobjective_se\trel_rms\tparameters\n");
+            if (!cli->args->json && first) fprintf(cli->out, "step\tmodel\tphase\twall_s\tn_path_total\tobjective\tobjective_se\trel_rms\tparameters\n");
             if (!cli->args->json) print_point(point, cli->out);
             first = false;
         }

@@ -117,9 +117,30 @@ static void print_parameter(const json_t *parameter, FILE *out)
     text_clean(member_text(parameter, "name"), name, sizeof name);
     text_clean(member_text(parameter, "unit"), unit, sizeof unit);
     text_with_error(member_number(parameter, "value"), member_number(parameter, "standard_error"), value);
-    fprintf(out, "  %-12s %-24s %-5s", name, value, unit);
+    fprintf(out, "  %-18s %-24s %-5s", name, value, unit);
     print_flags(parameter, out);
     fputc('\n', out);
+}
+
+/* One line a model, when there are several. */
+static void print_models(const json_t *models, FILE *out)
+{
+    size_t i;
+    const json_t *m;
+    if (json_array_size(models) < 2) return;
+    fprintf(out, "%-24s %10s %10s %12s %8s\n", "model (rel. RMS error)", "fitted", "held out", "paths", "time");
+    json_array_foreach(models, i, m)
+    {
+        char id[64], held_out[32] = "-", time[CLI_SHORT_TEXT];
+        double x = member_number(m, "heldout_rel_rms");
+        text_clean(member_text(m, "id"), id, sizeof id);
+        if (!isnan(x)) snprintf(held_out, sizeof held_out, "%.2f %%", 100.0 * x);
+        text_duration(member_number(m, "fit_wall_s"), time);
+        fprintf(out, "  %-22s %8.2f %% %10s %12.3g %8s  %s%s\n", id, 100.0 * member_number(m, "fit_rel_rms"), held_out,
+                member_number(m, "n_path_fit"), time, json_is_true(json_object_get(m, "best")) ? "best " : "",
+                json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
+    }
+    fprintf(out, "of the best model:\n");
 }
 
 void report_result(const json_t *job, FILE *out)
@@ -129,6 +150,7 @@ void report_result(const json_t *job, FILE *out)
     } residual[] = {{"fit_rel_rms", "relative RMS error, fitted"}, {"heldout_rel_rms", "relative RMS error, held out"}};
     size_t i;
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
+    print_models(json_object_get(result, "models"), out);
     if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
     json_array_foreach(parameters, i, parameter) print_parameter(parameter, out);
     for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {

@@ -1,7 +1,7 @@
 // The curves of one fit: objective (log axis), relative RMS, and one chart a parameter, fed by the incremental series.
 import { CurveChart } from "./curve_charts.js";
 import { el } from "./page_parts.js";
-import { finite, parameterGroups, parameterNames } from "./result_view.js";
+import { describedParameters, finite, parameterGroups } from "./result_view.js";
 import { getJson } from "./server_link.js";
 
 const BAND = 2; // standard errors
@@ -33,6 +33,8 @@ export class JobCharts {
     this.after = -1;
     this.charts = [];
     this.parameterCharts = null;
+    this.models = [];
+    this.chosen = null; // model shown; null: the one that is being fitted
     this.fitCard.replaceChildren(el("p", { class: "hint" }, "The curve begins with the fit."));
     this.parameterCard.replaceChildren(el("p", { class: "hint" }, "The curves begin with the fit."));
   }
@@ -43,6 +45,7 @@ export class JobCharts {
       const series = await getJson(`/v1/jobs/${job.id}/series?after_step=${this.after}&max_points=${MAX_POINT}`);
       if (series.generation !== undefined && series.generation !== this.generation) { this.reset(series.generation); continue; }
       if (series.points.length === 0) break;
+      this.models = series.models ?? [];
       this.points.push(...series.points);
       this.after = series.next_after_step ?? this.points[this.points.length - 1].step;
       if (this.points.length > 2 * MAX_POINT) { this.points = []; this.after = -1; continue; } // let the server thin it out
@@ -50,23 +53,34 @@ export class JobCharts {
     }
   }
 
+  // Curves of one model at a time: their parameters have nothing in common.
   draw(job) {
-    if (this.charts.length === 0) this.build(job);
-    const p = this.points;
-    this.bounds = (job.parameters ?? []).map(({ lower, upper }) => ({ lower, upper }));
+    const model = this.chosen ?? this.points[this.points.length - 1].i_model ?? 0;
+    if (this.charts.length === 0 || this.shown !== model) this.build(job, model);
+    this.drawTabs(job);
+    const p = this.points.filter((x) => (x.i_model ?? 0) === model);
     this.objective.set(p.map((x) => [x.step, band(x.objective, x.objective_se, { positive: true })]));
     this.rms.set(p.map((x) => [x.step, finite(x.rel_rms) === null || x.rel_rms <= 0 ? null : [100 * x.rel_rms, 100 * x.rel_rms, 100 * x.rel_rms]]));
     for (const { group, chart } of this.parameterCharts)
-      chart.set(p.map((x) => [x.step, ...group.flat.map((f) => band(x.parameter?.[f.i], x.parameter_se?.[f.i], this.bounds[f.i]))]));
+      chart.set(p.map((x) => [x.step, ...group.flat.map((f) => band(x.parameter?.[f.i], x.parameter_se?.[f.i], this.parameters[f.i]))]));
   }
 
-  build(job) {
+  drawTabs(job) {
+    if (this.models.length < 2) return;
+    this.tabs.replaceChildren(...this.models.map((m, i) => el("button", { class: i === this.shown ? "main" : "", onclick: () => { this.chosen = i; this.draw(job); } }, m.id)));
+  }
+
+  build(job, model) {
+    this.destroy();
+    this.shown = model;
+    this.tabs = el("p", { class: "tabs", id: "models-shown" });
     const objective = block("Objective f ± 2 s.e. (log)", true), rms = block("Relative RMS error of the fitted means, % (log)");
-    this.fitCard.replaceChildren(objective.box, rms.box);
+    this.fitCard.replaceChildren(this.tabs, objective.box, rms.box);
     this.objective = new CurveChart(objective.node, objective.legend, ["f"], ["--accent"], { log: true });
     this.rms = new CurveChart(rms.node, rms.legend, ["%"], ["--warn"], { log: true, digits: 3 });
-    const names = parameterNames(job, this.points[0].parameter?.length ?? 0);
-    this.parameterCharts = parameterGroups(names).map((group) => {
+    const n = this.points.find((x) => (x.i_model ?? 0) === model)?.parameter?.length ?? 0;
+    this.parameters = describedParameters(this.models[model], job, n);
+    this.parameterCharts = parameterGroups(this.parameters).filter((g) => g.flat.some((f) => !this.parameters[f.i].fixed)).map((group) => {
       const part = block(group.symbol + (group.unit ? ` (${group.unit === "deg" ? "°" : group.unit})` : ""));
       const colours = group.flat.map((f) => (f.channel < 0 ? "--accent" : RGB[f.channel]));
       const labels = group.flat.map((f) => (f.channel < 0 ? f.name : "rgb"[f.channel]));

@@ -4,7 +4,7 @@ import { fiberView } from "./fiber_view.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
 import { duration, el, isNumber, percent, refill, size, stateTag, when, withError } from "./page_parts.js";
-import { configurations, fiberFile, fitted, residuals, sliceFiles } from "./result_view.js";
+import { configurations, fiberFile, fitted, models, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 
 const SHOWN_WARNINGS = 2;
@@ -32,8 +32,10 @@ function fact(name, value) {
 function factsOf(job) {
   const facts = [];
   if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", duration(job.eta_s)));
+  if (job.state === "running" && job.message.startsWith("fitting ")) facts.push(fact("now", job.message));
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
-  if (isNumber(job.objective)) facts.push(fact("objective", withError(job.objective, job.objective_se)));
+  const of = job.result ?? job; // at the end: of the best model, at fresh paths
+  if (isNumber(of.objective)) facts.push(fact("objective", withError(of.objective, of.objective_se)));
   const { fit, held } = residuals(job);
   if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percent(fit, 2)));
   if (isNumber(held)) facts.push(fact("held out", percent(held, 2)));
@@ -57,11 +59,22 @@ function notesOf(job) {
   return notes;
 }
 
-function parameterTable(job) {
-  const rows = fitted(job).map((p) => el("tr", {}, el("td", { class: "mono" }, p.name), el("td", { class: "number" }, withError(p.value, p.se)),
+// The comparison that several models are fitted for.
+function modelTable(list) {
+  const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percent(m.fit, 2)), el("td", { class: "number" }, percent(m.held, 2)),
+    el("td", { class: "number" }, isNumber(m.paths) ? `${(m.paths / 1e6).toPrecision(3)} M` : "–"), el("td", { class: "number" }, duration(m.seconds)),
+    el("td", {}, m.best ? el("span", { class: "tag" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
+  return [el("p", { class: "hint" }, "Relative RMS errors of mean radiances; the best model has the lowest error over the held-out rows. Everything else on this page is of the best one."),
+    el("table", { id: "models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Fitted"), el("th", { class: "number" }, "Held out"),
+      el("th", { class: "number" }, "Paths"), el("th", { class: "number" }, "Time"), el("th", {}, "Remarks"))), el("tbody", {}, rows)),
+    ...list.filter((m) => !m.best).map((m) => el("details", {}, el("summary", {}, `Parameters of ${m.id}`), parameterTable(m.parameters)))];
+}
+
+function parameterTable(list, id) {
+  const rows = list.map((p) => el("tr", {}, el("td", { class: "mono" }, p.name), el("td", { class: "number" }, withError(p.value, p.se)),
     el("td", {}, p.unit === "deg" ? "°" : p.unit), el("td", { class: "number hint" }, isNumber(p.lower) ? `${Number(p.lower.toPrecision(4))} … ${Number(p.upper.toPrecision(4))}` : ""),
     el("td", {}, p.flags.map((f) => el("span", { class: "tag warn" }, f)))));
-  return el("table", { id: "parameters" }, el("thead", {}, el("tr", {}, el("th", {}, "Parameter"), el("th", { class: "number" }, "Value ± standard error"), el("th", {}, ""),
+  return el("table", { id }, el("thead", {}, el("tr", {}, el("th", {}, "Parameter"), el("th", { class: "number" }, "Value ± standard error"), el("th", {}, ""),
     el("th", { class: "number" }, "Allowed"), el("th", {}, "Remarks"))), el("tbody", {}, rows));
 }
 
@@ -106,8 +119,10 @@ export function jobPage(page, id) {
     const slices = sliceFiles(list.files), hair = fiberFile(list.files);
     const fibers = hair ? fiberView(hair) : null;
     closeFibers = fibers?.close ?? null;
+    const compete = models(job);
     results.append(
-      el("div", { class: "columns" }, card("Fitted parameters", parameterTable(job)), card("Measured against rendered", scatterPlot(compared))),
+      compete.length > 1 ? card("Models compared", modelTable(compete)) : "",
+      el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured against rendered", scatterPlot(compared))),
       compared.length ? card("Measured beside rendered", gallery(compared, job.result?.png_exposure)) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",
@@ -122,7 +137,7 @@ export function jobPage(page, id) {
     if (job.generation !== generation) { generation = job.generation; log.reset(); results.replaceChildren(); closeFibers?.(); closeFibers = null; }
     refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
     refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
-    refill(facts, [job.state, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
+    refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
     refill(notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
     await charts.update(job);
     await log.update(id);

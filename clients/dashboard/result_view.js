@@ -15,21 +15,24 @@ export function parameterGroups(parameters) {
   return groups;
 }
 
-// Names of the fitted parameters while there is no result yet: the model's, in its order.
-const KNOWN = {
-  "two_lobe.": ["C_R.r", "C_R.g", "C_R.b", "C_TT.r", "C_TT.g", "C_TT.b", "beta_R", "beta_TT", "gamma_TT"],
-};
-export function parameterNames(job, n) {
-  if (job.parameters?.length === n) return job.parameters.map((p) => ({ name: p.name, unit: p.unit }));
-  const model = job.document?.fit?.model ?? "two_lobe.v1";
-  const known = Object.entries(KNOWN).find(([prefix]) => model.startsWith(prefix))?.[1];
-  if (known?.length === n) return known.map((name) => ({ name, unit: /^(beta|gamma)/.test(name) ? "deg" : "" }));
+// What the n numbers of a model's points are: [{name, unit, lower, upper, fixed}]. The series describes its models; a series without that is of a job with one.
+export function describedParameters(model, job, n) {
+  if (model?.parameters?.length === n) return model.parameters;
+  if (job.parameters?.length === n) return job.parameters;
   return Array.from({ length: n }, (_, i) => ({ name: `parameter ${i + 1}`, unit: "" }));
 }
 
-// The fitted parameters: [{name, unit, value, se, flags: [text], lower, upper}]
-export function fitted(job) {
-  return (job.parameters ?? []).map((p) => {
+// Every model of the job: [{id, title, best, converged, fit, held, paths, seconds, parameters}]
+export function models(job) {
+  return (job.result?.models ?? []).map((m) => ({
+    id: m.id, title: m.title, best: m.best, converged: m.converged, fit: m.fit_rel_rms, held: m.heldout_rel_rms, paths: m.n_path_fit, seconds: m.fit_wall_s,
+    parameters: fitted(m),
+  }));
+}
+
+// The fitted parameters of a job or of one of its models: [{name, unit, value, se, flags: [text], lower, upper}]
+export function fitted(of) {
+  return (of.parameters ?? []).map((p) => {
     const flags = [];
     if (p.fixed) flags.push("fixed");
     else {

@@ -11,9 +11,19 @@ enum { SERIES_MAX_RECORD = 1000000 };
 struct reading {
     long long after_step;
     json_t *record;
+    json_t *model; /* [{"id", "parameters"}]: what the numbers of each model's points are */
     json_int_t last_step;
     size_t n;
 };
+
+/* The first record of a model describes its parameters: to the list of models, and out of the record. */
+static void take_description(struct reading *r, json_t *record)
+{
+    json_t *parameters = json_object_get(record, "parameters");
+    if (parameters == NULL) return;
+    json_array_append_new(r->model, json_pack("{s:O?,s:O}", "id", json_object_get(record, "model"), "parameters", parameters));
+    json_object_del(record, "parameters");
+}
 
 static bool on_record(void *context, const char *json, size_t n)
 {
@@ -23,6 +33,7 @@ static bool on_record(void *context, const char *json, size_t n)
     if (json_is_integer(json_object_get(j, "step"))) {
         r->n++;
         if (step > r->last_step) r->last_step = step;
+        take_description(r, j);
         if (step > r->after_step) json_array_append(r->record, j);
     }
     json_decref(j);
@@ -52,8 +63,15 @@ static void merge_parameters(json_t *point, const json_t *record, size_t from, s
     json_object_set_new(point, "parameter_max", high);
 }
 
+static json_int_t model_of(const json_t *record, size_t i)
+{
+    return json_integer_value(json_object_get(json_array_get(record, i), "i_model"));
+}
+
+/* Records from .. to - 1 as one point; a group that begins in an earlier model is left to the last one's. */
 static json_t *merge(const json_t *record, size_t from, size_t to)
 {
+    while (from + 1 < to && model_of(record, from) != model_of(record, to - 1)) from++;
     json_t *point = json_copy(json_array_get(record, to - 1));
     if (to - from == 1) return point;
     double least = 0, most = 0;
@@ -78,12 +96,13 @@ status series_view(struct job_service *v, const struct job_row *row, long long a
 {
     char path[PATH_BYTES];
     status s = STATUS_OK;
-    struct reading r = {.after_step = after_step, .record = json_array(), .last_step = -1};
+    struct reading r = {.after_step = after_step, .record = json_array(), .model = json_array(), .last_step = -1};
     path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_SERIES, NULL);
     uint64_t next = 0;
     if (row->attempt > 0 && !row->dirty && access(path, F_OK) == 0) s = record_read(path, 0, on_record, &r, &next, err);
     if (s != STATUS_OK) {
         json_decref(r.record);
+        json_decref(r.model);
         return s;
     }
     size_t n = json_array_size(r.record), n_point = n < max_points ? n : max_points;
@@ -95,6 +114,6 @@ status series_view(struct job_service *v, const struct job_row *row, long long a
     }
     json_decref(r.record);
     json_int_t last = n > 0 ? r.last_step : (json_int_t)after_step;
-    *view = json_pack("{s:o,s:I,s:I,s:I}", "points", point, "next_after_step", last, "n_step", (json_int_t)r.n, "generation", (json_int_t)row->generation);
+    *view = json_pack("{s:o,s:o,s:I,s:I,s:I}", "points", point, "models", r.model, "next_after_step", last, "n_step", (json_int_t)r.n, "generation", (json_int_t)row->generation);
     return STATUS_OK;
 }

@@ -46,7 +46,7 @@ def stop_daemon(process):
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory):
-    """A daemon with the real worker, and a small real job in it: volume, 9 + 4 photographs, few paths."""
+    """A daemon with the real worker, and a small real job in it: volume, 9 + 4 photographs, two models, few paths."""
     folder = tmp_path_factory.mktemp("real")
     sample = folder / "sample"
     subprocess.run([os.path.join(BIN, "selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "6",
@@ -55,7 +55,7 @@ def real(tmp_path_factory):
                     "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
     photographs = json.loads((sample / "photographs.json").read_text())
     document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
-                "photographs": photographs[:9] + photographs[16:20], "fit": {"path_budget": 300000, "render_px": 24, "render_samples": 4}}
+                "photographs": photographs[:9] + photographs[16:20], "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4}}
     (sample / "job.json").write_text(json.dumps(document))
     process, url = start_daemon(folder / "data")
     yield url, selvedge.Server(url).submit(str(sample / "job.json"))
@@ -128,13 +128,22 @@ def test_real_job_live_and_finished(real, browser):
     browser.find_element(By.CSS_SELECTOR, "#jobs tbody tr a").click()
     wait_for(browser, "document.querySelectorAll('.stage').length === 8")
     # live: curves appear while the fit runs
-    wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 14", 240)
-    titles = [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
-    assert any(t.startswith("Objective") for t in titles) and any(t.startswith("beta_TT (°)") for t in titles)
+    wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 8", 240)
+    assert any(e.text.startswith("Objective") for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title"))
     keep(browser, "running")
     # finished
     wait_for(browser, "document.querySelector('.state.succeeded')", 400)
     wait_for(browser, "document.querySelector('#parameters')")
+    # both models' curves, under their own names; and the table that compares them
+    titles = lambda: [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
+    wait_for(browser, "document.querySelectorAll('#models-shown button').length === 2")
+    assert any(t.startswith("alpha") for t in titles()) and not any(t.startswith("C_TT") for t in titles())
+    keep(browser, "second-model")
+    browser.find_element(By.CSS_SELECTOR, "#models-shown button").click()
+    wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 14")
+    assert any(t.startswith("beta_TT (°)") for t in titles()) and not any(t.startswith("alpha") for t in titles())
+    compared = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#models tbody tr")]
+    assert [c.split()[0] for c in compared] == ["two_lobe.v1", "microflake.v1"] and sum("best" in c for c in compared) == 1 and "best" in compared[0]
     result = job.state()["result"]
     rows = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#parameters tbody tr")]
     assert len(rows) == 9 and rows[0].startswith("C_R.r") and "±" in rows[3]

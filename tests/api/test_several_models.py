@@ -1,0 +1,106 @@
+"""Several models in one job, through daemon, real worker and command line: surface and volume models on one cloth of fibers."""
+import os
+import subprocess
+
+import pytest
+from daemon_under_test import Daemon, program
+from small_cloth import TABLE, hair
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
+MODELS = ["microflake.v1", "two_lobe.v1"]
+
+
+def document(**fit):
+    return {"sample": "which model", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"},
+            "fit": {"models": MODELS, "path_budget": 100000, "render_px": 8, "render_samples": 1, "density_multiplier_per_cm": 2000, **fit}}
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    with Daemon(tmp_path_factory.mktemp("models") / "data", worker=program("selvedge-worker")) as d:
+        yield d
+
+
+@pytest.fixture(scope="module")
+def finished(real):
+    job = real.create(document())
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    return job, real.wait_state(job, "succeeded", timeout_s=120)
+
+
+def test_all_are_fitted_and_compared(finished):
+    _, state = finished
+    result = state["result"]
+    assert [m["id"] for m in result["models"]] == MODELS
+    assert [m["kind"] for m in result["models"]] == ["volume", "surface"]
+    assert [len(m["parameters"]) for m in result["models"]] == [5, 9]
+    d = result["models"][0]["parameters"][-1]
+    assert (d["name"], d["unit"], d["value"], d["fixed"]) == ("density_multiplier", "1/cm", 2000, True)
+    best = [m for m in result["models"] if m["best"]]
+    assert len(best) == 1 and best[0]["heldout_rel_rms"] == min(m["heldout_rel_rms"] for m in result["models"])
+    # the top of the result is the best model's: clients that know of one model read on as before
+    assert result["model"] == best[0]["id"] and state["parameters"] == best[0]["parameters"]
+    for key in ("fit_rel_rms", "heldout_rel_rms", "objective", "n_path_fit", "converged", "correlation"):
+        assert result[key] == best[0][key], key
+    assert [r["rendered"] for r in result["rows"]] == [r["rendered"] for r in best[0]["rows"]]
+    for m in result["models"]:
+        assert len(m["rows"]) == 6 and all(x > 0 for r in m["rows"] for x in r["rendered"])
+
+
+def test_series_says_what_its_numbers_are(real, finished):
+    job, state = finished
+    series = real.get(f"/v1/jobs/{job}/series?max_points=5000").json()
+    assert [m["id"] for m in series["models"]] == MODELS
+    for m, of in zip(series["models"], state["result"]["models"]):
+        assert [(p["name"], p["unit"], p["lower"], p["upper"], p["fixed"]) for p in m["parameters"]] == \
+               [(p["name"], p["unit"], p["lower"], p["upper"], p["fixed"]) for p in of["parameters"]]
+    points = series["points"]
+    assert [p["step"] for p in points] == list(range(len(points)))
+    assert all(p["model"] == MODELS[p["i_model"]] for p in points) and {p["i_model"] for p in points} == {0, 1}
+    assert all(len(p["parameter"]) == len(series["models"][p["i_model"]]["parameters"]) for p in points)
+    assert all("parameters" not in p for p in points)
+    # thinned out: no point mixes two models, and the description stays although its records are merged away
+    few = real.get(f"/v1/jobs/{job}/series?max_points=3&after_step=0").json()
+    assert few["models"] == series["models"] and len(few["points"]) == 3
+    for p in few["points"]:
+        assert len(p.get("parameter_min", p["parameter"])) == len(few["models"][p["i_model"]]["parameters"])
+
+
+def test_command_line_prints_the_comparison(real, finished):
+    job, _ = finished
+    shown = subprocess.run([program("selvedge"), "--server", real.url, "status", job], capture_output=True, text=True, check=True).stdout
+    lines = [line for line in shown.splitlines() if line.strip().startswith(tuple(MODELS))]
+    assert len(lines) == 2 and sum("best" in line for line in lines) == 1, shown
+    assert shown.index("held out") < shown.index("of the best model")
+    series = subprocess.run([program("selvedge"), "--server", real.url, "series", job], capture_output=True, text=True, check=True).stdout
+    assert {line.split("\t")[1] for line in series.splitlines()[1:]} == set(MODELS)
+
+
+@pytest.mark.parametrize("fit,field,says", [
+    ({"models": ["two_lobe.v1", "no_model.v1"]}, "fit.models[1]", "microflake.v1"),
+    ({"models": []}, "fit.models", "1 to 8"),
+    ({"models": "two_lobe.v1"}, "fit.models", "list"),
+    ({"models": ["two_lobe.v1", "two_lobe.v1"]}, "fit.models[1]", "second time"),
+    ({"model": "two_lobe.v1"}, "fit.models", "both"),
+    ({"start": {"gamma": 0.2, "beta_R": 3, "nothing": 1}}, "fit.start.nothing", "alpha"),
+    ({"start": {"gamma": 9}}, "fit.start.gamma", "1.5"),
+    ({"fixed": {"density_multiplier": 4000}}, "fit.fixed.density_multiplier", "unknown parameter"),
+    ({"density_multiplier_per_cm": 1}, "fit.density_multiplier_per_cm", "10 to 100000"),
+    ({"models": ["two_lobe.v1"]}, "fit.density_multiplier_per_cm", "volume models"),
+    ({"fixed": {"alpha": 0.5, "gamma": 0.2}}, "fit.fixed", "microflake.v1"),
+])
+def test_bad_input(real, fit, field, says):
+    reply = real.post("/v1/jobs", json=document(**fit))
+    body = reply.json()
+    assert reply.status_code == 422 and body["field"] == field and says in body["detail"], body
+
+
+def test_voxels_that_need_too_much(real):
+    job = real.create({**document(), "fibers": {"file": "cloth.hair", "voxel_um": 0.05}})
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    real.post(f"/v1/jobs/{job}/start")
+    error = real.wait_state(job, "failed", timeout_s=60)["error"]
+    assert error["field"] == "fibers.voxel_um" and "limit" in error["text"], error
