@@ -66,6 +66,7 @@ static struct job_document *document_new(void)
     for (size_t i = 0; i < JOB_MAX_MODEL; i++) {
         fill_nan(d->model[i].fixed, JOB_MAX_PARAM);
         fill_nan(d->model[i].start, JOB_MAX_PARAM);
+        job_fit_option_init(&d->model[i].option);
     }
     d->density_multiplier_per_cm = NAN;
     d->render_px = 96;

@@ -19,13 +19,14 @@
  *   "measurements": {"file": "blue.csv"}                  this ...
  *   "photographs": [                                      ... or this
  *     {"file":"p00.exr","set":"fit"|"held-out","light_theta_deg":,"light_phi_deg":,"camera_theta_deg":,"camera_phi_deg":,
- *      "cloth_rotation_deg":, "scale": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
+ *      "cloth_rotation_deg":, "scale": 1.0, "weight": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
  *   "fit": {"model": "two_lobe.v1" or "models": ["two_lobe.v1", "phase_two_lobe.v1", ...],   ids of appearance.h; several
  *                                                         are fitted one after the other and compared
  *           "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
  *           "max_iterations": n, "path_budget": n,        of each model
  *           "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},   for every model that has the parameter
  *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
+ *           "tied", "bounds", "priors", "starts", "nuisance":           see job_fit_option.h
  *           "render_px": 96, "render_samples": 16}
  * }
  * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path
@@ -35,6 +36,7 @@
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 
 #include "base/status.h"
+#include "optimizer/job_fit_option.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -44,7 +46,6 @@ enum {
     JOB_MAX_PHOTOGRAPH = 1024,
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
-    JOB_MAX_PARAM = 16,
     JOB_MAX_MODEL = 8
 };
 
@@ -52,6 +53,7 @@ enum {
 struct job_model {
     char id[64];
     double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, flat; NaN: not given */
+    struct job_fit_option option;
 };
 
 enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
@@ -60,7 +62,7 @@ struct job_photograph {
     char file[JOB_MAX_NAME_BYTES];
     enum job_set set;
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
-    double scale;
+    double scale, weight;
     size_t crop_px[4]; /* all 0: whole picture */
     bool srgb;
 };
@@ -111,6 +113,12 @@ struct job_document {
 /* text need not be NUL-terminated. On success *doc owns memory: job_document_free. */
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
+
+struct param_info;
+/* Bounds, start and fixed flag of each parameter of a model after ties, bounds and priors; out: n_param. STATUS_INVALID
+ * with the field at fault when they contradict each other. */
+status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
+                       struct job_fit_parameter *out, struct error *err);
 
 /* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
 void job_document_visit_files(const struct job_document *doc,

@@ -215,6 +215,7 @@ static status parse_photograph(const struct json_field *f, const struct job_docu
                                       "camera_phi_deg",
                                       "cloth_rotation_deg",
                                       "scale",
+                                      "weight",
                                       "crop_px",
                                       "transfer",
                                       NULL};
@@ -222,7 +223,7 @@ static status parse_photograph(const struct json_field *f, const struct job_docu
     static const char *const transfer[] = {"linear", "srgb", NULL};
     char path[JSON_PATH_BYTES];
     size_t set = JOB_SET_FIT, srgb = 0;
-    p->scale = 1.0;
+    p->scale = p->weight = 1.0;
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = job_parse_file_name(f, "file", p->file, err);
     if (s == STATUS_OK) s = json_field_choice(f, "set", set_name, &set, err);
@@ -232,6 +233,7 @@ static status parse_photograph(const struct json_field *f, const struct job_docu
     if (s == STATUS_OK) s = json_field_required_number(f, "camera_phi_deg", -360.0, 360.0, &p->camera_phi_deg, err);
     if (s == STATUS_OK) s = json_field_number(f, "cloth_rotation_deg", -360.0, 360.0, &p->cloth_rotation_deg, err);
     if (s == STATUS_OK) s = json_field_number(f, "scale", 1e-9, 1e9, &p->scale, err);
+    if (s == STATUS_OK) s = json_field_number(f, "weight", 0.0, 1e6, &p->weight, err);
     if (s == STATUS_OK) s = json_field_size_array(f, "crop_px", 4, 1u << 20, p->crop_px, err);
     if (s == STATUS_OK) s = json_field_choice(f, "transfer", transfer, &srgb, err);
     if (s != STATUS_OK) return s;

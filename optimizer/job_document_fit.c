@@ -85,8 +85,8 @@ static void list_symbols(const struct appearance *m, char *text, size_t n_bytes)
     }
 }
 
-static status unknown_parameter(const struct appearance *model, size_t n_model, const char *path, const char *key,
-                                struct error *err)
+status job_unknown_parameter(const struct appearance *model, size_t n_model, const char *path, const char *key,
+                             struct error *err)
 {
     char list[300], text[1000];
     size_t used = 0;
@@ -150,7 +150,7 @@ static status parse_values(const struct json_field *fit, bool fixed, const struc
         if (s != STATUS_OK) return s;
         char path[JSON_PATH_BYTES];
         json_field_path(&f, key, path);
-        if (!known) return unknown_parameter(model, doc->n_model, path, key, err);
+        if (!known) return job_unknown_parameter(model, doc->n_model, path, key, err);
     }
     return STATUS_OK;
 }
@@ -212,7 +212,7 @@ static status parse_parameters(const struct json_field *f, struct job_document *
     if (s == STATUS_OK) s = parse_density(f, model, doc, err);
     for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
         s = check_free_parameters(&model[i], &doc->model[i], err);
-    return s;
+    return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
 }
 
 status job_parse_fit(const struct json_field *f, struct job_document *doc, struct error *err)
@@ -221,7 +221,8 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
                                       "seed",      "max_iterations", "path_budget",
                                       "fixed",     "start",          "density_multiplier_per_cm",
                                       "fit_density", "render_px",    "render_samples",
-                                      NULL};
+                                      "tied",      "bounds",         "priors",
+                                      "starts",    "nuisance",       NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_models(f, doc, err);
     if (s == STATUS_OK) s = parse_method(f, doc, err);

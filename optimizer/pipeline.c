@@ -104,21 +104,24 @@ static void warn_observation(void *context, const char *text)
     worker_status_warn(c->status, text);
 }
 
-static void set_parameters(const struct job_model *given, struct pipeline_model *m)
+static status set_parameters(const struct job_model *given, struct pipeline_model *m, struct error *err)
 {
+    struct job_fit_parameter k[JOB_MAX_PARAM];
+    status s = job_fit_resolve(m->appearance.param, m->appearance.n_param, given, k, err);
+    if (s != STATUS_OK) return s;
+    m->option = &given->option;
     for (size_t p = 0; p < m->appearance.n_param; p++) {
         const struct param_info *info = &m->appearance.param[p];
-        struct fit_parameter *k = &m->parameter[p];
-        double fixed = given->fixed[p], start = given->start[p];
-        k->lower = info->lower;
-        k->upper = info->upper;
-        k->fixed = !isnan(fixed);
-        k->start = k->fixed       ? param_from_file_unit(info, fixed)
-                   : isnan(start) ? info->start
-                                  : param_from_file_unit(info, start);
-        k->start =
-            fmin(fmax(k->start, k->lower), k->upper); /* degrees to radians may step over a bound by one rounding */
+        /* degrees to radians may step over a bound by one rounding */
+        double lower = fmin(fmax(param_from_file_unit(info, k[p].lower), info->lower), info->upper);
+        double upper = fmin(fmax(param_from_file_unit(info, k[p].upper), lower), info->upper);
+        m->parameter[p] = (struct fit_parameter){.lower = lower,
+                                                 .upper = upper,
+                                                 .start = param_from_file_unit(info, k[p].start),
+                                                 .fixed = k[p].fixed};
+        m->parameter[p].start = fmin(fmax(m->parameter[p].start, lower), upper);
     }
+    return STATUS_OK;
 }
 
 static status set_models(struct pipeline_context *c, struct error *err)
@@ -129,7 +132,8 @@ static status set_models(struct pipeline_context *c, struct error *err)
     for (size_t i = 0; i < c->n_model; i++) {
         if (!appearance_find(c->doc->model[i].id, &c->model[i].appearance))
             return error_set_field(err, STATUS_INVALID, "fit.model", "unknown model '%s'", c->doc->model[i].id);
-        set_parameters(&c->doc->model[i], &c->model[i]);
+        status s = set_parameters(&c->doc->model[i], &c->model[i], err);
+        if (s != STATUS_OK) return s;
     }
     return STATUS_OK;
 }

@@ -33,6 +33,7 @@ struct validation {
 struct pipeline_model {
     struct appearance appearance;
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    const struct job_fit_option *option; /* of the document */
     struct fit_result fit;
     struct validation validation;
 };

@@ -1,4 +1,6 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
+#include "optimizer/descent/fit_run.h"
+#include "optimizer/pipeline_fit_option.h"
 #include "optimizer/pipeline_trace.h"
 #include "optimizer/work_file.h"
 #include "optimizer/worker_series.h"
@@ -48,7 +50,23 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
                                   .report = on_step,
                                   .report_context = listener,
                                   .progress = progress};
-    return method->run(&problem, &m->fit, err);
+    struct fit_option option;
+    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    return fit_run(method, &problem, &option, &m->fit, err);
+}
+
+/* Another start that ended elsewhere with the same objective: the photographs cannot tell the two apart. */
+static void warn_of_starts(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    for (size_t k = 0; k < m->fit.n_start; k++) {
+        char warning[400];
+        if (!m->fit.start[k].elsewhere) continue;
+        snprintf(warning, sizeof warning,
+                 "start %zu of the fit of %s ended at other parameters with an objective (%.4g) that cannot be told "
+                 "from the one kept: the photographs allow more than one solution",
+                 k + 1, m->appearance.id, m->fit.start[k].objective);
+        worker_status_warn(c->status, warning);
+    }
 }
 
 static void log_fit(struct pipeline_context *c, const struct pipeline_model *m)
@@ -87,6 +105,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     if (estimate_journal_n_replayed(trace.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
     log_fit(c, m);
+    warn_of_starts(c, m);
     listener->step_base += m->fit.n_step;
 out:
     pipeline_trace_close(&trace);
@@ -106,7 +125,7 @@ static status store_fits(struct pipeline_context *c, struct error *err)
     result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.2", section, c->n_model, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.3", section, c->n_model, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
@@ -115,7 +134,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     struct work_section section[JOB_MAX_MODEL];
     result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    return s == STATUS_OK ? work_file_read(path, "fit.2", section, c->n_model, err) : s;
+    return s == STATUS_OK ? work_file_read(path, "fit.3", section, c->n_model, err) : s;
 }
 
 status stage_fit(struct pipeline_context *c, struct error *err)

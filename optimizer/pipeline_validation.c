@@ -44,9 +44,10 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
     }
 }
 
-static void evaluate_set(const struct pipeline_context *c, const struct validation *v, enum job_set set,
+static void evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
                          struct objective_value *value)
 {
+    const struct validation *v = &m->validation;
     struct observation_set part;
     size_t n = c->observation.n, n_part = 0;
     struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
@@ -55,8 +56,8 @@ static void evaluate_set(const struct pipeline_context *c, const struct validati
     if (a != NULL && observation_set_select(&c->observation, set, &part, NULL) == STATUS_OK && part.n > 0) {
         for (size_t i = 0; i < n; i++) {
             if (c->observation.item[i].set != set) continue;
-            a[n_part] = v->replica[0][i];
-            b[n_part++] = v->replica[1][i];
+            nuisance_show(&m->fit.nuisance, &v->replica[0][i], &a[n_part]);
+            nuisance_show(&m->fit.nuisance, &v->replica[1][i], &b[n_part++]);
         }
         objective_evaluate(&part, a, b, value);
     }
@@ -64,10 +65,11 @@ static void evaluate_set(const struct pipeline_context *c, const struct validati
     free(a);
 }
 
-static void score_validation(const struct pipeline_context *c, struct validation *v)
+static void score_validation(const struct pipeline_context *c, struct pipeline_model *m)
 {
-    evaluate_set(c, v, JOB_SET_FIT, &v->fit);
-    evaluate_set(c, v, JOB_SET_HELD_OUT, &v->held_out);
+    struct validation *v = &m->validation;
+    evaluate_set(c, m, JOB_SET_FIT, &v->fit);
+    evaluate_set(c, m, JOB_SET_HELD_OUT, &v->held_out);
     v->worst_rel_se = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         for (int k = 0; k < 3; k++)
@@ -121,7 +123,7 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     estimator = estimate_journal_estimator(trace.journal);
     s = estimate_validation(c, m, &estimator, &progress, n_path, err);
     if (s != STATUS_OK) goto out;
-    score_validation(c, &m->validation);
+    score_validation(c, m);
     log_info(c->log,
              "validation of %s: relative RMS error %.4f over the fitted rows, %.4f over the held-out rows; rendered "
              "means have a standard error below %.2f %%",
@@ -158,7 +160,7 @@ status stage_validation_load(struct pipeline_context *c, struct error *err)
     if (s != STATUS_OK) return s;
     estimate_sections(c, section);
     s = work_file_read(path, "validation.1", section, 2 * c->n_model, err);
-    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) score_validation(c, &c->model[i].validation);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) score_validation(c, &c->model[i]);
     return s;
 }
 

@@ -116,6 +116,13 @@ static char *record_text(const struct fit_step *step, const struct worker_series
                              number(step->damping), "noise", number(step->noise), "note",
                              step->note != NULL ? step->note : "");
     if (json != NULL && step->step == 0) json_object_set_new(json, "parameters", parameters_json(model));
+    if (json != NULL && step->nuisance != NULL) {
+        json_t *nuisance = json_object();
+        for (size_t i = 0; i < step->nuisance->n; i++)
+            json_object_set_new(nuisance, step->nuisance->name[i],
+                                json_pack("[o, o]", number(step->nuisance->value[i]), number(step->nuisance->se[i])));
+        json_object_set_new(json, "nuisance", nuisance);
+    }
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(9) | JSON_COMPACT) : NULL;
     json_decref(json);
     return text;

@@ -106,6 +106,8 @@ static void print_flags(const json_t *parameter, FILE *out)
         fputs("fixed", out);
         return;
     }
+    if (json_is_string(json_object_get(parameter, "tied_to"))) fprintf(out, "tied to %s  ", member_text(parameter, "tied_to"));
+    if (json_is_object(json_object_get(parameter, "prior"))) fputs("with a prior  ", out);
     if (json_is_string(at_bound)) fprintf(out, "at %s bound  ", strcmp(json_string_value(at_bound), "lower") == 0 ? "lower" : "upper");
     if (json_is_true(at_bound)) fputs("at a bound  ", out);
     if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined", out);
@@ -157,6 +159,7 @@ void report_result(const json_t *job, FILE *out)
         double x = member_number(result, residual[i].key);
         if (!isnan(x)) fprintf(out, "%s: %.2f %%\n", residual[i].label, 100.0 * x);
     }
+    json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, out);
     const json_t *converged = json_object_get(result, "converged");
     if (json_is_false(converged)) fprintf(out, "The fit has NOT converged; see the log.\n");
 }

@@ -1,6 +1,7 @@
 // One job: state and stages, live curves, and at the end parameters, comparison, fibers, downloads.
 import { gallery, scatterPlot } from "./comparison.js";
 import { fiberView } from "./fiber_view.js";
+import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
 import { duration, el, isNumber, percent, refill, size, stateTag, when, withError } from "./page_parts.js";
@@ -117,12 +118,14 @@ export function jobPage(page, id) {
     if (gone || results.childElementCount > 0) return;
     const compared = configurations(job, new Map(list.files.map((f) => [f.path, f.url])));
     const slices = sliceFiles(list.files), hair = fiberFile(list.files);
+    const details = fitDetails(job);
     const fibers = hair ? fiberView(hair) : null;
     closeFibers = fibers?.close ?? null;
     const compete = models(job);
     results.append(
       compete.length > 1 ? card("Models compared", modelTable(compete)) : "",
       el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured against rendered", scatterPlot(compared))),
+      details ? card("More about the fit", details) : "",
       compared.length ? card("Measured beside rendered", gallery(compared, job.result?.png_exposure)) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",

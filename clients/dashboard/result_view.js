@@ -39,6 +39,8 @@ export function fitted(of) {
       if (typeof p.at_bound === "string") flags.push(`at ${p.at_bound} bound`);
       else if (p.at_bound) flags.push("at a bound");
       if (p.determined === false) flags.push("not determined");
+      if (p.tied_to) flags.push(p.ratio === 1 ? `tied to ${p.tied_to}` : `${Number(p.ratio.toPrecision(3))} × ${p.tied_to}`);
+      if (p.prior) flags.push(`prior ${p.prior.mean} ± ${p.prior.se}`);
     }
     return { name: p.name, unit: p.unit ?? "", value: p.value, se: p.standard_error, flags, lower: p.lower, upper: p.upper };
   });

@@ -9,14 +9,21 @@
 
 #include "optimizer/descent/estimator.h"
 #include "optimizer/objective/coordinate.h"
+#include "optimizer/objective/fit_layout.h"
 #include "optimizer/objective/linear_model.h"
 #include "optimizer/objective/objective.h"
 #include "optimizer/objective/uncertainty.h"
 
-/* One parameter of this fit, internal units. Bounds lie inside the model's. A fixed one keeps `start`. */
-struct fit_parameter {
-    double lower, upper, start;
-    bool fixed;
+enum { FIT_MAX_START = 16 };
+
+/* One of several starts. */
+struct fit_start {
+    double from[SCATTERING_MAX_PARAM], param[SCATTERING_MAX_PARAM]; /* internal unit */
+    double objective, objective_se, prior_penalty;
+    bool converged;
+    bool kept;
+    bool elsewhere; /* as good as the kept one within the noise, but ended at other parameters */
+    uint64_t n_path;
 };
 
 /* What a method reports after every iteration. Pointers are valid during the call. */
@@ -33,6 +40,7 @@ struct fit_step {
     double damping,
         noise; /* mean damping added to the diagonal; Monte-Carlo variance per residual of the pooled model */
     const char *note;
+    const struct fit_nuisance *nuisance; /* NULL: none */
 };
 
 struct fit_problem {
@@ -46,6 +54,8 @@ struct fit_problem {
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
     const struct progress *progress; /* fraction of the budget; cancel */
+    const struct gaussian_prior *prior; /* n_param, fit coordinates; NULL: none. Methods that know no priors ignore it */
+    double gain_sd;                     /* of ln gain of every configuration, marginalised; 0: none. Likewise */
 };
 
 struct fit_result {
@@ -57,6 +67,11 @@ struct fit_result {
     double wall_s;
     struct objective_value objective; /* predicted at `param` by all estimates of the fit together */
     struct uncertainty uncertainty;
+    double prior_penalty; /* what the priors add to the objective at `param` */
+    /* Filled in by fit_run (fit_run.h): */
+    struct fit_nuisance nuisance;
+    size_t n_start; /* entries of start; 0: there was one only */
+    struct fit_start start[FIT_MAX_START];
 };
 
 struct descent_method {

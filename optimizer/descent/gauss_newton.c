@@ -148,9 +148,11 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
 static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
 {
     double se, f = linear_model_objective(&g->model, &se), doubt = se + g->best_se;
+    /* priors count in today's unit on both sides */
+    double penalty = linear_model_penalty(&g->model, g->x), best = g->best_f + linear_model_penalty(&g->model, g->best_x);
     bool first = g->history.n_step == 1;
-    *failed = !first && f - g->best_f > 3.0 * doubt && f > 1.1 * g->best_f && g->limit_scale > least_limit;
-    bool short_of_promise = !first && g->best_f - f < 0.25 * g->promised && g->promised > 2.0 * doubt;
+    *failed = !first && f + penalty - best > 3.0 * doubt && f + penalty > 1.1 * best && g->limit_scale > least_limit;
+    bool short_of_promise = !first && best - f - penalty < 0.25 * g->promised && g->promised > 2.0 * doubt;
     if (*failed || short_of_promise)
         g->limit_scale = fmax(least_limit, 0.5 * g->limit_scale);
     else
@@ -231,6 +233,7 @@ static status finish(struct gauss_newton *g, struct fit_result *result, struct e
     result->wall_s = g->run.wall_s;
     result->objective.value = linear_model_objective(&g->model, &result->objective.se);
     result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)g->model.n_row);
+    result->prior_penalty = linear_model_penalty(&g->model, g->x);
     uncertainty_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed, &result->uncertainty);
     return STATUS_OK;
 }
@@ -244,6 +247,8 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     linear_history_init(&g.history, problem->observation, g.run.coordinate, problem->n_param);
     s = linear_model_init(&g.model, 3 * problem->observation->n, problem->n_param, err);
     if (s != STATUS_OK) goto out;
+    g.model.prior = problem->prior;
+    g.model.gain_sd = problem->gain_sd;
     size_t index[N];
     g.n_free = free_index(&g, index);
     for (size_t p = 0; p < problem->n_param; p++)

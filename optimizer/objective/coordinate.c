@@ -18,16 +18,18 @@ static double forward(enum coordinate_kind kind, double p)
 void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper)
 {
     bool angle = strcmp(info->unit, "deg") == 0;
-    if (!angle && lower > 0.0 && upper < 1.0)
+    if (!angle && info->lower > 0.0 && info->upper < 1.0)
         k->kind = COORDINATE_LOGIT;
     else
-        k->kind = lower > 0.0 ? COORDINATE_LOG : COORDINATE_LINEAR;
+        k->kind = info->lower > 0.0 ? COORDINATE_LOG : COORDINATE_LINEAR;
     k->param_lower = lower;
     k->param_upper = upper;
     k->lower = forward(k->kind, lower);
     k->upper = forward(k->kind, upper);
     k->step_limit = k->kind == COORDINATE_LOGIT ? 1.0 : k->kind == COORDINATE_LOG ? 0.25 : (upper - lower) / 8.0;
 }
+
+double coordinate_of(const struct coordinate *k, double param) { return forward(k->kind, param); }
 
 double coordinate_from_param(const struct coordinate *k, double param)
 {

@@ -1,6 +1,6 @@
 /* Fit coordinates: the scale on which a parameter is moved. Colours and albedos strictly inside (0, 1) move in ln(p /
- * (1 - p)), positive quantities (lobe widths) in ln p, all others linearly. The bounds are finite in all three, so a
- * parameter can reach one and stay there.
+ * (1 - p)), positive quantities (lobe widths) in ln p, all others linearly; the model's range decides, so tighter bounds
+ * of a fit change nothing. The bounds are finite in all three, so a parameter can reach one and stay there.
  */
 #ifndef SELVEDGE_OPTIMIZER_COORDINATE_H
 #define SELVEDGE_OPTIMIZER_COORDINATE_H
@@ -18,6 +18,8 @@ struct coordinate {
 
 /* lower and upper: bounds of this fit, inside those of the model. */
 void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper);
+/* The coordinate of a value inside the model's range, whatever the bounds of the fit are. */
+double coordinate_of(const struct coordinate *k, double param);
 /* Values beyond a bound map to the bound; a coordinate at (or beyond) a bound gives exactly the bound. */
 double coordinate_from_param(const struct coordinate *k, double param);
 double coordinate_to_param(const struct coordinate *k, double x);

@@ -77,6 +77,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
         m->j[q] = m->r_var[q] + n_row;
         m->j_var[q] = m->j[q] + n_row * n_param;
     }
+    m->row_var = 1.0;
     m->weight = block + 2 * per_replica;
     for (size_t row = 0; row < n_row; row++) m->weight[row] = 1.0;
     return STATUS_OK;
@@ -229,6 +230,77 @@ static void pool_configuration(struct linear_model *m, const struct linear_histo
     }
 }
 
+/* ---- one gain for each configuration ---- */
+
+static double dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* Unit vector along m, and the share of a row along it that goes: 1 - 1 / sqrt(1 + sd^2 |m|^2 / v). */
+static double gain_share(const struct linear_model *m, const struct observation *o, size_t i, double misfit,
+                         double unit[3])
+{
+    double noise = 0.0, root_w = sqrt(objective_weight(o)), length2;
+    for (size_t c = 0; c < 3; c++) {
+        unit[c] = root_w * o->mean_rgb[c];
+        noise += 0.25 * (m->r_var[0][3 * i + c] + m->r_var[1][3 * i + c]) / 3.0;
+    }
+    length2 = dot3(unit, unit);
+    if (!(length2 > 0.0)) return 0.0;
+    for (size_t c = 0; c < 3; c++) unit[c] /= sqrt(length2);
+    return 1.0 - 1.0 / sqrt(1.0 + m->gain_sd * m->gain_sd * length2 / (misfit + noise));
+}
+
+static double absorbed_objective(const struct linear_model *m, const struct observation_set *o, double misfit)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < o->n; i++) {
+        double unit[3], share = gain_share(m, &o->item[i], i, misfit, unit);
+        const double *a = m->r[0] + 3 * i, *b = m->r[1] + 3 * i;
+        sum += dot3(a, b) + (share * share - 2.0 * share) * dot3(a, unit) * dot3(b, unit);
+    }
+    return sum;
+}
+
+/* v <- v - share unit (unit . v), for three values `stride` apart. */
+static void take_out(double *v, size_t stride, const double unit[3], double share)
+{
+    double along = share * (unit[0] * v[0] + unit[1] * v[stride] + unit[2] * v[2 * stride]);
+    for (size_t c = 0; c < 3; c++) v[c * stride] -= along * unit[c];
+}
+
+/* Variances of the same: the larger of what independent and what fully correlated channels give. */
+static void take_out_var(double *v, size_t stride, const double unit[3], double share)
+{
+    double old[3] = {v[0], v[stride], v[2 * stride]};
+    for (size_t c = 0; c < 3; c++) {
+        double apart = 0.0, together = 0.0;
+        for (size_t k = 0; k < 3; k++) {
+            double factor = (c == k ? 1.0 : 0.0) - share * unit[c] * unit[k];
+            apart += factor * factor * old[k];
+            together += factor * sqrt(old[k]);
+        }
+        v[c * stride] = fmax(apart, together * together);
+    }
+}
+
+static void absorb_gains(struct linear_model *m, const struct observation_set *o)
+{
+    enum { ROUND = 6 };
+    double misfit = fmax(linear_model_objective(m, NULL) / (double)m->n_row, 1e-8);
+    for (int round = 0; round < ROUND; round++)
+        misfit = fmax(absorbed_objective(m, o, misfit) / (double)m->n_row, 1e-8);
+    for (size_t i = 0; i < o->n; i++) {
+        double unit[3], share = gain_share(m, &o->item[i], i, misfit, unit);
+        for (int q = 0; q < 2; q++) {
+            take_out(m->r[q] + 3 * i, 1, unit, share);
+            take_out_var(m->r_var[q] + 3 * i, 1, unit, share);
+            for (size_t p = 0; p < m->n_param; p++) {
+                take_out(m->j[q] + 3 * i * m->n_param + p, m->n_param, unit, share);
+                take_out_var(m->j_var[q] + 3 * i * m->n_param + p, m->n_param, unit, share);
+            }
+        }
+    }
+}
+
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)
 {
     status s = STATUS_OK;
@@ -245,6 +317,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     for (size_t i = 0; i < h->observation->n; i++)
         pool_configuration(m, h, mean, i, mean + m->n_row * m->n_param, weight);
     m->n_effective /= (double)h->observation->n;
+    if (m->gain_sd > 0.0) absorb_gains(m, h->observation);
 out:
     free(mean);
     free(weight);
@@ -277,6 +350,15 @@ void linear_model_weigh(struct linear_model *m)
         mean += m->weight[row] / (double)m->n_row;
     }
     for (size_t row = 0; row < m->n_row; row++) m->weight[row] /= mean;
+    m->row_var = 1.0 / mean; /* weight x variance, the same for all rows */
+}
+
+double linear_model_penalty(const struct linear_model *m, const double *x)
+{
+    double sum = 0.0;
+    for (size_t p = 0; p < m->n_param && m->prior != NULL; p++)
+        sum += m->prior[p].precision * (x[p] - m->prior[p].mean) * (x[p] - m->prior[p].mean);
+    return m->row_var * sum;
 }
 
 void linear_model_gradient(const struct linear_model *m, double *g)
@@ -286,6 +368,8 @@ void linear_model_gradient(const struct linear_model *m, double *g)
         for (size_t p = 0; p < m->n_param; p++)
             g[p] += m->weight[row] *
                     (m->r[0][row] * m->j[1][row * m->n_param + p] + m->r[1][row] * m->j[0][row * m->n_param + p]);
+    for (size_t p = 0; p < m->n_param && m->prior != NULL; p++)
+        g[p] += 2.0 * m->row_var * m->prior[p].precision * (m->x_ref[p] - m->prior[p].mean);
 }
 
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian)
@@ -299,6 +383,7 @@ void linear_model_hessian(const struct linear_model *m, bool cross, double *hess
                 hessian[p * n + q] +=
                     m->weight[row] * (cross ? a[p] * b[q] + b[p] * a[q] : 0.5 * (a[p] + b[p]) * (a[q] + b[q]));
     }
+    for (size_t p = 0; p < n && m->prior != NULL; p++) hessian[p * n + p] += 2.0 * m->row_var * m->prior[p].precision;
 }
 
 double linear_model_noise(const struct linear_model *m)

@@ -17,6 +17,11 @@
 #include "optimizer/photographs/observation.h"
 #include "renderer/transport/estimate.h"
 
+/* Of one unknown, in its fit coordinate. precision 1 / sd^2; 0: none. */
+struct gaussian_prior {
+    double mean, precision;
+};
+
 struct history_step {
     double x[SCATTERING_MAX_PARAM];
     struct estimate *replica[2]; /* one per observation, owned */
@@ -36,6 +41,9 @@ struct linear_model {
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
     double *weight;     /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
+    double row_var;     /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
+    const struct gaussian_prior *prior; /* n_param, NULL: none; the caller's */
+    double gain_sd;     /* of ln gain of each configuration, taken out of the residuals by linear_model_pool; 0: none */
     double n_effective; /* paths a configuration and replica that the averages amount to, mean over configurations */
 };
 
@@ -51,7 +59,12 @@ double linear_history_path_variance(const struct linear_history *h, size_t i);
 
 status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, struct error *err);
 void linear_model_release(struct linear_model *m);
-/* Averages the history at x_ref. At least one step. STATUS_NO_MEMORY. */
+/* Averages the history at x_ref. At least one step. STATUS_NO_MEMORY.
+ *
+ * With gain_sd > 0 each configuration's gain is marginalised (a photograph's exposure is known to gain_sd only): its
+ * residuals have the covariance v I + gain_sd^2 m m', m = sqrt(w) M, and all rows are multiplied by
+ * sqrt(v) (v I + gain_sd^2 m m')^(-1/2), after which they are independent with variance v again. v is the row's
+ * Monte-Carlo variance plus the misfit that is left, found by iterating. */
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref,
                          struct error *err);
 
@@ -61,9 +74,11 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
  * next call and by linear_model_pool. */
 void linear_model_weigh(struct linear_model *m);
 
+/* s2 sum ((x - mean) / sd)^2 with s2 = row_var: what the priors add to f at x. */
+double linear_model_penalty(const struct linear_model *m, const double *x);
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);
-/* 2 x mirrored average of J' r: the gradient of f by coordinates. */
+/* 2 x mirrored average of J' r: the gradient of f by coordinates; priors included, here and in the Hessian. */
 void linear_model_gradient(const struct linear_model *m, double *g);
 /* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged
  * J, positive semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */

@@ -90,8 +90,9 @@ static void covariance(const struct linear_model *m, const struct observation_se
     small_clip_eigenvalues(h, n, 0.0);
     small_clip_eigenvalues(b, n, 0.0);
     for (size_t p = 0; p < n; p++) {
-        h[p * n + p] += s2;
-        b[p * n + p] += s2 * s2;
+        double precision = m->prior != NULL ? m->prior[index[p]].precision * scale[p] * scale[p] : 0.0;
+        h[p * n + p] += s2 * (1.0 + precision);
+        b[p * n + p] += s2 * s2 * (1.0 + precision);
     }
     if (!small_invert(h, n, inverse)) { /* cannot be: eigenvalues >= s2 > 0; the prior alone then */
         memset(inverse, 0, n * n * sizeof *inverse);
@@ -135,7 +136,8 @@ void uncertainty_compute(const struct linear_model *m, const struct observation_
     for (size_t p = 0; p < n; p++) {
         double uniform = (k[p].param_upper - k[p].param_lower) / sqrt(12.0);
         double slope = coordinate_slope(&k[p], coordinate_to_param(&k[p], m->x_ref[p]));
-        u->se_param[p] = fixed[p] ? 0.0 : fmin(slope * sqrt(u->cov[p * n + p]), uniform);
+        double most = m->prior != NULL && m->prior[p].precision > 0.0 ? slope / sqrt(m->prior[p].precision) : uniform;
+        u->se_param[p] = fixed[p] ? 0.0 : fmin(slope * sqrt(u->cov[p * n + p]), fmin(uniform, most));
         u->determined[p] = fixed[p] || u->se_param[p] < 0.5 * uniform;
         u->correlation[p * n + p] = 1.0;
     }

@@ -7,9 +7,9 @@
  * variance of the pooled mean (fully correlated between channels, which share their paths) (what is left of f per
  * degree of freedom, for residuals that no noise explains). D: Monte-Carlo noise of J times the residuals. L = s2 /
  * (prior sd)^2: the allowed range as a weak prior, so that an undetermined parameter gets an error as large as its
- * range and not infinity. s2: mean of V. A parameter at a bound gets the error that it would have if it could move.
+ * range and not infinity; the model's own priors (linear_model.h) add their precision to it. s2: mean of V. A parameter at a bound gets the error that it would have if it could move.
  * File units by the delta method: se(p) = |dp/dx| se(x), not more than that of a uniform distribution over the allowed
- * range.
+ * range, nor than its prior says.
  */
 #ifndef SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 #define SELVEDGE_OPTIMIZER_UNCERTAINTY_H

@@ -91,7 +91,7 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
 {
     const struct job_photograph *p = &doc->photograph[i];
     struct photograph_mean mean;
-    struct observation item = {.set = p->set, .weight = 1.0};
+    struct observation item = {.set = p->set, .weight = p->weight};
     char path[4096];
     snprintf(path, sizeof path, "%s/%s", folder, p->file);
     status s = photograph_measure(path, p, &mean, err);

@@ -1,5 +1,6 @@
 #include "optimizer/report/result_json.h"
 #include "optimizer/job_folder.h"
+#include "optimizer/report/result_options_json.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -79,13 +80,15 @@ static json_t *parameters_json(const struct pipeline_model *m)
     for (size_t p = 0; p < m->appearance.n_param; p++) {
         const struct param_info *info = &m->appearance.param[p];
         const struct fit_parameter *k = &m->parameter[p];
-        json_array_append_new(
-            list, json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit",
-                            info->unit, "value", number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
-                            number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
-                            param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
-                            param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
-                            (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed));
+        json_t *parameter =
+            json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit", info->unit,
+                      "value", number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
+                      number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
+                      param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
+                      param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
+                      (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);
+        result_parameter_options(m, p, parameter);
+        json_array_append_new(list, parameter);
     }
     return list;
 }
@@ -99,12 +102,15 @@ static json_t *correlation_json(const struct pipeline_model *m)
     return list;
 }
 
-/* Rendered mean and its standard error, from both replicas. */
-static void rendered_mean(const struct validation *v, size_t i, double mean[3], double se[3])
+/* What a photograph would show by the rendering (nuisance.h), and its standard error, from both replicas. */
+static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3])
 {
+    struct estimate a, b;
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
     for (int q = 0; q < 3; q++) {
-        mean[q] = 0.5 * (v->replica[0][i].mean[q] + v->replica[1][i].mean[q]);
-        se[q] = 0.5 * sqrt(v->replica[0][i].var[q] + v->replica[1][i].var[q]);
+        mean[q] = 0.5 * (a.mean[q] + b.mean[q]);
+        se[q] = 0.5 * sqrt(a.var[q] + b.var[q]);
     }
 }
 
@@ -124,6 +130,7 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
     json_object_set_new(json, "heldout_rel_rms", number(m->validation.held_out.rel_rms));
     json_object_set_new(json, "misfit_rel_rms", number(sqrt(m->fit.uncertainty.misfit_var)));
     json_object_set_new(json, "validation_worst_rel_se", number(m->validation.worst_rel_se));
+    result_fit_options(c, m, json);
     json_object_set_new(json, "n_path_fit", json_integer((json_int_t)m->fit.n_path));
     json_object_set_new(json, "n_step", count(m->fit.n_step));
     json_object_set_new(json, "fit_wall_s", number(m->fit.wall_s));
@@ -141,22 +148,25 @@ static json_t *model_json(const struct pipeline_context *c, size_t i_model)
     put_fit(json, c, m);
     for (size_t i = 0; i < c->observation.n; i++) {
         double mean[3], se[3];
-        rendered_mean(&m->validation, i, mean, se);
-        json_array_append_new(rows, json_pack("{s:o, s:o}", "rendered", number_list(mean, 3, 1.0), "rendered_se",
-                                              number_list(se, 3, 1.0)));
+        rendered_mean(m, i, mean, se);
+        json_t *row = json_pack("{s:o, s:o}", "rendered", number_list(mean, 3, 1.0), "rendered_se",
+                                number_list(se, 3, 1.0));
+        result_row_options(c, m, i, row);
+        json_array_append_new(rows, row);
     }
     json_object_set_new(json, "rows", rows);
     return json;
 }
 
-static json_t *row_json(const struct pipeline_context *c, const struct validation *v, size_t i, const char *picture)
+static json_t *row_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i,
+                        const char *picture)
 {
     const struct observation *o = &c->observation.item[i];
     const struct configuration *k = &o->configuration;
     const double deg = 180.0 / M_PI;
     double rendered[3], se[3];
     char png[200], exr[200], photograph[200];
-    rendered_mean(v, i, rendered, se);
+    rendered_mean(m, i, rendered, se);
     snprintf(png, sizeof png, "renderings/%s.png", picture);
     snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
     snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
@@ -172,6 +182,7 @@ static json_t *row_json(const struct pipeline_context *c, const struct validatio
     json_object_set_new(row, "rendering_png", json_string(png));
     json_object_set_new(row, "rendering_exr", json_string(exr));
     json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
+    result_row_options(c, m, i, row);
     return row;
 }
 
@@ -239,7 +250,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
     json_t *rows = json_array(), *models = json_array();
     for (size_t i = 0; i < c->observation.n; i++)
-        json_array_append_new(rows, row_json(c, &best->validation, i, picture[i]));
+        json_array_append_new(rows, row_json(c, best, i, picture[i]));
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
     json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", c->doc->sample, "model",
                              best->appearance.id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed);

@@ -2,7 +2,7 @@
  *
  * {"format":1, "sample", "model", "method", "seed", "converged":bool, "reason",
  *  "parameters":[{"name":"C_R.r","unit":""|"deg","value","standard_error","lower","upper","start","at_bound":null|"lower"|"upper","determined":bool,
- *                 "fixed":bool}],                     file units; standard_error includes photograph noise, Monte-Carlo
+ *                 "fixed":bool,"tied_to":null|name,"ratio":null|number,"prior":null|{"mean","se"}}],                     file units; standard_error includes photograph noise, Monte-Carlo
  * noise and misfit "correlation":[[...]],                             in fit coordinates; 0 for parameters that are
  * fixed or at a bound "objective", "objective_se", "fit_rel_rms",       fresh paths at the result, fitted rows
  * (objective.h defines all three) "heldout_rel_rms":number|null, "misfit_rel_rms",  misfit: per residual, what no noise
@@ -10,7 +10,9 @@
  * the row's brightness
  *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg",
  *           "weight","measured":[r,g,b],"measured_se":[3],"rendered":[3],"rendered_se":[3],
- *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null}],
+ *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null,"gain":null|number,"gain_se":null|number}],
+ *  "prior_penalty", "nuisance":[{"name","value","standard_error","at_bound":bool}], "fit_rel_rms_with_gains":number|null,
+ *  "starts":[{"start":[...],"value":[...],"objective","objective_se","prior_penalty","converged","kept","elsewhere","n_path"}],
  *  "models":[{"id","title","kind":"surface"|"volume","best":bool, all of "converged" to "validation_worst_rel_se" and
  *             "n_path_fit" to "n_path_validation", "rows":[{"rendered":[3],"rendered_se":[3]}] in the order of "rows"}],
  *             in the order of the job document; all the rest is of the best model: the one with the lowest error over

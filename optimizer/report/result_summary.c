@@ -1,6 +1,7 @@
 /* results/summary.txt: the result on one page, for people. */
 #include "optimizer/job_folder.h"
 #include "optimizer/report/result_json.h"
+#include "optimizer/report/result_options_json.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -18,12 +19,12 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
                  param_to_file_unit(info, k->upper), info->unit);
         fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, m->fit.param[p]),
-                param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : "",
+                param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : m->option->leader[p] != p ? "tied " : "",
                 u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these photographs");
     }
 }
 
-static void print_rows(const struct pipeline_context *c, const struct validation *v, FILE *out)
+static void print_rows(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
     const double deg = 180.0 / M_PI;
     fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi",
@@ -32,8 +33,11 @@ static void print_rows(const struct pipeline_context *c, const struct validation
         const struct observation *o = &c->observation.item[i];
         const struct configuration *k = &o->configuration;
         double r[3], error = 0.0;
+        struct estimate a, b;
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
         for (int q = 0; q < 3; q++) {
-            r[q] = 0.5 * (v->replica[0][i].mean[q] + v->replica[1][i].mean[q]);
+            r[q] = 0.5 * (a.mean[q] + b.mean[q]);
             error += (r[q] - o->mean_rgb[q]) * (r[q] - o->mean_rgb[q]) / 3.0;
         }
         fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6.1f   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
@@ -76,7 +80,8 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
             m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
     print_parameters(m, out);
-    print_rows(c, &m->validation, out);
+    result_summary_options(c, m, out);
+    print_rows(c, m, out);
     for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
         fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
 }

@@ -3,6 +3,7 @@
 #include "optimizer/descent/method_names.h"
 #include "optimizer/job_document.h"
 #include "optimizer/pipeline.h"
+#include "renderer/scattering/appearance.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -179,6 +180,76 @@ static void test_fit(void **state)
     check_error(FIT_OF("{\"path_budget\":10}"), "fit.path_budget", "1000");
 }
 
+static void resolve(const char *fit, struct job_fit_parameter k[JOB_MAX_PARAM])
+{
+    struct job_document *d = parse(fit);
+    struct appearance m;
+    struct error err = {0};
+    assert_true(appearance_find(d->model[0].id, &m));
+    if (job_fit_resolve(m.param, m.n_param, &d->model[0], k, &err) != STATUS_OK) fail_msg("%s", err.text);
+    job_document_free(d);
+}
+
+/* two_lobe.v1: C_R 0..2, C_TT 3..5, beta_R 6, beta_TT 7, gamma_TT 8 */
+static void test_fit_options(void **state)
+{
+    (void)state;
+    struct job_fit_parameter k[JOB_MAX_PARAM];
+    resolve(FIT_OF("{\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":0.5}],\"bounds\":{\"beta_R\":[2,8],\"gamma_TT\":[6,20]},"
+                   "\"start\":{\"gamma_TT\":8},\"priors\":{\"beta_R\":{\"mean\":3,\"se\":1}}}"),
+            k);
+    assert_true(k[6].lower == 2.0 && k[6].upper == 8.0 && k[6].start == 3.0);
+    assert_true(fabs(k[7].lower - 12.0) < 1e-12 && fabs(k[7].upper - 40.0) < 1e-12 && fabs(k[7].start - 16.0) < 1e-12);
+    assert_true(fabs(k[8].lower - 6.0) < 1e-12 && fabs(k[8].upper - 20.0) < 1e-12 && k[8].start == 8.0);
+    resolve(FIT_OF("{\"tied\":[[\"C_R.r\",\"C_R.b\"]],\"fixed\":{\"C_R.b\":0.3}}"), k);
+    assert_true(k[0].fixed && k[0].start == 0.3 && !k[1].fixed && k[2].fixed);
+    struct job_document *d = parse(FIT_OF("{\"starts\":4,\"nuisance\":{\"gain\":\"per_photograph\",\"gain_prior_rel\":0.1,"
+                                          "\"stray_light\":true},\"models\":[\"two_lobe.v1\",\"two_lobe_balanced.v1\"]}"));
+    for (size_t i = 0; i < 2; i++) {
+        const struct job_fit_option *o = &d->model[i].option;
+        assert_true(o->n_start == 4 && o->gain == JOB_GAIN_PER_PHOTOGRAPH && o->gain_prior_rel == 0.1);
+        assert_true(o->stray_light && o->stray_light_prior == 0.01);
+    }
+    job_document_free(d);
+}
+
+static void test_fit_option_errors(void **state)
+{
+    (void)state;
+    check_error(FIT_OF("{\"tied\":[\"C_R\"]}"), "fit.tied[0]", "list of parameter names");
+    check_error(FIT_OF("{\"tied\":{}}"), "fit.tied", "list of groups");
+    check_error(FIT_OF("{\"tied\":[[\"beta_R\"]]}"), "fit.tied[0]", "at least two");
+    check_error(FIT_OF("{\"tied\":[[\"beta_R\",\"beta_R\"]]}"), "fit.tied[0]", "second time");
+    check_error(FIT_OF("{\"tied\":[[\"C_R\"],[\"C_R.r\",\"C_TT.r\"]]}"), "fit.tied[1]", "second time");
+    check_error(FIT_OF("{\"tied\":[[\"beta_R\",\"beta_X\"]]}"), "fit.tied[0]", "unknown parameter 'beta_X'");
+    check_error(FIT_OF("{\"tied\":[[\"beta_R\",\"C_R.r\"]]}"), "fit.tied[0]", "same unit");
+    check_error(FIT_OF("{\"tied\":[[\"beta_R\",7]]}"), "fit.tied[0]", "list of parameter names");
+    check_error(FIT_OF("{\"tied\":[{\"beta_R\":1,\"beta_TT\":0}]}"), "fit.tied[0].beta_TT", "0.001");
+    check_error(FIT_OF("{\"tied\":[{\"beta_R\":10,\"beta_TT\":1}]}"), "fit.tied", "no room");
+    check_error(FIT_OF("{\"tied\":[[\"C_R\"]],\"fixed\":{\"C_R\":[0.1,0.2,0.1]}}"), "fit.fixed", "does not allow");
+    check_error(FIT_OF("{\"tied\":[[\"C_R\"]],\"start\":{\"C_R\":[0.1,0.2,0.1]}}"), "fit.start", "does not allow");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2]}}"), "fit.bounds.beta_R", "2 numbers");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[5,5]}}"), "fit.bounds.beta_R", "below the second");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[0,5]}}"), "fit.bounds.beta_R[0]", "1 to 10");
+    check_error(FIT_OF("{\"bounds\":{\"C_R\":[0.1,0.5],\"C_R.g\":[0.1,0.2]}}"), "fit.bounds.C_R.g", "second time");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"start\":{\"beta_R\":5}}"), "fit.start", "2 and 4");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"fixed\":{\"beta_R\":5}}"), "fit.fixed", "2 and 4");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5}}}"), "fit.priors.beta_R.se", "missing");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 10");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":0}}}"), "fit.priors.beta_R.se", "0");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"sd\":1}}}"), "fit.priors.beta_R.sd", "unknown field");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"fixed\":{\"beta_R\":5}}"), "fit.priors", "fixed");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"method\":\"published_sgd.v1\"}"), "fit.priors",
+                METHOD_GAUSS_NEWTON);
+    check_error(FIT_OF("{\"nuisance\":{\"stray_light\":true},\"method\":\"published_sgd.v1\"}"), "fit.nuisance",
+                METHOD_GAUSS_NEWTON);
+    check_error(FIT_OF("{\"nuisance\":{\"gain\":\"each\"}}"), "fit.nuisance.gain", "per_photograph");
+    check_error(FIT_OF("{\"nuisance\":{\"gain_prior_rel\":0}}"), "fit.nuisance.gain_prior_rel", "0.0001");
+    check_error(FIT_OF("{\"starts\":0}"), "fit.starts", "1 to 16");
+    check_error(FIT_OF("{\"starts\":2,\"max_iterations\":1000}"), "fit.max_iterations", "500");
+    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"weight\":-1"), "photographs[0].weight", "-1");
+}
+
 static void test_bounds_are_values(void **state)
 {
     (void)state;
@@ -278,6 +349,7 @@ int main(void)
         cmocka_unit_test(test_volume),
         cmocka_unit_test(test_photographs),
         cmocka_unit_test(test_fit),
+        cmocka_unit_test(test_fit_options), cmocka_unit_test(test_fit_option_errors),
         cmocka_unit_test(test_bounds_are_values),
         cmocka_unit_test(test_file_names),
         cmocka_unit_test(test_damage),

@@ -1,0 +1,43 @@
+// What the options of a fit gave beyond the parameters: nuisance terms, gains of photographs, several starts.
+import { el, isNumber, percent, withError } from "./page_parts.js";
+
+function table(id, heads, rows) {
+  return el("div", { class: "scroll" }, el("table", { id }, el("thead", {}, el("tr", {}, heads.map((h) => el("th", { class: h.startsWith("#") ? "number" : null }, h.replace("#", ""))))), el("tbody", {}, rows)));
+}
+
+const number = (text) => el("td", { class: "number" }, text);
+const tag = (text, kind = "warn") => el("span", { class: `tag ${kind}` }, text);
+
+function nuisance(result) {
+  const list = result.nuisance ?? [];
+  if (!list.length) return null;
+  const name = { gain: "gain of all photographs", stray_light: "stray light (radiance)" };
+  return el("div", {}, el("h3", {}, "Nuisance terms"),
+    table("nuisance", ["Term", "#Value ± standard error", ""], list.map((n) => el("tr", {}, el("td", {}, name[n.name] ?? n.name), number(withError(n.value, n.standard_error)), el("td", {}, n.at_bound ? tag("at a bound") : "")))));
+}
+
+function gains(result) {
+  const rows = (result.rows ?? []).filter((r) => isNumber(r.gain));
+  if (!rows.length) return null;
+  return el("div", {}, el("h3", {}, "Gain of each photograph"),
+    el("p", { class: "hint" }, `With them the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}.`),
+    table("gains", ["Photograph", "#Gain ± standard error", ""], rows.map((r) => el("tr", {}, el("td", { class: "mono" }, r.name), number(withError(r.gain, r.gain_se)),
+      el("td", {}, Math.abs(r.gain - 1) > 3 * r.gain_se && Math.abs(r.gain - 1) > 0.05 ? tag("differs from the others") : "")))));
+}
+
+function starts(result) {
+  const list = result.starts ?? [];
+  if (!list.length) return null;
+  const names = result.parameters.map((p) => p.name);
+  const short = (v) => v.map((x, i) => `${names[i]} ${Number(x.toPrecision(3))}`).join(", ");
+  return el("div", {}, el("h3", {}, "Starts"),
+    table("starts", ["Start", "#Objective ± s.e.", "", "Ended at"], list.map((s, i) => el("tr", {}, el("td", { title: short(s.start) }, String(i + 1)), number(withError(s.objective, s.objective_se)),
+      el("td", {}, s.kept ? tag("kept", "good") : "", s.converged ? "" : tag("not converged"), s.elsewhere ? tag("as good, elsewhere") : ""), el("td", { class: "hint" }, short(s.value))))));
+}
+
+// The content of the card, or null when the job asked for nothing special.
+export function fitDetails(job) {
+  if (!job.result) return null;
+  const parts = [nuisance, gains, starts].map((part) => part(job.result)).filter((p) => p !== null);
+  return parts.length ? el("div", { id: "fit-details" }, parts) : null;
+}

@@ -1,0 +1,115 @@
+#include "optimizer/report/result_options_json.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(); }
+
+void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *parameter)
+{
+    const struct job_fit_option *o = m->option;
+    bool tied = o->leader[p] != p;
+    json_object_set_new(parameter, "tied_to", tied ? json_string(m->appearance.param[o->leader[p]].name) : json_null());
+    json_object_set_new(parameter, "ratio", tied ? json_real(o->ratio[p]) : json_null());
+    json_object_set_new(parameter, "prior",
+                        isnan(o->prior_mean[p])
+                            ? json_null()
+                            : json_pack("{s:f, s:f}", "mean", o->prior_mean[p], "se", o->prior_se[p]));
+}
+
+static void row_gain(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *gain, double *se)
+{
+    struct estimate a, b;
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
+    nuisance_photograph_gain(&c->observation.item[i], &a, &b, m->option->gain_prior_rel,
+                             m->fit.uncertainty.misfit_var, gain, se);
+}
+
+void result_row_options(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, json_t *row)
+{
+    double gain = NAN, se = NAN;
+    if (m->option->gain == JOB_GAIN_PER_PHOTOGRAPH) row_gain(c, m, i, &gain, &se);
+    json_object_set_new(row, "gain", number(gain));
+    json_object_set_new(row, "gain_se", number(se));
+}
+
+/* Relative RMS error of the fitted rows after each has had its gain. */
+static double rel_rms_with_gains(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    double sum = 0.0;
+    size_t n = 0;
+    if (m->option->gain != JOB_GAIN_PER_PHOTOGRAPH) return NAN;
+    for (size_t i = 0; i < c->observation.n; i++) {
+        const struct observation *o = &c->observation.item[i];
+        struct estimate a, b;
+        double gain, se;
+        if (o->set != JOB_SET_FIT) continue;
+        row_gain(c, m, i, &gain, &se);
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
+        for (int k = 0; k < 3; k++)
+            sum += objective_relative_weight(o) * (gain * a.mean[k] - o->mean_rgb[k]) *
+                   (gain * b.mean[k] - o->mean_rgb[k]);
+        n += 3;
+    }
+    return n > 0 ? sqrt(fmax(0.0, sum) / (double)n) : NAN;
+}
+
+static json_t *nuisance_json(const struct fit_nuisance *n)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < n->n; i++)
+        json_array_append_new(list, json_pack("{s:s, s:o, s:o, s:b}", "name", n->name[i], "value", number(n->value[i]),
+                                              "standard_error", number(n->se[i]), "at_bound", (int)n->at_bound[i]));
+    return list;
+}
+
+static json_t *values_json(const struct pipeline_model *m, const double *param)
+{
+    json_t *list = json_array();
+    for (size_t p = 0; p < m->appearance.n_param; p++)
+        json_array_append_new(list, number(param_to_file_unit(&m->appearance.param[p], param[p])));
+    return list;
+}
+
+static json_t *starts_json(const struct pipeline_model *m)
+{
+    json_t *list = json_array();
+    for (size_t k = 0; k < m->fit.n_start; k++) {
+        const struct fit_start *s = &m->fit.start[k];
+        json_array_append_new(
+            list, json_pack("{s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:b, s:I}", "start", values_json(m, s->from), "value",
+                            values_json(m, s->param), "objective", number(s->objective), "objective_se",
+                            number(s->objective_se), "prior_penalty", number(s->prior_penalty), "converged",
+                            (int)s->converged, "kept", (int)s->kept, "elsewhere", (int)s->elsewhere, "n_path",
+                            (json_int_t)s->n_path));
+    }
+    return list;
+}
+
+void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result)
+{
+    json_object_set_new(result, "prior_penalty", number(m->fit.prior_penalty));
+    json_object_set_new(result, "nuisance", nuisance_json(&m->fit.nuisance));
+    json_object_set_new(result, "starts", starts_json(m));
+    json_object_set_new(result, "fit_rel_rms_with_gains", number(rel_rms_with_gains(c, m)));
+}
+
+void result_summary_options(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
+{
+    const struct fit_nuisance *n = &m->fit.nuisance;
+    double with_gains = rel_rms_with_gains(c, m);
+    for (size_t i = 0; i < n->n; i++)
+        fprintf(out, "%-12s %10.5f %10.5f  nuisance term%s\n", n->name[i], n->value[i], n->se[i],
+                n->at_bound[i] ? ", at a bound" : "");
+    if (isfinite(with_gains))
+        fprintf(out, "one gain for each photograph: relative RMS error over the fitted rows with them %.2f %%\n",
+                100.0 * with_gains);
+    for (size_t k = 0; k < m->fit.n_start; k++) {
+        const struct fit_start *s = &m->fit.start[k];
+        fprintf(out, "start %-2zu objective %.5g +- %.2g%s%s%s\n", k + 1, s->objective, s->objective_se,
+                s->converged ? "" : ", not converged", s->kept ? ", kept" : "",
+                s->elsewhere ? ", as good but at other parameters" : "");
+    }
+}
