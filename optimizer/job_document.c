@@ -161,6 +161,26 @@ static status parse_observations(const struct json_field *root, struct job_docum
     return s;
 }
 
+/* What the front shows hardly depends on density: the fit of it wants light that went through the cloth. (Rows of a
+ * table are looked at when it is read.) */
+static status check_density(const struct job_document *doc, struct error *err)
+{
+    bool from_behind = false;
+    for (size_t i = 0; i < doc->n_photograph; i++)
+        if (doc->photograph[i].set == JOB_SET_FIT && doc->photograph[i].light_theta_deg > 90.0) from_behind = true;
+    if (!doc->fit_density || from_behind || (doc->n_photograph == 0 && !doc->black_sheet)) return STATUS_OK;
+    return job_density_undetermined(doc->black_sheet, err);
+}
+
+status job_density_undetermined(bool black_sheet, struct error *err)
+{
+    return error_set_field(err, STATUS_INVALID, "fit.fit_density",
+                           "'fit.fit_density' cannot be fitted: no photograph to be fitted has the lamp behind the "
+                           "cloth (light_theta_deg above 90%s), and from the front brightness hardly depends on "
+                           "density; add one, or give density_multiplier_per_cm",
+                           black_sheet ? ", black_sheet false" : "");
+}
+
 /* ---- no file twice ---- */
 
 struct name_list {
@@ -234,6 +254,7 @@ status job_document_parse(const char *text, size_t n_bytes, struct job_document 
     if (s == STATUS_OK) s = parse_observations(&root, d, err);
     if (s == STATUS_OK) s = json_field_object(&root, "fit", &fit, &has_fit, err);
     if (s == STATUS_OK && has_fit) s = job_parse_fit(&fit, d, err);
+    if (s == STATUS_OK) s = check_density(d, err);
     if (s == STATUS_OK) s = check_duplicates(d, err);
     if (s != STATUS_OK) goto out;
     *doc = d;

@@ -123,6 +123,8 @@ status job_fit_resolve(const struct param_info *info, size_t n_param, const stru
 /* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
+/* The error of a job that wants the density fitted without a row that is lit from behind. */
+status job_density_undetermined(bool black_sheet, struct error *err);
 /* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
 bool job_file_name_valid(const char *name);
 

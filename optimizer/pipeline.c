@@ -138,6 +138,14 @@ static status set_models(struct pipeline_context *c, struct error *err)
     return STATUS_OK;
 }
 
+static status check_density(const struct pipeline_context *c, struct error *err)
+{
+    bool from_behind = false;
+    for (size_t i = 0; i < c->fitted.n; i++)
+        if (c->fitted.item[i].configuration.light_theta_rad > M_PI_2) from_behind = true;
+    return c->doc->fit_density && !from_behind ? job_density_undetermined(c->doc->black_sheet, err) : STATUS_OK;
+}
+
 static void warn_few_rows(struct pipeline_context *c)
 {
     for (size_t i = 0; i < c->n_model; i++) {
@@ -196,6 +204,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
     if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
+    if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);
     return s;
 }

@@ -81,6 +81,18 @@ static void log_fit(struct pipeline_context *c, const struct pipeline_model *m)
     worker_status_warn(c->status, warning);
 }
 
+static void warn_density(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    int d = appearance_param_index(&m->appearance, APPEARANCE_DENSITY_MULTIPLIER);
+    if (d < 0 || m->parameter[d].fixed || m->fit.uncertainty.determined[d]) return;
+    char warning[300];
+    snprintf(warning, sizeof warning,
+             "the density multiplier of %s is not determined by these photographs: too little light comes through "
+             "the cloth, or too much",
+             m->appearance.id);
+    worker_status_warn(c->status, warning);
+}
+
 static status fit_model(struct fit_listener *listener, struct error *err)
 {
     struct pipeline_context *c = listener->pipeline;
@@ -106,6 +118,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
     log_fit(c, m);
     warn_of_starts(c, m);
+    warn_density(c, m);
     listener->step_base += m->fit.n_step;
 out:
     pipeline_trace_close(&trace);

@@ -7,6 +7,8 @@
 #include <string.h>
 
 enum { N = SCATTERING_MAX_PARAM };
+/* A quantity that is positive and spans decades is not known when it may be half or twice as large (one standard error). */
+static const double log_determined = 0.69;
 
 /* Squared residuals (without Monte-Carlo bias) beyond what the photographs' own noise explains, per degree of freedom.
  */
@@ -138,7 +140,8 @@ void uncertainty_compute(const struct linear_model *m, const struct observation_
         double slope = coordinate_slope(&k[p], coordinate_to_param(&k[p], m->x_ref[p]));
         double most = m->prior != NULL && m->prior[p].precision > 0.0 ? slope / sqrt(m->prior[p].precision) : uniform;
         u->se_param[p] = fixed[p] ? 0.0 : fmin(slope * sqrt(u->cov[p * n + p]), fmin(uniform, most));
-        u->determined[p] = fixed[p] || u->se_param[p] < 0.5 * uniform;
+        bool in_proportion = k[p].kind != COORDINATE_LOG || sqrt(u->cov[p * n + p]) < log_determined;
+        u->determined[p] = fixed[p] || (u->se_param[p] < 0.5 * uniform && in_proportion);
         u->correlation[p * n + p] = 1.0;
     }
     for (size_t a = 0; a < n_inner; a++) {

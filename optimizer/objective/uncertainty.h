@@ -25,7 +25,8 @@ struct uncertainty {
                        SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed or at a bound */
     double se_param[SCATTERING_MAX_PARAM];    /* internal unit; 0 for fixed parameters */
     bool at_bound[SCATTERING_MAX_PARAM];
-    /* The standard error is below half of that of a uniform distribution over the allowed range. */
+    /* The standard error is below half of that of a uniform distribution over the allowed range, and for parameters
+     * that move in the logarithm below a factor of 2. */
     bool determined[SCATTERING_MAX_PARAM];
     double misfit_var; /* per residual, in units of the objective: about the squared relative error that the model
                           leaves */

@@ -88,6 +88,7 @@ def test_command_line_prints_the_comparison(real, finished):
     ({"start": {"gamma": 9}}, "fit.start.gamma", "1.5"),
     ({"fixed": {"density_multiplier": 4000}}, "fit.fixed.density_multiplier", "unknown parameter"),
     ({"density_multiplier_per_cm": 1}, "fit.density_multiplier_per_cm", "10 to 100000"),
+    ({"fit_density": True}, "fit.fit_density", "black_sheet false"),
     ({"models": ["two_lobe.v1"]}, "fit.density_multiplier_per_cm", "volume models"),
     ({"fixed": {"alpha": 0.5, "gamma": 0.2}}, "fit.fixed", "microflake.v1"),
 ])
@@ -95,6 +96,16 @@ def test_bad_input(real, fit, field, says):
     reply = real.post("/v1/jobs", json=document(**fit))
     body = reply.json()
     assert reply.status_code == 422 and body["field"] == field and says in body["detail"], body
+
+
+def test_density_wants_light_from_behind(real):
+    """A table is read by the worker: the same error as for photographs, only later."""
+    job = real.create({**document(fit_density=True), "black_sheet": False})
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    real.post(f"/v1/jobs/{job}/start")
+    error = real.wait_state(job, "failed", timeout_s=60)["error"]
+    assert error["field"] == "fit.fit_density" and "behind the cloth" in error["text"], error
 
 
 def test_voxels_that_need_too_much(real):

@@ -178,6 +178,9 @@ static void test_fit(void **state)
     check_error(FIT_OF("{\"fixed\":{\"beta_R\":5,\"beta_TT\":10,\"gamma_TT\":10,\"C_R\":0.1,\"C_TT\":0.8}}"),
                 "fit.fixed", "at least one free");
     check_error(FIT_OF("{\"path_budget\":10}"), "fit.path_budget", "1000");
+    check_error(FIT_OF("{\"model\":\"microflake.v1\",\"fit_density\":true}"), "fit.fit_density", "behind the cloth");
+    check_error(FIT_OF("{\"fit_density\":true}"), "fit.fit_density", "volume models");
+    check_error(FIT_OF("{\"model\":\"microflake.v1\",\"fit_density\":1}"), "fit.fit_density", "true or false");
 }
 
 static void resolve(const char *fit, struct job_fit_parameter k[JOB_MAX_PARAM])
