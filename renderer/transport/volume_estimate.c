@@ -4,9 +4,7 @@
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/volume_tracer.h"
 
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 struct run {
     const struct volume_estimate_request *q;
@@ -17,27 +15,8 @@ struct run {
 static uint64_t trace(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng, float *value)
 {
     const struct run *r = context;
-    const struct camera *camera = &r->camera[i_configuration];
-    struct volume_ray ray[ESTIMATE_BLOCK_PATHS];
-    struct volume_result path[ESTIMATE_BLOCK_PATHS];
-    size_t n = 0, place[ESTIMATE_BLOCK_PATHS], n_jac = r->q->want_jacobian ? 3 * (r->q->model->n_param + 1) : 0;
-    uint64_t n_vertex = 0;
-    for (size_t i = 0; i < ESTIMATE_BLOCK_PATHS; i++) {
-        double origin_mm[3], direction[3];
-        camera_origin(camera, xy[i][0], xy[i][1], origin_mm);
-        camera_direction(camera, xy[i][0], xy[i][1], direction);
-        if (!volume_ray_enter(r->q->scene, origin_mm, direction, &ray[n])) continue; /* sees nothing: adds 0 */
-        rng[n] = rng[i];
-        place[n++] = i;
-    }
-    volume_trace_many(&r->setting[i_configuration], n, ray, rng, path);
-    for (size_t i = 0; i < n; i++) {
-        float *v = value + place[i] * (3 + n_jac);
-        memcpy(v, path[i].radiance, sizeof path[i].radiance);
-        memcpy(v + 3, path[i].jac, n_jac * sizeof *v);
-        n_vertex += path[i].n_vertex;
-    }
-    return n_vertex;
+    return volume_trace_camera(&r->setting[i_configuration], &r->camera[i_configuration], ESTIMATE_BLOCK_PATHS, xy,
+                               rng, value);
 }
 
 static status numeric_error(const struct volume_estimate_request *q, size_t i_configuration, size_t i_value,
@@ -53,6 +32,13 @@ static status numeric_error(const struct volume_estimate_request *q, size_t i_co
                            q->model->id, i_configuration, name[0] != '\0' ? name : "radiance");
 }
 
+status volume_check_multiplier(double multiplier_per_m, struct error *err)
+{
+    if (multiplier_per_m > 0 && multiplier_per_m <= 1e9) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "d", "cannot trace with density multiplier %g per metre",
+                           multiplier_per_m);
+}
+
 status volume_estimate_run(const struct volume_estimate_request *q, struct thread_pool *pool,
                            const struct progress *progress, struct estimate *out, struct error *err)
 {
@@ -61,9 +47,8 @@ status volume_estimate_run(const struct volume_estimate_request *q, struct threa
     size_t bad_configuration = 0, bad_value = 0;
     status st = estimate_check_configurations(q->configuration, q->n_configuration, q->iteration, q->replica, err);
     if (st != STATUS_OK) return st;
-    if (!(q->multiplier_per_m > 0 && q->multiplier_per_m <= 1e9))
-        return error_set_field(err, STATUS_INVALID, "d", "cannot trace with density multiplier %g per metre",
-                               q->multiplier_per_m);
+    st = volume_check_multiplier(q->multiplier_per_m, err);
+    if (st != STATUS_OK) return st;
     st = q->model->prepare(q->param, &state, err);
     if (st != STATUS_OK) return st;
     r.setting = malloc((q->n_configuration + 1) * sizeof *r.setting);

@@ -27,5 +27,7 @@ struct volume_estimate_request {
  * NaN appears). */
 status volume_estimate_run(const struct volume_estimate_request *q, struct thread_pool *pool,
                            const struct progress *progress, struct estimate *out, struct error *err);
+/* STATUS_INVALID, field d, for a density multiplier that is not positive or above 1e9. */
+status volume_check_multiplier(double multiplier_per_m, struct error *err);
 
 #endif

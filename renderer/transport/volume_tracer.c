@@ -1,5 +1,6 @@
 #include "renderer/transport/volume_tracer.h"
 
+#include "renderer/transport/camera.h"
 #include "renderer/transport/volume_flight.h"
 
 #define VOLUME_ROULETTE_BELOW 0.3f
@@ -351,7 +352,7 @@ void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct
     *rng = l.rng;
 }
 
-void volume_trace_many(const struct volume_setting *s, size_t n, const struct volume_ray *ray, const struct rng *rng,
+void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
                        struct volume_result *out)
 {
     struct lane lane[N_LANE];
@@ -370,4 +371,29 @@ void volume_trace_many(const struct volume_setting *s, size_t n, const struct vo
             }
         }
     } while (n_busy > 0);
+}
+
+uint64_t volume_trace_camera(const struct volume_setting *s, const struct camera *camera, size_t n, double (*xy)[2],
+                             struct rng *rng, float *value)
+{
+    struct volume_ray ray[VOLUME_CAMERA_PATHS];
+    struct volume_result path[VOLUME_CAMERA_PATHS];
+    size_t n_ray = 0, place[VOLUME_CAMERA_PATHS], n_jac = s->want_jacobian ? 3 * (s->model->n_param + 1) : 0;
+    uint64_t n_vertex = 0;
+    for (size_t i = 0; i < n; i++) {
+        double origin_mm[3], direction[3];
+        camera_origin(camera, xy[i][0], xy[i][1], origin_mm);
+        camera_direction(camera, xy[i][0], xy[i][1], direction);
+        if (!volume_ray_enter(s->scene, origin_mm, direction, &ray[n_ray])) continue; /* sees nothing: adds 0 */
+        rng[n_ray] = rng[i];
+        place[n_ray++] = i;
+    }
+    volume_trace_many(s, n_ray, ray, rng, path);
+    for (size_t i = 0; i < n_ray; i++) {
+        float *v = value + place[i] * (3 + n_jac);
+        memcpy(v, path[i].radiance, sizeof path[i].radiance);
+        memcpy(v + 3, path[i].jac, n_jac * sizeof *v);
+        n_vertex += path[i].n_vertex;
+    }
+    return n_vertex;
 }

@@ -82,8 +82,16 @@ void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct
                   struct volume_record *record);
 
 /* n paths, several of them under way at any time, so that one computes while the others wait for memory. Each has its
- * ray and random numbers, and the result that volume_trace gives it. */
-void volume_trace_many(const struct volume_setting *s, size_t n, const struct volume_ray *ray, const struct rng *rng,
+ * ray and random numbers (left as they are), and the result that volume_trace gives it. */
+void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
                        struct volume_result *out);
+
+struct camera;
+enum { VOLUME_CAMERA_PATHS = 256 };
+/* The paths of n <= VOLUME_CAMERA_PATHS camera rays through xy (camera.h), each with its generator (changed):
+ * value[n][3 + 3 * (model->n_param + 1)] (value[n][3] without derivatives), preset to 0, radiance and derivatives.
+ * Result: the number of vertices. */
+uint64_t volume_trace_camera(const struct volume_setting *s, const struct camera *camera, size_t n, double (*xy)[2],
+                             struct rng *rng, float *value);
 
 #endif
