@@ -9,7 +9,10 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
+#include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/orientation/main_directions.h"
+#include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
 #include "geometry/volume/volume_source.h"
 
@@ -22,6 +25,9 @@ struct reconstruct_option {
     char axes[8];                /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
     double matrix[9];            /* rotation/shear applied after `axes`, row-major; identity by default */
     size_t crop_voxel[6];        /* x0 y0 z0 x1 y1 z1 after the matrix; all 0: everything */
+    bool align;                  /* estimate the matrix (main_directions.h); one that is given wins */
+    bool crop;                   /* choose the box that tiles best (tile_crop.h); one that is given wins */
+    double crop_keep;            /* least share of its edges that is kept, 0.5 by default */
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
     double s, t;                 /* filter widths, per square voxel (thesis Table 5.2) */
     size_t h;                    /* edge of the filter's cube, voxels */
@@ -39,7 +45,16 @@ void reconstruct_option_default(struct reconstruct_option *o);
 struct reconstruct_report {
     size_t n[3];
     double voxel_size_m[3];
+    double file_voxel_size_m[3];           /* as the file states it, NaN where it does not */
+    struct main_directions main;           /* with option "align" only, as the next */
+    struct alignment align;
+    bool aligned;                          /* the estimated matrix was used: it is in the options */
+    struct tile_crop tile;                 /* with option "crop", or when a matrix was used; else all zero */
+    struct seam_density seam_density;      /* of the volume that is used */
+    struct fiber_seam seam_fiber;          /* of the fibers that are used */
+    size_t n_seam_joined;
     double density_low, density_high;      /* scanner values */
+    double separability;                   /* of void and material in the histogram, 0..1 (density_map.h) */
     double noise_sd;                       /* of the mapped density, in material-free voxels */
     double fiber_diameter_voxel;           /* measured from the volume before the filter */
     size_t n_material_voxel, n_kept_voxel; /* V >= eps_d; and J <= eps_j as well */
@@ -75,6 +90,13 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
 /* Step "directions": voxels within 2r of a polyline take its tangent (thesis 5.6.7). */
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err);
+
+/* What a user should know about the geometry though it stops nothing; each text begins with the subject. Says the same again for a report
+ * that was read back. f: the fibers in use, NULL before there are any. */
+void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
+                             void (*warn)(void *context, const char *text), void *context);
+void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
+                             void (*warn)(void *context, const char *text), void *context);
 
 /* Grey PNG-ready picture of slice i_slice perpendicular to axis (0 x, 1 y, 2 z) with the fibers crossing it marked as red
  * crosses; rgb is 3 bytes a pixel, malloc'ed, width x height filled in. */

@@ -1,6 +1,7 @@
 /* Step "volume": from files to a density volume in the cloth frame. */
 #include "geometry/reconstruct.h"
 
+#include "geometry/orientation/repeat_direction.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/volume_align.h"
 #include "geometry/volume/volume_source.h"
@@ -14,6 +15,7 @@ void reconstruct_option_default(struct reconstruct_option *o)
     *o = (struct reconstruct_option){
         .voxel_size_m = {NAN, NAN, NAN},
         .axes = "xyz",
+        .crop_keep = 0.5,
         .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         .density_low = NAN,
         .density_high = NAN,
@@ -70,7 +72,7 @@ static status plan_voxel_size(const struct volume_source_info *info, struct reco
                                "cannot use the volume: voxels of %g x %g x %g um are too far from cubes", o->voxel_size_m[0] * 1e6,
                                o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
     p->voxel_m = least;
-    p->resample = most > 1.0001 * least || !is_identity(o->matrix);
+    p->resample = most > 1.0001 * least || !is_identity(o->matrix) || o->align;
     return STATUS_OK;
 }
 
@@ -157,6 +159,42 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
     return s;
 }
 
+static const double LEAST_SEPARABILITY = 0.7;
+
+/* The matrix from the directions of the fibers. Turns smaller than their own error, or than a tenth of a degree, are left alone. */
+static status estimate_alignment(const struct volume *stored, struct reconstruct_option *o, struct thread_pool *pool,
+                                 const struct progress *progress, struct reconstruct_report *report, struct error *err)
+{
+    struct density_modes m;
+    status s = density_modes_find(stored, &m, err);
+    alignment_from_directions(&report->main, &report->align);
+    if (s == STATUS_OK && m.separability < LEAST_SEPARABILITY) return STATUS_OK; /* noise */
+    if (s == STATUS_OK) s = main_directions_find(stored, m.half, pool, progress, &report->main, err);
+    if (s == STATUS_OK && report->main.n > 0) s = repeat_directions_refine(stored, m.low, pool, &report->main, err);
+    if (s != STATUS_OK) return s;
+    struct alignment *a = &report->align;
+    alignment_from_directions(&report->main, a);
+    double least_deg = fmax(0.1, 2.0 * a->se_deg), least_tilt_deg = fmax(0.1, 2.0 * a->tilt_se_deg);
+    report->aligned = a->outcome == ALIGN_DONE &&
+                      (fabs(a->rotation_deg) > least_deg || fabs(a->shear_deg) > least_deg || a->tilt_deg > least_tilt_deg);
+    if (report->aligned) memcpy(o->matrix, a->matrix, sizeof o->matrix);
+    return STATUS_OK;
+}
+
+/* With option "crop" the box that tiles best; after any matrix, how much of the tile lies in the scan. */
+static status choose_crop(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool, const struct progress *progress,
+                          struct reconstruct_report *report, struct error *err)
+{
+    struct density_modes m;
+    if (!o->crop && is_identity(o->matrix)) return STATUS_OK;
+    status s = density_modes_find(v, &m, err);
+    if (s == STATUS_OK) s = tile_crop_find(v, m.half, m.low, o->crop ? o->crop_keep : 1.0, pool, progress, &report->tile, err);
+    if (s != STATUS_OK || !o->crop) return s;
+    memcpy(o->crop_voxel, report->tile.box, sizeof o->crop_voxel);
+    volume_crop(v, o->crop_voxel);
+    return STATUS_OK;
+}
+
 static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                             struct reconstruct_report *report, struct error *err)
 {
@@ -180,7 +218,9 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
                                o->density_low + threshold * (o->density_high - o->density_low));
     report->density_low = o->density_low;
     report->density_high = o->density_high;
+    report->separability = m.separability;
     report->noise_sd = density_noise_sd(v);
+    seam_density_measure(v, &report->seam_density);
     return STATUS_OK;
 }
 
@@ -192,14 +232,18 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     struct volume stored = {0};
     struct plan p;
     *v = (struct volume){0};
+    for (int i = 0; i < 6; i++) o->crop = o->crop && o->crop_voxel[i] == 0;
+    o->align = o->align && is_identity(o->matrix);
     status s = volume_source_open_declared(path, n_path, &o->raw, &source, err);
     if (s != STATUS_OK) return s;
+    memcpy(report->file_voxel_size_m, volume_source_describe(source)->voxel_size_m, sizeof report->file_voxel_size_m);
     s = plan_read(volume_source_describe(source), o, &p, err);
     if (s != STATUS_OK) goto out;
     size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
     s = volume_init_in(&stored, n, p.spacing_m, space, err);
     if (s == STATUS_OK) s = read_slices(source, &p, progress, &stored, err);
+    if (s == STATUS_OK && o->align) s = estimate_alignment(&stored, o, pool, NULL, report, err);
     if (s != STATUS_OK) goto out;
     if (p.resample) {
         s = volume_resample(&stored, o->matrix, p.voxel_m, p.box, pool, NULL, v, err);
@@ -208,6 +252,7 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
         *v = stored;
         stored = (struct volume){0};
     }
+    if (s == STATUS_OK) s = choose_crop(v, o, pool, NULL, report, err);
     if (s == STATUS_OK) s = map_densities(v, o, pool, report, err);
     if (s != STATUS_OK) goto out;
     memcpy(report->n, v->n, sizeof report->n);

@@ -51,7 +51,8 @@ static struct job_document *document_new(void)
     memcpy(d->axes, "xyz", 4);
     d->matrix[0] = d->matrix[4] = d->matrix[8] = 1.0;
     d->density_low = d->density_high = d->filter_s = d->filter_t = d->filter_eps_d = d->filter_eps_j = NAN;
-    d->link_sigma_voxel = d->radius_um = NAN;
+    d->link_sigma_voxel = d->radius_um = d->crop_keep = NAN;
+    d->join_seams = true;
     fill_nan(d->tile_mm, 2);
     d->voxel_um = NAN;
     d->lamp_side_cm = 10.0;

@@ -7,6 +7,7 @@
  * its data file) "voxel_size_um": 2.0 | [2.0, 2.0, 2.5],             required unless the file states it "raw":
  * {"shape": [nx,ny,nz], "type": "uint16", "endian": "little", "header_bytes": 0}, only for files without a header
  *     "axes": "xyz",  "matrix": [9 numbers],  "crop_voxel": [x0,y0,z0,x1,y1,z1],
+ *     "align": "none"|"auto",  "crop": "none"|"auto",  "crop_keep": 0.5,  "join_seams": true,
  *     "density_low": v, "density_high": v,
  *     "filter": {"s":, "t":, "h":, "eps_d":, "eps_J":},   all optional: chosen from the data
  *     "link_sigma_voxel":, "min_vertices":, "radius_um": v, "radius_per_axis": bool
@@ -81,6 +82,9 @@ struct job_document {
     char axes[8];
     double matrix[9];
     size_t crop_voxel[6];
+    bool align, crop;         /* "auto"; false where matrix, crop_voxel are given */
+    double crop_keep;         /* NaN: not given */
+    bool join_seams;
     double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j; /* NaN: not given */
     size_t filter_h;                                                                  /* 0: not given */
     double link_sigma_voxel, radius_um;                                               /* NaN: not given */

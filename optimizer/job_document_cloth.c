@@ -150,11 +150,26 @@ static status parse_filter(const struct json_field *f, struct job_document *doc,
     return s;
 }
 
+/* What is chosen from the data. A matrix or a box that is given wins, so that a job can be repeated with the values of its result. */
+static status parse_alignment(const struct json_field *f, struct job_document *doc, struct error *err)
+{
+    static const char *const choice[] = {"none", "auto", NULL};
+    size_t align = 0, crop = 0;
+    status s = json_field_choice(f, "align", choice, &align, err);
+    if (s == STATUS_OK) s = json_field_choice(f, "crop", choice, &crop, err);
+    if (s == STATUS_OK) s = json_field_number(f, "crop_keep", 0.1, 1.0, &doc->crop_keep, err);
+    if (s == STATUS_OK) s = json_field_bool(f, "join_seams", &doc->join_seams, err);
+    doc->align = align == 1 && json_object_get(f->object, "matrix") == NULL;
+    doc->crop = crop == 1 && json_object_get(f->object, "crop_voxel") == NULL;
+    return s;
+}
+
 status job_parse_volume(const struct json_field *f, struct job_document *doc, struct error *err)
 {
     static const char *const key[] = {"files",        "raw",         "voxel_size_um",   "axes",   "matrix",
                                       "crop_voxel",   "density_low", "density_high",    "filter", "link_sigma_voxel",
-                                      "min_vertices", "radius_um",   "radius_per_axis", NULL};
+                                      "min_vertices", "radius_um",   "radius_per_axis", "align",  "crop",
+                                      "crop_keep",    "join_seams",  NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_files(f, doc, err);
     if (s == STATUS_OK) s = parse_raw(f, doc, err);
@@ -162,6 +177,7 @@ status job_parse_volume(const struct json_field *f, struct job_document *doc, st
     if (s == STATUS_OK) s = parse_axes(f, doc, err);
     if (s == STATUS_OK) s = parse_matrix(f, doc, err);
     if (s == STATUS_OK) s = parse_crop_voxel(f, doc, err);
+    if (s == STATUS_OK) s = parse_alignment(f, doc, err);
     if (s == STATUS_OK) s = json_field_number(f, "density_low", -1e9, 1e9, &doc->density_low, err);
     if (s == STATUS_OK) s = json_field_number(f, "density_high", -1e9, 1e9, &doc->density_high, err);
     if (s == STATUS_OK && doc->density_low >= doc->density_high)

@@ -24,6 +24,9 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
     memcpy(o->axes, doc->axes, sizeof o->axes);
     memcpy(o->matrix, doc->matrix, sizeof o->matrix);
     memcpy(o->crop_voxel, doc->crop_voxel, sizeof o->crop_voxel);
+    o->align = doc->align;
+    o->crop = doc->crop;
+    if (!isnan(doc->crop_keep)) o->crop_keep = doc->crop_keep;
     o->density_low = doc->density_low;
     o->density_high = doc->density_high;
     if (!isnan(doc->filter_s)) o->s = doc->filter_s;
@@ -36,6 +39,12 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
     if (!isnan(doc->radius_um))
         for (int a = 0; a < 3; a++) o->radius_m[a] = doc->radius_um * um;
     o->radius_per_axis = doc->radius_per_axis;
+}
+
+static void warn_geometry(void *context, const char *text)
+{
+    struct pipeline_context *c = context;
+    worker_status_warn(c->status, text);
 }
 
 /* ---- volume ---- */
@@ -70,6 +79,7 @@ status stage_volume(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;
+    reconstruct_warn_volume(&c->option, &c->geometry, warn_geometry, c);
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
                                      {c->volume.n, sizeof c->volume.n},
@@ -100,7 +110,9 @@ static status load_volume(struct pipeline_context *c, struct reconstruct_option 
 
 status stage_volume_load(struct pipeline_context *c, struct error *err)
 {
-    return load_volume(c, &c->option, &c->geometry, err);
+    status s = load_volume(c, &c->option, &c->geometry, err);
+    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, warn_geometry, c);
+    return s;
 }
 
 status pipeline_need_volume(struct pipeline_context *c, struct error *err)
@@ -210,6 +222,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
                                    &c->geometry, err);
         volume_release(&c->volume);
         memset(&c->volume, 0, sizeof c->volume);
+        if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
     } else {
         s = read_fiber_file(c, err);
         c->geometry.n_fiber = c->fiber.n_fiber;
@@ -217,6 +230,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
         if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
     }
     if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
+    if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;
@@ -307,6 +321,7 @@ static status make_volume_scene(struct pipeline_context *c, struct error *err)
 
 status stage_scene(struct pipeline_context *c, struct error *err)
 {
+    reconstruct_warn_fibers(&c->geometry, &c->fiber, warn_geometry, c); /* this stage runs in every attempt */
     struct scene_option option = {.black_sheet = c->doc->black_sheet};
     status s = scene_new(&c->fiber, &option, &c->scene, err);
     if (s != STATUS_OK) return s;

@@ -1,4 +1,6 @@
 #include "optimizer/report/result_json.h"
+#include "optimizer/report/json_number.h"
+#include "optimizer/report/result_geometry.h"
 #include "optimizer/job_folder.h"
 #include "optimizer/report/result_options_json.h"
 
@@ -7,23 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(); }
-static json_t *count(size_t n) { return json_integer((json_int_t)n); }
-
-static json_t *number_list(const double *v, size_t n, double factor)
-{
-    json_t *list = json_array();
-    for (size_t i = 0; i < n; i++) json_array_append_new(list, number(v[i] * factor));
-    return list;
-}
-
-static json_t *count_list(const size_t *v, size_t n)
-{
-    json_t *list = json_array();
-    for (size_t i = 0; i < n; i++) json_array_append_new(list, count(v[i]));
-    return list;
-}
 
 /* ---- names and exposure ---- */
 
@@ -82,8 +67,8 @@ static json_t *parameters_json(const struct pipeline_model *m)
         const struct fit_parameter *k = &m->parameter[p];
         json_t *parameter =
             json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit", info->unit,
-                      "value", number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
-                      number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
+                      "value", json_number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
+                      json_number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
                       param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
                       param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
                       (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);
@@ -98,7 +83,7 @@ static json_t *correlation_json(const struct pipeline_model *m)
     size_t n = m->appearance.n_param;
     json_t *list = json_array();
     for (size_t p = 0; p < n; p++)
-        json_array_append_new(list, number_list(m->fit.uncertainty.correlation + p * n, n, 1.0));
+        json_array_append_new(list, json_number_list(m->fit.uncertainty.correlation + p * n, n, 1.0));
     return list;
 }
 
@@ -124,16 +109,16 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
     json_object_set_new(json, "reason", json_string(m->fit.reason));
     json_object_set_new(json, "parameters", parameters_json(m));
     json_object_set_new(json, "correlation", correlation_json(m));
-    json_object_set_new(json, "objective", number(m->validation.fit.value));
-    json_object_set_new(json, "objective_se", number(m->validation.fit.se));
-    json_object_set_new(json, "fit_rel_rms", number(m->validation.fit.rel_rms));
-    json_object_set_new(json, "heldout_rel_rms", number(m->validation.held_out.rel_rms));
-    json_object_set_new(json, "misfit_rel_rms", number(sqrt(m->fit.uncertainty.misfit_var)));
-    json_object_set_new(json, "validation_worst_rel_se", number(m->validation.worst_rel_se));
+    json_object_set_new(json, "objective", json_number(m->validation.fit.value));
+    json_object_set_new(json, "objective_se", json_number(m->validation.fit.se));
+    json_object_set_new(json, "fit_rel_rms", json_number(m->validation.fit.rel_rms));
+    json_object_set_new(json, "heldout_rel_rms", json_number(m->validation.held_out.rel_rms));
+    json_object_set_new(json, "misfit_rel_rms", json_number(sqrt(m->fit.uncertainty.misfit_var)));
+    json_object_set_new(json, "validation_worst_rel_se", json_number(m->validation.worst_rel_se));
     result_fit_options(c, m, json);
     json_object_set_new(json, "n_path_fit", json_integer((json_int_t)m->fit.n_path));
-    json_object_set_new(json, "n_step", count(m->fit.n_step));
-    json_object_set_new(json, "fit_wall_s", number(m->fit.wall_s));
+    json_object_set_new(json, "n_step", json_count(m->fit.n_step));
+    json_object_set_new(json, "fit_wall_s", json_number(m->fit.wall_s));
     json_object_set_new(json, "n_path_validation", json_integer((json_int_t)n_path));
 }
 
@@ -149,8 +134,8 @@ static json_t *model_json(const struct pipeline_context *c, size_t i_model)
     for (size_t i = 0; i < c->observation.n; i++) {
         double mean[3], se[3];
         rendered_mean(m, i, mean, se);
-        json_t *row = json_pack("{s:o, s:o}", "rendered", number_list(mean, 3, 1.0), "rendered_se",
-                                number_list(se, 3, 1.0));
+        json_t *row = json_pack("{s:o, s:o}", "rendered", json_number_list(mean, 3, 1.0), "rendered_se",
+                                json_number_list(se, 3, 1.0));
         result_row_options(c, m, i, row);
         json_array_append_new(rows, row);
     }
@@ -175,63 +160,15 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
                             "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg", k->camera_theta_rad * deg,
                             "camera_phi_deg", k->camera_phi_rad * deg, "cloth_rotation_deg",
                             k->cloth_rotation_rad * deg, "weight", o->weight);
-    json_object_set_new(row, "measured", number_list(o->mean_rgb, 3, 1.0));
-    json_object_set_new(row, "measured_se", number_list(o->se_rgb, 3, 1.0));
-    json_object_set_new(row, "rendered", number_list(rendered, 3, 1.0));
-    json_object_set_new(row, "rendered_se", number_list(se, 3, 1.0));
+    json_object_set_new(row, "measured", json_number_list(o->mean_rgb, 3, 1.0));
+    json_object_set_new(row, "measured_se", json_number_list(o->se_rgb, 3, 1.0));
+    json_object_set_new(row, "rendered", json_number_list(rendered, 3, 1.0));
+    json_object_set_new(row, "rendered_se", json_number_list(se, 3, 1.0));
     json_object_set_new(row, "rendering_png", json_string(png));
     json_object_set_new(row, "rendering_exr", json_string(exr));
     json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
     result_row_options(c, m, i, row);
     return row;
-}
-
-static json_t *geometry_json(const struct pipeline_context *c)
-{
-    const struct reconstruct_report *g = &c->geometry;
-    const double um = 1e6, mm = 1e3;
-    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input", c->doc->has_volume ? "volume" : "fibers", "n_fiber",
-                             count(c->fiber.n_fiber), "n_vertex", count(c->fiber.n_vertex), "tile_mm",
-                             number_list(c->fiber.tile_size_m, 2, mm));
-    json_object_set_new(json, "total_length_mm", number(g->total_length_m * mm));
-    double radius = 0.0;
-    for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
-    json_object_set_new(json, "mean_radius_um", number(radius * um));
-    if (!c->doc->has_volume) return json;
-    const struct reconstruct_option *o = &c->option;
-    json_object_set_new(json, "n_voxel", count_list(g->n, 3));
-    json_object_set_new(json, "voxel_size_um", number_list(g->voxel_size_m, 3, um));
-    json_object_set_new(json, "density_low", number(g->density_low));
-    json_object_set_new(json, "density_high", number(g->density_high));
-    json_object_set_new(json, "noise_sd", number(g->noise_sd));
-    json_object_set_new(json, "fiber_diameter_voxel", number(g->fiber_diameter_voxel));
-    json_object_set_new(json, "n_material_voxel", count(g->n_material_voxel));
-    json_object_set_new(json, "n_kept_voxel", count(g->n_kept_voxel));
-    json_object_set_new(json, "n_class_voxel", count_list(g->n_class_voxel, 3));
-    json_object_set_new(json, "n_center", count_list(g->n_center, 3));
-    json_object_set_new(json, "n_chain", count_list(g->n_chain, 3));
-    json_object_set_new(json, "n_short_dropped", count_list(g->n_short_dropped, 3));
-    json_object_set_new(json, "n_gap_bridged", count(g->n_gap_bridged));
-    json_object_set_new(json, "n_joined", count(g->n_joined));
-    json_object_set_new(json, "radius_um", number_list(g->radius_m, 3, um));
-    json_object_set_new(json, "radius_score", number_list(g->radius_score, 3, 1.0));
-    json_object_set_new(json, "dice", number(g->dice));
-    json_object_set_new(json, "direction_change_mean_deg", number(g->direction_change_mean_deg));
-    json_object_set_new(json, "options",
-                        json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", number(o->s),
-                                  "t", number(o->t), "h", count(o->h), "eps_d", number(o->eps_d), "eps_J",
-                                  number(o->eps_j), "link_sigma_voxel", number(o->link_sigma_voxel), "min_vertices",
-                                  count(o->min_vertex), "smooth_alpha", number(o->smooth_alpha)));
-    return json;
-}
-
-static json_t *warnings_json(struct pipeline_context *c)
-{
-    json_t *list = json_array();
-    char text[600];
-    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
-        json_array_append_new(list, json_string(text));
-    return list;
 }
 
 static json_t *stages_json(const struct pipeline_context *c)
@@ -241,7 +178,7 @@ static json_t *stages_json(const struct pipeline_context *c)
     json_t *list = json_array();
     for (size_t i = 0; i < n_stage; i++)
         json_array_append_new(list,
-                              json_pack("{s:s, s:o}", "name", info[i].name, "wall_s", number(c->stage_wall_s[i])));
+                              json_pack("{s:s, s:o}", "name", info[i].name, "wall_s", json_number(c->stage_wall_s[i])));
     return list;
 }
 
@@ -257,10 +194,10 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     put_fit(json, c, best);
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);
-    json_object_set_new(json, "geometry", geometry_json(c));
-    json_object_set_new(json, "png_exposure", number(result_png_exposure(&c->observation)));
+    json_object_set_new(json, "geometry", result_geometry_json(c));
+    json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));
     json_object_set_new(json, "stages", stages_json(c));
-    json_object_set_new(json, "warnings", warnings_json(c));
+    json_object_set_new(json, "warnings", result_warnings_json(c));
     json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
     return json;
 }

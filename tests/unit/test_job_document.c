@@ -143,6 +143,21 @@ static void test_volume(void **state)
     check_error(VOLUME_OF("\"density_low\":1e999"), "", "not valid JSON");
 }
 
+/* A matrix or a box that is given wins over "auto". */
+static void test_alignment(void **state)
+{
+    (void)state;
+    struct job_document *d = parse(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false"));
+    assert_true(d->align && d->crop && d->crop_keep == 0.3 && !d->join_seams);
+    job_document_free(d);
+    d = parse(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"matrix\":[1,0,0,0,1,0,0,0,1],\"crop_voxel\":[0,0,0,9,9,9]"));
+    assert_true(!d->align && !d->crop && d->join_seams && isnan(d->crop_keep));
+    job_document_free(d);
+    check_error(VOLUME_OF("\"align\":\"yes\""), "volume.align", "auto");
+    check_error(VOLUME_OF("\"crop\":true"), "volume.crop", "none, auto");
+    check_error(VOLUME_OF("\"crop_keep\":0"), "volume.crop_keep", "0.1 to 1");
+}
+
 static void test_photographs(void **state)
 {
     (void)state;
@@ -346,6 +361,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_raw_volume),
+        cmocka_unit_test(test_alignment),
         cmocka_unit_test(test_defaults),
         cmocka_unit_test(test_everything_given),
         cmocka_unit_test(test_structure),

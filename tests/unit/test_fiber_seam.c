@@ -1,0 +1,93 @@
+/* Fibers across the seams of a tile: a phantom's continue exactly; shifted ends are counted and brought together. */
+#include "geometry/fibers/fiber_seam.h"
+#include "geometry/phantom/phantom.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+static void make(struct fiber_set *f)
+{
+    struct phantom_option o;
+    struct phantom_report report;
+    phantom_option_default(&o, PHANTOM_PLAIN);
+    fiber_set_init(f);
+    assert_int_equal(phantom_generate(&o, NULL, NULL, f, &report, NULL), STATUS_OK);
+}
+
+static void test_phantom(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    struct fiber_seam s;
+    make(&f);
+    assert_int_equal(fiber_seam_measure(&f, &s, NULL), STATUS_OK);
+    for (int a = 0; a < 2; a++) {
+        print_message("%c: %zu ends, %.3f continue, offset %.3f um\n", "xy"[a], s.n_end[a], s.share[a], s.offset_m[a] * 1e6);
+        assert_true(s.n_end[a] > 20);
+        assert_true(s.share[a] > 0.97);
+        assert_true(s.offset_m[a] < 0.01 * (double)f.radius_m[0]);
+    }
+    fiber_set_release(&f);
+}
+
+/* Everything in the upper half of x is moved in y and z by 0.6 radii: the seam across x opens by that much. */
+static void shift_half(struct fiber_set *f, float by)
+{
+    float middle = 0.5f * (float)f->tile_size_m[0];
+    for (size_t i = 0; i < f->n_vertex; i++)
+        if (f->position_m[3 * i] > middle) f->position_m[3 * i + 2] += by * (f->position_m[3 * i] - middle) / middle;
+}
+
+static void test_shifted(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    struct fiber_seam before, after;
+    size_t n_joined;
+    make(&f);
+    float by = 0.6f * f.radius_m[0];
+    shift_half(&f, by);
+    double length = fiber_set_length_m(&f);
+    assert_int_equal(fiber_seam_measure(&f, &before, NULL), STATUS_OK);
+    assert_true(before.share[0] > 0.9); /* a few nearer neighbours */
+    assert_true(fabs(before.offset_m[0] - (double)by) < 0.15 * (double)by);
+    assert_int_equal(fiber_seam_join(&f, &n_joined, NULL), STATUS_OK);
+    assert_int_equal(fiber_seam_measure(&f, &after, NULL), STATUS_OK);
+    print_message("%zu pairs joined: x %.3f -> %.3f continue, offset %.3f -> %.6f um\n", n_joined, before.share[0], after.share[0],
+                  before.offset_m[0] * 1e6, after.offset_m[0] * 1e6);
+    assert_true(n_joined >= (size_t)(0.45 * (double)(before.n_end[0] + before.n_end[1])));
+    assert_true(after.share[0] >= before.share[0] && after.offset_m[0] < 1e-9);
+    assert_true(after.share[1] > 0.97 && after.offset_m[1] < 1e-9);
+    assert_int_equal(fiber_set_validate(&f, NULL), STATUS_OK);
+    assert_true(fabs(fiber_set_length_m(&f) / length - 1.0) < 0.01);
+    shift_half(&f, 40.0f * by); /* beyond any reach: nothing continues */
+    assert_int_equal(fiber_seam_measure(&f, &after, NULL), STATUS_OK);
+    assert_true(after.share[0] < 0.4);
+    fiber_set_release(&f);
+}
+
+static void test_no_ends(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    struct fiber_seam s;
+    fiber_set_init(&f);
+    assert_int_equal(fiber_set_reserve(&f, 1, 2, NULL), STATUS_OK);
+    f.first_vertex[1] = 2;
+    f.tile_size_m[0] = f.tile_size_m[1] = 1.0;
+    f.radius_m[0] = 0.01f;
+    for (int i = 0; i < 6; i++) f.position_m[i] = i < 3 ? 0.4f : 0.6f;
+    assert_int_equal(fiber_seam_measure(&f, &s, NULL), STATUS_OK);
+    assert_true(s.n_end[0] == 0 && isnan(s.share[0]) && isnan(s.offset_m[1]));
+    fiber_set_release(&f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_phantom), cmocka_unit_test(test_shifted), cmocka_unit_test(test_no_ends)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
