@@ -55,9 +55,9 @@ static int frame_axis(const struct slice_frame *f)
 
 static status find_chains(struct fiber_job *job, struct polyline_set *chains, struct error *err)
 {
-    uint16_t *mask = malloc(volume_n_voxel(job->v->n) * sizeof *mask);
-    if (mask == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
-    status s = class_mask(job->d, job->pool, mask, job->report->n_class_voxel, err);
+    struct subvolumes sub;
+    status s = subvolumes_init(&sub, job->d, job->pool, err);
+    memcpy(job->report->n_class_voxel, sub.n_class_voxel, sizeof sub.n_class_voxel);
     for (int a = 0; a < 3; a++) job->report->n_center[a] = job->report->n_chain[a] = 0;
     for (int i = 0; i < N_SLICE_FRAME && s == STATUS_OK; i++) {
         struct center_list list = {0};
@@ -65,14 +65,14 @@ static status find_chains(struct fiber_job *job, struct polyline_set *chains, st
         size_t n_chain = 0;
         slice_frame_init(&frame, i, job->v->n);
         enter_part(job, 0.6 * i / N_SLICE_FRAME, 0.6 * (i + 1) / N_SLICE_FRAME);
-        s = centers_detect(job->v, job->d, mask, &frame, job->diameter, job->pool, &job->inner, &list, err);
+        s = centers_detect(job->v, job->d, &sub, &frame, job->diameter, job->pool, &job->inner, &list, err);
         if (s != STATUS_OK) break;
         s = centers_link(&list, &frame, job->o->link_sigma_voxel, job->diameter, MIN_PIECE, chains, &n_chain, err);
         job->report->n_center[frame_axis(&frame)] += list.first[list.n_slice];
         job->report->n_chain[frame_axis(&frame)] += n_chain;
         center_list_release(&list);
     }
-    free(mask);
+    subvolumes_release(&sub);
     return s;
 }
 

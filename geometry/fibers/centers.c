@@ -1,6 +1,7 @@
 #include "geometry/fibers/centers.h"
 
 #include "geometry/fibers/center_refine.h"
+#include "geometry/fibers/slice_image.h"
 #include "geometry/vision/vision.h"
 
 #include <math.h>
@@ -27,14 +28,24 @@ struct detect_job {
     const struct direction_volume *d;
     const uint16_t *mask;
     const struct slice_frame *frame;
-    size_t width, height;
+    size_t first;             /* slice of the slab's task 0 */
+    float *image;             /* of the slab */
+    struct pixel_range *own;  /* per slice of the slab */
+    size_t margin;            /* pixels around what is its own that a picture needs */
     double sigma[N_SCALE];
     float min_distance;
     double diameter;
-    float *scratch; /* per thread: image and N_SCALE responses */
+    float *scratch; /* per thread: a part of the picture and N_SCALE responses */
     size_t scratch_per_thread;
     struct slice_result *slice;
     struct error *error; /* per thread */
+};
+
+/* The part of a slice's picture that matters. */
+struct view {
+    size_t i_slice, width, height;
+    float origin[2]; /* of pixel (0, 0) in the whole picture */
+    float *image, *response;
 };
 
 void center_list_release(struct center_list *l)
@@ -43,71 +54,6 @@ void center_list_release(struct center_list *l)
     free(l->first);
     free(l->center);
     *l = (struct center_list){0};
-}
-
-struct mask_job {
-    const struct direction_volume *d;
-    uint16_t *mask;
-    float normal[N_SLICE_FRAME][3];
-    size_t (*count)[3]; /* per slice */
-};
-
-static void mask_slice(void *context, size_t k, size_t i_thread)
-{
-    (void)i_thread;
-    const struct mask_job *job = context;
-    size_t n = job->d->n[0] * job->d->n[1];
-    for (size_t i = k * n; i < (k + 1) * n; i++) {
-        job->mask[i] = 0;
-        if (job->d->density[i] == 0) continue;
-        float d[3];
-        direction_volume_get(job->d, i, d);
-        int nearest = 0;
-        for (int a = 1; a < 3; a++)
-            if (fabsf(d[a]) > fabsf(d[nearest])) nearest = a;
-        unsigned bits = 1u << (12 + nearest);
-        for (unsigned f = 0; f < N_SLICE_FRAME; f++) {
-            const float *w = job->normal[f];
-            if (fabsf(d[0] * w[0] + d[1] * w[1] + d[2] * w[2]) >= CLASS_COSINE) bits |= 1u << f;
-        }
-        job->mask[i] = (uint16_t)bits;
-        job->count[k][nearest]++;
-    }
-}
-
-/* An emptied voxel shows its density in a frame unless all its kept neighbours belong to others (it is then the rim of such a fiber). */
-static void rim_slice(void *context, size_t k, size_t i_thread)
-{
-    (void)i_thread;
-    const struct mask_job *job = context;
-    const size_t *n = job->d->n, stride[3] = {1, n[0], n[0] * n[1]};
-    size_t x[3] = {0, 0, k}, at = k * stride[2];
-    for (x[1] = 0; x[1] < n[1]; x[1]++)
-        for (x[0] = 0; x[0] < n[0]; x[0]++, at++) {
-            if (job->d->density[at] > 0) continue;
-            unsigned seen = 0;
-            for (int a = 0; a < 3; a++) { /* kept neighbours only: their masks are not changed here */
-                if (x[a] > 0 && job->d->density[at - stride[a]] > 0) seen |= job->mask[at - stride[a]];
-                if (x[a] + 1 < n[a] && job->d->density[at + stride[a]] > 0) seen |= job->mask[at + stride[a]];
-            }
-            job->mask[at] = (uint16_t)((seen == 0 ? ~0u : seen) & ((1u << N_SLICE_FRAME) - 1u));
-        }
-}
-
-status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint16_t *mask, size_t n_class_voxel[3],
-                  struct error *err)
-{
-    struct mask_job job = {.d = d, .mask = mask, .count = calloc(d->n[2], sizeof(size_t[3]))};
-    if (job.count == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot separate the axes: out of memory");
-    for (int f = 0; f < N_SLICE_FRAME; f++) slice_frame_normal(f, job.normal[f]);
-    status s = thread_pool_run(pool, d->n[2], mask_slice, &job, NULL);
-    if (s == STATUS_OK) s = thread_pool_run(pool, d->n[2], rim_slice, &job, NULL);
-    for (int a = 0; a < 3; a++) {
-        n_class_voxel[a] = 0;
-        for (size_t k = 0; k < d->n[2]; k++) n_class_voxel[a] += job.count[k][a];
-    }
-    free(job.count);
-    return s;
 }
 
 /* Voxel that holds point x; false (and the nearest voxel) when x lies outside of the volume. */
@@ -121,97 +67,33 @@ static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
     return inside;
 }
 
-/* Density of the subvolume at a voxel, 0 where it is emptied. */
-static float class_density(const struct detect_job *job, const size_t x[3], bool *own)
+static bool is_peak(const struct view *w, const float *response, size_t u, size_t v)
 {
-    size_t at = volume_index(job->v->n, x[0], x[1], x[2]);
-    uint16_t m = job->mask[at], visible = m >> job->frame->index & 1;
-    *own = visible != 0 && m >= CLASS_KEPT;
-    return visible != 0 ? job->v->density[at] : 0.0f;
-}
-
-/* Between voxels: bilinear in the plane of the two diagonal axes (the third stays on the grid). */
-static float diagonal_density(const struct detect_job *job, const float x[3], bool *own)
-{
-    const struct slice_frame *f = job->frame;
-    const size_t *n = job->v->n;
-    float sum = 0.0f;
-    *own = false;
-    for (int corner = 0; corner < 4; corner++) {
-        size_t at[3];
-        float weight = 1.0f;
-        for (int a = 0, bit = 0; a < 3; a++) {
-            float c = x[a] - 0.5f, whole = floorf(c);
-            if (f->w[a] == 0.0f) {
-                whole = floorf(x[a]);
-            } else {
-                float fraction = c - whole;
-                if (corner >> bit & 1) {
-                    weight *= fraction;
-                    whole += 1.0f;
-                } else {
-                    weight *= 1.0f - fraction;
-                }
-                bit++;
-            }
-            at[a] = whole <= 0.0f ? 0 : whole >= (float)n[a] - 1.0f ? n[a] - 1 : (size_t)whole;
-        }
-        bool own_corner;
-        sum += weight * class_density(job, at, &own_corner);
-        *own = *own || own_corner;
-    }
-    return sum;
-}
-
-/* The slice of the subvolume; false when nothing of the class is in it. Pixels beyond the faces repeat the face's densities. */
-static bool fill_image(const struct detect_job *job, size_t i_slice, float *image)
-{
-    bool any = false;
-    for (size_t v = 0; v < job->height; v++)
-        for (size_t u = 0; u < job->width; u++, image++) {
-            float x[3];
-            bool own;
-            size_t at[3];
-            slice_frame_point(job->frame, (float)u + 0.5f, (float)v + 0.5f, (float)i_slice + 0.5f, x);
-            bool inside = voxel_at(job->v->n, x, at);
-            if (!inside && (fabsf(x[0] - (float)at[0]) > 6.0f || fabsf(x[1] - (float)at[1]) > 6.0f ||
-                            fabsf(x[2] - (float)at[2]) > 6.0f)) {
-                *image = 0.0f;
-                continue;
-            }
-            *image = job->frame->index < 3 ? class_density(job, at, &own) : diagonal_density(job, x, &own);
-            any = any || own;
-        }
-    return any;
-}
-
-static bool is_peak(const struct detect_job *job, const float *response, size_t u, size_t v)
-{
-    float c = response[v * job->width + u];
-    for (size_t y = v > 0 ? v - 1 : 0; y <= v + 1 && y < job->height; y++)
-        for (size_t x = u > 0 ? u - 1 : 0; x <= u + 1 && x < job->width; x++) {
-            float r = response[y * job->width + x];
+    float c = response[v * w->width + u];
+    for (size_t y = v > 0 ? v - 1 : 0; y <= v + 1 && y < w->height; y++)
+        for (size_t x = u > 0 ? u - 1 : 0; x <= u + 1 && x < w->width; x++) {
+            float r = response[y * w->width + x];
             if (r > c || (r == c && (y < v || (y == v && x < u)))) return false;
         }
     return true;
 }
 
 /* Offset of the maximum of the paraboloid through a 3 x 3 neighbourhood (least squares), at most one pixel. */
-static void refine_position(const struct detect_job *job, const float *response, size_t u, size_t v, float offset[2])
+static void refine_position(const struct view *w, const float *response, size_t u, size_t v, float offset[2])
 {
     offset[0] = offset[1] = 0.0f;
-    if (u == 0 || v == 0 || u + 1 >= job->width || v + 1 >= job->height) return;
-    const float *p = response + v * job->width + u;
-    size_t w = job->width;
+    if (u == 0 || v == 0 || u + 1 >= w->width || v + 1 >= w->height) return;
+    const float *p = response + v * w->width + u;
+    size_t pitch = w->width;
     float gu = 0.0f, gv = 0.0f, uu = 0.0f, vv = 0.0f;
     for (ptrdiff_t r = -1; r <= 1; r++) {
-        const float *q = p + r * (ptrdiff_t)w;
+        const float *q = p + r * (ptrdiff_t)pitch;
         gu += (q[1] - q[-1]) / 6.0f;
         uu += (q[1] - 2.0f * q[0] + q[-1]) / 3.0f;
-        gv += (p[w + (size_t)(r + 1) - 1] - p[-(ptrdiff_t)w + r]) / 6.0f;
-        vv += (p[(ptrdiff_t)w + r] - 2.0f * p[r] + p[-(ptrdiff_t)w + r]) / 3.0f;
+        gv += (p[pitch + (size_t)(r + 1) - 1] - p[-(ptrdiff_t)pitch + r]) / 6.0f;
+        vv += (p[(ptrdiff_t)pitch + r] - 2.0f * p[r] + p[-(ptrdiff_t)pitch + r]) / 3.0f;
     }
-    float uv = (p[w + 1] - p[w - 1] - p[-(ptrdiff_t)w + 1] + p[-(ptrdiff_t)w - 1]) / 4.0f;
+    float uv = (p[pitch + 1] - p[pitch - 1] - p[-(ptrdiff_t)pitch + 1] + p[-(ptrdiff_t)pitch - 1]) / 4.0f;
     float det = uu * vv - uv * uv;
     if (!(det > 0.0f) || !(uu < 0.0f)) return;
     offset[0] = fminf(1.0f, fmaxf(-1.0f, (uv * gv - vv * gu) / det));
@@ -262,24 +144,24 @@ static bool push(struct slice_result *r, const struct center *c)
     return true;
 }
 
-static bool collect_peaks(const struct detect_job *job, size_t i_slice, const float *response, struct slice_result *r)
+static bool collect_peaks(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
-    size_t n_pixel = job->width * job->height;
+    size_t n_pixel = w->width * w->height;
     for (int s = 0; s < N_SCALE; s++)
-        for (size_t v = 0; v < job->height; v++)
-            for (size_t u = 0; u < job->width; u++) {
-                const float *map = response + (size_t)s * n_pixel;
-                size_t at = v * job->width + u;
+        for (size_t v = 0; v < w->height; v++)
+            for (size_t u = 0; u < w->width; u++) {
+                const float *map = w->response + (size_t)s * n_pixel;
+                size_t at = v * w->width + u;
                 if (map[at] < MIN_STRENGTH) continue;
-                if (!is_peak(job, map, u, v)) continue;
+                if (!is_peak(w, map, u, v)) continue;
                 if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at])) continue;
                 float offset[2];
-                refine_position(job, map, u, v, offset);
-                struct center c = {.u = (float)u + 0.5f + offset[0],
-                                   .v = (float)v + 0.5f + offset[1],
+                refine_position(w, map, u, v, offset);
+                struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
+                                   .v = w->origin[1] + (float)v + 0.5f + offset[1],
                                    .sigma = (float)job->sigma[s],
                                    .strength = map[at]};
-                if (find_slope(job, i_slice, &c) && !push(r, &c)) return false;
+                if (find_slope(job, w->i_slice, &c) && !push(r, &c)) return false;
             }
     return true;
 }
@@ -299,40 +181,80 @@ static int lower_v_first(const void *a, const void *b)
     return (x->u > y->u) - (x->u < y->u);
 }
 
-/* Of peaks nearer to each other than min_distance the strongest stays. */
-static void thin_out(const struct detect_job *job, struct slice_result *r)
+/* Of peaks nearer to each other than min_distance the strongest stays. Those that stay are filed in cells of that edge. */
+static bool thin_out(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
-    size_t kept = 0;
+    size_t kept = 0, n_cell[2] = {(size_t)((float)w->width / job->min_distance) + 3, (size_t)((float)w->height / job->min_distance) + 3};
     float limit = job->min_distance * job->min_distance;
-    if (r->n == 0) return;
+    if (r->n == 0) return true;
+    uint32_t *head = calloc(n_cell[0] * n_cell[1], sizeof *head), *next = malloc(r->n * sizeof *next);
+    if (head == NULL || next == NULL) {
+        free(head);
+        free(next);
+        return false;
+    }
     qsort(r->center, r->n, sizeof *r->center, stronger_first);
     for (size_t i = 0; i < r->n; i++) {
+        const struct center *c = &r->center[i];
+        size_t cu = (size_t)fmaxf(0.0f, (c->u - w->origin[0]) / job->min_distance) + 1;
+        size_t cv = (size_t)fmaxf(0.0f, (c->v - w->origin[1]) / job->min_distance) + 1;
         bool near = false;
-        for (size_t j = 0; j < kept && !near; j++) {
-            float du = r->center[i].u - r->center[j].u, dv = r->center[i].v - r->center[j].v;
-            near = du * du + dv * dv < limit;
-        }
-        if (!near) r->center[kept++] = r->center[i];
+        for (size_t y = cv - 1; y <= cv + 1 && y < n_cell[1]; y++)
+            for (size_t x = cu - 1; x <= cu + 1 && x < n_cell[0]; x++)
+                for (uint32_t at = head[y * n_cell[0] + x]; at != 0 && !near; at = next[at - 1]) {
+                    float du = c->u - r->center[at - 1].u, dv = c->v - r->center[at - 1].v;
+                    near = du * du + dv * dv < limit;
+                }
+        if (near) continue;
+        size_t cell = (cv < n_cell[1] ? cv : n_cell[1] - 1) * n_cell[0] + (cu < n_cell[0] ? cu : n_cell[0] - 1);
+        r->center[kept] = *c;
+        next[kept] = head[cell];
+        head[cell] = (uint32_t)++kept;
     }
     r->n = kept;
+    free(head);
+    free(next);
+    return true;
 }
 
-static void detect_slice(void *context, size_t i_slice, size_t i_thread)
+/* The slice's own pixels and a margin around them, copied out of the slab. */
+static struct view cut_view(const struct detect_job *job, size_t i_task, float *scratch)
+{
+    const struct slice_frame *f = job->frame;
+    const struct pixel_range *own = &job->own[i_task];
+    size_t m = job->margin, u0 = own->u0 > m ? own->u0 - m : 0, v0 = own->v0 > m ? own->v0 - m : 0;
+    size_t u1 = own->u1 + m < f->width ? own->u1 + m : f->width, v1 = own->v1 + m < f->height ? own->v1 + m : f->height;
+    struct view w = {job->first + i_task, u1 - u0, v1 - v0, {(float)u0, (float)v0}, scratch, scratch + (u1 - u0) * (v1 - v0)};
+    const float *from = job->image + i_task * f->width * f->height;
+    for (size_t v = 0; v < w.height; v++) memcpy(w.image + v * w.width, from + (v0 + v) * f->width + u0, w.width * sizeof *from);
+    return w;
+}
+
+static void move_centers(struct slice_result *r, float du, float dv)
+{
+    for (size_t i = 0; i < r->n; i++) {
+        r->center[i].u += du;
+        r->center[i].v += dv;
+    }
+}
+
+static void detect_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct detect_job *job = context;
-    struct slice_result *r = &job->slice[i_slice];
-    float *image = job->scratch + i_thread * job->scratch_per_thread;
-    size_t n_pixel = job->width * job->height;
-    float *response = image + n_pixel;
-    if (!fill_image(job, i_slice, image)) return;
+    scratch_keep_within(job->v->space);
+    if (job->own[i_task].u0 >= job->own[i_task].u1) return; /* nothing of the class in it */
+    struct view w = cut_view(job, i_task, job->scratch + i_thread * job->scratch_per_thread);
+    struct slice_result *r = &job->slice[w.i_slice];
+    size_t n_pixel = w.width * w.height;
     for (int s = 0; s < N_SCALE && r->failed == STATUS_OK; s++)
-        r->failed = vision_blob_response(image, job->width, job->height, job->sigma[s], response + (size_t)s * n_pixel,
+        r->failed = vision_blob_response(w.image, w.width, w.height, job->sigma[s], w.response + (size_t)s * n_pixel,
                                          &job->error[i_thread]);
     if (r->failed != STATUS_OK) return;
-    if (!collect_peaks(job, i_slice, response, r))
+    if (!collect_peaks(job, &w, r) || !thin_out(job, &w, r))
         r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
-    thin_out(job, r);
-    centers_refine(image, job->width, job->height, job->diameter, r->center, r->n, response, response + n_pixel);
+    move_centers(r, -w.origin[0], -w.origin[1]);
+    centers_refine(w.image, w.width, w.height, job->diameter, r->center, r->n, w.response, w.response + n_pixel);
+    move_centers(r, w.origin[0], w.origin[1]);
     if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
 
@@ -353,36 +275,69 @@ static status gather(struct detect_job *job, size_t n_slice, struct center_list 
     return STATUS_OK;
 }
 
-status centers_detect(const struct volume *v, const struct direction_volume *d, const uint16_t *mask,
+/* Slabs of slices: their pictures, then the centers in them. */
+static status detect_slabs(struct detect_job *job, const struct slice_source *source, size_t n_slab, struct thread_pool *pool,
+                           const struct progress *progress, struct error *err)
+{
+    size_t n = job->frame->n_slice;
+    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    status s = STATUS_OK;
+    for (job->first = 0; job->first < n && s == STATUS_OK; job->first += n_slab) {
+        size_t n_here = job->first + n_slab < n ? n_slab : n - job->first;
+        s = slice_images_fill(source, job->first, n_here, pool, job->image, job->own, err);
+        if (s == STATUS_OK) s = thread_pool_run(pool, n_here, detect_slice, job, &quiet);
+        if (s == STATUS_CANCELLED) error_set(err, s, "finding fiber centers was cancelled");
+        progress_report(progress, (double)(job->first + n_here) / (double)n);
+    }
+    for (size_t t = 0, n_thread = thread_pool_n_thread(pool); t < n_thread && s == STATUS_OK; t++)
+        if (job->error[t].code != STATUS_OK) {
+            s = job->error[t].code;
+            if (err != NULL) *err = job->error[t];
+        }
+    return s;
+}
+
+/* Pictures need the filters' reach around centers, what a center may move, and its window stretched by the slope. */
+static size_t picture_margin(double largest_sigma, double diameter)
+{
+    return (size_t)ceil(4.0 * largest_sigma + diameter) + 8;
+}
+
+status centers_detect(const struct volume *v, const struct direction_volume *d, const struct subvolumes *sub,
                       const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
                       const struct progress *progress, struct center_list *list, struct error *err)
 {
-    struct detect_job job = {.v = v, .d = d, .mask = mask, .frame = frame, .width = frame->width, .height = frame->height};
-    size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool);
+    struct detect_job job = {.v = v, .d = d, .mask = sub->mask, .frame = frame};
+    struct slice_source source = {.v = v, .mask = sub->mask, .frame = frame};
+    size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool), n_pixel = frame->width * frame->height;
+    size_t n_slab = scratch_buffer_bytes(v->space) / (n_pixel * sizeof(float));
     *list = (struct center_list){0};
     status s = vision_init(err);
     if (s != STATUS_OK) return s;
+    n_slab = n_slab < n_thread ? n_thread : n_slab > n_slice ? n_slice : n_slab;
     for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
     job.diameter = diameter_voxel;
     job.min_distance = MIN_SPACING * (float)diameter_voxel;
-    job.scratch_per_thread = job.width * job.height * (N_SCALE + 1);
+    job.margin = picture_margin(job.sigma[N_SCALE - 1], diameter_voxel);
+    for (int a = 0; a < 3; a++) { /* beyond this, pictures are void: diagonals need 3/2 of the margin for it */
+        size_t reach = job.margin * 3 / 2;
+        source.from[a] = sub->from[a] > reach ? sub->from[a] - reach : 0;
+        source.to[a] = sub->to[a] + reach < v->n[a] ? sub->to[a] + reach : v->n[a];
+    }
+    job.scratch_per_thread = n_pixel * (N_SCALE + 1);
     job.scratch = malloc(n_thread * job.scratch_per_thread * sizeof *job.scratch);
+    job.image = malloc(n_slab * n_pixel * sizeof *job.image);
+    job.own = malloc(n_slab * sizeof *job.own);
     job.slice = calloc(n_slice, sizeof *job.slice);
     job.error = calloc(n_thread, sizeof *job.error);
-    if (job.scratch == NULL || job.slice == NULL || job.error == NULL)
+    if (job.scratch == NULL || job.image == NULL || job.own == NULL || job.slice == NULL || job.error == NULL)
         s = error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
-    if (s == STATUS_OK) {
-        s = thread_pool_run(pool, n_slice, detect_slice, &job, progress);
-        if (s != STATUS_OK) error_set(err, s, "finding fiber centers was cancelled");
-        for (size_t t = 0; t < n_thread && s == STATUS_OK; t++)
-            if (job.error[t].code != STATUS_OK) {
-                s = job.error[t].code;
-                if (err != NULL) *err = job.error[t];
-            }
-    }
+    if (s == STATUS_OK) s = detect_slabs(&job, &source, n_slab, pool, progress, err);
     if (s == STATUS_OK) s = gather(&job, n_slice, list, err);
     for (size_t k = 0; job.slice != NULL && k < n_slice; k++) free(job.slice[k].center);
     free(job.scratch);
+    free(job.image);
+    free(job.own);
     free(job.slice);
     free(job.error);
     if (s != STATUS_OK) center_list_release(list);

@@ -10,11 +10,8 @@
 
 #include "base/thread_pool.h"
 #include "geometry/fibers/slice_frame.h"
+#include "geometry/fibers/subvolumes.h"
 #include "geometry/volume/volume.h"
-
-#define CLASS_COSINE 0.77f /* of CLASS_ANGLE, 39.6 degrees */
-
-#define CLASS_KEPT 4096u
 
 struct center {
     float u, v;              /* in pixels of the frame: a pixel's centre is at (i + 1/2) */
@@ -31,14 +28,8 @@ struct center_list {
 
 void center_list_release(struct center_list *l);
 
-/* Two bytes a voxel: bit f set when the voxel shows in slices of frame f, bit 12 + a for the axis nearest to its direction;
- * voxels emptied by the filter have none of the latter (mask < CLASS_KEPT).
- * mask has room for all voxels; n_class_voxel counts voxels by nearest axis. */
-status class_mask(const struct direction_volume *d, struct thread_pool *pool, uint16_t *mask, size_t n_class_voxel[3],
-                  struct error *err);
-
 /* Centers of all slices of a frame. diameter_voxel sets the scales. STATUS_CANCELLED, STATUS_NO_MEMORY. */
-status centers_detect(const struct volume *v, const struct direction_volume *d, const uint16_t *mask,
+status centers_detect(const struct volume *v, const struct direction_volume *d, const struct subvolumes *sub,
                       const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
                       const struct progress *progress, struct center_list *list, struct error *err);
 

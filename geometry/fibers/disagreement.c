@@ -45,6 +45,7 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
     *n_cut = 0;
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), run = 0;
+        scratch_keep_within(d->space);
         for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
             if (i < n && !disagrees(value, n, i, limit)) continue;

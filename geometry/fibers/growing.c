@@ -195,6 +195,7 @@ static status grow_line(struct walk *w, const struct polyline_set *lines, size_t
     float path[2][MAX_WALK][3], x[3], t[3];
     int n[2];
     status s = STATUS_OK;
+    scratch_keep_within(w->v->space);
     for (int e = 0; e < 2; e++) {
         end_tangent(lines, l, e == 1, x, t);
         n[e] = walk_on(w, (uint32_t)l, x, t, path[e]);

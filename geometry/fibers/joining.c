@@ -126,6 +126,7 @@ static status find_joins(const struct line_end *end, size_t n_end, const struct 
     if (s == STATUS_OK) s = vertex_grid_init(&g, &points, v->n, reach, err);
     for (size_t e = 0; e < n_end && s == STATUS_OK; e++) {
         size_t from[3], to[3], c[3];
+        scratch_keep_within(v->space);
         vertex_grid_range(&g, end[e].x, reach, from, to);
         for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
             for (c[1] = from[1]; c[1] <= to[1]; c[1]++)

@@ -39,6 +39,7 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
 {
     struct radius_job *job = context;
     size_t i_brick = job->chosen[i_task];
+    scratch_keep_within(job->v->space);
     struct distance_histogram *h = &job->histogram[i_thread];
     float *distance2 = job->distance2 + i_thread * FINE * FINE * FINE;
     uint32_t *nearest = job->nearest + i_thread * FINE * FINE * FINE;

@@ -62,6 +62,7 @@ static void relax_brick(void *context, size_t i_brick, size_t i_thread)
     const struct segment_bricks *b = job->bricks;
     size_t n_segment = b->first[i_brick + 1] - b->first[i_brick];
     if (n_segment == 0) return;
+    scratch_keep_within(job->v->space);
     float *distance2 = job->distance2 + i_thread * BRICK * BRICK * BRICK;
     uint32_t *nearest = job->nearest + i_thread * BRICK * BRICK * BRICK, *slot = job->slot + i_thread * b->n_segment;
     struct brick_pulls *r = &job->result[i_brick];

@@ -43,7 +43,7 @@ struct result {
     struct reconstruct_report r;
 };
 
-static void run(const char *path, const char *axes, size_t n_thread, struct result *x)
+static void run_in(struct scratch_space *space, const char *path, const char *axes, size_t n_thread, struct result *x)
 {
     struct error err = {0};
     struct thread_pool *pool;
@@ -52,13 +52,15 @@ static void run(const char *path, const char *axes, size_t n_thread, struct resu
     snprintf(x->o.axes, sizeof x->o.axes, "%s", axes);
     for (int a = 0; a < 3; a++) x->o.voxel_size_m[a] = 2e-6;
     assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    assert_int_equal(reconstruct_read(&path, 1, &x->o, NULL, pool, NULL, &x->v, &x->r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_read(&path, 1, &x->o, space, pool, NULL, &x->v, &x->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_orientation(&x->v, &x->o, pool, NULL, &x->d, &x->r, &err), STATUS_OK);
     fiber_set_init(&x->f);
     if (reconstruct_fibers(&x->v, &x->d, &x->o, pool, NULL, &x->f, &x->r, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_int_equal(reconstruct_transfer(&x->f, &x->d, pool, NULL, &x->r, &err), STATUS_OK);
     thread_pool_free(pool);
 }
+
+static void run(const char *path, const char *axes, size_t n_thread, struct result *x) { run_in(NULL, path, axes, n_thread, x); }
 
 static void release(struct result *x)
 {
@@ -134,21 +136,51 @@ static void test_chain(void **state)
     release(&x);
 }
 
+static void assert_same(const struct result *a, const struct result *b)
+{
+    size_t n = (size_t)NX * NY * NZ;
+    assert_memory_equal(a->v.density, b->v.density, n * sizeof(float));
+    assert_memory_equal(a->d.density, b->d.density, n);
+    assert_memory_equal(a->d.octahedral, b->d.octahedral, 4 * n);
+    assert_int_equal(a->f.n_fiber, b->f.n_fiber);
+    assert_int_equal(a->f.n_vertex, b->f.n_vertex);
+    assert_memory_equal(a->f.first_vertex, b->f.first_vertex, (a->f.n_fiber + 1) * sizeof *a->f.first_vertex);
+    assert_memory_equal(a->f.position_m, b->f.position_m, a->f.n_vertex * 3 * sizeof(float));
+    assert_memory_equal(a->f.radius_m, b->f.radius_m, a->f.n_fiber * sizeof(float));
+}
+
 static void test_threads(void **state)
 {
     (void)state;
     struct result one, three;
     run(path, "xyz", 1, &one);
     run(path, "xyz", 3, &three);
-    size_t n = (size_t)NX * NY * NZ;
-    assert_memory_equal(one.v.density, three.v.density, n * sizeof(float));
-    assert_memory_equal(one.d.density, three.d.density, n);
-    assert_memory_equal(one.d.octahedral, three.d.octahedral, 4 * n);
-    assert_int_equal(one.f.n_vertex, three.f.n_vertex);
-    assert_memory_equal(one.f.position_m, three.f.position_m, one.f.n_vertex * 3 * sizeof(float));
-    assert_memory_equal(one.f.radius_m, three.f.radius_m, one.f.n_fiber * sizeof(float));
+    assert_same(&one, &three);
     release(&one);
     release(&three);
+}
+
+/* Slabs of a few slices and arrays in files give the bits that everything in memory gives; "zxy" writes across the slices. */
+static void test_memory_limit(void **state)
+{
+    (void)state;
+    char folder[64];
+    test_make_folder(folder);
+    for (int turned = 0; turned < 2; turned++) {
+        struct result free_of_limit, limited;
+        const char *axes = turned ? "zxy" : "xyz";
+        run(path, axes, 2, &free_of_limit);
+        for (size_t mib = 1; mib <= 4; mib += 3) {
+            struct scratch_space *space;
+            assert_int_equal(scratch_space_new(folder, mib << 20, &space, NULL), STATUS_OK);
+            run_in(space, path, axes, 2, &limited);
+            assert_true(mib > 1 || scratch_file_bytes(space) > 0);
+            assert_same(&free_of_limit, &limited);
+            release(&limited);
+            scratch_space_free(space);
+        }
+        release(&free_of_limit);
+    }
 }
 
 /* A permuted file gives the permuted cloth: "zxy" takes file z for cloth x. */
@@ -189,6 +221,6 @@ static void test_cancel(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
-                                       cmocka_unit_test(test_cancel)};
+                                       cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit)};
     return cmocka_run_group_tests(tests, make_scan, NULL);
 }
