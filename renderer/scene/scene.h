@@ -22,7 +22,9 @@ struct scene_option {
     const uint8_t *fiber_group; /* n_fiber groups below SCENE_MAX_GROUP instead; copied; NULL: none given */
 };
 
-/* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_INVALID. */
+/* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_TOO_LARGE; STATUS_INVALID,
+ * naming the fiber, for one that reaches too far beyond the tile and for a radius below 1/500,000 of the tile (single
+ * precision). Segments longer than 200 radii are cut: segments of the scene may be more than those of f. */
 status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err);
 void scene_free(struct scene *scene);
 size_t scene_memory_bytes(const struct scene *scene);

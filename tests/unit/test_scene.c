@@ -142,6 +142,58 @@ static void bad_fibers_are_refused(void **state)
     fiber_set_release(&f);
 }
 
+/* Rays aimed at a band twice as wide as the fiber: half of them hit, whatever the fiber's share of the tile, and none
+ * that leaves to the outside meets the fiber again. */
+static void thin_fibers_are_as_wide_as_thick_ones(void **state)
+{
+    (void)state;
+    enum { N = 20000 };
+    static const double share[4] = {1e-2, 1e-4, 1e-5, 3e-6}, tile_m = 4e-3;
+    for (int k = 0; k < 4; k++) {
+        const double radius_m = share[k] * tile_m, y_z[1][2] = {{0.33 * tile_m, 0}};
+        struct fiber_set f;
+        struct scene *s = NULL;
+        struct error err = {0};
+        struct rng r;
+        hand_straight(&f, 1, y_z, tile_m, radius_m);
+        if (scene_new(&f, &(struct scene_option){true}, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
+        rng_start(&r, &(struct rng_key){13, 0, 0, 0}, (uint32_t)k, 0);
+        int n_hit = 0;
+        for (int i = 0; i < N; i++) {
+            double tilt = 2 * rng_double(&r) - 1, l = sqrt(1 + tilt * tilt), off = 1e3 * radius_m * (4 * rng_double(&r) - 2);
+            double d[3] = {tilt / l, 0, -1 / l}; /* the fiber lies along x: y is across the ray */
+            double p[3] = {32 * rng_double(&r) - 16, 1e3 * 0.33 * tile_m + off, -1e3 * radius_m}, o[3];
+            for (int a = 0; a < 3; a++) o[a] = p[a] - 1000 * d[a];
+            struct scene_ray ray, out;
+            struct scene_hit h;
+            assert_true(scene_ray_enter(s, o, d, &ray));
+            if (!scene_trace(s, &ray, &h)) continue;
+            n_hit++;
+            scene_ray_leave(&h, ray.offset_mm, h.normal, &out);
+            assert_false(scene_occluded(s, &out));
+        }
+        double se = 0.5 / sqrt(N);
+        if (fabs((double)n_hit / N - 0.5) > 4 * se)
+            fail_msg("radius %g of the tile: %g of the rays hit, +- %g", share[k], (double)n_hit / N, se);
+        scene_free(s);
+        fiber_set_release(&f);
+    }
+}
+
+static void too_thin_fibers_are_refused(void **state)
+{
+    (void)state;
+    const double y_z[1][2] = {{1e-3, 0}};
+    struct fiber_set f;
+    struct scene *s = NULL;
+    struct error err = {0};
+    hand_straight(&f, 1, y_z, 4e-3, 4e-9);
+    assert_int_equal(scene_new(&f, &(struct scene_option){true}, &s, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "radius_m");
+    assert_non_null(strstr(err.text, "1/500000"));
+    fiber_set_release(&f);
+}
+
 static void camera_looks_at_the_orbit_centre(void **state)
 {
     (void)state;
@@ -214,6 +266,8 @@ int main(void)
         cmocka_unit_test(back_faces_do_not_exist),
         cmocka_unit_test(cloth_is_periodic),
         cmocka_unit_test(bad_fibers_are_refused),
+        cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
+        cmocka_unit_test(too_thin_fibers_are_refused),
         cmocka_unit_test(camera_looks_at_the_orbit_centre),
         cmocka_unit_test(lamp_is_calibrated),
     };
