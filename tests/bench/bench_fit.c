@@ -1,0 +1,391 @@
+/* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
+ *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
+ * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "real"; nothing: all. --prepare renders photographs only.
+ * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 400,000 a held-out mean of the truth, 2 x 50,000
+ * of a fit, the method's own budget. SELVEDGE_DATA: where measured-reflectance/ is.
+ *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
+ *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
+ *   fit.<fabric>.truth_rel_rms           the same at the true parameters
+ *   fit.<fabric>.published_paths         what the published method's own budget comes to
+ *   fit.coverage_2sigma                  20 fits of gabardine and mid1 with new noise: share of determined parameters within 2 se
+ *   fit.seeds.worst_over_median          10 fits of gabardine with other seeds: held-out error
+ *   fit.curve.<method>                   held-out error against paths and seconds, one line a point, of mid1
+ *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave, felts on felt
+ */
+#include "base/durable.h"
+#include "optimizer/descent/descent.h"
+#include "optimizer/descent/method_names.h"
+#include "optimizer/photographs/measurement_table.h"
+#include "tests/support/fit_fabrics.h"
+#include "tests/support/fit_phantom.h"
+
+#include <glob.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_COVERAGE = 20, N_SEED = 10, N_CURVE = 14, MAX_STEP = 600, CURVE_PATHS = 10000 };
+
+struct bench {
+    struct thread_pool *pool;
+    const char *folder;
+    size_t photograph_paths, kept_paths, score_paths;
+    uint64_t path_budget;
+    const char *sample; /* NULL: all measured tables */
+    bool prepare;
+};
+
+static void print(const char *of, const char *what, double value, const char *unit, const char *better)
+{
+    printf("{\"name\":\"fit.%s%s%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", of, what[0] ? "." : "", what,
+           value, unit, better);
+    fflush(stdout);
+}
+
+/* ---- one fit ---- */
+
+struct curve {
+    size_t n, n_param;
+    double wall_s[MAX_STEP], paths[MAX_STEP], objective[MAX_STEP], param[MAX_STEP][SCATTERING_MAX_PARAM];
+};
+
+static status on_step(void *context, const struct fit_step *step, struct error *err)
+{
+    (void)err;
+    struct curve *c = context;
+    if (c->n == MAX_STEP) return STATUS_OK;
+    c->wall_s[c->n] = step->wall_s;
+    c->paths[c->n] = (double)step->n_path_total;
+    c->objective[c->n] = step->objective.value;
+    memcpy(c->param[c->n++], step->param, step->n_param * sizeof *step->param);
+    return STATUS_OK;
+}
+
+static void run_fit(const struct fit_phantom *f, const char *method, uint64_t seed, uint64_t budget,
+                    struct fit_result *r, struct curve *curve)
+{
+    struct error err = {0};
+    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct configuration *configuration = trace_configurations(&f->fitted);
+    struct trace_estimator trace = {.model = &f->model,
+                                    .scene = {f->cloth.scene, f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
+                                    .pool = f->pool,
+                                    .seed = seed,
+                                    .configuration = configuration,
+                                    .n_configuration = f->fitted.n};
+    struct estimator estimator = trace_estimator(&trace);
+    for (size_t p = 0; p < f->model.n_param; p++) {
+        const struct param_info *info = &f->model.param[p];
+        parameter[p] = (struct fit_parameter){info->lower, info->upper, info->start,
+                                              strcmp(info->name, APPEARANCE_DENSITY_MULTIPLIER) == 0};
+    }
+    struct curve own = {0};
+    if (curve == NULL) curve = &own;
+    curve->n = 0;
+    curve->n_param = f->model.n_param;
+    const struct fit_problem problem = {.n_param = f->model.n_param,
+                                        .info = f->model.param,
+                                        .param = parameter,
+                                        .observation = &f->fitted,
+                                        .estimator = &estimator,
+                                        .path_budget = budget,
+                                        .report = on_step,
+                                        .report_context = curve};
+    fit_check(descent_find(method)->run(&problem, r, &err), &err);
+    free(configuration);
+}
+
+static void tell_fit(const struct fit_phantom *f, const struct fit_result *r)
+{
+    fprintf(stderr, "  %s after %zu steps, %.3g paths, %.1f s (%.0f k paths/s), objective %.4g: %s\n",
+            r->converged ? "converged" : "NOT converged", r->n_step, (double)r->n_path, r->wall_s,
+            1e-3 * (double)r->n_path / r->wall_s, r->objective.value, r->reason);
+    for (size_t p = 0; p < f->model.n_param; p++) {
+        const struct param_info *info = &f->model.param[p];
+        fprintf(stderr, "  %-18s %9.4f +- %-8.4f true %9.4f%s%s\n", info->name, param_to_file_unit(info, r->param[p]),
+                param_to_file_unit(info, r->uncertainty.se_param[p]), param_to_file_unit(info, f->truth[p]),
+                r->uncertainty.at_bound[p] ? " at bound" : "", r->uncertainty.determined[p] ? "" : " undetermined");
+    }
+}
+
+static void open_fabric(const struct bench *b, const char *name, struct fit_phantom *f)
+{
+    const struct fit_fabric *fabric = fit_fabric_find(name);
+    fprintf(stderr, "%s\n", name);
+    fit_phantom_init(f, b->folder, b->pool, fabric->weave, fabric->model_id, fabric->truth);
+    for (size_t p = 0; p < f->model.n_param; p++) /* tables are rounded: not beyond a bound */
+        f->truth[p] = fmin(fmax(f->truth[p], f->model.param[p].lower), f->model.param[p].upper);
+    fit_phantom_photograph(f, b->photograph_paths, 0.005, 1);
+}
+
+static struct fit_score score(const struct bench *b, const struct fit_phantom *f, const double *param)
+{
+    return fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, param, param == f->truth ? 0 : b->score_paths);
+}
+
+/* ---- figures ---- */
+
+/* 16 configurations x 2 replicas x 64 x 64 x 64 paths x (6 x 60 iterations, one for the first rate, up to 10 to settle);
+ * rescaling curves: 5 of nine values each, one replica. */
+static double published_paths(void) { return 16.0 * 64 * 64 * 64 * (2.0 * (6 * 60 + 1 + 10) + 5 * 9); }
+
+static void bench_fabric(const struct bench *b, const char *name)
+{
+    struct fit_phantom f;
+    struct fit_result r;
+    open_fabric(b, name, &f);
+    struct fit_score truth = score(b, &f, f.truth);
+    fprintf(stderr, "  the truth scores %.4f +- %.4f\n", truth.rel_rms, truth.se);
+    if (!b->prepare) {
+        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, &r, NULL);
+        tell_fit(&f, &r);
+        struct fit_score s = score(b, &f, r.param);
+        fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
+        print(name, "wall_s", r.wall_s, "s", "lower");
+        print(name, "paths", (double)r.n_path, "path", "lower");
+        print(name, "heldout_rel_rms", s.rel_rms, "1", "lower");
+        print(name, "truth_rel_rms", truth.rel_rms, "1", "lower");
+        print(name, "published_paths", published_paths(), "path", "lower");
+    }
+    fit_phantom_release(&f);
+}
+
+static void bench_coverage(const struct bench *b)
+{
+    static const char *const name[] = {"gabardine", "mid1"};
+    size_t n_inside = 0, n_judged = 0;
+    for (size_t k = 0; k < 2; k++) {
+        struct fit_phantom f;
+        open_fabric(b, name[k], &f);
+        for (uint64_t i = 0; i < N_COVERAGE / 2; i++) {
+            struct fit_result r;
+            fit_phantom_photograph(&f, b->photograph_paths, 0.005, 100 + i);
+            run_fit(&f, METHOD_GAUSS_NEWTON, 100 + i, b->path_budget, &r, NULL);
+            tell_fit(&f, &r);
+            for (size_t p = 0; p < f.model.n_param; p++) {
+                if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
+                n_judged++;
+                n_inside += fabs(r.param[p] - f.truth[p]) < 2.0 * r.uncertainty.se_param[p];
+            }
+        }
+        fit_phantom_release(&f);
+    }
+    fprintf(stderr, "%zu of %zu determined parameters within two standard errors\n", n_inside, n_judged);
+    print("coverage_2sigma", "", (double)n_inside / (double)n_judged, "1", "higher");
+}
+
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void bench_seeds(const struct bench *b)
+{
+    struct fit_phantom f;
+    double error[N_SEED];
+    open_fabric(b, "gabardine", &f);
+    for (uint64_t i = 0; i < N_SEED; i++) {
+        struct fit_result r;
+        run_fit(&f, METHOD_GAUSS_NEWTON, 200 + i, b->path_budget, &r, NULL);
+        tell_fit(&f, &r);
+        struct fit_score s = score(b, &f, r.param);
+        fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
+        error[i] = s.rel_rms;
+    }
+    qsort(error, N_SEED, sizeof *error, by_size);
+    double median = 0.5 * (error[N_SEED / 2 - 1] + error[N_SEED / 2]);
+    print("seeds.worst_over_median", "", error[N_SEED - 1] / median, "1", "lower");
+    print("seeds.median_heldout_rel_rms", "", median, "1", "lower");
+    fit_phantom_release(&f);
+}
+
+/* Points evenly spaced in the logarithm of paths, and the result. */
+static void print_curve(const struct bench *b, const struct fit_phantom *f, const char *method, const struct curve *c,
+                        const struct fit_result *r)
+{
+    double next = 0.0, ratio = pow(c->paths[c->n - 1] / c->paths[0], 1.0 / (N_CURVE - 1));
+    for (size_t i = 0; i < c->n; i++) {
+        if (c->paths[i] < next) continue;
+        next = c->paths[i] * ratio;
+        struct fit_score s = fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, c->param[i], CURVE_PATHS);
+        printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_s\":%.4g}\n",
+               method, s.rel_rms, c->paths[i], c->wall_s[i]);
+        fflush(stdout);
+    }
+    struct fit_score s = score(b, f, r->param);
+    printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_s\":%.4g}\n",
+           method, s.rel_rms, (double)r->n_path, r->wall_s);
+    fflush(stdout);
+}
+
+static void bench_curve(const struct bench *b)
+{
+    static const struct {
+        const char *method;
+        uint64_t budget;
+    } run[] = {{METHOD_GAUSS_NEWTON, 0}, {METHOD_PUBLISHED_SGD, 20000000}};
+    struct fit_phantom f;
+    struct curve *c = calloc(1, sizeof *c);
+    if (c == NULL) exit(1);
+    open_fabric(b, "mid1", &f);
+    print("curve.truth_rel_rms", "", score(b, &f, f.truth).rel_rms, "1", "lower");
+    for (size_t k = 0; k < 2; k++) {
+        struct fit_result r;
+        run_fit(&f, run[k].method, 1, run[k].budget, &r, c);
+        tell_fit(&f, &r);
+        print_curve(b, &f, run[k].method, c, &r);
+    }
+    fit_phantom_release(&f);
+    free(c);
+}
+
+/* ---- measured tables ---- */
+
+enum { N_REAL_MODEL = 4, MAX_REAL = 32 };
+
+static const struct {
+    const char *name, *id;
+} real_model[N_REAL_MODEL] = {{"two_lobe", "two_lobe.v1"},
+                              {"two_lobe_balanced", "two_lobe_balanced.v1"},
+                              {"two_lobe_volume", "phase_two_lobe.v1"},
+                              {"microflake", "microflake.v1"}};
+
+struct real_row {
+    char sample[64];
+    double error[N_REAL_MODEL][2]; /* fitted, held out */
+};
+
+static void fit_table(const struct bench *b, const char *path, struct real_row *row)
+{
+    const bool felt = strstr(row->sample, "felt") != NULL;
+    struct observation_set o;
+    struct error err = {0};
+    char *text = NULL;
+    size_t n = 0;
+    const struct job_document set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0, .black_sheet = true};
+    observation_set_init(&o);
+    fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
+    fit_check(measurement_table_parse(text, n, row->sample, &set_up, &o, &err), &err);
+    for (size_t k = 0; k < N_REAL_MODEL; k++) {
+        struct fit_phantom f;
+        struct fit_result r;
+        char what[160];
+        fprintf(stderr, "%s, %s\n", row->sample, real_model[k].name);
+        fit_phantom_init(&f, b->folder, b->pool, felt ? PHANTOM_FELT : PHANTOM_PLAIN, real_model[k].id, NULL);
+        fit_phantom_observe(&f, &o);
+        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, &r, NULL);
+        tell_fit(&f, &r);
+        for (int held_out = 0; held_out < 2; held_out++) {
+            const enum job_set set = held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT;
+            row->error[k][held_out] = fit_phantom_score(&f, set, NULL, 0, r.param, b->score_paths / 2).rel_rms;
+            snprintf(what, sizeof what, "%s.%s.%s", row->sample, real_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");
+            print("real", what, row->error[k][held_out], "1", "lower");
+        }
+        fit_phantom_release(&f);
+    }
+    observation_set_release(&o);
+    free(text);
+}
+
+static void print_table(const struct real_row *row, size_t n)
+{
+    fprintf(stderr, "%-32s", "relative RMS, fitted / held out");
+    for (size_t k = 0; k < N_REAL_MODEL; k++) fprintf(stderr, "%20s", real_model[k].name);
+    for (size_t i = 0; i < n; i++) {
+        fprintf(stderr, "\n%-32s", row[i].sample);
+        for (size_t k = 0; k < N_REAL_MODEL; k++)
+            fprintf(stderr, "%12.3f / %.3f", row[i].error[k][0], row[i].error[k][1]);
+    }
+    fputc('\n', stderr);
+}
+
+static void bench_real(const struct bench *b)
+{
+    const char *data = getenv("SELVEDGE_DATA");
+    char pattern[1024];
+    glob_t found;
+    struct real_row row[MAX_REAL] = {0};
+    size_t n = 0;
+    snprintf(pattern, sizeof pattern, "%s/measured-reflectance/*.csv", data != NULL ? data : "../shared/data");
+    if (glob(pattern, 0, NULL, &found) != 0) {
+        fprintf(stderr, "skipped: no '%s' (set SELVEDGE_DATA)\n", pattern);
+        return;
+    }
+    for (size_t i = 0; i < found.gl_pathc && n < MAX_REAL; i++) {
+        const char *slash = strrchr(found.gl_pathv[i], '/');
+        snprintf(row[n].sample, sizeof row[n].sample, "%s", slash != NULL ? slash + 1 : found.gl_pathv[i]);
+        row[n].sample[strcspn(row[n].sample, ".")] = '\0';
+        if (b->sample != NULL && strcmp(b->sample, row[n].sample) != 0) continue;
+        fit_table(b, found.gl_pathv[i], &row[n]);
+        n++;
+    }
+    print_table(row, n);
+    globfree(&found);
+}
+
+static void run_one(const struct bench *b, const char *what)
+{
+    if (strcmp(what, "coverage") == 0)
+        bench_coverage(b);
+    else if (strcmp(what, "seeds") == 0)
+        bench_seeds(b);
+    else if (strcmp(what, "curve") == 0)
+        bench_curve(b);
+    else if (strcmp(what, "real") == 0)
+        bench_real(b);
+    else if (fit_fabric_find(what) != NULL)
+        bench_fabric(b, what);
+    else {
+        fprintf(stderr, "unknown: '%s'\n", what);
+        exit(1);
+    }
+}
+
+static bool take_option(struct bench *b, const char *name, const char *value)
+{
+    if (strcmp(name, "--folder") == 0)
+        b->folder = value;
+    else if (strcmp(name, "--sample") == 0)
+        b->sample = value;
+    else if (strcmp(name, "--photograph-paths") == 0)
+        b->photograph_paths = strtoul(value, NULL, 10);
+    else if (strcmp(name, "--kept-paths") == 0)
+        b->kept_paths = strtoul(value, NULL, 10);
+    else if (strcmp(name, "--score-paths") == 0)
+        b->score_paths = strtoul(value, NULL, 10);
+    else if (strcmp(name, "--path-budget") == 0)
+        b->path_budget = strtoull(value, NULL, 10);
+    else
+        return false;
+    return true;
+}
+
+int main(int argc, char **argv)
+{
+    static const char *const more[] = {"coverage", "seeds", "curve", "real"};
+    struct bench b = {
+        .folder = "build/bench-fit", .photograph_paths = 1000000, .kept_paths = 400000, .score_paths = 50000};
+    struct error err = {0};
+    int i = 1;
+    for (; i < argc && argv[i][0] == '-'; i++) {
+        if (strcmp(argv[i], "--prepare") == 0) {
+            b.prepare = true;
+        } else if (i + 1 == argc || !take_option(&b, argv[i], argv[i + 1])) {
+            fprintf(stderr, "unknown option '%s', or its value is missing\n", argv[i]);
+            return 1;
+        } else {
+            i++;
+        }
+    }
+    fit_check(thread_pool_new(0, &b.pool, &err), &err);
+    if (i == argc) {
+        for (const struct fit_fabric *f = fit_fabric; f->name != NULL; f++) run_one(&b, f->name);
+        for (size_t k = 0; k < sizeof more / sizeof more[0]; k++) run_one(&b, more[k]);
+    }
+    for (; i < argc; i++) run_one(&b, argv[i]);
+    thread_pool_free(b.pool);
+    return 0;
+}

@@ -1,0 +1,314 @@
+#include "tests/support/fit_phantom.h"
+
+#include "base/durable.h"
+#include "base/rng.h"
+#include "geometry/fibers/voxelise.h"
+#include "optimizer/objective/linear_model.h"
+#include "optimizer/objective/objective.h"
+#include "optimizer/phantom_view_table.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+
+enum { SEED_PHOTOGRAPH = 77001, SEED_KEPT = 77002, SEED_SCORE = 77003 };
+
+void fit_check(status s, const struct error *err)
+{
+    if (s == STATUS_OK) return;
+    fprintf(stderr, "%s\n", err->text);
+    exit(1);
+}
+
+static void check_memory(const void *p)
+{
+    if (p != NULL) return;
+    fputs("out of memory\n", stderr);
+    exit(1);
+}
+
+/* ---- cloth ---- */
+
+static void make_volume(struct fit_cloth *c, struct thread_pool *pool)
+{
+    struct error err = {0};
+    double voxel_m;
+    fit_check(fibers_voxelise(&c->fiber, &(struct voxelise_option){2e-6, 1u << 30}, pool, NULL, &c->volume, &voxel_m, &err),
+              &err);
+    fit_check(volume_scene_init(&c->volume_scene, &c->volume, &(struct volume_scene_option){.black_sheet = true}, &err),
+              &err);
+    c->has_volume = true;
+}
+
+void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, bool with_volume, struct thread_pool *pool)
+{
+    struct error err = {0};
+    struct phantom_option o;
+    struct phantom_report report;
+    *c = (struct fit_cloth){0};
+    fiber_set_init(&c->fiber);
+    phantom_option_default(&o, weave);
+    o.n_fiber_per_yarn = weave == PHANTOM_FELT ? 400 : 37;
+    o.felt_tile_m = 6e-4;
+    o.felt_thickness_m = 2.5e-4;
+    o.vertex_spacing_m = 8e-6;
+    fit_check(phantom_generate(&o, pool, NULL, &c->fiber, &report, &err), &err);
+    fprintf(stderr, "phantom %s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n",
+            phantom_weave_name(weave), c->fiber.n_fiber, c->fiber.n_vertex, report.cover, report.volume_fraction);
+    fit_check(scene_new(&c->fiber, &(struct scene_option){.black_sheet = true}, &c->scene, &err), &err);
+    if (with_volume) make_volume(c, pool);
+}
+
+void fit_cloth_release(struct fit_cloth *c)
+{
+    if (c->has_volume) {
+        volume_scene_release(&c->volume_scene);
+        direction_volume_release(&c->volume);
+    }
+    scene_free(c->scene);
+    fiber_set_release(&c->fiber);
+}
+
+/* ---- phantom ---- */
+
+void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_pool *pool, enum phantom_weave weave,
+                      const char *model_id, const double *truth_file_unit)
+{
+    struct error err = {0};
+    *f = (struct fit_phantom){.pool = pool, .folder = folder};
+    fit_check(durable_make_folder(folder, &err), &err);
+    if (!appearance_find(model_id, &f->model)) {
+        fprintf(stderr, "no model '%s'\n", model_id);
+        exit(1);
+    }
+    fit_cloth_init(&f->cloth, weave, f->model.kind == APPEARANCE_VOLUME, pool);
+    for (size_t p = 0; p < f->model.n_param; p++)
+        f->truth[p] = truth_file_unit != NULL ? param_from_file_unit(&f->model.param[p], truth_file_unit[p])
+                                              : f->model.param[p].start;
+    observation_set_init(&f->observation);
+    observation_set_init(&f->fitted);
+}
+
+static void forget_observations(struct fit_phantom *f)
+{
+    observation_set_release(&f->observation);
+    observation_set_release(&f->fitted);
+    free(f->configuration);
+    f->configuration = NULL;
+}
+
+void fit_phantom_release(struct fit_phantom *f)
+{
+    forget_observations(f);
+    fit_cloth_release(&f->cloth);
+}
+
+void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o)
+{
+    struct error err = {0};
+    forget_observations(f);
+    if (o->n > FIT_MAX_OBSERVATION) {
+        fprintf(stderr, "%zu observations: at most %d\n", o->n, FIT_MAX_OBSERVATION);
+        exit(1);
+    }
+    for (size_t i = 0; i < o->n; i++) fit_check(observation_set_append(&f->observation, &o->item[i], &err), &err);
+    fit_check(observation_set_select(o, JOB_SET_FIT, &f->fitted, &err), &err);
+    f->configuration = trace_configurations(&f->observation);
+    check_memory(f->configuration);
+}
+
+/* ---- estimates that are kept ---- */
+
+struct kept_call {
+    const double *param;
+    const struct configuration *configuration;
+    size_t n_configuration;
+    uint64_t seed;
+    uint32_t replica;
+    bool want_jacobian;
+};
+
+static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
+                         struct estimate *out)
+{
+    struct error err = {0};
+    size_t count[FIT_MAX_OBSERVATION];
+    for (size_t i = 0; i < c->n_configuration; i++) count[i] = n_path;
+    const struct appearance_request q = {.scene = {.fibers = f->cloth.scene,
+                                                   .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
+                                         .model = &f->model,
+                                         .param = c->param,
+                                         .configuration = c->configuration,
+                                         .n_configuration = c->n_configuration,
+                                         .n_path = count,
+                                         .seed = c->seed,
+                                         .iteration = iteration,
+                                         .replica = c->replica,
+                                         .want_jacobian = c->want_jacobian};
+    fit_check(appearance_estimate_run(&q, f->pool, NULL, out, &err), &err);
+}
+
+static uint32_t call_sum(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path)
+{
+    const struct fiber_set *s = &f->cloth.fiber;
+    const uint32_t number[] = {(uint32_t)c->seed, c->replica, chunk, c->want_jacobian, (uint32_t)n_path};
+    uint32_t sum = (uint32_t)crc32_z(0, (const void *)s->position_m, 3 * s->n_vertex * sizeof *s->position_m);
+    sum = (uint32_t)crc32_z(sum, (const void *)f->model.id, strlen(f->model.id));
+    sum = (uint32_t)crc32_z(sum, (const void *)c->param, f->model.n_param * sizeof *c->param);
+    for (size_t i = 0; i < c->n_configuration; i++) {
+        const struct configuration *k = &c->configuration[i];
+        const double angle[] = {k->light_theta_rad, k->light_phi_rad, k->camera_theta_rad, k->camera_phi_rad,
+                                k->cloth_rotation_rad};
+        sum = (uint32_t)crc32_z(sum, (const void *)angle, sizeof angle);
+    }
+    return (uint32_t)crc32_z(sum, (const void *)number, sizeof number);
+}
+
+static void chunk_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path,
+                           struct estimate *out)
+{
+    struct error err = {0};
+    char path[1024], *data = NULL;
+    size_t n = c->n_configuration * sizeof *out, n_read = 0;
+    snprintf(path, sizeof path, "%s/%08x.estimates", f->folder, call_sum(f, c, chunk, n_path));
+    if (file_read_all(path, n, &data, &n_read, &err) == STATUS_OK && n_read == n) {
+        memcpy(out, data, n);
+    } else {
+        run_estimate(f, c, chunk, n_path, out);
+        fit_check(durable_replace_volatile(path, out, n, &err), &err);
+    }
+    free(data);
+}
+
+/* sum <- sum + part, as means over chunks with equal path counts: divide by n_chunk at the end. */
+static void merge(struct estimate *sum, const struct estimate *part, double share)
+{
+    for (int c = 0; c < 3; c++) {
+        sum->mean[c] += share * part->mean[c];
+        sum->var[c] += share * share * part->var[c];
+    }
+    for (int k = 0; k < 3 * SCATTERING_MAX_FLAT; k++) {
+        sum->jac[k] += share * part->jac[k];
+        sum->jac_var[k] += share * share * part->jac_var[k];
+    }
+    sum->n_path += part->n_path;
+    sum->n_vertex += part->n_vertex;
+}
+
+static void kept_estimate(const struct fit_phantom *f, const struct kept_call *c, size_t n_path, struct estimate *out)
+{
+    size_t n_chunk = (n_path + FIT_CHUNK - 1) / FIT_CHUNK;
+    struct estimate *part = calloc(c->n_configuration, sizeof *part);
+    check_memory(part);
+    memset(out, 0, c->n_configuration * sizeof *out);
+    for (size_t k = 0; k < n_chunk; k++) {
+        chunk_estimate(f, c, (uint32_t)k, n_path / n_chunk, part);
+        for (size_t i = 0; i < c->n_configuration; i++) merge(&out[i], &part[i], 1.0 / (double)n_chunk);
+    }
+    free(part);
+}
+
+/* ---- photographs ---- */
+
+void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, uint64_t noise_seed)
+{
+    struct phantom_view_table *t = calloc(1, sizeof *t);
+    struct estimate *e = calloc(FIT_N_VIEW, sizeof *e);
+    struct configuration configuration[FIT_N_VIEW];
+    struct observation_set o;
+    struct error err = {0};
+    struct rng rng;
+    check_memory(t);
+    check_memory(e);
+    phantom_view_table_builtin(t);
+    const struct job_document set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
+    for (size_t i = 0; i < FIT_N_VIEW; i++) {
+        const struct job_photograph *v = &t->view[i];
+        configuration[i] = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
+                                                     v->camera_phi_deg, v->cloth_rotation_deg);
+    }
+    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, false};
+    kept_estimate(f, &call, n_path, e);
+    rng_start(&rng, &(struct rng_key){.seed = noise_seed, .iteration = 65533}, 0, 0);
+    observation_set_init(&o);
+    for (size_t i = 0; i < FIT_N_VIEW; i++) {
+        struct observation item = {.set = t->view[i].set, .configuration = configuration[i], .weight = 1.0};
+        memcpy(item.name, t->view[i].file, sizeof item.name);
+        for (int c = 0; c < 3; c++) {
+            double normal[2];
+            rng_normal_pair(&rng, normal);
+            item.mean_rgb[c] = e[i].mean[c] * (1.0 + noise * normal[0]);
+            item.se_rgb[c] = sqrt(e[i].var[c] + noise * noise * e[i].mean[c] * e[i].mean[c]);
+        }
+        fit_check(observation_set_append(&o, &item, &err), &err);
+    }
+    fit_phantom_observe(f, &o);
+    observation_set_release(&o);
+    free(e);
+    free(t);
+}
+
+/* ---- scores ---- */
+
+struct scorer {
+    struct observation_set part;
+    struct configuration *configuration;
+    struct coordinate coordinate[SCATTERING_MAX_PARAM];
+    struct linear_history history;
+    struct linear_model model;
+    struct estimate *replica[2];
+};
+
+static void append_here(struct scorer *s, const struct fit_phantom *f, const double *param)
+{
+    struct error err = {0};
+    double x[SCATTERING_MAX_PARAM];
+    for (size_t p = 0; p < f->model.n_param; p++) x[p] = coordinate_from_param(&s->coordinate[p], param[p]);
+    fit_check(linear_history_append(&s->history, x, s->replica[0], s->replica[1], &err), &err);
+}
+
+struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
+                                   const double *param, size_t n_path)
+{
+    struct scorer s = {0};
+    struct error err = {0};
+    double x[SCATTERING_MAX_PARAM], se;
+    observation_set_init(&s.part);
+    fit_check(observation_set_select(&f->observation, set, &s.part, &err), &err);
+    s.configuration = trace_configurations(&s.part);
+    check_memory(s.configuration);
+    for (size_t p = 0; p < f->model.n_param; p++) {
+        const struct param_info *info = &f->model.param[p];
+        coordinate_init(&s.coordinate[p], info, info->lower, info->upper);
+        x[p] = coordinate_from_param(&s.coordinate[p], param[p]);
+    }
+    linear_history_init(&s.history, &s.part, s.coordinate, f->model.n_param);
+    fit_check(linear_model_init(&s.model, 3 * s.part.n, f->model.n_param, &err), &err);
+    for (int q = 0; q < 2; q++) check_memory(s.replica[q] = calloc(s.part.n, sizeof(struct estimate)));
+    if (at != NULL) {
+        for (uint32_t q = 0; q < 2; q++)
+            kept_estimate(f, &(struct kept_call){at, s.configuration, s.part.n, SEED_KEPT, q, true}, n_kept,
+                          s.replica[q]);
+        append_here(&s, f, at);
+    }
+    if (n_path > 0) {
+        for (uint32_t q = 0; q < 2; q++)
+            run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true}, 0, n_path,
+                         s.replica[q]);
+        append_here(&s, f, param);
+    }
+    fit_check(linear_model_pool(&s.model, &s.history, x, &err), &err);
+    double value = fmax(linear_model_objective(&s.model, &se), 0.0), n_row = (double)s.model.n_row;
+    struct fit_score score = {.rel_rms = sqrt(value / n_row)};
+    score.se = score.rel_rms > 0.0 ? 0.5 * se / (n_row * score.rel_rms) : 0.0;
+    linear_model_release(&s.model);
+    linear_history_release(&s.history);
+    observation_set_release(&s.part);
+    free(s.configuration);
+    free(s.replica[0]);
+    free(s.replica[1]);
+    return score;
+}

@@ -1,0 +1,67 @@
+/* Phantom cloth with photographs of it, for the figures of fits: made once, kept in a folder, scored against the truth.
+ *
+ * Photographs are path-traced mean radiances of the 16 + 24 built-in configurations (phantom_view_table.h) with seeds
+ * that no fit uses, in chunks of at most FIT_CHUNK paths a configuration; a chunk is a file, so an interrupted run goes on.
+ * A file's name states everything that it depends on but the renderer itself: empty the folder after a change of that.
+ *
+ * Score of a parameter set: relative RMS error of the held-out means (objective.h) from two independent replicas,
+ * without Monte-Carlo bias. Estimates at the truth (kept as well) and at the parameters are carried to one another by
+ * their derivatives and averaged (linear_model.h), so that truth and fit are compared on largely the same paths.
+ * Everything here ends the program when something fails.
+ */
+#ifndef SELVEDGE_TESTS_FIT_PHANTOM_H
+#define SELVEDGE_TESTS_FIT_PHANTOM_H
+
+#include "geometry/phantom/phantom.h"
+#include "optimizer/descent/trace_estimator.h"
+#include "renderer/transport/volume_scene.h"
+
+enum { FIT_CHUNK = 100000, FIT_N_VIEW = 40, FIT_MAX_OBSERVATION = 64 };
+
+struct fit_cloth {
+    struct fiber_set fiber;
+    struct scene *scene;
+    struct direction_volume volume; /* only when asked for */
+    struct volume_scene volume_scene;
+    bool has_volume;
+};
+
+struct fit_phantom {
+    struct thread_pool *pool;
+    const char *folder; /* of kept estimates */
+    struct fit_cloth cloth;
+    struct appearance model;
+    double truth[SCATTERING_MAX_PARAM];         /* internal units */
+    struct observation_set observation, fitted; /* all; those of the set fit */
+    struct configuration *configuration;        /* of `observation` */
+};
+
+/* Status and error to standard error, then exit(1), unless s is STATUS_OK. */
+void fit_check(status s, const struct error *err);
+
+/* One tile of a phantom: fibers of 14 um in yarns of 37 (felt: 0.6 x 0.6 x 0.25 mm), black sheet below. with_volume:
+ * also as densities and directions on a grid of 2 um. */
+void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, bool with_volume, struct thread_pool *pool);
+void fit_cloth_release(struct fit_cloth *c);
+
+/* Cloth and model; no observations yet. truth_file_unit: NULL leaves the truth at the model's start. */
+void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_pool *pool, enum phantom_weave weave,
+                      const char *model_id, const double *truth_file_unit);
+void fit_phantom_release(struct fit_phantom *f);
+
+/* Photographs at the truth, n_path a configuration (cut into equal chunks); every number gets a relative error of `noise`
+ * (0.005), drawn from noise_seed. Stated standard errors hold both kinds of noise. Replaces earlier ones. */
+void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, uint64_t noise_seed);
+/* Observations from elsewhere (kept: copied). */
+void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o);
+
+struct fit_score {
+    double rel_rms, se; /* se: of rel_rms, Monte-Carlo only */
+};
+
+/* On the observations of one set. at: where the kept estimates of 2 x n_kept paths a configuration are taken (usually
+ * the truth; NULL: none); n_path: new paths a configuration and replica at param (0: the kept ones only). */
+struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
+                                   const double *param, size_t n_path);
+
+#endif
