@@ -41,9 +41,11 @@ static const char usage[] =
     "  --bits 8|16             depth of scan.tif                                                          [16]\n"
     "  --no-deflate            write scan.tif uncompressed\n"
     "  --metaimage             write DIR/scan.mhd and scan.raw as well\n"
+    "  --voxels-z N            slices in all, the cloth in the middle of them                             [as many as it needs]\n"
     "other\n"
     "  --seed N                everything random follows from it                                          [1]\n"
-    "  --threads N             0: one per processor                                                       [0]\n";
+    "  --threads N             0: one per processor                                                       [0]\n"
+    "  --memory-mib N          resident memory; beyond it the volume is worked on in a file in DIR          [2048]\n";
 
 struct cloth {
     const char *out, *yarn; /* yarn: NULL or a file of parameters */
@@ -51,7 +53,7 @@ struct cloth {
     struct phantom_scan_option scan;
     struct phantom_file_option file;
     bool metaimage;
-    size_t n_thread;
+    size_t n_thread, n_slice, memory_mib; /* n_slice 0: as many as needed */
     struct phantom_report report;
     struct fiber_set fibers;
     struct volume volume;
@@ -84,6 +86,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
     phantom_file_option_default(&c->file);
     double voxel_um = 2.0, diameter[3] = {7.0, 7.0, 7.0}, pile_um = 200.0, felt_um[2] = {320.0, 120.0};
     size_t bits = 16;
+    c->memory_mib = 2048;
     const struct command_option option[] = {
         {.name = "out", .kind = OPTION_TEXT, .to = &c->out},
         {.name = "weave", .kind = OPTION_TEXT, .to = &weave_name},
@@ -110,6 +113,8 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "bits", .kind = OPTION_COUNT, .to = &bits},
         {.name = "no-deflate", .kind = OPTION_FALSE, .to = &c->file.deflate},
         {.name = "metaimage", .kind = OPTION_FLAG, .to = &c->metaimage},
+        {.name = "voxels-z", .kind = OPTION_COUNT, .to = &c->n_slice},
+        {.name = "memory-mib", .kind = OPTION_COUNT, .to = &c->memory_mib},
         {.name = "seed", .kind = OPTION_U64, .to = &c->phantom.seed},
         {.name = "threads", .kind = OPTION_COUNT, .to = &c->n_thread},
     };
@@ -152,11 +157,13 @@ static status write_slice(const struct volume *v, int axis, const char *path, st
     uint8_t *grey = malloc(width * height);
     if (grey == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     at[axis] = v->n[axis] / 2;
-    for (at[up] = 0; at[up] < height; at[up]++)
+    for (at[up] = 0; at[up] < height; at[up]++) {
+        scratch_keep_within(v->space);
         for (at[across] = 0; at[across] < width; at[across]++) {
             double value = 255.0 * ((double)v->density[volume_index(v->n, at[0], at[1], at[2])] + 0.4) / 1.8;
             grey[at[up] * width + at[across]] = (uint8_t)fmax(0.0, fmin(255.0, value));
         }
+    }
     status st = write_png_grey(grey, width, height, path, err);
     free(grey);
     return st;
@@ -242,10 +249,24 @@ static status write_files(struct cloth *c, struct error *err)
     return st;
 }
 
+/* Void below and above the cloth up to the wanted number of slices. */
+static status center_cloth(struct cloth *c, struct error *err)
+{
+    size_t *n = &c->report.n_voxel[2];
+    if (c->n_slice == 0) return STATUS_OK;
+    if (c->n_slice < *n || c->n_slice > 100000)
+        return error_set(err, STATUS_INVALID, "option --voxels-z: the cloth needs %zu slices, %zu are asked for", *n, c->n_slice);
+    float rise_m = (float)((double)((c->n_slice - *n) / 2) * c->phantom.voxel_size_m);
+    for (size_t i = 0; i < c->fibers.n_vertex; i++) c->fibers.position_m[3 * i + 2] += rise_m;
+    *n = c->n_slice;
+    return STATUS_OK;
+}
+
 int phantom_command_cloth(int argc, char **argv)
 {
     struct cloth c = {0};
     struct thread_pool *pool = NULL;
+    struct scratch_space *space = NULL;
     struct error err = {0};
     fiber_set_init(&c.fibers);
     for (int i = 1; i < argc; i++)
@@ -260,10 +281,13 @@ int phantom_command_cloth(int argc, char **argv)
     status st = thread_pool_new(c.n_thread, &pool, &err);
     if (st == STATUS_OK) st = durable_make_folder(c.out, &err);
     if (st == STATUS_OK) st = phantom_generate(&c.phantom, pool, NULL, &c.fibers, &c.report, &err);
-    if (st == STATUS_OK) st = phantom_scan(&c.fibers, c.report.n_voxel, &c.scan, pool, NULL, &c.volume, &err);
+    if (st == STATUS_OK) st = center_cloth(&c, &err);
+    if (st == STATUS_OK) st = scratch_space_new(c.out, c.memory_mib << 20, &space, &err);
+    if (st == STATUS_OK) st = phantom_scan_in(&c.fibers, c.report.n_voxel, &c.scan, space, pool, NULL, &c.volume, &err);
     if (st == STATUS_OK) st = write_files(&c, &err);
     if (st != STATUS_OK) fprintf(stderr, "selvedge-phantom cloth: %s\n", err.text);
     volume_release(&c.volume);
+    scratch_space_free(space);
     fiber_set_release(&c.fibers);
     thread_pool_free(pool);
     return st == STATUS_OK ? 0 : 1;

@@ -112,6 +112,9 @@ void phantom_scan_option_default(struct phantom_scan_option *o);
  * A voxel's value before blur is the share of it inside fibers, by the ramp that keeps area and second moment (phantom_raster.c). */
 status phantom_scan(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct thread_pool *pool,
                     const struct progress *progress, struct volume *v, struct error *err);
+/* The same with the volume in a scratch space, whose limit holds for the work on it, too (NULL: memory). */
+status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct scratch_space *space,
+                       struct thread_pool *pool, const struct progress *progress, struct volume *v, struct error *err);
 
 /* Share of the tile's area under a fiber, looking along z, at the given pixel size; grey (optional) gets one byte a pixel,
  * 255 for the highest fiber (malloc'ed, nx x ny, row 0 at y = 0). */

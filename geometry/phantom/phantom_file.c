@@ -53,6 +53,7 @@ static bool write_page(TIFF *t, const struct volume *v, size_t k, const struct p
               TIFFSetField(t, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT) && TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, rows) &&
               TIFFSetField(t, TIFFTAG_COMPRESSION, o->deflate ? COMPRESSION_ADOBE_DEFLATE : COMPRESSION_NONE);
     if (ok && o->deflate) ok = TIFFSetField(t, TIFFTAG_PREDICTOR, PREDICTOR_HORIZONTAL) && TIFFSetField(t, TIFFTAG_ZIPQUALITY, 3);
+    scratch_keep_within(v->space);
     for (size_t j = 0; j < v->n[1] && ok; j++) {
         encode(v->density + volume_index(v->n, 0, j, k), v->n[0], o, row);
         ok = TIFFWriteScanline(t, row, (uint32_t)j, 0) == 1;
@@ -94,22 +95,42 @@ out:
     return st;
 }
 
+/* Slice by slice under a temporary name. */
+static status write_raw(const struct volume *v, const struct phantom_file_option *o, const char *path, struct error *err)
+{
+    size_t n_slice = v->n[0] * v->n[1], slice_bytes = n_slice * (o->bits == 8 ? 1 : 2);
+    char temporary[4096 + 8];
+    uint8_t *data = malloc(slice_bytes);
+    if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write volume '%s': out of memory", path);
+    snprintf(temporary, sizeof temporary, "%s.part", path);
+    FILE *file = fopen(temporary, "wbe");
+    bool ok = file != NULL;
+    for (size_t k = 0; k < v->n[2] && ok; k++) {
+        scratch_keep_within(v->space);
+        encode(v->density + k * n_slice, n_slice, o, data);
+        ok = fwrite(data, slice_bytes, 1, file) == 1;
+    }
+    ok = ok && fflush(file) == 0 && fsync(fileno(file)) == 0;
+    status st = ok ? STATUS_OK : error_set_errno(err, "cannot write volume '%s'", path);
+    if (file != NULL && fclose(file) != 0 && st == STATUS_OK) st = error_set_errno(err, "cannot write volume '%s'", path);
+    if (st == STATUS_OK && rename(temporary, path) != 0) st = error_set_errno(err, "cannot write volume '%s'", path);
+    if (st != STATUS_OK && file != NULL) unlink(temporary);
+    free(data);
+    return st;
+}
+
 status phantom_write_metaimage(const struct volume *v, const struct phantom_file_option *o, const char *path, struct error *err)
 {
     status st = check(o, path, err);
     if (st != STATUS_OK) return st;
-    size_t length = strlen(path), n_voxel = volume_n_voxel(v->n), n_bytes = n_voxel * (o->bits == 8 ? 1 : 2);
+    size_t length = strlen(path);
     char raw[4096], header[1024];
     if (length < 5 || strcmp(path + length - 4, ".mhd") != 0 || length >= sizeof raw)
         return error_set(err, STATUS_INVALID, "cannot write volume '%s': the name must end in .mhd", path);
     snprintf(raw, sizeof raw, "%.*s.raw", (int)(length - 4), path);
     const char *base = strrchr(raw, '/');
     base = base != NULL ? base + 1 : raw;
-    uint8_t *data = malloc(n_bytes);
-    if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write volume '%s': out of memory", path);
-    encode(v->density, n_voxel, o, data);
-    st = durable_replace(raw, data, n_bytes, err);
-    free(data);
+    st = write_raw(v, o, raw, err);
     if (st != STATUS_OK) return st;
     int n = snprintf(header, sizeof header,
                      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"

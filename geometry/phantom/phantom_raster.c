@@ -3,6 +3,9 @@
  * A voxel's share inside one fiber is taken as clamp(1/2 + (r' - d) / w), d the distance of its centre to the axis, w its width. A
  * ramp of width w has the second moment of a box of width w in any direction, and r'^2 = r^2 - w^2/12 keeps the area of the section:
  * integral of 2 pi d clamp(...) = pi (r'^2 + w^2/12). Shares of different fibers add, up to 1.
+ *
+ * Slices are drawn, blurred along x and y, and kept in a ring until the blur along z has passed; only the result is as large as the
+ * volume. Noise is a function of the voxel's index. So nothing depends on how many slices are worked on together.
  */
 #include "base/rng.h"
 #include "geometry/phantom/phantom_strand.h"
@@ -22,9 +25,13 @@ struct scan {
     const struct fiber_set *f;
     const struct phantom_scan_option *o;
     struct volume *v;
-    uint32_t *owner;  /* fiber that last touched a voxel, + 1 */
+    size_t n_slab;    /* slices worked on together */
+    size_t first, n_drawn; /* slices of the slab */
+    float *drawn;     /* of the slab: shares of all fibers */
+    uint32_t *owner;  /* of the slab: fiber that last touched a voxel, + 1 */
     float *share;     /* and its share */
-    float *blurred;
+    float *blurred;   /* along x and y; slice k at k % n_held */
+    size_t n_held;
     float *kernel;
     long reach;       /* of the blur */
     float *ring;      /* by distance from the axis in voxels */
@@ -78,7 +85,7 @@ static void add_share(struct scan *s, size_t at, uint32_t fiber, float share)
         s->share[at] = 0.0f;
     }
     if (share <= s->share[at]) return;
-    s->v->density[at] += share - s->share[at];
+    s->drawn[at] += share - s->share[at];
     s->share[at] = share;
 }
 
@@ -99,7 +106,7 @@ static void draw_capsule(struct scan *s, const struct capsule *c, uint32_t fiber
                 double share = 0.5 + c->r_ramp - axis_distance(c, p);
                 if (!(share > 0.0) || behind_an_end(c, p)) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
-                add_share(s, volume_index(s->v->n, x, y, (size_t)k), fiber, (float)fmin(share, 1.0));
+                add_share(s, volume_index(s->v->n, x, y, (size_t)k - s->first), fiber, (float)fmin(share, 1.0));
             }
 }
 
@@ -108,8 +115,11 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     struct scan *s = context;
     const struct fiber_set *f = s->f;
     double per_m = 1.0 / s->o->voxel_size_m;
-    long z_from = (long)i_task * SLAB, z_to = z_from + SLAB < (long)s->v->n[2] ? z_from + SLAB : (long)s->v->n[2];
+    long z_end = (long)(s->first + s->n_drawn), z_from = (long)(s->first + i_task * SLAB), z_to = z_from + SLAB < z_end ? z_from + SLAB : z_end;
+    size_t at = volume_index(s->v->n, 0, 0, i_task * SLAB), end = volume_index(s->v->n, 0, 0, (size_t)z_to - s->first);
     (void)i_thread;
+    memset(s->drawn + at, 0, (end - at) * sizeof *s->drawn);
+    memset(s->owner + at, 0, (end - at) * sizeof *s->owner);
     for (size_t i = 0; i < f->n_fiber; i++) {
         double r = (double)f->radius_m[i] * per_m;
         struct capsule c = {.r = r, .r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0))};
@@ -128,24 +138,28 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
             draw_capsule(s, &c, (uint32_t)i + 1, z_from, z_to);
         }
     }
-    for (size_t at = volume_index(s->v->n, 0, 0, (size_t)z_from), end = volume_index(s->v->n, 0, 0, (size_t)z_to); at < end; at++)
-        s->v->density[at] = fminf(s->v->density[at], 1.0f);
+    for (; at < end; at++) s->drawn[at] = fminf(s->drawn[at], 1.0f);
 }
 
 /* One slice blurred along x and y (periodic) into `blurred`. */
-static void blur_slice(void *context, size_t k, size_t i_thread)
+static void blur_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct scan *s = context;
     const size_t *n = s->v->n;
-    float *from = s->v->density + volume_index(n, 0, 0, k), *row = s->share + volume_index(n, 0, 0, k), *to = s->blurred + volume_index(n, 0, 0, k);
+    float *from = s->drawn + volume_index(n, 0, 0, i_task), *row = s->share + volume_index(n, 0, 0, i_task);
+    float *to = s->blurred + volume_index(n, 0, 0, (s->first + i_task) % s->n_held);
     (void)i_thread;
-    for (size_t j = 0; j < n[1]; j++)
-        for (size_t i = 0; i < n[0]; i++) {
-            float sum = 0.0f;
-            for (long m = -s->reach; m <= s->reach; m++)
-                sum += s->kernel[m + s->reach] * from[j * n[0] + (size_t)((long)(i + (size_t)s->reach * n[0]) + m) % n[0]];
-            row[j * n[0] + i] = sum;
+    for (size_t j = 0; j < n[1]; j++) {
+        memset(row + j * n[0], 0, n[0] * sizeof *row);
+        for (long m = -s->reach; m <= s->reach; m++) {
+            size_t shift = (size_t)((long)((size_t)s->reach * n[0]) + m) % n[0]; /* i + m, from 0 on again at the end of the row */
+            float w = s->kernel[m + s->reach];
+            const float *in = from + j * n[0];
+            float *out = row + j * n[0];
+            for (size_t i = 0; i < n[0] - shift; i++) out[i] += w * in[i + shift];
+            for (size_t i = n[0] - shift; i < n[0]; i++) out[i] += w * in[i + shift - n[0]];
         }
+    }
     for (size_t j = 0; j < n[1]; j++) {
         memset(to + j * n[0], 0, n[0] * sizeof *to);
         for (long m = -s->reach; m <= s->reach; m++) {
@@ -180,17 +194,18 @@ static double disturb(const struct scan *s, double value, size_t at, size_t i, s
 }
 
 /* Blur along z (void outside) and everything that goes wrong in a scanner. */
-static void finish_slice(void *context, size_t k, size_t i_thread)
+static void finish_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct scan *s = context;
-    const size_t *n = s->v->n;
+    const size_t *n = s->v->n, k = s->first + i_task;
     (void)i_thread;
+    scratch_keep_within(s->v->space);
     for (size_t j = 0; j < n[1]; j++)
         for (size_t i = 0; i < n[0]; i++) {
             double sum = 0.0;
             for (long m = -s->reach; m <= s->reach; m++) {
                 long z = (long)k + m;
-                if (z >= 0 && z < (long)n[2]) sum += (double)s->kernel[m + s->reach] * (double)s->blurred[volume_index(n, i, j, (size_t)z)];
+                if (z >= 0 && z < (long)n[2]) sum += (double)s->kernel[m + s->reach] * (double)s->blurred[volume_index(n, i, j, (size_t)z % s->n_held)];
             }
             size_t at = volume_index(n, i, j, k);
             s->v->density[at] = (float)disturb(s, sum, at, i, j);
@@ -199,19 +214,23 @@ static void finish_slice(void *context, size_t k, size_t i_thread)
 
 static status scan_init(struct scan *s, struct error *err)
 {
-    size_t n_voxel = volume_n_voxel(s->v->n);
+    size_t n_slice = s->v->n[0] * s->v->n[1], slice_bytes = n_slice * (sizeof *s->drawn + sizeof *s->owner + sizeof *s->share + sizeof *s->blurred);
     double sd = s->o->blur_sd_voxel;
     s->reach = (long)ceil(4.0 * sd);
-    s->owner = calloc(n_voxel, sizeof *s->owner);
-    s->share = calloc(n_voxel, sizeof *s->share);
-    s->blurred = calloc(n_voxel, sizeof *s->blurred);
+    s->n_slab = scratch_buffer_bytes(s->v->space) / slice_bytes;
+    s->n_slab = s->n_slab < 2 * SLAB ? 2 * SLAB : s->n_slab > s->v->n[2] ? s->v->n[2] : s->n_slab;
+    s->n_held = s->n_slab + 2 * (size_t)s->reach;
+    s->drawn = malloc(s->n_slab * n_slice * sizeof *s->drawn);
+    s->owner = malloc(s->n_slab * n_slice * sizeof *s->owner);
+    s->share = malloc(s->n_slab * n_slice * sizeof *s->share);
+    s->blurred = malloc(s->n_held * n_slice * sizeof *s->blurred);
     s->kernel = calloc((size_t)(2 * s->reach + 1), sizeof *s->kernel);
     if (s->o->ring_amplitude > 0.0) {
         s->n_ring = (size_t)hypot((double)s->v->n[0], (double)s->v->n[1]) + 3;
         s->ring = calloc(s->n_ring, sizeof *s->ring);
     }
-    if (!s->owner || !s->share || !s->blurred || !s->kernel || (s->n_ring > 0 && !s->ring))
-        return error_set(err, STATUS_NO_MEMORY, "cannot scan phantom of %zu voxels: out of memory", n_voxel);
+    if (!s->drawn || !s->owner || !s->share || !s->blurred || !s->kernel || (s->n_ring > 0 && !s->ring))
+        return error_set(err, STATUS_NO_MEMORY, "cannot scan phantom of %zu voxels: out of memory", volume_n_voxel(s->v->n));
     double sum = 0.0;
     for (long m = -s->reach; m <= s->reach; m++) sum += sd > 0.0 ? exp(-0.5 * (double)(m * m) / (sd * sd)) : 1.0;
     for (long m = -s->reach; m <= s->reach; m++)
@@ -237,24 +256,43 @@ static status check(const struct phantom_scan_option *o, struct error *err)
     return STATUS_OK;
 }
 
-status phantom_scan(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct thread_pool *pool,
-                    const struct progress *progress, struct volume *v, struct error *err)
+/* Slices from the end of the last slab on: drawn and blurred until those up to `wanted` are held. */
+static status hold_slices(struct scan *s, size_t *ready, size_t wanted, struct thread_pool *pool, const struct progress *quiet)
+{
+    status st = STATUS_OK;
+    while (*ready < wanted && st == STATUS_OK) {
+        s->first = *ready;
+        s->n_drawn = wanted - *ready < s->n_slab ? wanted - *ready : s->n_slab;
+        st = thread_pool_run(pool, (s->n_drawn + SLAB - 1) / SLAB, draw_slab, s, quiet);
+        if (st == STATUS_OK) st = thread_pool_run(pool, s->n_drawn, blur_slice, s, quiet);
+        *ready += s->n_drawn;
+    }
+    return st;
+}
+
+status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct scratch_space *space,
+                       struct thread_pool *pool, const struct progress *progress, struct volume *v, struct error *err)
 {
     status st = check(o, err);
     if (st != STATUS_OK) return st;
     const double size_m[3] = {o->voxel_size_m, o->voxel_size_m, o->voxel_size_m};
-    st = volume_init(v, n, size_m, err);
+    st = volume_init_in(v, n, size_m, space, err);
     if (st != STATUS_OK) return st;
     struct scan s = {.f = f, .o = o, .v = v};
-    memset(v->density, 0, volume_n_voxel(n) * sizeof *v->density);
+    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    size_t ready = 0;
     st = scan_init(&s, err);
     if (st != STATUS_OK) goto out;
-    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
-    st = thread_pool_run(pool, (n[2] + SLAB - 1) / SLAB, draw_slab, &s, &quiet);
-    if (st == STATUS_OK) st = thread_pool_run(pool, n[2], blur_slice, &s, &quiet);
-    if (st == STATUS_OK) st = thread_pool_run(pool, n[2], finish_slice, &s, progress);
+    for (size_t k = 0; k < n[2] && st == STATUS_OK; k += s.n_slab) {
+        size_t end = k + s.n_slab < n[2] ? k + s.n_slab : n[2], reached = end + (size_t)s.reach;
+        st = hold_slices(&s, &ready, reached < n[2] ? reached : n[2], pool, &quiet);
+        s.first = k;
+        if (st == STATUS_OK) st = thread_pool_run(pool, end - k, finish_slice, &s, &quiet);
+        progress_report(progress, (double)end / (double)n[2]);
+    }
     if (st != STATUS_OK) error_set(err, st, "cancelled while scanning the phantom");
 out:
+    free(s.drawn);
     free(s.owner);
     free(s.share);
     free(s.blurred);
@@ -262,4 +300,10 @@ out:
     free(s.ring);
     if (st != STATUS_OK) volume_release(v);
     return st;
+}
+
+status phantom_scan(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct thread_pool *pool,
+                    const struct progress *progress, struct volume *v, struct error *err)
+{
+    return phantom_scan_in(f, n, o, NULL, pool, progress, v, err);
 }
