@@ -20,6 +20,7 @@
 #include "renderer/scattering/appearance.h"
 #include "renderer/scene/scene.h"
 #include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/derivative_check.h"
 
 /* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */
 struct validation {
@@ -36,6 +37,7 @@ struct pipeline_model {
     const struct job_fit_option *option; /* of the document */
     struct fit_result fit;
     struct validation validation;
+    struct derivative_check certificate; /* of the free parameters at the result; filled in before the report */
 };
 
 struct pipeline_context {

@@ -1,4 +1,4 @@
-// What the options of a fit gave beyond the parameters: nuisance terms, gains of photographs, several starts.
+// What the options of a fit gave beyond the parameters: certificate, nuisance terms, gains of photographs, several starts.
 import { el, isNumber, percent, withError } from "./page_parts.js";
 
 function table(id, heads, rows) {
@@ -35,9 +35,17 @@ function starts(result) {
       el("td", {}, s.kept ? tag("kept", "good") : "", s.converged ? "" : tag("not converged"), s.elsewhere ? tag("as good, elsewhere") : ""), el("td", { class: "hint" }, short(s.value))))));
 }
 
-// The content of the card, or null when the job asked for nothing special.
+function certificate(result) {
+  const c = result.certificate;
+  if (!c) return null;
+  const passed = c.worst_rel_error - 3 * c.worst_rel_error_se <= 0.01;
+  return el("div", { id: "certificate" }, el("h3", {}, "Gradient certificate ", tag(passed ? "passed" : "failed", passed ? "good" : "warn")),
+    el("p", { class: "hint" }, `Derivatives of ${c.n_path} paths through this cloth against differences of the same paths: worst relative error ${c.worst_rel_error.toExponential(1)} ± ${c.worst_rel_error_se.toExponential(0)} (${c.worst_parameter}).`));
+}
+
+// The content of the card, or null when there is nothing to say.
 export function fitDetails(job) {
   if (!job.result) return null;
-  const parts = [nuisance, gains, starts].map((part) => part(job.result)).filter((p) => p !== null);
+  const parts = [certificate, nuisance, gains, starts].map((part) => part(job.result)).filter((p) => p !== null);
   return parts.length ? el("div", { id: "fit-details" }, parts) : null;
 }

@@ -88,18 +88,35 @@ static json_t *starts_json(const struct pipeline_model *m)
     return list;
 }
 
+static json_t *certificate_json(const struct pipeline_model *m)
+{
+    const struct derivative_check *k = &m->certificate;
+    json_t *list = json_array();
+    for (size_t p = 0; p < m->appearance.n_param; p++)
+        if (k->checked[p])
+            json_array_append_new(list, json_pack("{s:s, s:o, s:o}", "name", m->appearance.param[p].name, "rel_error",
+                                                  number(k->error[p]), "rel_error_se", number(k->error_se[p])));
+    return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", number(k->error[k->worst]), "worst_rel_error_se",
+                     number(k->error_se[k->worst]), "worst_parameter", m->appearance.param[k->worst].name, "n_path",
+                     (json_int_t)k->n_path, "parameters", list);
+}
+
 void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result)
 {
     json_object_set_new(result, "prior_penalty", number(m->fit.prior_penalty));
     json_object_set_new(result, "nuisance", nuisance_json(&m->fit.nuisance));
     json_object_set_new(result, "starts", starts_json(m));
+    json_object_set_new(result, "certificate", certificate_json(m));
     json_object_set_new(result, "fit_rel_rms_with_gains", number(rel_rms_with_gains(c, m)));
 }
 
 void result_summary_options(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
     const struct fit_nuisance *n = &m->fit.nuisance;
+    const struct derivative_check *check = &m->certificate;
     double with_gains = rel_rms_with_gains(c, m);
+    fprintf(out, "gradient certificate: the derivatives on this cloth are right to %.1g (+- %.1g), worst by %s\n",
+            check->error[check->worst], check->error_se[check->worst], m->appearance.param[check->worst].name);
     for (size_t i = 0; i < n->n; i++)
         fprintf(out, "%-12s %10.5f %10.5f  nuisance term%s\n", n->name[i], n->value[i], n->se[i],
                 n->at_bound[i] ? ", at a bound" : "");

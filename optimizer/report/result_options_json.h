@@ -1,4 +1,4 @@
-/* Parts of result.json that exist because of options of the fit (job_fit_option.h). */
+/* Parts of result.json that exist because of options of the fit (job_fit_option.h), and its certificate. */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_OPTIONS_JSON_H
 #define SELVEDGE_OPTIMIZER_RESULT_OPTIONS_JSON_H
 
@@ -10,7 +10,7 @@
 void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *parameter);
 /* Adds "gain" and "gain_se" to row i: numbers with a gain for each photograph, null otherwise. */
 void result_row_options(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, json_t *row);
-/* Adds "prior_penalty", "nuisance", "starts" and "fit_rel_rms_with_gains" to the result. */
+/* Adds "prior_penalty", "nuisance", "starts", "fit_rel_rms_with_gains" and "certificate" to the result. */
 void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result);
 /* The same for people. */
 void result_summary_options(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out);

@@ -63,7 +63,8 @@ struct lane {
     float wo[3];
 
     float light_wi[3], light[3], worth; /* what the connection brings if nothing is in its way; the most of that */
-    float passed;                       /* share of it that got through so far */
+    float passed;                       /* share of it that got through so far, for the rays thinned out as well */
+    float ratios;                       /* of a recorded path: the share without those */
     struct flight_score shadow;
 
     float h[VOLUME_N_DERIVATIVE]; /* running score sums of the phase function, [c * n_param + p] */
@@ -168,6 +169,7 @@ static bool leave(const struct volume_setting *s, struct lane *l, bool lost)
         if (s->want_jacobian) /* only now: few connections get here */
             s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, score);
         add_light(s, l, value, score, &l->shadow);
+        note_light(l, VOLUME_ARRIVE, NULL, (float[3]){l->passed / l->ratios, 0, 0});
     }
     return connect(s, l, l->purpose + 1);
 }
@@ -256,7 +258,7 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
             keep_nan(l, l->light);
             continue;
         }
-        l->passed = 1;
+        l->passed = l->ratios = 1;
         if (l->worth < s->shadow_below) { /* hardly any light: follow few of these rays, for more each */
             l->passed = s->shadow_below / l->worth;
             if (rng_float(&l->rng) * l->passed >= 1) continue;
@@ -289,6 +291,7 @@ static bool pass(const struct volume_setting *s, struct lane *l, const struct lo
     l->passed *= 1 - k->ratio;
     l->shadow.ln_d -= k->ratio * inv;
     l->shadow.param -= k->d_ratio * inv;
+    if (l->record != NULL) l->ratios *= 1 - k->ratio;
     note_lookup(l, VOLUME_PASSED, k);
     float worth = l->passed * l->worth;
     if (worth < s->shadow_below) {

@@ -1,0 +1,46 @@
+/* Gradient certificate: the derivatives that the tracers carry along, against differences of the same paths' values.
+ *
+ * A few paths of every configuration are traced once, with derivatives, and recorded (path_tracer.h, volume_tracer.h).
+ * A recorded path's value at other parameters needs no tracing, so its derivative by each parameter also follows from
+ * four values around it (five-point stencil; beside a bound, four points on the inner side). Both are of the same
+ * paths: what differs beyond rounding is an error of a model's scores or of a tracer's sums, on this very scene and at
+ * these very parameters.
+ *
+ * For parameter p, J_i and D_i being the mean derivatives of configuration i summed over channels, w_i its weight:
+ *     error = sum_i w_i |J_i - D_i| / max(sum_i w_i |J_i|, 0.001 sum_i w_i R_i / |p|)
+ * (a parameter that hardly acts cannot look worse than a thousandth of what it could do), with the standard error that
+ * the scatter of the single paths' differences gives. All random numbers come from the key: same bits every time.
+ */
+#ifndef SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
+#define SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
+
+#include "base/progress.h"
+#include "renderer/transport/appearance_estimate.h"
+
+struct derivative_check_request {
+    struct appearance_scene scene;
+    const struct appearance *model;
+    const double *param; /* internal units, inside the model's bounds */
+    const bool *skip;    /* parameters that are not looked at; NULL: none */
+    const struct configuration *configuration;
+    const double *weight; /* of each configuration, > 0; NULL: all 1 */
+    size_t n_configuration;
+    size_t n_path; /* of all configurations together, at least one each; long paths stop earlier */
+    uint64_t seed;
+    uint32_t iteration, replica;
+};
+
+struct derivative_check {
+    size_t n_param;
+    double error[SCATTERING_MAX_PARAM], error_se[SCATTERING_MAX_PARAM]; /* 0 for skipped ones */
+    bool checked[SCATTERING_MAX_PARAM];
+    size_t worst; /* parameter with the largest error */
+    uint64_t n_path, n_step;
+};
+
+/* STATUS_INVALID as for an estimate; STATUS_CANCELLED; STATUS_NUMERIC (naming model and parameter) for a value that is
+ * not finite. */
+status derivative_check_run(const struct derivative_check_request *q, const struct progress *progress,
+                            struct derivative_check *out, struct error *err);
+
+#endif
