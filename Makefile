@@ -42,7 +42,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps test check bench demo clean help layers format asan bench-geometry bench-transport bench-fit docs-pictures fuzz fuzz-programs
+.PHONY: all deps test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -82,6 +82,7 @@ $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/n
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
+PHYSICS_RENDERER := $(filter-out %reconstruct_phantom %reconstruct_real,$(filter $(BUILD)/tests/physics/%,$(TEST_BINS)))
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
@@ -138,6 +139,12 @@ layers:            ## includes go one way: base <- geometry <- renderer <- optim
 asan:              ## unit and physics tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build build/asan
+
+asan-physics:      ## the renderer's physics tests under the same sanitizers (about half an hour)
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \
+		$(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER))
+	@for t in $(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER)); do \
+		echo "$$t"; UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 $$t || exit 1; done
 
 # one libFuzzer program per file tests/fuzz/fuzz_*.c (fuzz_input.c is what they share)
 FUZZ_SECONDS ?= 600

@@ -230,7 +230,7 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     st = choose_block(s, f, err);
     if (st != STATUS_OK) goto out;
     /* one build thread: the order of the tree's leaves, which decides ties, must not depend on timing */
-    s->device = rtcNewDevice("threads=1,set_affinity=0");
+    s->device = rtcNewDevice(o->no_avx512 ? "threads=1,set_affinity=0,isa=avx2" : "threads=1,set_affinity=0");
     if (s->device == NULL) {
         st = error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)",
                        (int)rtcGetDeviceError(NULL));

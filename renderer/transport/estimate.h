@@ -36,7 +36,7 @@ struct estimate {
 };
 
 /* out: n_configuration estimates. STATUS_INVALID (a configuration, a parameter, fewer sets than groups),
- * STATUS_CANCELLED, STATUS_NUMERIC (naming model and configuration when a NaN appears).
+ * STATUS_CANCELLED (within 100 ms), STATUS_NUMERIC (naming model and configuration when a NaN appears).
  */
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,
                     struct estimate *out, struct error *err);

@@ -35,6 +35,7 @@ static void trace_block(const struct run *r, uint32_t i_configuration, uint32_t 
     double xy[BLOCK_PATHS][2];
     memset(value, 0, BLOCK_PATHS * n_value * sizeof *value);
     for (uint32_t i = 0; i < BLOCK_PATHS; i++) {
+        if (progress_cancelled(r->progress)) return; /* a block of white cloth takes longer than a caller will wait */
         rng_start(&rng[i], &key, i_block, i);
         for (int a = 0; a < 2; a++) xy[i][a] = rng_double(&rng[i]);
         if (b->trace_block == NULL)

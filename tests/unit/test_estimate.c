@@ -106,33 +106,79 @@ static void variances_are_honest(void **state)
     if (fabs(ratio - 1) > 0.65 || fabs(jac_ratio - 1) > 0.65) fail_msg("variance ratios %g, %g", ratio, jac_ratio);
 }
 
-static void *cancel_soon(void *flag)
+/* The same random numbers: only rays that graze an edge may fare differently. */
+static void agrees_without_avx512(void **state)
 {
-    usleep(100000);
-    atomic_store((atomic_bool *)flag, true);
+    (void)state;
+    const size_t n_path[2] = {4096, 4096};
+    struct fiber_set f;
+    struct error err = {0};
+    struct scene *plain = NULL;
+    struct estimate with[2], without[2];
+    struct estimate_request q = request(n_path, 2);
+    hand_weave_small(&f);
+    if (scene_new(&f, &(struct scene_option){.black_sheet = true, .no_avx512 = true}, &plain, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
+    assert_int_equal(estimate_run(&q, NULL, NULL, with, &err), STATUS_OK);
+    q.scene = plain;
+    assert_int_equal(estimate_run(&q, NULL, NULL, without, &err), STATUS_OK);
+    for (int i = 0; i < 2; i++)
+        for (int c = 0; c < 3; c++) {
+            double se = sqrt(with[i].var[c]), off = fabs(with[i].mean[c] - without[i].mean[c]);
+            if (!(off < se)) fail_msg("configuration %d, channel %d: %g, without %g", i, c, with[i].mean[c], without[i].mean[c]);
+        }
+    scene_free(plain);
+    fiber_set_release(&f);
+}
+
+struct canceller {
+    atomic_bool flag;
+    double at_s;
+};
+
+static void *cancel_soon(void *canceller)
+{
+    struct canceller *c = canceller;
+    usleep(60000);
+    c->at_s = clock_monotonic_s();
+    atomic_store(&c->flag, true);
     return NULL;
 }
 
-static void cancels_quickly(void **state)
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* White fibers: the longest paths there are. The median of five, so that one late turn of a loaded machine's scheduler
+ * does not count. */
+static void cancels_within_100_ms(void **state)
 {
     (void)state;
+    const double white[9] = {0.001, 0.001, 0.001, 0.999, 0.999, 0.999, 0.1, 0.4, 0.4};
     const size_t n_path[1] = {200000000};
     struct estimate_request q = request(n_path, 1);
-    struct estimate e;
-    struct error err = {0};
     struct thread_pool *pool = NULL;
-    atomic_bool flag = false;
-    struct progress progress = {NULL, NULL, &flag};
-    pthread_t thread;
+    struct error err = {0};
+    double late_s[5];
+    q.param = white;
     assert_int_equal(thread_pool_new(2, &pool, &err), STATUS_OK);
-    pthread_create(&thread, NULL, cancel_soon, &flag);
-    double t0 = clock_monotonic_s();
-    assert_int_equal(estimate_run(&q, pool, &progress, &e, &err), STATUS_CANCELLED);
-    double wall = clock_monotonic_s() - t0;
-    pthread_join(thread, NULL);
+    for (int k = 0; k < 5; k++) {
+        struct estimate e;
+        struct canceller c = {.at_s = 0};
+        struct progress progress = {NULL, NULL, &c.flag};
+        pthread_t thread;
+        pthread_create(&thread, NULL, cancel_soon, &c);
+        assert_int_equal(estimate_run(&q, pool, &progress, &e, &err), STATUS_CANCELLED);
+        double back_s = clock_monotonic_s();
+        pthread_join(thread, NULL);
+        late_s[k] = back_s - c.at_s;
+    }
     thread_pool_free(pool);
-    if (wall > 0.1 + 0.1 + 0.3)
-        fail_msg("took %.3f s after the flag", wall - 0.1); /* 0.3: a loaded machine, sanitizers */
+    qsort(late_s, 5, sizeof *late_s, by_size);
+    print_message("cancelled in %.1f ms (median), %.1f ms at most\n", 1e3 * late_s[2], 1e3 * late_s[4]);
+    if (late_s[2] > 0.1) fail_msg("took %.3f s after the flag", late_s[2]);
 }
 
 static void bad_requests(void **state)
@@ -190,7 +236,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(same_bits_for_any_threads),
         cmocka_unit_test(variances_are_honest),
-        cmocka_unit_test(cancels_quickly),
+        cmocka_unit_test(agrees_without_avx512),
+        cmocka_unit_test(cancels_within_100_ms),
         cmocka_unit_test(bad_requests),
         cmocka_unit_test(nan_is_named),
     };
