@@ -19,7 +19,7 @@ struct settings {
     /* [jobs] */
     int64_t max_jobs, workers;
     char worker[SETTING_TEXT_BYTES];
-    int64_t nice, memory_limit_bytes, cancel_grace_s, max_lost_attempts, heartbeat_timeout_s;
+    int64_t nice, memory_limit_bytes, volume_memory_bytes, cancel_grace_s, max_lost_attempts, heartbeat_timeout_s;
     /* [disk] */
     int64_t floor_bytes, ballast_bytes;
 };

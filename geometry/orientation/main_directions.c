@@ -54,6 +54,7 @@ static void copy_brick(const struct finder *f, const size_t corner[3], float *ou
 {
     const size_t *n = f->v->n;
     float least = f->material;
+    scratch_keep_within(f->v->space);
     for (size_t k = 0; k < EDGE; k++)
         for (size_t j = 0; j < EDGE; j++)
             for (size_t i = 0; i < EDGE; i++) {

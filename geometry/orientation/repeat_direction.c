@@ -27,12 +27,14 @@ static void fill_height(void *context, size_t z, size_t i_thread)
     float *out = c->value + z * c->n[0] * c->n[1];
     size_t to = (z + 1) * c->block[2] < n[2] ? (z + 1) * c->block[2] : n[2], count = 0;
     for (size_t i = 0; i < c->n[0] * c->n[1]; i++) out[i] = 0.0f;
-    for (size_t k = z * c->block[2]; k < to; k++, count++)
+    for (size_t k = z * c->block[2]; k < to; k++, count++) {
+        scratch_keep_within(c->v->space);
         for (size_t j = 0; j < c->n[1] * c->block[1]; j++) {
             const float *row = c->v->density + volume_index(n, 0, j, k);
             float *to_row = out + j / c->block[1] * c->n[0];
             for (size_t i = 0; i < c->n[0] * c->block[0]; i++) to_row[i / c->block[0]] += isfinite(row[i]) ? row[i] : c->void_value;
         }
+    }
     float scale = 1.0f / (float)(count * c->block[0] * c->block[1]);
     for (size_t i = 0; i < c->n[0] * c->n[1]; i++) out[i] *= scale;
 }

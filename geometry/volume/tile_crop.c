@@ -29,6 +29,7 @@ static void count_slice(void *context, size_t k, size_t i_thread)
     struct profile *p = context;
     size_t n = p->v->n[0] * p->v->n[1], count = 0;
     const float *d = p->v->density + k * n;
+    scratch_keep_within(p->v->space);
     for (size_t i = 0; i < n; i++) count += d[i] >= p->material;
     p->n_material[k] = (double)count;
 }
@@ -55,6 +56,7 @@ static void add_block(void *context, size_t bz, size_t i_thread)
     size_t to = (bz + 1) * p->block[2] < n[2] ? (bz + 1) * p->block[2] : n[2];
     for (size_t k = bz * p->block[2]; k < to; k++) {
         bool inner = k >= p->z_low && k < p->z_high;
+        scratch_keep_within(p->v->space);
         for (size_t j = 0; j < n[1]; j++) {
             const float *row = p->v->density + volume_index(n, 0, j, k);
             float *of_x = p->mean[0] + (j / p->block[1]) * nb[2] + bz, *of_y = p->mean[1] + j * nb[0] * nb[2] + bz;
@@ -263,9 +265,11 @@ void volume_crop(struct volume *v, const size_t box[6])
 {
     size_t n[3], at = 0;
     for (int a = 0; a < 3; a++) n[a] = box[3 + a] - box[a];
-    for (size_t k = box[2]; k < box[5]; k++) /* to the front: nothing is overwritten before it is moved */
+    for (size_t k = box[2]; k < box[5]; k++) { /* to the front: nothing is overwritten before it is moved */
+        scratch_keep_within(v->space);
         for (size_t j = box[1]; j < box[4]; j++, at += n[0])
             memmove(v->density + at, v->density + volume_index(v->n, box[0], j, k), n[0] * sizeof *v->density);
+    }
     memcpy(v->n, n, sizeof v->n);
 }
 
@@ -273,7 +277,8 @@ void seam_density_measure(const struct volume *v, struct seam_density *s)
 {
     const size_t *n = v->n;
     double across[2] = {0.0}, neighbour[2] = {0.0};
-    for (size_t k = 0; k < n[2]; k++)
+    for (size_t k = 0; k < n[2]; k++) {
+        scratch_keep_within(v->space);
         for (size_t j = 0; j < n[1]; j++) {
             const float *row = v->density + volume_index(n, 0, j, k), *next = j + 1 < n[1] ? row + n[0] : row - j * n[0];
             double in_x = 0.0, to_next = 0.0;
@@ -283,6 +288,7 @@ void seam_density_measure(const struct volume *v, struct seam_density *s)
             across[0] += (double)fabsf(row[0] - row[n[0] - 1]);
             *(j + 1 < n[1] ? &neighbour[1] : &across[1]) += to_next;
         }
+    }
     for (int a = 0; a < 2; a++) {
         double slice = (double)n[1 - a] * (double)n[2];
         s->across[a] = n[a] > 1 ? across[a] / slice : NAN;

@@ -148,7 +148,7 @@ static void launch(struct supervisor *u, const char *job_id)
     struct slot *slot = u->slot;
     while (slot->used) slot++;
     pid_t pid = 0;
-    struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes};
+    struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes, u->v->settings->volume_memory_bytes};
     s = worker_launch(u->worker, folder, console, &limits, &pid, &err);
     if (s != STATUS_OK) {
         log_error(u->v->log, "job %s: %s", job_id, err.text);

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <stdio.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -47,7 +48,9 @@ status worker_launch(const char *program, const char *job_folder, const char *co
         s = error_set_errno(err, "cannot open '/dev/null'");
         goto out;
     }
-    char *argv[] = {(char *)(uintptr_t)program, (char *)(uintptr_t)job_folder, NULL};
+    char volume_mib[24];
+    snprintf(volume_mib, sizeof volume_mib, "%lld", (long long)(limits->volume_memory_bytes >> 20));
+    char *folder = (char *)(uintptr_t)job_folder, *argv[] = {(char *)(uintptr_t)program, "--memory-mib", volume_mib, folder, NULL};
     pid_t parent = getpid(), pid = fork();
     if (pid < 0) s = error_set_errno(err, "cannot start worker '%s'", program);
     if (pid == 0) become_worker(program, argv, console_fd, null_fd, limits, parent);

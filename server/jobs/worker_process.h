@@ -11,7 +11,8 @@
 
 struct worker_limits {
     int nice;
-    int64_t memory_bytes; /* address space; 0: not limited */
+    int64_t memory_bytes;        /* address space; 0: not limited */
+    int64_t volume_memory_bytes; /* told to the worker as --memory-mib */
 };
 
 struct worker_end {

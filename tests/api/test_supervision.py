@@ -109,7 +109,7 @@ def test_at_most_so_many_workers(daemon_maker):
 
 
 def test_workers_are_nice_in_a_session_of_their_own_and_bounded(daemon_maker):
-    d = daemon_maker(options={"jobs.nice": 7, "jobs.memory_limit_bytes": 3_000_000_000})
+    d = daemon_maker(options={"jobs.nice": 7, "jobs.memory_limit_bytes": 3_000_000_000, "jobs.volume_memory_bytes": 300 << 20})
     job = d.start_job("work")
     wait_until(lambda: d.job(job)["fraction"] == 0.5)
     pid = worker_pid(d, job)
@@ -118,6 +118,8 @@ def test_workers_are_nice_in_a_session_of_their_own_and_bounded(daemon_maker):
         limits = f.read()
     assert re.search(r"Max address space +3000000000 ", limits) and re.search(r"Max core file size +0 ", limits)
     open_files = [os.readlink(f"/proc/{pid}/fd/{n}") for n in os.listdir(f"/proc/{pid}/fd")]
+    with open(f"/proc/{pid}/cmdline", "rb") as f:
+        assert b"--memory-mib\x00300\x00" in f.read()
     assert not any("selvedge.db" in f or "socket" in f for f in open_files), open_files
 
 

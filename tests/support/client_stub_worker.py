@@ -12,7 +12,7 @@ import sys
 import time
 import zlib
 
-FOLDER = sys.argv[1]
+FOLDER = sys.argv[-1]
 STAGES = ["volume", "orientation", "fibers", "directions", "scene", "fit", "validation", "report"]
 NAMES = ["C_R.r", "C_R.g", "C_R.b", "C_TT.r", "C_TT.g", "C_TT.b", "beta_R", "beta_TT", "gamma_TT"]
 STARTED = time.time()

@@ -9,7 +9,7 @@ import sys
 import time
 import zlib
 
-job = sys.argv[1]
+job = sys.argv[-1]
 os.makedirs(os.path.join(job, "work"), exist_ok=True)
 os.makedirs(os.path.join(job, "results", "pictures"), exist_ok=True)
 lock = open(os.path.join(job, "lock"), "w")
