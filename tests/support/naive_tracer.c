@@ -125,6 +125,11 @@ static double lamp_radiance(const struct configuration *c, struct vec o, struct 
     return M_PI / sum;
 }
 
+double naive_lamp_radiance(const struct configuration *c, const double from_m[3], const double d[3])
+{
+    return lamp_radiance(c, (struct vec){from_m[0], from_m[1], from_m[2]}, (struct vec){d[0], d[1], d[2]});
+}
+
 double naive_path(const struct fiber_set *f, const struct configuration *c, const double param[9], struct rng *r)
 {
     double z_low, z_high, throughput = 1, tnear = 0;

@@ -11,5 +11,8 @@
 
 /* Radiance of one path through a random point of the crop (channel 0 of the parameters). */
 double naive_path(const struct fiber_set *f, const struct configuration *c, const double param[9], struct rng *r);
+/* Radiance of the configuration's square lamp that comes from direction d to a point seen from the orbit centre (m, cloth
+ * frame); 0 beside the lamp. */
+double naive_lamp_radiance(const struct configuration *c, const double from_m[3], const double d[3]);
 
 #endif

@@ -1,0 +1,115 @@
+/* The volume renderer against the naive volume tracer of tests/support: two implementations that must agree. The lamp is
+ * large, so that the naive one finds it, and the lobes are wide, so that its directions serve. */
+#include "base/thread_pool.h"
+#include "renderer/transport/volume_estimate.h"
+#include "tests/support/hand_volume.h"
+#include "tests/support/naive_volume.h"
+#include "tests/support/statistics_test.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define DEG (M_PI / 180)
+
+enum { N_TASK = 64 };
+
+struct job {
+    struct naive_volume naive;
+    struct configuration c;
+    uint32_t n_path; /* a task */
+    struct sample_mean mean[N_TASK];
+};
+
+static struct direction_volume volume;
+
+static int set_up(void **state)
+{
+    (void)state;
+    const size_t n[3] = {21, 18, 9}; /* no whole number of bricks */
+    hand_volume_weave(&volume, n, 10e-6, 0.5);
+    for (size_t i = 0; i < n[0]; i++) { /* a thin layer on top and one below, of fibers on the slant */
+        const float slant[3] = {0.3f, 0.9f, -0.2f};
+        for (size_t k = 0; k < n[2]; k += n[2] - 1) {
+            size_t at = volume_index(n, i, i % n[1], k);
+            volume.density[at] = 120;
+            direction_volume_set(&volume, at, slant);
+        }
+    }
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    direction_volume_release(&volume);
+    return 0;
+}
+
+static void run_task(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    struct job *j = context;
+    for (uint32_t i = 0; i < j->n_path; i++) {
+        struct rng r;
+        rng_start(&r, &(struct rng_key){78, 0, 0, 0}, (uint32_t)i_task, i);
+        sample_mean_add(&j->mean[i_task], naive_volume_path(&j->naive, &j->c, &r));
+    }
+}
+
+static void agree(struct configuration c, double sky, bool black_sheet, double d_per_m, const double *param,
+                  uint32_t n_task_path, struct thread_pool *pool)
+{
+    static struct job j;
+    struct volume_scene scene;
+    struct error err = {0};
+    struct estimate e;
+    const size_t n_path = 300000;
+    memset(&j, 0, sizeof j);
+    naive_volume_init(&j.naive, &volume, param, d_per_m, black_sheet, sky);
+    j.c = c;
+    j.n_path = n_task_path;
+    assert_int_equal(thread_pool_run(pool, N_TASK, run_task, &j, NULL), STATUS_OK);
+    struct sample_mean batch = {0};
+    for (int i = 0; i < N_TASK; i++) sample_mean_add(&batch, j.mean[i].mean);
+    for (int k = 0; k < 3; k++) c.environment_rgb[k] = sky;
+    assert_int_equal(volume_scene_init(&scene, &volume, &(struct volume_scene_option){black_sheet}, &err), STATUS_OK);
+    const struct volume_estimate_request q = {.scene = &scene, .model = phase_find("phase_two_lobe.v1"), .param = param,
+                                              .multiplier_per_m = d_per_m, .configuration = &c, .n_configuration = 1,
+                                              .n_path = &n_path, .seed = 5};
+    if (volume_estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    double se = sqrt(sample_mean_se(&batch) * sample_mean_se(&batch) + e.var[0]), z = (batch.mean - e.mean[0]) / se;
+    print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se,
+                  100 * se / e.mean[0]);
+    if (fabs(z) > 3.5 || se > 0.03 * e.mean[0]) fail_msg("%.1f standard errors apart", z);
+    volume_scene_release(&scene);
+}
+
+static void two_tracers_agree(void **state)
+{
+    (void)state;
+    struct thread_pool *pool = NULL;
+    assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
+    const double wide[12] = {0.12, 0.12, 0.12, 0.4, 0.4, 0.4, 10 * DEG, 45 * DEG, 45 * DEG, 0.7, 0.7, 0.7};
+    const double narrower[12] = {0.3, 0.3, 0.3, 0.35, 0.35, 0.35, 10 * DEG, 38 * DEG, 40 * DEG, 0.9, 0.9, 0.9};
+    agree((struct configuration){30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, 0, true, 5e4, wide, 1500,
+          pool);
+    agree((struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, 0.2, true, 2e4,
+          narrower, 4000, pool);
+    /* back light, seen through the cloth and beside it */
+    agree((struct configuration){170 * DEG, 40 * DEG, 25 * DEG, 0, 0.3, 0.61, 1.0, 1.0, 0.01}, 0, false, 3e4, wide,
+          1000, pool);
+    struct configuration sky = {0, 0, 35 * DEG, 1, 0.3, 1, 1, 1.0, 0.01, .light = LIGHT_NO_LAMP};
+    agree(sky, 0.7, true, 4e4, narrower, 4000, pool);
+    thread_pool_free(pool);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(two_tracers_agree)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
