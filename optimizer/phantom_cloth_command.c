@@ -249,19 +249,6 @@ static status write_files(struct cloth *c, struct error *err)
     return st;
 }
 
-/* Void below and above the cloth up to the wanted number of slices. */
-static status center_cloth(struct cloth *c, struct error *err)
-{
-    size_t *n = &c->report.n_voxel[2];
-    if (c->n_slice == 0) return STATUS_OK;
-    if (c->n_slice < *n || c->n_slice > 100000)
-        return error_set(err, STATUS_INVALID, "option --voxels-z: the cloth needs %zu slices, %zu are asked for", *n, c->n_slice);
-    float rise_m = (float)((double)((c->n_slice - *n) / 2) * c->phantom.voxel_size_m);
-    for (size_t i = 0; i < c->fibers.n_vertex; i++) c->fibers.position_m[3 * i + 2] += rise_m;
-    *n = c->n_slice;
-    return STATUS_OK;
-}
-
 int phantom_command_cloth(int argc, char **argv)
 {
     struct cloth c = {0};
@@ -281,7 +268,7 @@ int phantom_command_cloth(int argc, char **argv)
     status st = thread_pool_new(c.n_thread, &pool, &err);
     if (st == STATUS_OK) st = durable_make_folder(c.out, &err);
     if (st == STATUS_OK) st = phantom_generate(&c.phantom, pool, NULL, &c.fibers, &c.report, &err);
-    if (st == STATUS_OK) st = center_cloth(&c, &err);
+    if (st == STATUS_OK && c.n_slice > 0) st = phantom_pad(&c.fibers, &c.report, c.phantom.voxel_size_m, c.n_slice, &err);
     if (st == STATUS_OK) st = scratch_space_new(c.out, c.memory_mib << 20, &space, &err);
     if (st == STATUS_OK) st = phantom_scan_in(&c.fibers, c.report.n_voxel, &c.scan, space, pool, NULL, &c.volume, &err);
     if (st == STATUS_OK) st = write_files(&c, &err);

@@ -137,3 +137,14 @@ status phantom_generate(const struct phantom_option *option, struct thread_pool 
     strand_set_release(&s);
     return st;
 }
+
+status phantom_pad(struct fiber_set *f, struct phantom_report *report, double voxel_size_m, size_t n_slice, struct error *err)
+{
+    size_t *n = &report->n_voxel[2];
+    if (n_slice < *n || n_slice > 1000000)
+        return error_set_field(err, STATUS_INVALID, "voxels_z", "the cloth needs %zu slices, %zu are asked for", *n, n_slice);
+    float rise_m = (float)((double)((n_slice - *n) / 2) * voxel_size_m);
+    for (size_t i = 0; i < f->n_vertex; i++) f->position_m[3 * i + 2] += rise_m;
+    *n = n_slice;
+    return STATUS_OK;
+}

@@ -95,6 +95,10 @@ struct phantom_report {
 status phantom_generate(const struct phantom_option *o, struct thread_pool *pool, const struct progress *progress,
                         struct fiber_set *f, struct phantom_report *report, struct error *err);
 
+/* Void below and above the cloth, as much on either side, up to n_slice slices in all: f is raised, report->n_voxel[2] changed.
+ * STATUS_INVALID, field "voxels_z", when the cloth needs more. */
+status phantom_pad(struct fiber_set *f, struct phantom_report *report, double voxel_size_m, size_t n_slice, struct error *err);
+
 /* How the scanner sees it. Signal: void 0, fiber 1. */
 struct phantom_scan_option {
     uint64_t seed;
