@@ -183,8 +183,8 @@ static bool bench(const struct sample *p, const char *folder)
             print(p->name, "wall_s", o.wall_s, "s", "lower");
             print(p->name, "cpu_s", o.cpu_s, "s", "lower");
             print(p->name, "peak_bytes", (double)o.peak_bytes, "B", "lower");
-            print(p->name, "material_voxels", material, "1", "none");
-            print(p->name, "material_share", material / voxels, "1", "none");
+            print(p->name, "material_voxels", material, "1", "higher");
+            print(p->name, "material_share", material / voxels, "1", "higher");
         }
         if (strcmp(p->name, "fleece") == 0) {
             char what[64];
