@@ -51,7 +51,7 @@ struct reconstruct_report {
     bool aligned;                          /* the estimated matrix was used: it is in the options */
     struct tile_crop tile;                 /* with option "crop", or when a matrix was used; else all zero */
     struct seam_density seam_density;      /* of the volume that is used */
-    struct fiber_seam seam_fiber;          /* of the fibers that are used */
+    struct fiber_seam seam_found, seam_fiber; /* of the fibers as found, and as used (ends joined) */
     size_t n_seam_joined;
     double density_low, density_high;      /* scanner values */
     double separability;                   /* of void and material in the histogram, 0..1 (density_map.h) */
@@ -65,6 +65,7 @@ struct reconstruct_report {
     double total_length_m;
     double radius_m[3], radius_score[3];
     double dice;                           /* of fibers (radius r) against kept voxels */
+    double direction_noise_deg[2];         /* direction_noise.h, before and after the transfer */
     double direction_change_mean_deg;      /* between filtered and transferred directions */
 };
 
@@ -99,7 +100,7 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
                              void (*warn)(void *context, const char *text), void *context);
 
 /* Grey PNG-ready picture of slice i_slice perpendicular to axis (0 x, 1 y, 2 z) with the fibers crossing it marked as red
- * crosses; rgb is 3 bytes a pixel, malloc'ed, width x height filled in. */
+ * crosses; y or z points up, x or y to the right; rgb is 3 bytes a pixel, malloc'ed, width x height filled in. */
 status reconstruct_slice_picture(const struct volume *v, const struct fiber_set *f, int axis, size_t i_slice,
                                  uint8_t **rgb, size_t *width, size_t *height, struct error *err);
 

@@ -21,7 +21,7 @@ static void put_red(const struct canvas *c, long x, long y)
 
 static void cross(const struct canvas *c, double u, double v)
 {
-    long x = lround(u * (double)c->zoom - 0.5), y = lround(v * (double)c->zoom - 0.5), arm = (long)c->zoom;
+    long x = lround(u * (double)c->zoom - 0.5), y = (long)c->height - 1 - lround(v * (double)c->zoom - 0.5), arm = (long)c->zoom;
     for (long i = -arm; i <= arm; i++) {
         put_red(c, x + i, y);
         put_red(c, x, y + i);
@@ -37,7 +37,7 @@ static void fill_grey(const struct canvas *c, const struct volume *v, int axis, 
             size_t i[3];
             i[axis] = i_slice;
             i[au] = x / c->zoom;
-            i[av] = y / c->zoom;
+            i[av] = v->n[av] - 1 - y / c->zoom; /* upwards */
             float d = fminf(1.0f, fmaxf(0.0f, v->density[volume_index(v->n, i[0], i[1], i[2])]));
             uint8_t *p = c->rgb + 3 * (y * c->width + x);
             p[0] = p[1] = p[2] = (uint8_t)lrintf(255.0f * d);

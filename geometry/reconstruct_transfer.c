@@ -2,6 +2,7 @@
 #include "geometry/reconstruct.h"
 
 #include "geometry/fibers/segment_bricks.h"
+#include "geometry/orientation/direction_noise.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -88,7 +89,11 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
     for (size_t i = 0; i < f->n_fiber; i++) r_max = fmaxf(r_max, f->radius_m[i]);
     float reach = (float)(2.0 * (double)r_max / d->voxel_size_m[0]);
     status s = segment_bricks_from_fibers(&bricks, f, d->n, d->voxel_size_m, BRICK, reach, err);
-    if (s != STATUS_OK) return s;
+    if (s == STATUS_OK) s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[0], err);
+    if (s != STATUS_OK) {
+        segment_bricks_release(&bricks);
+        return s;
+    }
     size_t n_brick = segment_n_brick(&bricks);
     struct transfer_job job = {.bricks = &bricks, .fibers = f, .d = d};
     job.distance2 = malloc(n_thread * BRICK * BRICK * BRICK * sizeof *job.distance2);
@@ -101,6 +106,7 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
         if (s != STATUS_OK) error_set(err, s, "transferring directions was cancelled");
     }
     if (s == STATUS_OK) reduce(&job, n_brick, report);
+    if (s == STATUS_OK) s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[1], err);
     free(job.distance2);
     free(job.nearest);
     free(job.sum);

@@ -55,8 +55,8 @@ static void warn_alignment(const struct warner *w, const struct reconstruct_opti
             "%zu..%zu, y %zu..%zu, or give volume.crop \"auto\"",
             100.0 * share, valid[0], valid[2], valid[1], valid[3]);
     for (int a = 0; a < 2; a++)
-        if (o->crop && r->tile.mismatch[a] > 0.5)
-            say(w, "volume.crop: no two places of the scan match across %c (mismatch %.2f, 0 is a repeat and 1 is chance): the tile has a seam",
+        if (o->crop && r->tile.mismatch[a] > TILE_MOST_MISMATCH)
+            say(w, "volume.crop: no two places of the scan match across %c (mismatch %.2f, 0 is a repeat and 1 is chance): nothing was cut, the tile has a seam",
                 "xy"[a], r->tile.mismatch[a]);
 }
 

@@ -222,6 +222,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
                                    &c->geometry, err);
         volume_release(&c->volume);
         memset(&c->volume, 0, sizeof c->volume);
+        if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
         if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
     } else {
         s = read_fiber_file(c, err);

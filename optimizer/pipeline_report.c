@@ -1,6 +1,8 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
 #include "optimizer/pipeline_advice.h"
+#include "optimizer/pipeline_context.h"
+#include "optimizer/report/quality.h"
 #include "optimizer/report/result_json.h"
 #include "optimizer/report/result_pictures.h"
 
@@ -10,6 +12,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);
+    if (s == STATUS_OK) s = quality_write(c, err);
     if (s == STATUS_OK) s = result_renderings_write(c, 0.1, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
     return s;

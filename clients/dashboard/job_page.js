@@ -5,6 +5,7 @@ import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
 import { duration, el, isNumber, percent, refill, size, stateTag, when, withError } from "./page_parts.js";
+import { qualityCard } from "./quality_card.js";
 import { configurations, fiberFile, fitted, models, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 
@@ -120,6 +121,7 @@ export function jobPage(page, id) {
     const slices = sliceFiles(list.files), hair = fiberFile(list.files);
     const details = fitDetails(job);
     const fibers = hair ? fiberView(hair) : null;
+    const quality = qualityCard(job, list.files);
     closeFibers = fibers?.close ?? null;
     const compete = models(job);
     results.append(
@@ -127,6 +129,7 @@ export function jobPage(page, id) {
       el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured against rendered", scatterPlot(compared))),
       details ? card("More about the fit", details) : "",
       compared.length ? card("Measured beside rendered", gallery(compared, job.result?.png_exposure)) : "",
+      quality ? card("Quality of the geometry", quality) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",
       card("Downloads", downloads(job, list)));

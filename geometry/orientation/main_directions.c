@@ -121,6 +121,7 @@ static void sample_brick(void *context, size_t i_brick, size_t i_thread)
     float *a = f->scratch + i_thread * 2 * CUBE, *b = a + CUBE;
     struct sample *out = f->sample + i_brick * PER_BRICK;
     size_t n = 0, at[3];
+    scratch_keep_within(f->v->space);
     copy_brick(f, f->first + 3 * i_brick, a);
     blur_brick(a, b);
     const size_t low = WINDOW + 1 + BLUR;
@@ -392,10 +393,15 @@ static void turned_frame(const double u[3], int axis, double column[3][3])
     }
 }
 
-static void align_one(const struct main_directions *m, struct alignment *a)
+/* Less than a repeat of crimped yarns leans somewhere: then the part out of the plane says nothing. */
+static void flattened(const struct main_directions *m, int p, double u[3])
 {
-    int axis = length(m->direction[0]) > 0.5 ? 0 : 1;
-    const double *u = m->direction[axis];
+    const double flat[3] = {m->direction[p][0], m->direction[p][1], m->repeat_m[p] > 0.0 ? m->direction[p][2] : 0.0};
+    unit(flat, u);
+}
+
+static void align_one(const struct main_directions *m, int axis, const double u[3], struct alignment *a)
+{
     double column[3][3];
     turned_frame(u, axis, column);
     inverse_of_columns(column[0], column[1], column[2], a->matrix);
@@ -418,11 +424,13 @@ void alignment_from_directions(const struct main_directions *m, struct alignment
         }
     }
     a->outcome = ALIGN_DONE;
+    double u[3], v[3];
+    flattened(m, 0, u);
+    flattened(m, 1, v);
     if (m->n == 1) {
-        align_one(m, a);
+        align_one(m, length(u) > 0.5 ? 0 : 1, length(u) > 0.5 ? u : v, a);
         return;
     }
-    const double *u = m->direction[0], *v = m->direction[1];
     double w[3], dot = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
     cross(u, v, w);
     double norm = length(w);

@@ -46,7 +46,7 @@ struct alignment {
     double se_deg, tilt_se_deg; /* the larger of the two directions' standard errors */
 };
 
-/* With two systems: weft to x, warp to y, their common normal to z (lengths along all three stay). With one: the turn by the shortest
+/* A direction without a repeat (repeat_directions_refine) counts as lying in the plane of x and y. With two systems: weft to x, warp to y, their common normal to z (lengths along all three stay). With one: the turn by the shortest
  * way that brings it to the nearer of x and y. */
 void alignment_from_directions(const struct main_directions *m, struct alignment *a);
 

@@ -55,6 +55,7 @@ static void add_block(void *context, size_t bz, size_t i_thread)
     const size_t *n = p->v->n, *nb = p->n_block;
     size_t to = (bz + 1) * p->block[2] < n[2] ? (bz + 1) * p->block[2] : n[2];
     for (size_t k = bz * p->block[2]; k < to; k++) {
+        scratch_keep_within(p->v->space);
         bool inner = k >= p->z_low && k < p->z_high;
         scratch_keep_within(p->v->space);
         for (size_t j = 0; j < n[1]; j++) {
@@ -230,8 +231,10 @@ static status search_axis(const struct profile *p, int axis, const size_t valid[
         struct candidate best = s.best[0];
         for (size_t x0 = 1; x0 + s.least <= n; x0++)
             if (s.best[x0].cost < best.cost) best = s.best[x0];
-        box[axis] = s.low + best.x0;
-        box[2 + axis] = s.low + best.x1;
+        if (best.mismatch <= TILE_MOST_MISMATCH) {
+            box[axis] = s.low + best.x0;
+            box[2 + axis] = s.low + best.x1;
+        }
         *least_mismatch = best.mismatch;
     }
     free(s.difference);

@@ -4,7 +4,8 @@
  * to 8 pairs of slices V(x0 + k), V(x1 + k), -4 <= k < 4, that lie in the volume (slices averaged over blocks of 1/64 of their edges), over
  * the mean of pairs of slices that have nothing to do with each other: 0 for a perfect repeat, 1 for none. A box that leaves no slice
  * outside of it is judged by its first and its last slice. Chosen is the least mismatch plus 0.05 times the share that is cropped, so that of
- * boxes that match alike the largest is taken. z is left as it is.
+ * boxes that match alike the largest is taken. Where no box comes below TILE_MOST_MISMATCH nothing is gained by cutting, and the axis keeps
+ * all that is valid. z is left as it is.
  * Two passes over the volume, slice by slice: it may be larger than memory.
  */
 #ifndef SELVEDGE_GEOMETRY_TILE_CROP_H
@@ -13,10 +14,12 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
+#define TILE_MOST_MISMATCH 0.6
+
 struct tile_crop {
     size_t box[6];         /* x0 y0 z0 x1 y1 z1, ends excluded */
     size_t valid[4];       /* x0 y0 x1 y1: largest box without cells from outside of the scan where there is material */
-    double mismatch[2];    /* at the seams across x and y, as above; NaN where an axis has too few slices to say */
+    double mismatch[2];    /* of the best box across x and y, as above, whether it was used or not; NaN where an axis has too few slices to say */
 };
 
 /* keep: least share of the valid box's edges that is kept, 0.1 .. 1 (1: only the valid box is cut out). material: value from which on a

@@ -35,7 +35,8 @@ static json_t *seam_density_json(const struct seam_density *s)
 static json_t *seam_fibers_json(const struct reconstruct_report *g)
 {
     const struct fiber_seam *s = &g->seam_fiber;
-    return json_pack("{s:o, s:o, s:o, s:o}", "n_end", json_count_list(s->n_end, 2), "continued", json_number_list(s->share, 2, 1.0), "offset_um",
+    const double *found_m = g->seam_found.offset_m;
+    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "offset_found_um", g->n[0] > 0 ? json_number_list(found_m, 2, 1e6) : json_null(), "n_end", json_count_list(s->n_end, 2), "continued", json_number_list(s->share, 2, 1.0), "offset_um",
                      json_number_list(s->offset_m, 2, 1e6), "n_joined", json_count(g->n_seam_joined));
 }
 
@@ -86,6 +87,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "radius_um", json_number_list(g->radius_m, 3, um));
     json_object_set_new(json, "radius_score", json_number_list(g->radius_score, 3, 1.0));
     json_object_set_new(json, "dice", json_number(g->dice));
+    json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));
     json_object_set_new(json, "direction_change_mean_deg", json_number(g->direction_change_mean_deg));
     json_object_set_new(json, "alignment", alignment_json(o, g));
     json_object_set_new(json, "crop", crop_json(o, g));

@@ -195,6 +195,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);
     json_object_set_new(json, "geometry", result_geometry_json(c));
+    json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
     json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));
     json_object_set_new(json, "stages", stages_json(c));
     json_object_set_new(json, "warnings", result_warnings_json(c));

@@ -66,17 +66,24 @@ static status write_volumes(const struct pipeline_context *c, struct error *err)
     return put_in_place(c, vol_write_kept_density(temporary, &c->direction, err), temporary, path, err);
 }
 
-static status write_slice(const struct pipeline_context *c, int axis, struct error *err)
+status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width, size_t height, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    status s = make_folder(c, "pictures", err);
+    if (s != STATUS_OK) return s;
+    picture_paths(c, "pictures", name, ".png", path, temporary);
+    return put_in_place(c, image_write_png_rgb8(rgb, width, height, temporary, err), temporary, path, err);
+}
+
+static status write_slice(const struct pipeline_context *c, int axis, struct error *err)
+{
     static const char *const name[] = {"slice-x", "slice-y", "slice-z"};
     uint8_t *rgb = NULL;
     size_t width, height;
-    picture_paths(c, "pictures", name[axis], ".png", path, temporary);
     status s =
         reconstruct_slice_picture(&c->volume, &c->fiber, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
     if (s != STATUS_OK) return s;
-    s = put_in_place(c, image_write_png_rgb8(rgb, width, height, temporary, err), temporary, path, err);
+    s = result_picture_write(c, name[axis], rgb, width, height, err);
     free(rgb);
     return s;
 }
@@ -86,7 +93,6 @@ status result_geometry_write(struct pipeline_context *c, struct error *err)
     status s = write_fibers(c, err);
     if (s != STATUS_OK || !c->doc->has_volume) return s;
     s = write_volumes(c, err);
-    if (s == STATUS_OK) s = make_folder(c, "pictures", err);
     if (s == STATUS_OK) s = pipeline_need_volume(c, err);
     for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(c, axis, err);
     return s;

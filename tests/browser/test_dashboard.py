@@ -161,7 +161,16 @@ def test_real_job_live_and_finished(real, browser):
     # fibers in 3D, or a sentence that says why not (a machine without WebGL)
     browser.execute_script("document.querySelector('.view3d button').click()")
     wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")
+    # the geometry's key figures, and the page with all of them
+    quality = browser.find_element(By.ID, "quality").text
+    assert "material explained" in quality and "direction noise" in quality and "continue" in quality
     keep(browser, "finished")
+    assert complaints(browser) == []
+    browser.get(browser.find_element(By.CSS_SELECTOR, "#quality a").get_attribute("href"))
+    assert job.state()["sample"] in browser.find_element(By.TAG_NAME, "h1").text
+    wait_for(browser, "[...document.images].length === 5 && [...document.images].every((i) => i.complete && i.naturalWidth > 0)")
+    assert browser.execute_script("return getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
+    keep(browser, "quality")
     assert complaints(browser) == []
 
 

@@ -1,0 +1,33 @@
+// What the job's geometry is worth: the key figures, the length distribution, and the way to the whole report.
+import { el, isNumber, percent } from "./page_parts.js";
+
+const number = (x, digits = 3) => (isNumber(x) ? String(Number(x.toPrecision(digits))) : "–");
+const pair = (v, show) => (v ? v.map((x) => (isNumber(x) ? show(x) : "–")).join(" / ") : "–");
+
+// [[name, value, what it means]] from result.json's geometry
+export function qualityRows(g) {
+  const rows = [["fibers", `${g.n_fiber}, ${number(g.total_length_mm)} mm`, ""], ["mean radius", `${number(g.mean_radius_um, 4)} µm`, ""]];
+  if (g.input === "volume") rows.push(
+    ["material explained (Dice)", number(g.dice), "overlap of fibers and material, 1 is all"],
+    ["gaps bridged, pieces joined", `${g.n_gap_bridged}, ${g.n_joined}`, ""],
+    ["fiber diameter", `${number(g.fiber_diameter_voxel)} voxels`, "4 and more tell fibers apart"],
+    ["direction noise", pair(g.direction_noise_deg, (x) => `${number(x)}°`), "voxel to voxel, before / after the fibers' directions were taken"],
+    ["density step at the seams", pair(g.seam_density?.ratio, (x) => number(x)), "across x / y; 1 is no seam"]);
+  rows.push(["fiber ends that continue", pair(g.seam_fibers?.continued, (x) => percent(x, 0)), "across the seams in x / y"]);
+  const a = g.alignment;
+  if (a) rows.push(["alignment", a.applied ? `turned ${number(a.rotation_deg)}°, sheared ${number(a.shear_deg)}°, tilted ${number(a.tilt_deg)}°` : "not needed or not possible",
+    isNumber(a.standard_error_deg) && a.outcome === "found" ? `standard error ${number(a.standard_error_deg, 2)}°` : ""]);
+  if (g.crop && g.options?.crop_voxel) rows.push(["cropped to", g.options.crop_voxel.join(", "), "x0, y0, z0, x1, y1, z1"]);
+  return rows;
+}
+
+export function qualityCard(job, files) {
+  const g = job.result?.geometry, find = (path) => files.find((f) => f.path === path);
+  if (!g) return null;
+  const plot = find("pictures/fiber-lengths.svg"), page = find("quality.html");
+  return el("div", { id: "quality" },
+    el("div", { class: "columns" },
+      el("table", {}, el("tbody", {}, qualityRows(g).map(([name, value, hint]) => el("tr", {}, el("td", {}, name), el("td", { class: "number" }, value), el("td", { class: "hint" }, hint))))),
+      plot ? el("img", { src: plot.url, alt: "length distribution of the fibers", class: "plot", loading: "lazy" }) : null),
+    page ? el("p", {}, el("a", { href: page.url, target: "_blank" }, "Whole quality report")) : null);
+}
