@@ -1,6 +1,7 @@
 /* Step "fibers": subvolumes, centers, chains, joins, smoothing, radius. */
 #include "geometry/reconstruct.h"
 
+#include "geometry/fibers/axis_fit.h"
 #include "geometry/fibers/centers.h"
 #include "geometry/fibers/disagreement.h"
 #include "geometry/fibers/growing.h"
@@ -17,6 +18,7 @@
 enum {
     MIN_PIECE = 4, /* centers in a chain before joining */
     N_MEND = 2,    /* rounds of growing and cutting */
+    N_FIT = 5,     /* rounds of fitting axes to the scan */
     MAX_GROWTH = 64 /* voxels that an end may grow */
 };
 
@@ -155,6 +157,52 @@ static status relax(struct fiber_job *job, struct polyline_set *lines, int n_rou
     return polylines_relax(lines, job->v, (float)(0.6 * job->diameter), n_round, job->o->smooth_alpha, job->pool, &job->inner, err);
 }
 
+static bool is_inside(const struct fiber_job *job, const float x[3])
+{
+    for (int a = 0; a < 3; a++)
+        if (!(x[a] >= 0.0f && x[a] <= (float)job->v->n[a])) return false;
+    return true;
+}
+
+/* Lines without the vertices at their ends that lie outside of the volume. */
+static status keep_inside(const struct fiber_job *job, const struct polyline_set *in, struct polyline_set *out, struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t l = 0; l < in->n_line && s == STATUS_OK; l++) {
+        size_t from = in->first[l], to = in->first[l + 1];
+        while (from < to && !is_inside(job, in->vertex[from])) from++;
+        while (to > from && !is_inside(job, in->vertex[to - 1])) to--;
+        if (to - from < job->o->min_vertex) {
+            job->report->n_short_dropped[in->axis[l]]++;
+            continue;
+        }
+        s = polyline_begin(out, in->axis[l], err);
+        for (size_t i = from; i < to && s == STATUS_OK; i++) s = polyline_add(out, in->vertex[i], err);
+    }
+    return s;
+}
+
+/* Lines are moved to where they explain the scan best. */
+static status fit_axes(struct fiber_job *job, struct polyline_set *lines, struct error *err)
+{
+    struct axis_profile profile = {0.5 * job->diameter, 0.8, 0.0, 1.0};
+    struct polyline_set even, inside;
+    polyline_set_init(&even);
+    polyline_set_init(&inside);
+    status s = relax(job, lines, 2, err);
+    if (s == STATUS_OK) s = polylines_resample(lines, &even, err);
+    if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, N_FIT, &profile, job->pool, &job->inner, err);
+    if (s == STATUS_OK) s = keep_inside(job, &even, &inside, err);
+    if (s == STATUS_OK) {
+        polyline_set_release(lines);
+        *lines = inside;
+        polyline_set_init(&inside);
+    }
+    polyline_set_release(&even);
+    polyline_set_release(&inside);
+    return s;
+}
+
 static void finish_lines(struct fiber_job *job, struct polyline_set *lines)
 {
     classify(lines);
@@ -183,7 +231,7 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         classify(&part[0]); /* from subvolumes to axes */
         s = smooth_and_drop(job, &part[0], lines, err);
     }
-    if (s == STATUS_OK) s = relax(job, lines, 3, err);
+    if (s == STATUS_OK) s = fit_axes(job, lines, err);
     if (s == STATUS_OK) {
         job->report->n_gap_bridged = counts.n_gap_bridged;
         job->report->n_joined = counts.n_joined;

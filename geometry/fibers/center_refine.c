@@ -64,6 +64,8 @@ static void move_to_centroid(const float *image, struct center *c, float index, 
             size_t at = v * width + u;
             if (distance[at] >= r * r || owner[at] != index) continue;
             float w = image[at] - FLOOR;
+            float mirror_u = 2.0f * c->u - (float)u - 0.5f, mirror_v = 2.0f * c->v - (float)v - 0.5f;
+            if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)width || mirror_v > (float)height) continue; /* cut by the border */
             if (w <= 0.0f) continue;
             sum += w;
             su += w * ((float)u + 0.5f - c->u);

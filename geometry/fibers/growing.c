@@ -87,7 +87,8 @@ static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t l
 }
 
 /* Material around x in the disk of radius r and thickness 1.5 perpendicular to t that is nearer to x than to the neighbours:
- * mean offset (perpendicular), and mean density within half of r of x. */
+ * mean offset (perpendicular), and mean density within half of r of x. Near a face only voxels whose mirror image through x is in the
+ * volume too count, or the walk would turn along the face. */
 static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r, float (*other)[3], size_t n_other,
                           float offset[3], float *core)
 {
@@ -109,7 +110,9 @@ static bool disk_centroid(const struct walk *w, const float x[3], const float t[
                     d2 += p[a] * p[a];
                 }
                 float across2 = d2 - along * along;
-                if (fabsf(along) > 0.75f || across2 > r * r) continue;
+                bool mirrored = true;
+                for (int a = 0; a < 3; a++) mirrored = mirrored && x[a] - p[a] >= 0.0f && x[a] - p[a] <= (float)n[a];
+                if (!mirrored || fabsf(along) > 0.75f || across2 > r * r) continue;
                 bool mine = true;
                 for (size_t k = 0; k < n_other && mine; k++) {
                     float e2 = 0.0f;

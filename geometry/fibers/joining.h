@@ -2,9 +2,10 @@
  *
  * 1. Duplicates: a fiber near 45 degrees is seen in two subvolumes; where two lines run side by side within a quarter of a
  *    diameter, the vertices of the shorter are removed.
- * 2. Joins: two free ends become one line when each lies ahead of the other along its tangent, the tangents agree, the
- *    way between them is short and lies in material. Best pairs first. A join within one subvolume is a bridged gap
- *    (a center missed in some slices), one between two subvolumes a fiber that turned from one to the other.
+ * 2. Joins: two free ends become one line when one smooth curve passes through the last vertices of both (join_curve.h), and the way
+ *    between them is short, lies in material and is no other line's. Ends at a face of the volume stay free. Best pairs first. A join
+ *    within one subvolume is a bridged gap (a center missed in some slices), one between two subvolumes a fiber that turned from one
+ *    to the other.
  */
 #ifndef SELVEDGE_GEOMETRY_JOINING_H
 #define SELVEDGE_GEOMETRY_JOINING_H

@@ -47,6 +47,10 @@ static void pull_voxel(const struct relax_job *job, struct brick_pulls *r, uint3
     if (!(length2 > 0.0f)) return;
     float t = along / length2;
     if (t < -0.5f || t > 1.5f) return; /* beyond the end of a line */
+    for (int a = 0; a < 3; a++) { /* near a face only what has its mirror image in the volume tells which way to go */
+        float mirror = 2.0f * (g->a[a] + t * u[a]) - x[a];
+        if (mirror < 0.0f || mirror > (float)job->v->n[a]) return;
+    }
     float inside = t < 0.0f ? 0.0f : t > 1.0f ? 1.0f : t;
     for (int e = 0; e < 2; e++) {
         struct pull *q = &r->pull[2 * slot + (size_t)e];

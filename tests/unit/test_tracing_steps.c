@@ -1,5 +1,6 @@
 /* The steps from directions to fibers, one by one: smoothing, linking, joining, relaxing, radius, alignment. */
 #include "base/rng.h"
+#include "geometry/fibers/axis_fit.h"
 #include "geometry/fibers/joining.h"
 #include "geometry/fibers/linking.h"
 #include "geometry/fibers/radius.h"
@@ -143,6 +144,42 @@ static void test_relax(void **state)
     volume_release(&v);
 }
 
+/* Three fibers, two of them touching, of which only two have lines: these end on their axes, whatever the third one does, and with the true
+ * radius. A straight axis through N voxels of a surface that blur b spreads is known to sigma / sqrt(A) per voxel of length,
+ * A = pi r / (2 sqrt(pi) b) (a quarter of a circle's surface pushes each way), some 0.1 voxel; the fit averages over a few. */
+static void test_axis_fit(void **state)
+{
+    (void)state;
+    const size_t n[3] = {64, 40, 32};
+    const struct test_cylinder c[3] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 3.5},
+                                       {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 3.5},
+                                       {{0.0, 26.6, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
+    struct volume v;
+    struct polyline_set coarse, lines;
+    struct axis_profile profile = {3.2, 0.8, 0.0, 1.0};
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, c, 3, 0.2, 1);
+    polyline_set_init(&coarse);
+    polyline_set_init(&lines);
+    add_piece(&coarse, 0, 0.5f, 63.5f, 13.2f);
+    add_piece(&coarse, 0, 0.5f, 63.5f, 19.0f);
+    assert_int_equal(polylines_resample(&coarse, &lines, NULL), STATUS_OK);
+    assert_int_equal(polyline_length(&lines, 0), 64);
+    assert_int_equal(polylines_fit(&lines, &v, 7.0, 6, &profile, NULL, NULL, NULL), STATUS_OK);
+    double square = 0.0;
+    for (size_t i = 0; i < lines.n_vertex; i++) {
+        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5), dz = (double)lines.vertex[i][2] - 16.0;
+        square += dy * dy + dz * dz;
+    }
+    print_message("rms distance from the axes %.3f voxels, radius %.3f, blur %.2f, densities %.2f to %.2f\n",
+                  sqrt(square / (double)lines.n_vertex), profile.radius, profile.blur, profile.low, profile.high);
+    assert_true(sqrt(square / (double)lines.n_vertex) < 0.1);
+    assert_true(fabs(profile.radius - 3.5) < 0.03 * 3.5);
+    polyline_set_release(&coarse);
+    polyline_set_release(&lines);
+    volume_release(&v);
+}
+
 /* Histogram pass against counting by hand; both radii on a bundle of touching fibers, off-axis by a quarter voxel. */
 static void test_radius(void **state)
 {
@@ -222,7 +259,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_smoothing), cmocka_unit_test(test_linking_leaning_neighbours),
-        cmocka_unit_test(test_duplicates_and_joins), cmocka_unit_test(test_relax),
+        cmocka_unit_test(test_duplicates_and_joins), cmocka_unit_test(test_relax), cmocka_unit_test(test_axis_fit),
         cmocka_unit_test(test_radius),    cmocka_unit_test(test_alignment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
