@@ -69,7 +69,7 @@ static struct job_document *document_new(void)
         fill_nan(d->model[i].start, JOB_MAX_PARAM);
         job_fit_option_init(&d->model[i].option);
     }
-    d->density_multiplier_per_cm = NAN;
+    d->density_multiplier_per_cm = d->radius_lower_um = d->radius_upper_um = NAN;
     d->render_px = 96;
     d->render_sample = 16;
     return d;

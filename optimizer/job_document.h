@@ -27,6 +27,8 @@
  *           "max_iterations": n, "path_budget": n,        of each model
  *           "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},   for every model that has the parameter
  *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
+ *           "fit_radius": true | {"lower_um": v, "upper_um": v},         one mean radius of all fibers; default: half to
+ *                                                                        twice the one that the cloth has
  *           "tied", "bounds", "priors", "starts", "nuisance":           see job_fit_option.h
  *           "render_px": 96, "render_samples": 16}
  * }
@@ -111,6 +113,8 @@ struct job_document {
     /* volume models: d is a parameter, the last one; its entries in fixed and start follow from these two */
     double density_multiplier_per_cm; /* NaN: the model's default */
     bool fit_density;
+    bool fit_radius;
+    double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
     size_t render_px, render_sample;
 };
 

@@ -183,6 +183,35 @@ static status parse_density(const struct json_field *f, const struct appearance 
     return STATUS_OK;
 }
 
+/* true, false or the range to search. */
+static status parse_radius(const struct json_field *f, const struct appearance *model, struct job_document *doc,
+                           struct error *err)
+{
+    static const char *const key[] = {"lower_um", "upper_um", NULL};
+    const json_t *value = json_object_get(f->object, "fit_radius");
+    struct json_field range;
+    if (value == NULL) return STATUS_OK;
+    if (json_is_boolean(value)) {
+        doc->fit_radius = json_is_true(value);
+    } else {
+        status s = json_field_object(f, "fit_radius", &range, &doc->fit_radius, err);
+        if (s == STATUS_OK) s = json_field_check_keys(&range, key, err);
+        if (s == STATUS_OK) s = json_field_number(&range, "lower_um", 0.05, 1000.0, &doc->radius_lower_um, err);
+        if (s == STATUS_OK) s = json_field_number(&range, "upper_um", 0.05, 1000.0, &doc->radius_upper_um, err);
+        if (s != STATUS_OK) return s;
+        if (doc->radius_upper_um < 1.1 * doc->radius_lower_um)
+            return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
+                                   "'fit.fit_radius.upper_um' is %g: it must be at least 1.1 times lower_um (%g)",
+                                   doc->radius_upper_um, doc->radius_lower_um);
+    }
+    for (size_t i = 0; i < doc->n_model && doc->fit_radius; i++)
+        if (model[i].kind == APPEARANCE_SURFACE) return STATUS_OK;
+    return doc->fit_radius ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
+                                             "'fit.fit_radius' needs a model of fibers' surfaces: '%s' sees a volume",
+                                             model[0].id)
+                           : STATUS_OK;
+}
+
 static status check_free_parameters(const struct appearance *m, const struct job_model *given, struct error *err)
 {
     size_t n_free = 0;
@@ -210,6 +239,7 @@ static status parse_parameters(const struct json_field *f, struct job_document *
     status s = parse_values(f, true, model, doc, err);
     if (s == STATUS_OK) s = parse_values(f, false, model, doc, err);
     if (s == STATUS_OK) s = parse_density(f, model, doc, err);
+    if (s == STATUS_OK) s = parse_radius(f, model, doc, err);
     for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
         s = check_free_parameters(&model[i], &doc->model[i], err);
     return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
@@ -222,7 +252,7 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
                                       "fixed",     "start",          "density_multiplier_per_cm",
                                       "fit_density", "render_px",    "render_samples",
                                       "tied",      "bounds",         "priors",
-                                      "starts",    "nuisance",       NULL};
+                                      "starts",    "nuisance",       "fit_radius",  NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_models(f, doc, err);
     if (s == STATUS_OK) s = parse_method(f, doc, err);

@@ -13,6 +13,7 @@
 #include "geometry/volume/volume.h"
 #include "optimizer/descent/descent.h"
 #include "optimizer/job_document.h"
+#include "optimizer/objective/noisy_minimum.h"
 #include "optimizer/photographs/observation.h"
 #include "optimizer/pipeline.h"
 #include "optimizer/worker_folder.h"
@@ -40,6 +41,16 @@ struct pipeline_model {
     struct derivative_check certificate; /* of the free parameters at the result; filled in before the report */
 };
 
+/* What the search for the fiber radius gave (pipeline_radius.h). */
+struct pipeline_radius {
+    size_t i_model, n_step;               /* the model that was fitted at each radius; records of the series */
+    double start_m, radius_m, se_m;       /* mean radius before and after; its standard error */
+    double lower_m, upper_m;
+    struct noisy_minimum curve;           /* u = ln of the radius in metres; f: objective of the fit there */
+    uint64_t n_path;
+    double wall_s;
+};
+
 struct pipeline_context {
     const struct worker_folder *folder; /* not owned, as the next three */
     struct worker_status *status;
@@ -55,6 +66,7 @@ struct pipeline_context {
     struct observation_set fitted;      /* those of the set "fit" */
     size_t n_model;
     struct pipeline_model *model; /* in the order of the document */
+    struct pipeline_radius radius; /* when the job has the radius fitted */
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;
@@ -98,6 +110,10 @@ status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
 status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
                           char path[WORKER_PATH_BYTES], struct error *err);
+/* The cloth for ray tracing from the fibers as they are; what was made before is released. The second makes it for
+ * surface models only. */
+status pipeline_make_scene(struct pipeline_context *c, struct error *err);
+status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err);
 /* As above, with a number for all models but the first: "estimates.journal", "estimates-1.journal". */
 status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
                            char path[WORKER_PATH_BYTES], struct error *err);

@@ -1,6 +1,7 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
 #include "optimizer/descent/fit_run.h"
 #include "optimizer/pipeline_fit_option.h"
+#include "optimizer/pipeline_radius.h"
 #include "optimizer/pipeline_trace.h"
 #include "optimizer/work_file.h"
 #include "optimizer/worker_series.h"
@@ -98,8 +99,10 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     struct pipeline_context *c = listener->pipeline;
     struct pipeline_model *m = &c->model[listener->i_model];
     struct pipeline_trace trace;
-    struct pipeline_part part;
-    struct progress progress = pipeline_part_progress(&part, c, listener->i_model);
+    struct pipeline_part rest, part;
+    double before = c->doc->fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
+    struct progress whole = pipeline_sub_progress(&rest, &c->progress, before, 1.0 - before);
+    struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_model);
     struct estimator estimator;
     char message[160];
     snprintf(message, sizeof message, "fitting %s (model %zu of %zu)", m->appearance.id, listener->i_model + 1,
@@ -108,7 +111,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
         worker_status_message(c->status, message);
         log_info(c->log, "%s", message);
     }
-    status s = pipeline_trace_open(&trace, c, "fit", listener->i_model, &c->fitted, err);
+    status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", listener->i_model, &c->fitted, err);
     if (s != STATUS_OK) goto out;
     listener->journal = trace.journal;
     estimator = estimate_journal_estimator(trace.journal);
@@ -125,35 +128,40 @@ out:
     return s;
 }
 
-static void result_sections(struct pipeline_context *c, struct work_section section[JOB_MAX_MODEL])
+static size_t result_sections(struct pipeline_context *c, struct work_section section[JOB_MAX_MODEL + 1])
 {
     for (size_t i = 0; i < c->n_model; i++)
         section[i] = (struct work_section){&c->model[i].fit, sizeof c->model[i].fit};
+    section[c->n_model] = (struct work_section){&c->radius, sizeof c->radius};
+    return c->n_model + 1;
 }
 
 static status store_fits(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[JOB_MAX_MODEL];
-    result_sections(c, section);
+    struct work_section section[JOB_MAX_MODEL + 1];
+    size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.3", section, c->n_model, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.4", section, n, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[JOB_MAX_MODEL];
-    result_sections(c, section);
+    struct work_section section[JOB_MAX_MODEL + 1];
+    size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    return s == STATUS_OK ? work_file_read(path, "fit.3", section, c->n_model, err) : s;
+    if (s == STATUS_OK) s = work_file_read(path, "fit.4", section, n, err);
+    return s == STATUS_OK && c->doc->fit_radius ? pipeline_radius_apply(c, err) : s;
 }
 
 status stage_fit(struct pipeline_context *c, struct error *err)
 {
     struct fit_listener listener = {.pipeline = c};
     status s = worker_series_open(c->folder, &listener.series, err);
+    if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_search(c, listener.series, err);
+    listener.step_base = c->radius.n_step;
     for (; listener.i_model < c->n_model && s == STATUS_OK; listener.i_model++) s = fit_model(&listener, err);
     if (s == STATUS_OK) s = store_fits(c, err);
     worker_series_close(listener.series);

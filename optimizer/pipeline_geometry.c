@@ -1,5 +1,4 @@
 /* Stages "volume" to "scene": from the scan, or from a fiber file, to a cloth ready for ray tracing. */
-#include "geometry/fibers/voxelise.h"
 #include "optimizer/job_folder.h"
 #include "optimizer/pipeline_context.h"
 #include "optimizer/work_file.h"
@@ -9,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { VOXELISE_MEMORY_SHARE = 4 };
 static const double um = 1e-6, mm = 1e-3;
 
 /* The document's options over the defaults. */
@@ -273,62 +271,4 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
     fiber_set_release(&c->fiber);
     c->fiber = f;
     return STATUS_OK;
-}
-
-/* ---- scene ---- */
-
-static bool wants_volume_scene(const struct pipeline_context *c)
-{
-    for (size_t i = 0; i < c->n_model; i++)
-        if (c->model[i].appearance.kind == APPEARANCE_VOLUME) return true;
-    return false;
-}
-
-/* The cloth came as fibers: volume models get the density of those. Cheap enough to be done again after a resume. */
-static status voxelise(struct pipeline_context *c, struct error *err)
-{
-    const struct voxelise_option option = {.voxel_size_m = c->doc->voxel_um * um,
-                                           .limit_bytes = c->memory_limit_bytes / VOXELISE_MEMORY_SHARE};
-    double radius_m = 0.0, voxel_m;
-    char warning[300];
-    status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
-    if (s != STATUS_OK) {
-        if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, "fibers.voxel_um");
-        return s;
-    }
-    for (size_t i = 0; i < c->fiber.n_fiber; i++)
-        radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
-    if (isnan(option.voxel_size_m) && voxel_m > 0.51 * radius_m) {
-        snprintf(warning, sizeof warning,
-                 "volume models see the fibers in voxels of %.3g um instead of %.3g um (half a radius): finer ones do "
-                 "not fit into the memory setting",
-                 voxel_m / um, 0.5 * radius_m / um);
-        worker_status_warn(c->status, warning);
-    }
-    return STATUS_OK;
-}
-
-static status make_volume_scene(struct pipeline_context *c, struct error *err)
-{
-    const struct volume_scene_option option = {.black_sheet = c->doc->black_sheet};
-    status s = volume_scene_init(&c->volume_scene, &c->direction, &option, err);
-    c->has_volume_scene = s == STATUS_OK;
-    if (s == STATUS_OK)
-        log_info(c->log, "volume: %zu x %zu x %zu voxels of %.3g um, %.0f MB", c->direction.n[0], c->direction.n[1],
-                 c->direction.n[2], c->direction.voxel_size_m[0] / um,
-                 (double)volume_scene_memory_bytes(&c->volume_scene) / 1e6);
-    return s;
-}
-
-status stage_scene(struct pipeline_context *c, struct error *err)
-{
-    reconstruct_warn_fibers(&c->geometry, &c->fiber, warn_geometry, c); /* this stage runs in every attempt */
-    struct scene_option option = {.black_sheet = c->doc->black_sheet};
-    status s = scene_new(&c->fiber, &option, &c->scene, err);
-    if (s != STATUS_OK) return s;
-    log_info(c->log, "scene: %zu fibers, %zu segments, %.0f MB", c->fiber.n_fiber, scene_n_segment(c->scene),
-             (double)scene_memory_bytes(c->scene) / 1e6);
-    if (!wants_volume_scene(c)) return STATUS_OK;
-    if (!c->doc->has_volume) s = voxelise(c, err);
-    return s == STATUS_OK ? make_volume_scene(c, err) : s;
 }

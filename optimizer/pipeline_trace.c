@@ -28,8 +28,8 @@ static status may_write(void *context, struct error *err)
     return worker_folder_check(c->folder, err);
 }
 
-status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, size_t i_model,
-                           const struct observation_set *o, struct error *err)
+status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
+                           size_t i_model, const struct observation_set *o, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     *t = (struct pipeline_trace){.configuration = trace_configurations(o)};
@@ -42,7 +42,7 @@ status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c,
                                        .configuration = t->configuration,
                                        .n_configuration = o->n};
     t->live_estimator = trace_estimator(&t->live);
-    status s = pipeline_model_path(c, stage, "estimates.journal", i_model, path, err);
+    status s = pipeline_model_path(c, stage, name, i_model, path, err);
     return s == STATUS_OK ? estimate_journal_open(path, fingerprint(c, i_model), &t->live_estimator, may_write, c,
                                                   &t->journal, err)
                           : s;
@@ -67,8 +67,9 @@ struct progress pipeline_sub_progress(struct pipeline_part *part, const struct p
     return (struct progress){report_part, part, whole->cancel};
 }
 
-struct progress pipeline_part_progress(struct pipeline_part *part, const struct pipeline_context *c, size_t i_model)
+struct progress pipeline_model_progress(struct pipeline_part *part, const struct progress *whole,
+                                        const struct pipeline_context *c, size_t i_model)
 {
     double share = 1.0 / (double)c->n_model;
-    return pipeline_sub_progress(part, &c->progress, share * (double)i_model, share);
+    return pipeline_sub_progress(part, whole, share * (double)i_model, share);
 }

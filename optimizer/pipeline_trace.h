@@ -14,20 +14,21 @@ struct pipeline_trace {
     struct estimate_journal *journal;
 };
 
-/* Opens (and replays) work/<stage>/estimates.journal of the model. Not to be moved in memory until closed; close in any
+/* Opens (and replays) the journal work/<stage>/<name> of the model, "estimates.journal" for its own fit. Not to be moved in memory until closed; close in any
  * case. */
-status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, size_t i_model,
-                           const struct observation_set *o, struct error *err);
+status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
+                           size_t i_model, const struct observation_set *o, struct error *err);
 void pipeline_trace_close(struct pipeline_trace *t);
 
-/* Models take equal shares of a stage. */
 struct pipeline_part {
     const struct progress *whole;
     double base, share;
 };
-struct progress pipeline_part_progress(struct pipeline_part *part, const struct pipeline_context *c, size_t i_model);
-/* A part of a part (or of anything): fractions 0..1 become base .. base + share of `whole`. */
+/* Fractions 0..1 become base .. base + share of `whole`. */
 struct progress pipeline_sub_progress(struct pipeline_part *part, const struct progress *whole, double base,
                                       double share);
+/* Models take equal shares. */
+struct progress pipeline_model_progress(struct pipeline_part *part, const struct progress *whole,
+                                        const struct pipeline_context *c, size_t i_model);
 
 #endif

@@ -116,9 +116,9 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     struct pipeline_model *m = &c->model[i_model];
     struct pipeline_trace trace;
     struct pipeline_part part;
-    struct progress progress = pipeline_part_progress(&part, c, i_model);
+    struct progress progress = pipeline_model_progress(&part, &c->progress, c, i_model);
     struct estimator estimator;
-    status s = pipeline_trace_open(&trace, c, "validation", i_model, &c->observation, err);
+    status s = pipeline_trace_open(&trace, c, "validation", "estimates.journal", i_model, &c->observation, err);
     if (s != STATUS_OK) goto out;
     estimator = estimate_journal_estimator(trace.journal);
     s = estimate_validation(c, m, &estimator, &progress, n_path, err);

@@ -145,6 +145,16 @@ static void print_models(const json_t *models, FILE *out)
     fprintf(out, "of the best model:\n");
 }
 
+static void print_radius(const json_t *radius, FILE *out)
+{
+    char value[CLI_SHORT_TEXT];
+    if (!json_is_object(radius)) return;
+    text_with_error(member_number(radius, "radius_um"), member_number(radius, "standard_error_um"), value);
+    fprintf(out, "fiber radius: %s um (it was %.4g um)%s%s\n", value, member_number(radius, "start_um"),
+            json_is_false(json_object_get(radius, "determined")) ? "  not determined" : "",
+            json_is_true(json_object_get(radius, "at_bound")) ? "  at the edge of its range" : "");
+}
+
 void report_result(const json_t *job, FILE *out)
 {
     static const struct {
@@ -153,6 +163,7 @@ void report_result(const json_t *job, FILE *out)
     size_t i;
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
     print_models(json_object_get(result, "models"), out);
+    print_radius(json_object_get(result, "radius"), out);
     if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
     json_array_foreach(parameters, i, parameter) print_parameter(parameter, out);
     for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {

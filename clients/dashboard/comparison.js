@@ -74,3 +74,22 @@ export function scatterPlot(list) {
     root,
   ];
 }
+
+// Objective over the fiber radius with two standard errors either way; the line marks what came out.
+export function radiusPlot(search) {
+  const W = 460, H = 220, L = 56, R = 12, T = 12, B = 34, list = search.curve;
+  const low = Math.min(...list.map((p) => p.f - 2 * p.se)), high = Math.max(...list.map((p) => p.f + 2 * p.se));
+  const from = Math.log(list[0].radius), to = Math.log(list[list.length - 1].radius);
+  const x = (r) => L + (W - L - R) * (Math.log(r) - from) / (to - from), y = (f) => H - B - (H - T - B) * (f - low) / (high - low);
+  const parts = [svg("rect", { x: L, y: T, width: W - L - R, height: H - T - B, fill: "none", stroke: "var(--line)" })];
+  const label = (text, at) => { const t = svg("text", { fill: "currentColor", "font-size": 11, ...at }); t.textContent = text; parts.push(t); };
+  const inside = (r) => Math.min(Math.max(x(r), L), W - R);
+  parts.push(svg("rect", { x: inside(Math.max(search.value - search.se, 1e-9)), y: T, width: inside(search.value + search.se) - inside(Math.max(search.value - search.se, 1e-9)), height: H - T - B, fill: "var(--accent)", opacity: 0.15 }),
+    svg("line", { x1: inside(search.value), x2: inside(search.value), y1: T, y2: H - B, stroke: "var(--accent)" }));
+  for (const p of list)
+    parts.push(svg("line", { x1: x(p.radius), x2: x(p.radius), y1: y(p.f - 2 * p.se), y2: y(p.f + 2 * p.se), stroke: "var(--ink)", opacity: 0.6 }), svg("circle", { cx: x(p.radius), cy: y(p.f), r: 3, fill: "var(--accent)" }));
+  for (const r of [list[0].radius, Math.exp((from + to) / 2), list[list.length - 1].radius]) label(Number(r.toPrecision(3)), { x: x(r), y: H - B + 15, "text-anchor": "middle" });
+  for (const f of [low, high]) label(Number(f.toPrecision(2)), { x: L - 6, y: y(f) + (f === low ? 0 : 10), "text-anchor": "end" });
+  label("fiber radius, µm", { x: (L + W - R) / 2, y: H - 4, "text-anchor": "middle" });
+  return el("div", {}, el("p", { class: "hint" }, "Objective of the fit at each radius ± 2 s.e.; the band is the radius that came out and its standard error."), svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "radius" }, ...parts));
+}

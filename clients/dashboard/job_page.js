@@ -1,12 +1,12 @@
 // One job: state and stages, live curves, and at the end parameters, comparison, fibers, downloads.
-import { gallery, scatterPlot } from "./comparison.js";
+import { gallery, radiusPlot, scatterPlot } from "./comparison.js";
 import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
 import { duration, el, isNumber, percent, refill, size, stateTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
-import { configurations, fiberFile, fitted, models, residuals, sliceFiles } from "./result_view.js";
+import { configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 
 const SHOWN_WARNINGS = 2;
@@ -34,13 +34,15 @@ function fact(name, value) {
 function factsOf(job) {
   const facts = [];
   if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", duration(job.eta_s)));
-  if (job.state === "running" && job.message.startsWith("fitting ")) facts.push(fact("now", job.message));
+  if (job.state === "running" && /^(fitting|fiber radius)/.test(job.message)) facts.push(fact("now", job.message));
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
   const of = job.result ?? job; // at the end: of the best model, at fresh paths
   if (isNumber(of.objective)) facts.push(fact("objective", withError(of.objective, of.objective_se)));
   const { fit, held } = residuals(job);
   if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percent(fit, 2)));
   if (isNumber(held)) facts.push(fact("held out", percent(held, 2)));
+  const radius = radiusSearch(job);
+  if (radius) facts.push(fact("fiber radius, fitted", `${withError(radius.value, radius.se)} µm ${radius.flags.join(", ")}`));
   if (isNumber(job.started_unix_s) && isNumber(job.finished_unix_s)) facts.push(fact("took", duration(job.finished_unix_s - job.started_unix_s)));
   if (job.attempt > 1) facts.push(fact("attempt", String(job.attempt)));
   if (job.peak_rss_bytes > 0) facts.push(fact("memory", size(job.peak_rss_bytes)));
@@ -123,11 +125,12 @@ export function jobPage(page, id) {
     const fibers = hair ? fiberView(hair) : null;
     const quality = qualityCard(job, list.files);
     closeFibers = fibers?.close ?? null;
-    const compete = models(job);
+    const compete = models(job), radius = radiusSearch(job);
     results.append(
       compete.length > 1 ? card("Models compared", modelTable(compete)) : "",
       el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured against rendered", scatterPlot(compared))),
       details ? card("More about the fit", details) : "",
+      radius ? card("Fiber radius", radiusPlot(radius)) : "",
       compared.length ? card("Measured beside rendered", gallery(compared, job.result?.png_exposure)) : "",
       quality ? card("Quality of the geometry", quality) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",

@@ -46,6 +46,15 @@ export function fitted(of) {
   });
 }
 
+// The search for the fiber radius: {value, se, start, flags, curve: [{radius, f, se}]} by rising radius, or null.
+export function radiusSearch(job) {
+  const r = job.result?.radius;
+  if (!r) return null;
+  const flags = [r.at_bound ? "at the edge of its range" : null, r.determined ? null : "not determined"].filter(Boolean);
+  const curve = r.curve.map((p) => ({ radius: p.radius_um, f: p.objective, se: p.objective_se })).sort((a, b) => a.radius - b.radius);
+  return { value: r.radius_um, se: r.standard_error_um, start: r.start_um, flags, curve };
+}
+
 // Every configuration: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error}]
 export function configurations(job, urls) {
   return (job.result?.rows ?? []).map((c) => {

@@ -182,6 +182,26 @@ static json_t *stages_json(const struct pipeline_context *c)
     return list;
 }
 
+/* The search for the fiber radius; null when the job did not ask for it. */
+static json_t *radius_json(const struct pipeline_context *c)
+{
+    const struct pipeline_radius *r = &c->radius;
+    const double um = 1e6;
+    if (!c->doc->fit_radius) return json_null();
+    json_t *curve = json_array();
+    for (size_t i = 0; i < r->curve.n_point; i++) {
+        const struct noisy_point *p = &r->curve.point[i];
+        json_array_append_new(curve, json_pack("{s:o, s:o, s:o}", "radius_um", json_number(exp(p->u) * um), "objective",
+                                               json_number(p->f), "objective_se", json_number(p->se)));
+    }
+    return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:I, s:o, s:o}", "model",
+                     c->model[r->i_model].appearance.id, "start_um", json_number(r->start_m * um), "radius_um",
+                     json_number(r->radius_m * um), "minimum_um", json_number(exp(r->curve.u) * um), "standard_error_um",
+                     json_number(r->se_m * um), "lower_um", json_number(r->lower_m * um), "upper_um", json_number(r->upper_m * um),
+                     "determined", (int)r->curve.determined, "at_bound", (int)r->curve.at_bound, "n_path",
+                     (json_int_t)r->n_path, "wall_s", json_number(r->wall_s), "curve", curve);
+}
+
 static json_t *result_json(struct pipeline_context *c, picture_name *picture)
 {
     const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
@@ -194,6 +214,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     put_fit(json, c, best);
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);
+    json_object_set_new(json, "radius", radius_json(c));
     json_object_set_new(json, "geometry", result_geometry_json(c));
     json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
     json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));

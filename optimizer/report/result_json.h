@@ -18,6 +18,8 @@
  *             "n_path_fit" to "n_path_validation", "rows":[{"rendered":[3],"rendered_se":[3]}] in the order of "rows"}],
  *             in the order of the job document; all the rest is of the best model: the one with the lowest error over
  *             the held-out rows (over the fitted rows when none are held out)
+ *  "radius":null|{"model","start_um","radius_um" (what was used),"minimum_um","standard_error_um","lower_um","upper_um",
+ *             "determined","at_bound","n_path","wall_s","curve":[{"radius_um","objective","objective_se"}]},
  *  "geometry":{...reconstruct_report, "input":"volume"|"fibers", "options":{...}} (result_geometry.h),
  *  "png_exposure",                                    all PNG pictures show radiance x this, sRGB
  *  "n_path_fit", "n_step", "fit_wall_s", "n_path_validation", "stages":[{"name","wall_s":number|null}],

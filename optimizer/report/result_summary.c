@@ -74,6 +74,10 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
+    if (c->doc->fit_radius)
+        fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m,
+                1e6 * c->radius.se_m, 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
+                c->radius.curve.at_bound ? " (at the edge of its range)" : "");
     fprintf(out, "relative RMS error over the fitted rows    %.2f %%\n", 100.0 * m->validation.fit.rel_rms);
     if (isfinite(m->validation.held_out.rel_rms))
         fprintf(out, "relative RMS error over the held-out rows  %.2f %%\n", 100.0 * m->validation.held_out.rel_rms);

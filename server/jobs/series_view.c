@@ -21,7 +21,9 @@ static void take_description(struct reading *r, json_t *record)
 {
     json_t *parameters = json_object_get(record, "parameters");
     if (parameters == NULL) return;
-    json_array_append_new(r->model, json_pack("{s:O?,s:O}", "id", json_object_get(record, "model"), "parameters", parameters));
+    json_int_t i_model = json_integer_value(json_object_get(record, "i_model"));
+    if (i_model == (json_int_t)json_array_size(r->model)) /* a search before the fit describes the model as well */
+        json_array_append_new(r->model, json_pack("{s:O?,s:O}", "id", json_object_get(record, "model"), "parameters", parameters));
     json_object_del(record, "parameters");
 }
 

@@ -89,6 +89,10 @@ def test_command_line_prints_the_comparison(real, finished):
     ({"fixed": {"density_multiplier": 4000}}, "fit.fixed.density_multiplier", "unknown parameter"),
     ({"density_multiplier_per_cm": 1}, "fit.density_multiplier_per_cm", "10 to 100000"),
     ({"fit_density": True}, "fit.fit_density", "black_sheet false"),
+    ({"fit_radius": 8}, "fit.fit_radius", "object"),
+    ({"fit_radius": {"lower": 8}}, "fit.fit_radius.lower", "lower_um"),
+    ({"fit_radius": {"lower_um": 8, "upper_um": 8}}, "fit.fit_radius.upper_um", "1.1 times"),
+    ({"fit_radius": True, "models": ["microflake.v1"]}, "fit.fit_radius", "microflake.v1"),
     ({"models": ["two_lobe.v1"]}, "fit.density_multiplier_per_cm", "volume models"),
     ({"fixed": {"alpha": 0.5, "gamma": 0.2}}, "fit.fixed", "microflake.v1"),
 ])
@@ -96,6 +100,33 @@ def test_bad_input(real, fit, field, says):
     reply = real.post("/v1/jobs", json=document(**fit))
     body = reply.json()
     assert reply.status_code == 422 and body["field"] == field and says in body["detail"], body
+
+
+def test_fiber_radius(real):
+    """The search goes before the fits, leaves its curve in the result, and all that follows uses what it found."""
+    job = real.create(document(fit_radius={"lower_um": 5, "upper_um": 12}, path_budget=60000))
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    real.post(f"/v1/jobs/{job}/start")
+    result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
+    radius = result["radius"]
+    assert radius["model"] == "two_lobe.v1" and abs(radius["start_um"] - 8) < 1e-3 and 8 <= len(radius["curve"]) <= 11
+    assert all(5 <= p["radius_um"] * (1 + 1e-9) and p["radius_um"] <= 12 * (1 + 1e-9) and p["objective_se"] > 0 for p in radius["curve"])
+    want = radius["minimum_um"] if radius["determined"] or radius["at_bound"] else radius["start_um"]
+    assert abs(radius["radius_um"] - want) < 1e-9 and abs(result["geometry"]["mean_radius_um"] - want) < 1e-3 * want
+    points = real.get(f"/v1/jobs/{job}/series").json()["points"]
+    assert [p["phase"] for p in points[:len(radius["curve"])]] == ["radius"] * len(radius["curve"]) and points[len(radius["curve"])]["phase"] != "radius"
+    shown = subprocess.run([program("selvedge"), "--server", real.url, "status", job], capture_output=True, text=True, check=True).stdout
+    assert "fiber radius:" in shown
+
+
+def test_radius_beyond_the_tile(real):
+    job = real.create(document(fit_radius={"lower_um": 5, "upper_um": 500}))
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    real.post(f"/v1/jobs/{job}/start")
+    error = real.wait_state(job, "failed", timeout_s=60)["error"]
+    assert error["field"] == "fit.fit_radius.upper_um" and "tile" in error["text"], error
 
 
 def test_density_wants_light_from_behind(real):

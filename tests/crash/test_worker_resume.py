@@ -49,6 +49,7 @@ def outcome(folder):
         result.pop(key)
     for model in result["models"]:
         model.pop("fit_wall_s")
+    (result["radius"] or {}).pop("wall_s", None)
     with open(os.path.join(folder, "series.rec")) as f:
         series = [json.loads(line[9:]) for line in f]
     for record in series:
@@ -56,9 +57,9 @@ def outcome(folder):
     return result, series
 
 
-def journal_bytes(folder, stage, number=""):
+def journal_bytes(folder, stage, number="", name="estimates"):
     try:
-        return os.path.getsize(os.path.join(folder, "work", stage, f"estimates{number}.journal"))
+        return os.path.getsize(os.path.join(folder, "work", stage, f"{name}{number}.journal"))
     except FileNotFoundError:
         return 0
 
@@ -77,11 +78,13 @@ def kill_when(folder, threads, condition, timeout_s=60):
     return killed
 
 
-@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models"])
+@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models", "fit_radius"])
 def reference(request, tmp_path_factory):
     fit = {"method": request.param}
     if request.param == "several_models":
         fit = {"models": ["microflake.v1", "two_lobe.v1"], "path_budget": 60000}
+    if request.param == "fit_radius":
+        fit = {"fit_radius": {"lower_um": 5, "upper_um": 12}, "path_budget": 60000}
     if request.param == "published_sgd.v1":
         fit.update(max_iterations=2, path_budget=300000)
     folder = make_job(str(tmp_path_factory.mktemp("reference") / "job"), **fit)
@@ -93,9 +96,12 @@ def reference(request, tmp_path_factory):
 def test_killed_at_several_points(reference, tmp_path, threads):
     fit, _, want = reference
     folder = make_job(str(tmp_path / "job"), **fit)
-    first = kill_when(folder, threads, lambda: journal_bytes(folder, "fit") > 20)
+    kills = 0
+    if "fit_radius" in fit:
+        kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", name="radius-02") > 20)
+        kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", name="radius-06") > 20)
+    kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit") > 20)
     record = journal_bytes(folder, "fit")
-    kills = int(first)
     for point in (3, 6, 9):
         kills += kill_when(folder, threads, lambda p=point: journal_bytes(folder, "fit") >= p * record)
     if "models" in fit:
