@@ -115,16 +115,28 @@ static void mean_derivatives(const struct linear_history *h, double *mean)
     }
 }
 
-/* Predicted squared change of configuration i over dx, largest channel. */
-static double squared_change(const double *mean, size_t i, const double *dx, size_t n)
+/* How far configuration i moves over dx, largest channel. net: square of the predicted change. Along a valley the
+ * changes by several parameters cancel, their curvatures do not: r is the sum over p of (dr/dx_p dx_p^2)^2, j that of
+ * (dr/dx_p dx_p)^2. */
+struct bend {
+    double net, r, j;
+};
+
+static void bent_change(const double *mean, size_t i, const double *dx, size_t n, struct bend *out)
 {
-    double largest = 0.0;
+    *out = (struct bend){0};
     for (size_t row = 3 * i; row < 3 * i + 3; row++) {
-        double change = 0.0;
-        for (size_t p = 0; p < n; p++) change += mean[row * n + p] * dx[p];
-        largest = fmax(largest, change * change);
+        double net = 0.0, r = 0.0, j = 0.0;
+        for (size_t p = 0; p < n; p++) {
+            double change = mean[row * n + p] * dx[p];
+            net += change;
+            j += change * change;
+            r += change * change * dx[p] * dx[p];
+        }
+        out->net = fmax(out->net, net * net);
+        out->r = fmax(out->r, r);
+        out->j = fmax(out->j, j);
     }
-    return largest;
 }
 
 static void add_derivatives(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q,
@@ -186,18 +198,20 @@ static void derivative_scale(const struct linear_history *h, const double *mean,
 }
 
 /* Weights of all steps for configuration i, summing to 1. Means bend to second order, derivatives to first; how much
- * was chosen by trial on analytic cloth, where a factor of four either way made little difference. */
-static void pool_weights(const struct linear_history *h, const double *mean, size_t i, const double *change2,
+ * was chosen by trial on analytic cloth, where a factor of four either way made little difference. Without the parts
+ * that hide behind cancelling changes, old steps were believed all along a valley: fits ended 3 to 5 % off where noise
+ * is 1 %, one in ten. */
+static void pool_weights(const struct linear_history *h, const double *mean, size_t i, const struct bend *change,
                          struct pool_weight *weight, double *n_effective)
 {
-    const double bend_r = 64.0, bend_j = 16.0;
+    const double bend_r = 64.0, bend_j = 16.0, hidden = 16.0;
     double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0, j_variance,
            j_square;
     derivative_scale(h, mean, i, &j_variance, &j_square);
     for (size_t k = 0; k < h->n_step; k++) {
         double n = (double)h->step[k].replica[0][i].n_path, per_path = n > 0.0 ? 1.0 / n : INFINITY;
-        weight[k].r = 1.0 / (path_variance * per_path + bend_r * change2[k] * change2[k] + 1e-12);
-        weight[k].j = 1.0 / (j_variance * per_path + bend_j * change2[k] * j_square + 1e-12);
+        weight[k].r = 1.0 / (path_variance * per_path + bend_r * change[k].net * change[k].net + hidden * change[k].r + 1e-12);
+        weight[k].j = 1.0 / (j_variance * per_path + bend_j * change[k].net * j_square + hidden * change[k].j + 1e-12);
         sum_r += weight[k].r;
         sum_j += weight[k].j;
     }
@@ -211,14 +225,14 @@ static void pool_weights(const struct linear_history *h, const double *mean, siz
 }
 
 static void pool_configuration(struct linear_model *m, const struct linear_history *h, const double *mean, size_t i,
-                               double *change2, struct pool_weight *weight)
+                               struct bend *change, struct pool_weight *weight)
 {
     double dx[SCATTERING_MAX_PARAM], slope[SCATTERING_MAX_PARAM];
     for (size_t k = 0; k < h->n_step; k++) {
         for (size_t p = 0; p < m->n_param; p++) dx[p] = m->x_ref[p] - h->step[k].x[p];
-        change2[k] = squared_change(mean, i, dx, m->n_param);
+        bent_change(mean, i, dx, m->n_param, &change[k]);
     }
-    pool_weights(h, mean, i, change2, weight, &m->n_effective);
+    pool_weights(h, mean, i, change, weight, &m->n_effective);
     for (size_t k = 0; k < h->n_step; k++) {
         for (size_t p = 0; p < m->n_param; p++)
             slope[p] = coordinate_slope(&h->coordinate[p], coordinate_to_param(&h->coordinate[p], h->step[k].x[p]));
@@ -304,9 +318,10 @@ static void absorb_gains(struct linear_model *m, const struct observation_set *o
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)
 {
     status s = STATUS_OK;
-    double *mean = malloc((m->n_row * m->n_param + h->n_step) * sizeof *mean);
+    double *mean = malloc(m->n_row * m->n_param * sizeof *mean);
+    struct bend *change = malloc(h->n_step * sizeof *change);
     struct pool_weight *weight = malloc(h->n_step * sizeof *weight);
-    if (mean == NULL || weight == NULL) {
+    if (mean == NULL || weight == NULL || change == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot average estimates: out of memory");
         goto out;
     }
@@ -315,11 +330,12 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     mean_derivatives(h, mean);
     m->n_effective = 0.0;
     for (size_t i = 0; i < h->observation->n; i++)
-        pool_configuration(m, h, mean, i, mean + m->n_row * m->n_param, weight);
+        pool_configuration(m, h, mean, i, change, weight);
     m->n_effective /= (double)h->observation->n;
     if (m->gain_sd > 0.0) absorb_gains(m, h->observation);
 out:
     free(mean);
+    free(change);
     free(weight);
     return s;
 }

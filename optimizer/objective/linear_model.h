@@ -4,7 +4,8 @@
  * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by its own
  * derivatives, and they are averaged with weights 1 / (noise^2 + curvature^2): noise from the path count and the
  * configuration's pooled variance per path (not from the estimate's own variance, which is correlated with its value),
- * curvature from the predicted squared change of the residuals between the two points. So early, cheap iterations fade
+ * curvature from the predicted squared change of the residuals between the two points and from the changes by single
+ * parameters, which cancel along a valley while their curvatures do not. So early, cheap iterations fade
  * out and the last ones add up: this is the averaging over the last steps.
  *
  * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic), row 3 i + c; columns are the fit coordinates of

@@ -65,7 +65,7 @@ static void test_recovery_and_errors(void **state)
     enum { SEEDS = 20 };
     size_t n_inside = 0, n_judged = 0;
     for (size_t k = 0; k < sizeof cloth / sizeof cloth[0]; k++) {
-        double error[SEEDS], held = 0.0, mean = 0.0;
+        double error[SEEDS], held = 0.0, mean = 0.0, worst = 0.0;
         for (uint64_t seed = 1; seed <= SEEDS; seed++) {
             struct fake_cloth f;
             struct fit_result r;
@@ -74,6 +74,7 @@ static void test_recovery_and_errors(void **state)
             error[seed - 1] = fake_rel_rms(&f, 0, FAKE_N_FIT, r.param, truth);
             held += fake_rel_rms(&f, FAKE_N_FIT, FAKE_N_HELD_OUT, r.param, truth) / SEEDS;
             mean += error[seed - 1] / SEEDS;
+            worst = fmax(worst, error[seed - 1]);
             assert_true(r.n_path <= 6600000);
             for (size_t p = 0; p < FAKE_N_PARAM; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
@@ -81,14 +82,16 @@ static void test_recovery_and_errors(void **state)
                 n_inside += fabs(r.param[p] - truth[p]) < 2.0 * r.uncertainty.se_param[p];
             }
         }
-        print_message("cloth %zu: relative RMS error %.4f fitted, %.4f held out (means over %d seeds)\n", k, mean, held,
-                      SEEDS);
-        assert_true(mean < 0.025 && held < 0.05);
+        print_message("cloth %zu: relative RMS error %.4f fitted (worst %.4f), %.4f held out (means over %d seeds)\n", k, mean,
+                      worst, held, SEEDS);
+        assert_true(mean < 0.015 && held < 0.05);
+        /* 190,000 paths give a mean to 1.2 %, 9 parameters from 16 means 0.9 %: four times that */
+        assert_true(worst < 0.036);
     }
     double share = (double)n_inside / (double)n_judged;
     print_message("the truth lies within two standard errors for %.1f %% of %zu determined parameters\n", 100.0 * share,
                   n_judged);
-    assert_true(share > 0.85);
+    assert_true(share > 0.9 && share < 0.99);
 }
 
 static void test_says_when_it_has_not_converged(void **state)
