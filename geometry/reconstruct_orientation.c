@@ -40,11 +40,45 @@ struct orientation_job {
     struct consensus consensus;
     float *scratch;        /* per thread */
     size_t scratch_per_thread;
-    size_t *n_material, *n_kept; /* per slice */
+    size_t *n_material, *n_kept; /* per band, per slice */
+    ptrdiff_t neighbour[26];     /* offsets in the volume, in rising order */
 };
 
-/* The highest of the 26 neighbours of x in the blurred volume; x itself at a peak. */
-static void step_up(const struct volume *l, size_t x[3])
+enum { BAND = 32 }; /* rows of a slice in a task: short enough to be cancelled */
+
+struct band {
+    size_t j0, j1, k;
+};
+
+static size_t n_band(const struct orientation_job *o) { return (o->v->n[1] + BAND - 1) / BAND; }
+
+static struct band band_of(const struct orientation_job *o, size_t i_task)
+{
+    size_t j0 = i_task % n_band(o) * BAND;
+    return (struct band){j0, j0 + BAND < o->v->n[1] ? j0 + BAND : o->v->n[1], i_task / n_band(o)};
+}
+
+/* The highest of the 26 neighbours of x in the blurred volume. False at a peak. */
+static bool step_up_inside(const struct orientation_job *o, size_t x[3])
+{
+    const float *p = o->blurred.density + volume_index(o->blurred.n, x[0], x[1], x[2]);
+    float most = *p;
+    int best = -1;
+    for (int m = 0; m < 26; m++) {
+        float value = p[o->neighbour[m]];
+        best = value > most ? m : best;
+        most = value > most ? value : most;
+    }
+    if (best < 0) return false;
+    size_t cell = best < 13 ? (size_t)best : (size_t)best + 1; /* of the 27 */
+    x[0] += cell % 3 - 1;
+    x[1] += cell / 3 % 3 - 1;
+    x[2] += cell / 9 - 1;
+    return true;
+}
+
+/* The same where neighbours may be missing. */
+static bool step_up(const struct volume *l, size_t x[3])
 {
     size_t best[3] = {x[0], x[1], x[2]}, at[3];
     float most = l->density[volume_index(l->n, x[0], x[1], x[2])];
@@ -62,7 +96,19 @@ static void step_up(const struct volume *l, size_t x[3])
                     memcpy(best, at, sizeof best);
                 }
             }
+    bool moved = memcmp(x, best, sizeof best) != 0;
     memcpy(x, best, sizeof best);
+    return moved;
+}
+
+static void climb(const struct orientation_job *o, size_t x[3])
+{
+    const size_t *n = o->v->n;
+    for (int step = 0; step < o->n_climb; step++) {
+        bool inside = true;
+        for (int a = 0; a < 3; a++) inside = inside && x[a] > 0 && x[a] + 1 < n[a];
+        if (!(inside ? step_up_inside(o, x) : step_up(&o->blurred, x))) return;
+    }
 }
 
 /* An offset of at most n_climb along each axis in 16 bits. */
@@ -92,25 +138,26 @@ static void set_j(struct orientation_job *o, size_t at, double share)
     atomic_store_explicit(&o->j_ridge[at], (uint16_t)units, memory_order_relaxed);
 }
 
-static void climb_slice(void *context, size_t k, size_t i_thread)
+static void climb_band(void *context, size_t i_task, size_t i_thread)
 {
     (void)i_thread;
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
+    const struct band b = band_of(o, i_task);
     size_t material = 0;
     scratch_keep_within(o->v->space);
-    for (size_t j = 0; j < n[1]; j++)
+    for (size_t j = b.j0; j < b.j1; j++)
         for (size_t i = 0; i < n[0]; i++) {
-            size_t at = volume_index(n, i, j, k), x[3] = {i, j, k};
+            size_t at = volume_index(n, i, j, b.k), x[3] = {i, j, b.k};
             if (o->v->density[at] < o->eps_d) continue;
             material++;
-            if (!line_bound_reaches(&o->bound, i, j, k)) continue;
-            const size_t from[3] = {i, j, k};
-            for (int step = 0; step < o->n_climb; step++) step_up(&o->blurred, x);
+            if (!line_bound_reaches(&o->bound, i, j, b.k)) continue;
+            const size_t from[3] = {i, j, b.k};
+            climb(o, x);
             o->ridge[at] = pack_offset(o, from, x);
             set_j(o, volume_index(n, x[0], x[1], x[2]), 0.0);
         }
-    o->n_material[k] = material;
+    o->n_material[i_task] = material;
 }
 
 /* Values of J already known at a voxel. */
@@ -156,19 +203,20 @@ static float descend(const struct orientation_job *o, const struct line_filter_s
     return value;
 }
 
-static void ridge_slice(void *context, size_t k, size_t i_thread)
+static void ridge_band(void *context, size_t i_task, size_t i_thread)
 {
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
+    const struct band b = band_of(o, i_task);
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
     scratch_keep_within(o->v->space);
-    for (size_t j = 0; j < n[1]; j++)
+    for (size_t j = b.j0; j < b.j1; j++)
         for (size_t i = 0; i < n[0]; i++) {
-            size_t at = volume_index(n, i, j, k);
+            size_t at = volume_index(n, i, j, b.k);
             if (get_j(o, at) == 0) continue;
-            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
+            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, b.k, scratch);
             float d[3], least, d0[3];
-            structure_tensor_direction(&o->blurred, &o->window, i, j, k, d0);
+            structure_tensor_direction(&o->blurred, &o->window, i, j, b.k, d0);
             least = descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, d0), d);
             set_j(o, at, (double)least / o->j_full);
             direction_volume_set(o->d, at, d);
@@ -195,21 +243,22 @@ static void collect_layer(void *context, size_t layer, size_t i_thread)
 }
 
 /* The direction that the neighbourhood agrees on, where J has a minimum near it that is almost as deep. */
-static void agree_slice(void *context, size_t k, size_t i_thread)
+static void agree_band(void *context, size_t i_task, size_t i_thread)
 {
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
+    const struct band b = band_of(o, i_task);
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
     scratch_keep_within(o->v->space);
-    for (size_t j = 0; j < n[1]; j++)
+    for (size_t j = b.j0; j < b.j1; j++)
         for (size_t i = 0; i < n[0]; i++) {
-            size_t at = volume_index(n, i, j, k);
+            size_t at = volume_index(n, i, j, b.k);
             float own[3], common[3], d[3];
             if (get_j(o, at) == 0) continue;
-            if (!consensus_direction(&o->consensus, i, j, k, common)) continue;
+            if (!consensus_direction(&o->consensus, i, j, b.k, common)) continue;
             direction_volume_get(o->d, at, own);
             if (fabsf(own[0] * common[0] + own[1] * common[1] + own[2] * common[2]) > AGREEMENT_COSINE) continue;
-            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, k, scratch);
+            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, b.k, scratch);
             double share = (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, common), d) / o->j_full;
             if (share < (1.0 - J_TOLERANCE) * get_j(o, at) * J_UNIT) continue;
             set_j(o, at, share);
@@ -217,11 +266,11 @@ static void agree_slice(void *context, size_t k, size_t i_thread)
         }
 }
 
-static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, struct error *err)
+static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
     status s = thread_pool_run(pool, o->consensus.n[2], collect_layer, o, NULL);
     if (s == STATUS_OK) s = consensus_blur(&o->consensus, N_CONSENSUS_BLUR, pool, err);
-    if (s == STATUS_OK) s = thread_pool_run(pool, o->v->n[2], agree_slice, o, NULL);
+    if (s == STATUS_OK) s = thread_pool_run(pool, n_band(o) * o->v->n[2], agree_band, o, progress);
     return s;
 }
 
@@ -286,7 +335,7 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     if (s != STATUS_OK) return s;
     o->scratch_per_thread = line_filter_scratch(o->filter);
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
-    o->n_material = calloc(n[2], sizeof *o->n_material);
+    o->n_material = calloc(n[2] * n_band(o), sizeof *o->n_material);
     o->n_kept = calloc(n[2], sizeof *o->n_kept);
     if (o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
@@ -296,6 +345,8 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     tensor_window_init(&o->window, 0.28 * diameter_voxel);
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
     if (o->n_climb > MAX_CLIMB) o->n_climb = MAX_CLIMB;
+    for (ptrdiff_t c = 0, m = 0; c < 27; c++)
+        if (c != 13) o->neighbour[m++] = c % 3 - 1 + (c / 3 % 3 - 1) * (ptrdiff_t)n[0] + (c / 9 - 1) * (ptrdiff_t)(n[0] * n[1]);
     return STATUS_OK;
 }
 
@@ -344,20 +395,19 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
         s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2, -option->eps_j / (double)option->h, pool, err);
     if (s != STATUS_OK) goto out;
     part = (struct part_progress){progress, 0.3, 0.2};
-    s = thread_pool_run(pool, v->n[2], climb_slice, &o, &inner);
-    part = (struct part_progress){progress, 0.5, 0.5};
-    if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], ridge_slice, &o, &inner);
-    if (s == STATUS_OK) s = seek_agreement(&o, pool, err);
+    s = thread_pool_run(pool, n_band(&o) * v->n[2], climb_band, &o, &inner);
+    part = (struct part_progress){progress, 0.5, 0.4};
+    if (s == STATUS_OK) s = thread_pool_run(pool, n_band(&o) * v->n[2], ridge_band, &o, &inner);
+    part = (struct part_progress){progress, 0.9, 0.1};
+    if (s == STATUS_OK) s = seek_agreement(&o, pool, &inner, err);
     if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], assign_slice, &o, NULL);
     if (s != STATUS_OK) {
         s = error_set(err, s, "finding fiber directions was cancelled");
         goto out;
     }
     report->n_material_voxel = report->n_kept_voxel = 0;
-    for (size_t k = 0; k < v->n[2]; k++) {
-        report->n_material_voxel += o.n_material[k];
-        report->n_kept_voxel += o.n_kept[k];
-    }
+    for (size_t t = 0; t < v->n[2] * n_band(&o); t++) report->n_material_voxel += o.n_material[t];
+    for (size_t k = 0; k < v->n[2]; k++) report->n_kept_voxel += o.n_kept[k];
     if (report->n_kept_voxel == 0)
         s = error_set_field(err, STATUS_INVALID, "volume.eps_d",
                             "cannot find fibers: %zu voxels reach the density eps_d %g, none of them J <= eps_j %g",

@@ -14,8 +14,9 @@ static bool any_above(const struct bound_job *job, const size_t from[3], const s
     for (size_t k = from[2]; k < to[2]; k++)
         for (size_t j = from[1]; j < to[1]; j++) {
             const float *row = job->blurred->density + volume_index(job->blurred->n, 0, j, k);
-            for (size_t i = from[0]; i < to[0]; i++)
-                if (row[i] >= job->least) return true;
+            int above = 0; /* whole rows at once, in vectors */
+            for (size_t i = from[0]; i < to[0]; i++) above |= row[i] >= job->least;
+            if (above) return true;
         }
     return false;
 }

@@ -30,7 +30,7 @@ struct sample {
 };
 
 static const struct sample sample[] = {
-    {"cotton", PHANTOM_PLAIN, 10, 19, 40, {461, 440, 160}, 7.0, 1.05, 0.0, 0.0},
+    {"cotton", PHANTOM_PLAIN, 10, 19, 150, {461, 440, 160}, 7.0, 1.05, 0.0, 0.0},
     {"fleece", PHANTOM_FELT, 0, 1600, 6, {500, 540, 586}, 5.0, 0.0, 540.0, 540.0},
     {"1024", PHANTOM_TWILL_2_2, 20, 19, 100, {1024, 1024, 1024}, 7.0, 1.0182, 0.0, 0.0},
 };
