@@ -147,7 +147,7 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
 {
     char text[600];
     fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-          "<link rel=\"stylesheet\" href=\"quality.css\">\n<title>Geometry of ",
+          "<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"quality.css\">\n<title>Geometry of ",
           out);
     escaped(c->doc->sample, out);
     fputs("</title>\n</head>\n<body>\n<h1>Geometry of ", out);
