@@ -57,7 +57,7 @@ static inline float phase_extinction_at(const struct phase_extinction *e, float 
     float x = sine * PHASE_N_EXTINCTION;
     int i = x < PHASE_N_EXTINCTION - 1 ? (int)x : PHASE_N_EXTINCTION - 1;
     float t = x - (float)i;
-    *d_value = e->d_value[i] + t * (e->d_value[i + 1] - e->d_value[i]);
+    *d_value = e->i_param < 0 ? 0 : e->d_value[i] + t * (e->d_value[i + 1] - e->d_value[i]); /* spare the cache */
     return e->value[i] + t * (e->value[i + 1] - e->value[i]);
 }
 

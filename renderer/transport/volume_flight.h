@@ -60,31 +60,30 @@ static inline float empty_mm(const struct volume_scene *v, const struct volume_r
     float t = INFINITY;
     for (int a = 0; a < 3; a++) {
         int32_t brick = (int32_t)ray->at[a] >> VOLUME_BRICK_SHIFT;
-        float low = (float)((brick - n_empty + 1) << VOLUME_BRICK_SHIFT),
-              high = (float)((brick + n_empty) << VOLUME_BRICK_SHIFT);
-        low = low > least[a] ? low : least[a];
-        high = high < most[a] ? high : most[a];
-        float to = ((ray->per_mm[a] > 0 ? high : low) - ray->at[a]) / ray->per_mm[a];
-        t = to < t ? to : t; /* false for 0 / 0 */
+        bool up = ray->mm_per[a] > 0; /* sound for 0 and -0, too */
+        float face = (float)((up ? brick + n_empty : brick - n_empty + 1) << VOLUME_BRICK_SHIFT);
+        face = up ? (face < most[a] ? face : most[a]) : (face > least[a] ? face : least[a]);
+        float to = (face - ray->at[a]) * ray->mm_per[a];
+        t = to < t ? to : t; /* false for 0 times infinity */
     }
     return t > 0 ? t : 0;
 }
 
-/* What a voxel that is not empty does to a ray of direction w: extinction over that of the density `scale` (full density
- * times s), and its derivative by the parameter of s(w). */
+/* What a voxel that is not empty does to a ray of direction w: extinction over the majorant, and its derivative by the
+ * parameter of s(w). inv_majorant_density: of the density times s at which extinction would equal the majorant. */
 struct lookup {
-    float ratio, d_ratio, tangent[3], density, sine;
+    float ratio, d_ratio, density, sine;
 };
 
-static inline struct lookup look_up(const struct phase_extinction *e, float majorant_density, uint32_t voxel,
+static inline struct lookup look_up(const struct phase_extinction *e, float inv_majorant_density, uint32_t voxel,
                                     const float w[3])
 {
-    struct lookup l;
-    volume_voxel_direction(voxel, l.tangent);
-    float c = dot(l.tangent, w), d_value;
-    l.density = volume_voxel_density(voxel);
-    l.sine = sqrtf(fmaxf(0, 1 - c * c));
-    float scale = l.density / majorant_density, value = phase_extinction_at(e, l.sine, &d_value);
+    struct lookup l = {.density = volume_voxel_density(voxel)};
+    float along[3], d_value = 0;
+    volume_voxel_along(voxel, along);
+    float c = dot(along, w), rest = 1 - c * c / dot(along, along);
+    l.sine = sqrtf(rest > 0 ? rest : 0);
+    float scale = l.density * inv_majorant_density, value = phase_extinction_at(e, l.sine, &d_value);
     l.ratio = scale * value;
     l.d_ratio = scale * d_value;
     return l;

@@ -186,6 +186,7 @@ void volume_ray_turn(const struct volume_scene *s, const float direction[3], str
     for (int a = 0; a < 3; a++) {
         ray->direction[a] = direction[a];
         ray->per_mm[a] = direction[a] / s->voxel_mm[a];
+        ray->mm_per[a] = s->voxel_mm[a] / direction[a]; /* infinite: never leaves that way */
     }
 }
 

@@ -57,14 +57,20 @@ static inline float volume_voxel_density(uint32_t voxel) { return (float)(voxel 
 
 /* (A direction and its opposite mean the same fiber, so all point up: the upper half of the octahedron, turned by 45
  * degrees, fills the square of both coordinates.) */
-static inline void volume_voxel_direction(uint32_t voxel, float d[3])
+static inline void volume_voxel_along(uint32_t voxel, float d[3]) /* of any length */
 {
     float p = (float)((int32_t)(voxel & 4095) - 2047) * (0.5f / 2047),
           q = (float)((int32_t)(voxel >> 12 & 4095) - 2047) * (0.5f / 2047);
-    float u = p + q, w = p - q, z = 1 - fabsf(u) - fabsf(w), scale = 1 / sqrtf(u * u + w * w + z * z);
-    d[0] = u * scale;
-    d[1] = w * scale;
-    d[2] = z * scale;
+    d[0] = p + q;
+    d[1] = p - q;
+    d[2] = 1 - fabsf(d[0]) - fabsf(d[1]);
+}
+
+static inline void volume_voxel_direction(uint32_t voxel, float d[3])
+{
+    volume_voxel_along(voxel, d);
+    float scale = 1 / sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (int a = 0; a < 3; a++) d[a] *= scale;
 }
 
 /* Voxel (i, j, k) of the volume that the scene was made from; 0 when nothing is there. */
@@ -76,6 +82,7 @@ struct volume_ray {
     float at[3];         /* voxels, x and y within the tile */
     float direction[3];  /* unit, in the cloth frame */
     float per_mm[3];     /* voxels a millimetre along it */
+    float mm_per[3];     /* its inverse */
 };
 
 /* Ray from a point above (mm), brought to the top of the slab. False when it does not go down. */

@@ -20,6 +20,8 @@ void volume_setting_init(struct volume_setting *s, const struct volume_scene *sc
     s->multiplier_per_m = (float)multiplier_per_m;
     s->majorant_density = VOLUME_HEADROOM * scene->largest_density * s->extinction->largest;
     s->majorant_per_mm = (float)(1e-3 * multiplier_per_m) * s->majorant_density;
+    s->inv_majorant_density = 1 / s->majorant_density;
+    s->mean_step_mm = 1 / s->majorant_per_mm;
     s->has_lamp = c != NULL && c->light != LIGHT_NO_LAMP;
     if (s->has_lamp) lamp_init(&s->lamp, c);
     for (int k = 0; k < 3 && c != NULL; k++) {
@@ -180,7 +182,7 @@ static inline bool move_on(const struct volume_setting *s, struct lane *l, float
     l->voxel = NULL;
     l->out->n_lookup++;
     bool lost = ++l->n_lookup > VOLUME_MAX_LOOKUP;
-    float step_mm = minus_log_rest(rng_float(&l->rng)) / s->majorant_per_mm;
+    float step_mm = minus_log_rest(rng_float(&l->rng)) * s->mean_step_mm;
     if (lost || !advance(s->scene, skip_mm + step_mm, &l->ray)) return leave(s, l, lost);
     l->brick = brick_at(s->scene, &l->ray);
     __builtin_prefetch(l->brick);
@@ -271,14 +273,16 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
 }
 
 /* A real collision: the path's next vertex. */
-static bool collide(const struct volume_setting *s, struct lane *l, const struct lookup *k)
+static bool collide(const struct volume_setting *s, struct lane *l, uint32_t voxel, const struct lookup *k)
 {
+    float tangent[3];
     l->flight.ln_d += 1;
     l->flight.param += k->d_ratio / k->ratio;
     note_lookup(l, VOLUME_REAL, k);
     if (++l->out->n_vertex >= VOLUME_MAX_VERTEX) return false;
     float back[3] = {-l->ray.direction[0], -l->ray.direction[1], -l->ray.direction[2]};
-    fiber_frame_from(&l->frame, k->tangent);
+    volume_voxel_direction(voxel, tangent);
+    fiber_frame_from(&l->frame, tangent);
     to_local(&l->frame, back, l->wo);
     l->vertex = l->ray;
     return connect(s, l, LAMP);
@@ -313,9 +317,9 @@ static inline bool step(const struct volume_setting *s, struct lane *l)
     }
     uint32_t voxel = *l->voxel;
     if (voxel >> 24 == 0) return move_on(s, l, 0);
-    struct lookup k = look_up(s->extinction, s->majorant_density, voxel, l->ray.direction);
+    struct lookup k = look_up(s->extinction, s->inv_majorant_density, voxel, l->ray.direction);
     if (l->purpose != FLIGHT) return pass(s, l, &k);
-    if (rng_float(&l->rng) < k.ratio) return collide(s, l, &k);
+    if (rng_float(&l->rng) < k.ratio) return collide(s, l, voxel, &k);
     float inv = 1 / (1 - k.ratio);
     l->flight.ln_d -= k.ratio * inv;
     l->flight.param -= k.d_ratio * inv;

@@ -36,6 +36,7 @@ struct volume_setting {
     float multiplier_per_m; /* d */
     float majorant_per_mm;
     float majorant_density; /* density times s at which extinction would equal the majorant */
+    float inv_majorant_density, mean_step_mm; /* their inverses */
     struct lamp lamp;
     bool has_lamp;
     bool has_environment;

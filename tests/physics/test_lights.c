@@ -71,21 +71,23 @@ static void coloured(double param[9])
     memcpy(param, p, sizeof p);
 }
 
-/* One straight, nearly black fiber: coverage * pi * S cos th_i. */
+/* One straight, nearly black fiber: coverage * pi * S cos th_i, for lamps above and, without the sheet, below. */
 static void directional_lamp_closed_form(void **state)
 {
     (void)state;
     static const double angle_deg[][5] = {/* camera theta, phi, lamp theta, phi, rotation */
                                           {0, 0, 30, 90, 0}, {30, 0, 30, 180, 0}, {40, 90, 35, 270, 90}, {20, 45, 30, 235, 45},
-                                          {60, 180, 62, 5, 0}};
+                                          {60, 180, 62, 5, 0}, {10, 90, 150, 270, 0}, {35, 45, 130, 215, 20}};
     static const double param[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
     const double tile_m = 0.4e-3, radius_m = 5e-6, y_z[1][2] = {{0.13e-3, 0}};
     struct fiber_set f;
-    struct scene *scene = NULL;
+    struct scene *with_sheet[2] = {NULL, NULL};
     hand_straight(&f, 1, y_z, tile_m, radius_m);
-    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, NULL), STATUS_OK);
+    for (int b = 0; b < 2; b++)
+        assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = b == 1}, &with_sheet[b], NULL), STATUS_OK);
     for (size_t i = 0; i < sizeof angle_deg / sizeof angle_deg[0]; i++) {
         const double *a = angle_deg[i];
+        const struct scene *scene = with_sheet[a[2] < 90];
         struct configuration c = {.light_theta_rad = a[2] * DEG, .light_phi_rad = a[3] * DEG, .camera_theta_rad = a[0] * DEG,
                                   .camera_phi_rad = a[1] * DEG, .cloth_rotation_rad = a[4] * DEG, .crop_m = 8 * tile_m,
                                   .light = LIGHT_DIRECTIONAL, .camera = CAMERA_FAR_FIELD};
@@ -105,7 +107,7 @@ static void directional_lamp_closed_form(void **state)
                 fail_msg("view %zu, channel %d: %.6g +- %.2g, closed form %.6g", i, k, e.mean[k], se, want);
         }
     }
-    scene_free(scene);
+    for (int b = 0; b < 2; b++) scene_free(with_sheet[b]);
     fiber_set_release(&f);
 }
 
