@@ -61,8 +61,9 @@ static status read_volume(struct pipeline_context *c, struct error *err)
         worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text[i]);
         path[i] = text[i];
     }
-    s = reconstruct_read(path, n, &c->option, c->space, c->pool, &c->progress, &c->volume, &c->geometry,
-                         err);
+    s = reconstruct_read(path, n, &c->option, c->space, c->pool, &c->progress, &c->volume, &c->geometry, err);
+    if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
+        log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files", c->memory_limit_bytes / 1000000);
 out:
     free(path);
     free(text);
