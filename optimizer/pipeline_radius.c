@@ -11,7 +11,9 @@
 
 enum { FIRST_POINTS = 5, MOST_POINTS = 11 };
 
-static const double um = 1e-6, budget_share = 0.12, tolerance = 0.01;
+static const double um = 1e-6, tolerance = 0.01;
+/* Of the budget of a fit, for each radius; with less than some paths a row there would be no second iteration. */
+static const double budget_share = 0.12, least_paths_a_row = 21000.0;
 
 struct search {
     struct pipeline_context *c;
@@ -54,6 +56,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     struct pipeline_model *m = &c->model[c->radius.i_model];
     const struct descent_method *method = descent_find(METHOD_GAUSS_NEWTON);
     uint64_t budget = c->doc->path_budget > 0 ? c->doc->path_budget : method->default_path_budget;
+    double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)c->fitted.n);
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
     struct fit_option option;
     set_starts(q, u, parameter);
@@ -64,7 +67,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
                                         .param = parameter,
                                         .observation = &c->fitted,
                                         .estimator = e,
-                                        .path_budget = (uint64_t)(budget_share * (double)budget),
+                                        .path_budget = (uint64_t)paths,
                                         .progress = progress};
     return fit_run(method, &problem, &option, r, err);
 }
@@ -130,6 +133,15 @@ out:
     return s;
 }
 
+/* Variance of a residual that the photographs' own errors explain. */
+static double photograph_variance(const struct observation_set *o)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < o->n; i++)
+        for (int k = 0; k < 3; k++) sum += objective_weight(&o->item[i]) * o->item[i].se_rgb[k] * o->item[i].se_rgb[k];
+    return sum / (3.0 * (double)o->n);
+}
+
 /* From the place on the curve to the radius and its error. */
 static void conclude(struct pipeline_context *c)
 {
@@ -137,7 +149,7 @@ static void conclude(struct pipeline_context *c)
     const struct pipeline_model *m = &c->model[r->i_model];
     double n_free = 1.0, n_row = 3.0 * (double)c->fitted.n;
     for (size_t p = 0; p < m->appearance.n_param; p++) n_free += m->parameter[p].fixed ? 0.0 : 1.0;
-    double s2 = fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free);
+    double s2 = fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), photograph_variance(&c->fitted));
     double var = r->curve.u_se * r->curve.u_se + (r->curve.curvature > 0.0 ? 2.0 * s2 / r->curve.curvature : INFINITY);
     double range = log(r->upper_m / r->lower_m);
     r->curve.determined = r->curve.determined && sqrt(var) < 0.5 * range / sqrt(12.0);

@@ -3,7 +3,8 @@
  * found with the noise taken into account (noisy_minimum.h). Derivatives by the radius are not needed.
  *
  * Standard error of ln radius: the place's own (Monte-Carlo), and what residuals leave open: a change of the objective
- * by s2 = f / (rows - free parameters - 1) is one standard error, so var = 2 s2 / curvature, as for any least squares.
+ * by s2 = f / (rows - free parameters - 1) is one standard error (s2 is not below what the photographs' own errors
+ * make it), so var = 2 s2 / curvature, as for any least squares.
  * A radius that the photographs do not determine is left as it was; one at the edge of its range is taken there. Each
  * fit has a journal of its own, so the search resumes bit by bit.
  */

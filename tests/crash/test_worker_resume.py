@@ -78,13 +78,11 @@ def kill_when(folder, threads, condition, timeout_s=60):
     return killed
 
 
-@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models", "fit_radius"])
+@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models"])
 def reference(request, tmp_path_factory):
     fit = {"method": request.param}
     if request.param == "several_models":
         fit = {"models": ["microflake.v1", "two_lobe.v1"], "path_budget": 60000}
-    if request.param == "fit_radius":
-        fit = {"fit_radius": {"lower_um": 5, "upper_um": 12}, "path_budget": 60000}
     if request.param == "published_sgd.v1":
         fit.update(max_iterations=2, path_budget=300000)
     folder = make_job(str(tmp_path_factory.mktemp("reference") / "job"), **fit)
@@ -96,11 +94,7 @@ def reference(request, tmp_path_factory):
 def test_killed_at_several_points(reference, tmp_path, threads):
     fit, _, want = reference
     folder = make_job(str(tmp_path / "job"), **fit)
-    kills = 0
-    if "fit_radius" in fit:
-        kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", name="radius-02") > 20)
-        kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", name="radius-06") > 20)
-    kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit") > 20)
+    kills = int(kill_when(folder, threads, lambda: journal_bytes(folder, "fit") > 20))
     record = journal_bytes(folder, "fit")
     for point in (3, 6, 9):
         kills += kill_when(folder, threads, lambda p=point: journal_bytes(folder, "fit") >= p * record)
@@ -111,6 +105,18 @@ def test_killed_at_several_points(reference, tmp_path, threads):
     finish(folder, threads)
     assert outcome(folder) == want
     assert read_json(folder, "status.json")["state"] == "succeeded"
+
+
+def test_killed_while_looking_for_the_radius(tmp_path):
+    fit = {"fit_radius": {"lower_um": 6, "upper_um": 10}, "path_budget": 40000}
+    whole, killed = make_job(str(tmp_path / "whole"), **fit), make_job(str(tmp_path / "killed"), **fit)
+    finish(whole, 2)
+    assert kill_when(killed, 2, lambda: journal_bytes(killed, "fit", name="radius-02") > 20)
+    assert kill_when(killed, 1, lambda: journal_bytes(killed, "fit", name="radius-06") > 20)
+    kill_when(killed, 2, lambda: journal_bytes(killed, "fit") > 20)
+    kill_when(killed, 2, lambda: journal_bytes(killed, "validation") > 20)  # now the radius comes from the finished fit
+    finish(killed, 2)
+    assert outcome(killed) == outcome(whole)
 
 
 def test_damaged_checkpoints(reference, tmp_path):
