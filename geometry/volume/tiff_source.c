@@ -89,17 +89,21 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
 
 static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
 {
-    if (format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID) {
-        if (bits != 8 && bits != 16) return false;
-        *t = bits == 8 ? SAMPLE_UINT8 : SAMPLE_UINT16;
-        return true;
-    }
-    if (format == SAMPLEFORMAT_INT && bits == 16) {
-        *t = SAMPLE_INT16;
-        return true;
-    }
-    *t = SAMPLE_FLOAT32;
-    return format == SAMPLEFORMAT_IEEEFP && bits == 32;
+    static const struct {
+        uint16_t format, bits;
+        enum sample_type sample;
+    } kind[] = {
+        {SAMPLEFORMAT_UINT, 8, SAMPLE_UINT8},      {SAMPLEFORMAT_UINT, 16, SAMPLE_UINT16},     {SAMPLEFORMAT_UINT, 32, SAMPLE_UINT32},
+        {SAMPLEFORMAT_INT, 8, SAMPLE_INT8},        {SAMPLEFORMAT_INT, 16, SAMPLE_INT16},       {SAMPLEFORMAT_INT, 32, SAMPLE_INT32},
+        {SAMPLEFORMAT_IEEEFP, 32, SAMPLE_FLOAT32}, {SAMPLEFORMAT_IEEEFP, 64, SAMPLE_FLOAT64},
+    };
+    if (format == SAMPLEFORMAT_VOID) format = SAMPLEFORMAT_UINT;
+    for (size_t i = 0; i < sizeof kind / sizeof kind[0]; i++)
+        if (kind[i].format == format && kind[i].bits == bits) {
+            *t = kind[i].sample;
+            return true;
+        }
+    return false;
 }
 
 /* The stored bytes of a page must lie in the file and be enough for what the header promises, before we allocate. */

@@ -72,8 +72,12 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
     fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
     fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
-    fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n\n", c->fiber.n_fiber, c->fiber.n_vertex,
+    fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
+    if (c->doc->has_volume)
+        fprintf(out, "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those inside\n",
+                c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
+    fprintf(out, "         quality.html shows how good the geometry is\n\n");
     if (c->doc->fit_radius)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m,
                 1e6 * c->radius.se_m, 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",

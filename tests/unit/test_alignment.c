@@ -1,6 +1,8 @@
 /* Main directions of cloths that were turned and sheared by known matrices, and the box that tiles. */
+#include "base/scratch_space.h"
 #include "geometry/orientation/main_directions.h"
 #include "geometry/orientation/repeat_direction.h"
+#include "geometry/reconstruct.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume_align.h"
@@ -10,6 +12,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -258,10 +261,54 @@ static void test_align_and_crop(void **state)
     volume_release(&y);
 }
 
+/* The whole step from a file, in memory and in scratch files under a small limit: the same matrix, box and volume. */
+static void test_memory_limit(void **state)
+{
+    const struct cloth *c = *state;
+    double m[9];
+    char folder[64], path_text[128];
+    const char *path = path_text;
+    struct volume x, v[2];
+    struct reconstruct_option o[2];
+    struct reconstruct_report r[2] = {0};
+    struct scratch_space *space = NULL;
+    struct error err = {0};
+    motion(6.0, 0.0, 0.1, m);
+    moved(&c->v, m, &x);
+    test_make_folder(folder);
+    snprintf(path_text, sizeof path_text, "%s/cloth.tif", folder);
+    for (size_t i = 0; i < volume_n_voxel(x.n); i++) x.density[i] = isfinite(x.density[i]) ? x.density[i] : 0.0f;
+    const struct phantom_file_option file = {.bits = 16, .void_value = 10000.0, .fiber_value = 40000.0};
+    assert_int_equal(phantom_write_tiff(&x, &file, path, &err), STATUS_OK);
+    volume_release(&x);
+    assert_int_equal(scratch_space_new(folder, 1u << 20, &space, &err), STATUS_OK);
+    for (int i = 0; i < 2; i++) {
+        reconstruct_option_default(&o[i]);
+        for (int a = 0; a < 3; a++) o[i].voxel_size_m[a] = 2e-6;
+        o[i].align = o[i].crop = true;
+        assert_int_equal(reconstruct_read(&path, 1, &o[i], i == 0 ? NULL : space, NULL, NULL, &v[i], &r[i], &err), STATUS_OK);
+    }
+    assert_true(scratch_file_bytes(space) > 0);
+    assert_true(r[0].aligned && fabs(r[0].align.rotation_deg - 6.0) < 0.7 && r[0].tile.mismatch[0] < 0.4 && r[0].tile.mismatch[1] < 0.4);
+    assert_memory_equal(o[0].matrix, o[1].matrix, sizeof o[0].matrix);
+    assert_memory_equal(o[0].crop_voxel, o[1].crop_voxel, sizeof o[0].crop_voxel);
+    assert_memory_equal(v[0].n, v[1].n, sizeof v[0].n);
+    assert_memory_equal(v[0].density, v[1].density, volume_n_voxel(v[0].n) * sizeof(float));
+    for (int a = 0; a < 2; a++) { /* whole repeats, and seams no worse than inside */
+        double repeats = (double)v[0].n[a] / (double)c->n_tile[a];
+        print_message("%c: %.3f repeats, seam %.2f\n", "xy"[a], repeats, r[0].seam_density.ratio[a]);
+        assert_true(fabs(repeats - round(repeats)) < 0.04 && r[0].seam_density.ratio[a] < 1.6);
+    }
+    volume_release(&v[0]);
+    volume_release(&v[1]);
+    scratch_space_free(space);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_matrices), cmocka_unit_test(test_threads),
                                        cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
-                                       cmocka_unit_test(test_known_period), cmocka_unit_test(test_align_and_crop)};
+                                       cmocka_unit_test(test_known_period), cmocka_unit_test(test_align_and_crop),
+                                       cmocka_unit_test(test_memory_limit)};
     return cmocka_run_group_tests(tests, make_cloth, release_cloth);
 }
