@@ -42,7 +42,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit docs-pictures fuzz fuzz-programs
+.PHONY: all deps test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -126,6 +126,15 @@ bench-geometry: | deps ## accuracy of reconstructed fibers on phantoms and real 
 bench-fit: | deps  ## recovery of known parameters, errors, seeds, real tables (an hour; photographs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
+
+bench-published: | deps ## the published method with its own budget, 3.3e9 paths (5 hours on 2 cores; continues when stopped)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@nice -n 19 $(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --journal $(BUILD)/bench-fit/published.journal published
+
+docs-fit-curve:    ## draw docs/images/fit-curve.svg anew: error against paths of both methods (10 minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit curve > $(BUILD)/bench-fit/curve.json
+	@/usr/bin/python3 tests/bench/plot_fit_curve.py $(BUILD)/bench-fit/curve.json docs/images/fit-curve.svg
 
 docs-pictures:     ## render docs/images/{twill,derivatives}.png anew (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures

@@ -1,19 +1,24 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "real"; nothing: all. --prepare renders photographs only.
+ *             [--sgd-budget N] [--curve-paths N] [--journal FILE]
+ * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "real"; nothing: all. "published": the published method
+ * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 400,000 a held-out mean of the truth, 2 x 50,000
- * of a fit, the method's own budget. SELVEDGE_DATA: where measured-reflectance/ is.
+ * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ is.
  *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
  *   fit.<fabric>.published_paths         what the published method's own budget comes to
  *   fit.coverage_2sigma                  20 fits of gabardine and mid1 with new noise: share of determined parameters within 2 se
  *   fit.seeds.worst_over_median          10 fits of gabardine with other seeds: held-out error
- *   fit.curve.<method>                   held-out error against paths and seconds, one line a point, of mid1
+ *   fit.curve.<method>                   held-out error of gabardine against paths and seconds, one line a point; the
+ *                                        published method with --sgd-budget paths (20 million) in all
+ *   fit.published.{wall_s,paths,heldout_rel_rms}   gabardine by the published method
  *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave, felts on felt
  */
 #include "base/durable.h"
 #include "optimizer/descent/descent.h"
+#include "optimizer/descent/estimate_journal.h"
 #include "optimizer/descent/method_names.h"
 #include "optimizer/photographs/measurement_table.h"
 #include "tests/support/fit_fabrics.h"
@@ -25,13 +30,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_COVERAGE = 20, N_SEED = 10, N_CURVE = 14, MAX_STEP = 600, CURVE_PATHS = 10000 };
+enum { N_COVERAGE = 20, N_SEED = 10, N_CURVE = 14, MAX_STEP = 600 };
 
 struct bench {
     struct thread_pool *pool;
     const char *folder;
-    size_t photograph_paths, kept_paths, score_paths;
-    uint64_t path_budget;
+    size_t photograph_paths, kept_paths, score_paths, curve_paths;
+    uint64_t path_budget, sgd_budget;
+    const char *journal; /* of the published method; NULL: not kept */
     const char *sample; /* NULL: all measured tables */
     bool prepare;
 };
@@ -63,9 +69,10 @@ static status on_step(void *context, const struct fit_step *step, struct error *
 }
 
 static void run_fit(const struct fit_phantom *f, const char *method, uint64_t seed, uint64_t budget,
-                    struct fit_result *r, struct curve *curve)
+                    const char *journal_file, struct fit_result *r, struct curve *curve)
 {
     struct error err = {0};
+    struct estimate_journal *journal = NULL;
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
     struct configuration *configuration = trace_configurations(&f->fitted);
     struct trace_estimator trace = {.model = &f->model,
@@ -74,7 +81,12 @@ static void run_fit(const struct fit_phantom *f, const char *method, uint64_t se
                                     .seed = seed,
                                     .configuration = configuration,
                                     .n_configuration = f->fitted.n};
-    struct estimator estimator = trace_estimator(&trace);
+    const struct estimator live = trace_estimator(&trace);
+    struct estimator estimator = live;
+    if (journal_file != NULL) {
+        fit_check(estimate_journal_open(journal_file, fit_phantom_fingerprint(f), &live, NULL, NULL, &journal, &err), &err);
+        estimator = estimate_journal_estimator(journal);
+    }
     for (size_t p = 0; p < f->model.n_param; p++) {
         const struct param_info *info = &f->model.param[p];
         parameter[p] = (struct fit_parameter){info->lower, info->upper, info->start,
@@ -93,6 +105,7 @@ static void run_fit(const struct fit_phantom *f, const char *method, uint64_t se
                                         .report = on_step,
                                         .report_context = curve};
     fit_check(descent_find(method)->run(&problem, r, &err), &err);
+    estimate_journal_close(journal);
     free(configuration);
 }
 
@@ -138,7 +151,7 @@ static void bench_fabric(const struct bench *b, const char *name)
     struct fit_score truth = score(b, &f, f.truth);
     fprintf(stderr, "  the truth scores %.4f +- %.4f\n", truth.rel_rms, truth.se);
     if (!b->prepare) {
-        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, &r, NULL);
+        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
         tell_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
         fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
@@ -161,7 +174,7 @@ static void bench_coverage(const struct bench *b)
         for (uint64_t i = 0; i < N_COVERAGE / 2; i++) {
             struct fit_result r;
             fit_phantom_photograph(&f, b->photograph_paths, 0.005, 100 + i);
-            run_fit(&f, METHOD_GAUSS_NEWTON, 100 + i, b->path_budget, &r, NULL);
+            run_fit(&f, METHOD_GAUSS_NEWTON, 100 + i, b->path_budget, NULL, &r, NULL);
             tell_fit(&f, &r);
             for (size_t p = 0; p < f.model.n_param; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
@@ -188,7 +201,7 @@ static void bench_seeds(const struct bench *b)
     open_fabric(b, "gabardine", &f);
     for (uint64_t i = 0; i < N_SEED; i++) {
         struct fit_result r;
-        run_fit(&f, METHOD_GAUSS_NEWTON, 200 + i, b->path_budget, &r, NULL);
+        run_fit(&f, METHOD_GAUSS_NEWTON, 200 + i, b->path_budget, NULL, &r, NULL);
         tell_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
         fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
@@ -209,7 +222,7 @@ static void print_curve(const struct bench *b, const struct fit_phantom *f, cons
     for (size_t i = 0; i < c->n; i++) {
         if (c->paths[i] < next) continue;
         next = c->paths[i] * ratio;
-        struct fit_score s = fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, c->param[i], CURVE_PATHS);
+        struct fit_score s = fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, c->param[i], b->curve_paths);
         printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_s\":%.4g}\n",
                method, s.rel_rms, c->paths[i], c->wall_s[i]);
         fflush(stdout);
@@ -222,23 +235,36 @@ static void print_curve(const struct bench *b, const struct fit_phantom *f, cons
 
 static void bench_curve(const struct bench *b)
 {
-    static const struct {
+    const struct {
         const char *method;
         uint64_t budget;
-    } run[] = {{METHOD_GAUSS_NEWTON, 0}, {METHOD_PUBLISHED_SGD, 20000000}};
+    } run[] = {{METHOD_GAUSS_NEWTON, b->path_budget}, {METHOD_PUBLISHED_SGD, b->sgd_budget}};
     struct fit_phantom f;
     struct curve *c = calloc(1, sizeof *c);
     if (c == NULL) exit(1);
-    open_fabric(b, "mid1", &f);
+    open_fabric(b, "gabardine", &f);
     print("curve.truth_rel_rms", "", score(b, &f, f.truth).rel_rms, "1", "lower");
     for (size_t k = 0; k < 2; k++) {
         struct fit_result r;
-        run_fit(&f, run[k].method, 1, run[k].budget, &r, c);
+        run_fit(&f, run[k].method, 1, run[k].budget, NULL, &r, c);
         tell_fit(&f, &r);
         print_curve(b, &f, run[k].method, c, &r);
     }
     fit_phantom_release(&f);
     free(c);
+}
+
+static void bench_published(const struct bench *b)
+{
+    struct fit_phantom f;
+    struct fit_result r;
+    open_fabric(b, "gabardine", &f);
+    run_fit(&f, METHOD_PUBLISHED_SGD, 1, 0, b->journal, &r, NULL);
+    tell_fit(&f, &r);
+    print("published", "wall_s", r.wall_s, "s", "lower");
+    print("published", "paths", (double)r.n_path, "path", "lower");
+    print("published", "heldout_rel_rms", score(b, &f, r.param).rel_rms, "1", "lower");
+    fit_phantom_release(&f);
 }
 
 /* ---- measured tables ---- */
@@ -276,7 +302,7 @@ static void fit_table(const struct bench *b, const char *path, struct real_row *
         fprintf(stderr, "%s, %s\n", row->sample, real_model[k].name);
         fit_phantom_init(&f, b->folder, b->pool, felt ? PHANTOM_FELT : PHANTOM_PLAIN, real_model[k].id, NULL);
         fit_phantom_observe(&f, &o);
-        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, &r, NULL);
+        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
         tell_fit(&f, &r);
         for (int held_out = 0; held_out < 2; held_out++) {
             const enum job_set set = held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT;
@@ -334,6 +360,8 @@ static void run_one(const struct bench *b, const char *what)
         bench_seeds(b);
     else if (strcmp(what, "curve") == 0)
         bench_curve(b);
+    else if (strcmp(what, "published") == 0)
+        bench_published(b);
     else if (strcmp(what, "real") == 0)
         bench_real(b);
     else if (fit_fabric_find(what) != NULL)
@@ -356,8 +384,14 @@ static bool take_option(struct bench *b, const char *name, const char *value)
         b->kept_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--score-paths") == 0)
         b->score_paths = strtoul(value, NULL, 10);
+    else if (strcmp(name, "--curve-paths") == 0)
+        b->curve_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--path-budget") == 0)
         b->path_budget = strtoull(value, NULL, 10);
+    else if (strcmp(name, "--sgd-budget") == 0)
+        b->sgd_budget = strtoull(value, NULL, 10);
+    else if (strcmp(name, "--journal") == 0)
+        b->journal = value;
     else
         return false;
     return true;
@@ -367,7 +401,9 @@ int main(int argc, char **argv)
 {
     static const char *const more[] = {"coverage", "seeds", "curve", "real"};
     struct bench b = {
-        .folder = "build/bench-fit", .photograph_paths = 1000000, .kept_paths = 400000, .score_paths = 50000};
+        .folder = "build/bench-fit", .photograph_paths = 1000000, .kept_paths = 400000, .score_paths = 50000,
+                      .curve_paths = 10000,
+                      .sgd_budget = 20000000};
     struct error err = {0};
     int i = 1;
     for (; i < argc && argv[i][0] == '-'; i++) {

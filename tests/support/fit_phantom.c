@@ -251,6 +251,15 @@ void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, 
     free(t);
 }
 
+uint64_t fit_phantom_fingerprint(const struct fit_phantom *f)
+{
+    const struct kept_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false};
+    uint32_t sum = 0;
+    for (size_t i = 0; i < f->fitted.n; i++)
+        sum = (uint32_t)crc32_z(sum, (const void *)f->fitted.item[i].mean_rgb, sizeof f->fitted.item[i].mean_rgb);
+    return (uint64_t)call_sum(f, &call, 0, 0) << 32 | sum;
+}
+
 /* ---- scores ---- */
 
 struct scorer {

@@ -55,6 +55,9 @@ void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, 
 /* Observations from elsewhere (kept: copied). */
 void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o);
 
+/* Of cloth, model and fitted means: what a checkpoint of a fit depends on. */
+uint64_t fit_phantom_fingerprint(const struct fit_phantom *f);
+
 struct fit_score {
     double rel_rms, se; /* se: of rel_rms, Monte-Carlo only */
 };
