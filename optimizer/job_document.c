@@ -80,6 +80,7 @@ void job_document_free(struct job_document *doc)
     if (doc == NULL) return;
     free(doc->volume_file);
     free(doc->photograph);
+    free(doc->candidate);
     free(doc);
 }
 

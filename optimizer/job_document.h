@@ -29,6 +29,7 @@
  *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
  *           "fit_radius": true | {"lower_um": v, "upper_um": v},         one mean radius of all fibers; default: half to
  *                                                                        twice the one that the cloth has
+ *           "candidates": [{"light_theta_deg":, ...}] | {"grid": true}, which photograph to take next
  *           "tied", "bounds", "priors", "starts", "nuisance":           see job_fit_option.h
  *           "render_px": 96, "render_samples": 16}
  * }
@@ -49,6 +50,7 @@ enum {
     JOB_MAX_PHOTOGRAPH = 1024,
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
+    JOB_MAX_CANDIDATE = 1024,
     JOB_MAX_MODEL = 8
 };
 
@@ -68,6 +70,11 @@ struct job_photograph {
     double scale, weight;
     size_t crop_px[4]; /* all 0: whole picture */
     bool srgb;
+};
+
+/* A configuration of which a photograph might be taken. */
+struct job_candidate {
+    double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
 };
 
 struct job_document {
@@ -115,6 +122,8 @@ struct job_document {
     bool fit_density;
     bool fit_radius;
     double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
+    size_t n_candidate; /* for the next photograph; 0: not asked for */
+    struct job_candidate *candidate;
     size_t render_px, render_sample;
 };
 

@@ -205,8 +205,8 @@ status job_parse_fibers(const struct json_field *f, struct job_document *doc, st
 /* ---- photographs ---- */
 
 /* Behind the cloth the lamp lights it through; that needs a cloth without its black sheet. */
-static status parse_light_theta(const struct json_field *f, const struct job_document *doc, double *theta_deg,
-                                struct error *err)
+status job_parse_light_theta(const struct json_field *f, const struct job_document *doc, double *theta_deg,
+                             struct error *err)
 {
     char path[JSON_PATH_BYTES];
     json_field_path(f, "light_theta_deg", path);
@@ -243,7 +243,7 @@ static status parse_photograph(const struct json_field *f, const struct job_docu
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = job_parse_file_name(f, "file", p->file, err);
     if (s == STATUS_OK) s = json_field_choice(f, "set", set_name, &set, err);
-    if (s == STATUS_OK) s = parse_light_theta(f, doc, &p->light_theta_deg, err);
+    if (s == STATUS_OK) s = job_parse_light_theta(f, doc, &p->light_theta_deg, err);
     if (s == STATUS_OK) s = json_field_required_number(f, "light_phi_deg", -360.0, 360.0, &p->light_phi_deg, err);
     if (s == STATUS_OK) s = json_field_required_number(f, "camera_theta_deg", 0.0, 89.999, &p->camera_theta_deg, err);
     if (s == STATUS_OK) s = json_field_required_number(f, "camera_phi_deg", -360.0, 360.0, &p->camera_phi_deg, err);

@@ -252,7 +252,8 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
                                       "fixed",     "start",          "density_multiplier_per_cm",
                                       "fit_density", "render_px",    "render_samples",
                                       "tied",      "bounds",         "priors",
-                                      "starts",    "nuisance",       "fit_radius",  NULL};
+                                      "starts",    "nuisance",       "fit_radius",
+                                      "candidates", NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_models(f, doc, err);
     if (s == STATUS_OK) s = parse_method(f, doc, err);
@@ -261,5 +262,6 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
     if (s == STATUS_OK) s = json_field_u64(f, "path_budget", 1000, &doc->path_budget, err);
     if (s == STATUS_OK) s = json_field_size(f, "render_px", 8, 2048, &doc->render_px, err);
     if (s == STATUS_OK) s = json_field_size(f, "render_samples", 1, 65536, &doc->render_sample, err);
+    if (s == STATUS_OK) s = job_parse_candidates(f, doc, err);
     return s == STATUS_OK ? parse_parameters(f, doc, err) : s;
 }

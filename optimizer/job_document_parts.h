@@ -18,6 +18,11 @@ void job_fit_option_init(struct job_fit_option *o);
  * of the section is read before. model: those of the document, in its order. */
 status job_parse_fit_options(const struct json_field *f, const struct appearance *model, struct job_document *doc,
                              struct error *err);
+/* "candidates" of the section "fit". */
+status job_parse_candidates(const struct json_field *fit, struct job_document *doc, struct error *err);
+/* The angle of a lamp, which may be behind a cloth without its black sheet. */
+status job_parse_light_theta(const struct json_field *f, const struct job_document *doc, double *theta_deg,
+                             struct error *err);
 /* "unknown parameter": says what the models have. */
 status job_unknown_parameter(const struct appearance *model, size_t n_model, const char *path, const char *key,
                              struct error *err);

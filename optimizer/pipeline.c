@@ -52,7 +52,10 @@ void pipeline_context_release(struct pipeline_context *c)
     scene_free(c->scene);
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
     for (size_t i = 0; i < c->n_model; i++)
+        {
         for (int q = 0; q < 2; q++) free(c->model[i].validation.replica[q]);
+        free(c->model[i].candidate);
+    }
     free(c->model);
 }
 

@@ -13,6 +13,7 @@
 #include "geometry/volume/volume.h"
 #include "optimizer/descent/descent.h"
 #include "optimizer/job_document.h"
+#include "optimizer/objective/next_photograph.h"
 #include "optimizer/objective/noisy_minimum.h"
 #include "optimizer/photographs/observation.h"
 #include "optimizer/pipeline.h"
@@ -31,6 +32,12 @@ struct validation {
         worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
 };
 
+/* A candidate for the next photograph. */
+struct pipeline_candidate {
+    size_t i_candidate; /* of the document */
+    struct candidate_score score;
+};
+
 /* One model of the job: what is fitted and what came out. */
 struct pipeline_model {
     struct appearance appearance;
@@ -39,6 +46,7 @@ struct pipeline_model {
     struct fit_result fit;
     struct validation validation;
     struct derivative_check certificate; /* of the free parameters at the result; filled in before the report */
+    struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */
 };
 
 /* What the search for the fiber radius gave (pipeline_radius.h). */

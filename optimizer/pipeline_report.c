@@ -9,6 +9,7 @@
 status stage_report(struct pipeline_context *c, struct error *err)
 {
     status s = pipeline_certify(c, err);
+    if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);

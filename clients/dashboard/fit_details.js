@@ -43,9 +43,22 @@ function certificate(result) {
     el("p", { class: "hint" }, `Derivatives of ${c.n_path} paths through this cloth against differences of the same paths: worst relative error ${c.worst_rel_error.toExponential(1)} ± ${c.worst_rel_error_se.toExponential(0)} (${c.worst_parameter}).`));
 }
 
+const SHOWN_CANDIDATES = 8;
+
+function nextPhotograph(result) {
+  const list = result.next_photograph ?? [];
+  if (!list.length) return null;
+  const angle = (x) => number(`${Number(x.toPrecision(4))}°`);
+  return el("div", {}, el("h3", {}, "Next photograph"),
+    el("p", { class: "hint" }, `Of ${list.length} candidates, those that would narrow the parameters most.`),
+    table("next-photograph", ["#Lamp", "#phi", "#Camera", "#phi", "#Cloth turned", "#Information, nats", ""], list.slice(0, SHOWN_CANDIDATES).map((c) => el("tr", {},
+      angle(c.light_theta_deg), angle(c.light_phi_deg), angle(c.camera_theta_deg), angle(c.camera_phi_deg), angle(c.cloth_rotation_deg), number(c.information_nats.toFixed(2)),
+      el("td", {}, c.determines.length ? tag(`determines ${c.determines.join(", ")}`, "good") : "")))));
+}
+
 // The content of the card, or null when there is nothing to say.
 export function fitDetails(job) {
   if (!job.result) return null;
-  const parts = [certificate, nuisance, gains, starts].map((part) => part(job.result)).filter((p) => p !== null);
+  const parts = [certificate, nuisance, gains, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
   return parts.length ? el("div", { id: "fit-details" }, parts) : null;
 }

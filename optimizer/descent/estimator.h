@@ -15,7 +15,9 @@ enum estimator_replica {
     REPLICA_FINAL_A = 3,
     REPLICA_FINAL_B = 4,
     REPLICA_CERTIFICATE = 5,
-    REPLICA_PICTURE = 6
+    REPLICA_PICTURE = 6,
+    REPLICA_CANDIDATE_A = 7,
+    REPLICA_CANDIDATE_B = 8
 };
 
 struct estimator_call {

@@ -101,11 +101,35 @@ static json_t *certificate_json(const struct pipeline_model *m)
                      (json_int_t)k->n_path, "parameters", list);
 }
 
+static json_t *candidate_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t rank)
+{
+    const struct pipeline_candidate *k = &m->candidate[rank];
+    const struct job_candidate *g = &c->doc->candidate[k->i_candidate];
+    json_t *determines = json_array();
+    for (size_t p = 0; p < m->appearance.n_param; p++)
+        if (k->score.determines[p]) json_array_append_new(determines, json_string(m->appearance.param[p].name));
+    return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:o, s:o, s:o}", "candidate", (json_int_t)k->i_candidate,
+                     "light_theta_deg", g->light_theta_deg, "light_phi_deg", g->light_phi_deg, "camera_theta_deg",
+                     g->camera_theta_deg, "camera_phi_deg", g->camera_phi_deg, "cloth_rotation_deg",
+                     g->cloth_rotation_deg, "information_nats", number(k->score.information), "standard_error_after",
+                     values_json(m, k->score.se_after), "determines", determines);
+}
+
+/* Best first. */
+static json_t *candidates_json(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; m->candidate != NULL && i < c->doc->n_candidate; i++)
+        json_array_append_new(list, candidate_json(c, m, i));
+    return list;
+}
+
 void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result)
 {
     json_object_set_new(result, "prior_penalty", number(m->fit.prior_penalty));
     json_object_set_new(result, "nuisance", nuisance_json(&m->fit.nuisance));
     json_object_set_new(result, "starts", starts_json(m));
+    json_object_set_new(result, "next_photograph", candidates_json(c, m));
     json_object_set_new(result, "certificate", certificate_json(m));
     json_object_set_new(result, "fit_rel_rms_with_gains", number(rel_rms_with_gains(c, m)));
 }
@@ -117,6 +141,14 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
     double with_gains = rel_rms_with_gains(c, m);
     fprintf(out, "gradient certificate: the derivatives on this cloth are right to %.1g (+- %.1g), worst by %s\n",
             check->error[check->worst], check->error_se[check->worst], m->appearance.param[check->worst].name);
+    if (m->candidate != NULL) {
+        const struct job_candidate *best = &c->doc->candidate[m->candidate[0].i_candidate];
+        fprintf(out,
+                "next photograph: lamp %.0f (phi %.0f), camera %.0f (phi %.0f), cloth turned by %.0f degrees would add "
+                "%.2f nats\n",
+                best->light_theta_deg, best->light_phi_deg, best->camera_theta_deg, best->camera_phi_deg,
+                best->cloth_rotation_deg, m->candidate[0].score.information);
+    }
     for (size_t i = 0; i < n->n; i++)
         fprintf(out, "%-12s %10.5f %10.5f  nuisance term%s\n", n->name[i], n->value[i], n->se[i],
                 n->at_bound[i] ? ", at a bound" : "");

@@ -78,11 +78,14 @@ def kill_when(folder, threads, condition, timeout_s=60):
     return killed
 
 
-@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models"])
+@pytest.fixture(scope="module", params=["gauss_newton.v1", "published_sgd.v1", "several_models", "all_options"])
 def reference(request, tmp_path_factory):
     fit = {"method": request.param}
     if request.param == "several_models":
         fit = {"models": ["microflake.v1", "two_lobe.v1"], "path_budget": 60000}
+    if request.param == "all_options":
+        fit = {"tied": [["C_R"]], "bounds": {"beta_R": [2, 8]}, "priors": {"gamma_TT": {"mean": 10, "se": 5}}, "starts": 2, "path_budget": 300000,
+               "nuisance": {"gain": "per_photograph", "stray_light": True}, "candidates": {"grid": True}}
     if request.param == "published_sgd.v1":
         fit.update(max_iterations=2, path_budget=300000)
     folder = make_job(str(tmp_path_factory.mktemp("reference") / "job"), **fit)

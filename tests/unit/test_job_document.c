@@ -229,6 +229,12 @@ static void test_fit_options(void **state)
         assert_true(o->stray_light && o->stray_light_prior == 0.01);
     }
     job_document_free(d);
+    d = parse(FIT_OF("{\"candidates\":{\"grid\":true}}"));
+    assert_int_equal(d->n_candidate, 56);
+    job_document_free(d);
+    d = parse(FIT_OF("{\"candidates\":[{\"light_theta_deg\":10,\"light_phi_deg\":1,\"camera_theta_deg\":2,\"camera_phi_deg\":3}]}"));
+    assert_true(d->n_candidate == 1 && d->candidate[0].camera_phi_deg == 3.0 && d->candidate[0].cloth_rotation_deg == 0.0);
+    job_document_free(d);
 }
 
 static void test_fit_option_errors(void **state)
@@ -263,6 +269,10 @@ static void test_fit_option_errors(void **state)
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"nuisance\":{\"gain\":\"each\"}}"), "fit.nuisance.gain", "per_photograph");
     check_error(FIT_OF("{\"nuisance\":{\"gain_prior_rel\":0}}"), "fit.nuisance.gain_prior_rel", "0.0001");
+    check_error(FIT_OF("{\"candidates\":[]}"), "fit.candidates", "1 to 1024");
+    check_error(FIT_OF("{\"candidates\":{\"gird\":true}}"), "fit.candidates.gird", "unknown field");
+    check_error(FIT_OF("{\"candidates\":[{\"light_theta_deg\":95}]}"), "fit.candidates[0].light_theta_deg", "below 90");
+    check_error(FIT_OF("{\"candidates\":[7]}"), "fit.candidates[0]", "must be an object");
     check_error(FIT_OF("{\"starts\":0}"), "fit.starts", "1 to 16");
     check_error(FIT_OF("{\"starts\":2,\"max_iterations\":1000}"), "fit.max_iterations", "500");
     check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"weight\":-1"), "photographs[0].weight", "-1");
