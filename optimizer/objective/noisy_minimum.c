@@ -4,12 +4,14 @@
 #include <math.h>
 #include <string.h>
 
-enum { N_COEFFICIENT = 4, N_FOR_CUBIC = 6 };
+enum { N_COEFFICIENT = 5, N_GRID = 256, N_NEWTON = 20 };
+/* Points that a cubic and a quartic ask for. */
+static const size_t n_for[N_COEFFICIENT + 1] = {0, 0, 0, 0, 6, 8};
 
 /* How far to the sides, in standard errors of a point: a rise of four is seen well, and more of it bends. */
 static const double side_rise = 4.0;
 /* Share of its rise over the lowest point by which a point may be off the polynomial. */
-static const double bend = 0.15;
+static const double bend = 0.2;
 
 static size_t lowest(const struct noisy_minimum *m)
 {
@@ -79,23 +81,56 @@ static double variance_of(const struct polynomial *p, const double row[N_COEFFIC
     return fmax(sum, 0.0);
 }
 
+/* Derivative k of the polynomial as a row of factors of its coefficients, at t. */
+static void derivative_row(size_t n, int k, double t, double row[N_COEFFICIENT])
+{
+    for (size_t a = 0; a < n; a++) {
+        double factor = 1.0;
+        for (int j = 0; j < k; j++) factor *= (double)a - j;
+        row[a] = factor != 0.0 ? factor * pow(t, (double)a - k) : 0.0;
+    }
+}
+
+static double derivative(const struct polynomial *p, int k, double t)
+{
+    double row[N_COEFFICIENT], sum = 0.0;
+    derivative_row(p->n, k, t, row);
+    for (size_t a = 0; a < p->n; a++) sum += row[a] * p->x[a];
+    return sum;
+}
+
+/* The minimum inside the bounds that is nearest to the lowest point; false when there is none. */
+static bool find_vertex(const struct polynomial *p, const struct noisy_minimum_option *o, double *t)
+{
+    double step = (o->upper - o->lower) / N_GRID, nearest = INFINITY;
+    for (int i = 0; i < N_GRID; i++) {
+        double left = o->lower - p->u0 + i * step, middle = left + 0.5 * step;
+        if (derivative(p, 1, left) > 0.0 || derivative(p, 1, left + step) < 0.0 || fabs(middle) >= nearest) continue;
+        nearest = fabs(middle);
+        *t = middle;
+    }
+    for (int i = 0; i < N_NEWTON && isfinite(nearest); i++) {
+        double bent = derivative(p, 2, *t);
+        if (!(bent > 0.0)) return false;
+        *t -= fmin(fmax(derivative(p, 1, *t) / bent, -step), step);
+    }
+    return isfinite(nearest) && p->u0 + *t > o->lower && p->u0 + *t < o->upper;
+}
+
 /* The vertex, and its error by the delta method; false when there is none. */
 static bool set_vertex(struct noisy_minimum *m, const struct noisy_minimum_option *o, const struct polynomial *p)
 {
-    double b = p->x[1], c = p->x[2], d = p->n > 3 ? p->x[3] : 0.0, root2 = c * c - 3.0 * b * d;
-    if (!(root2 > 0.0) || !(c + sqrt(root2) > 0.0)) return false;
-    double t = -b / (c + sqrt(root2)), slope[N_COEFFICIENT] = {0.0, 1.0, 2.0 * t, 3.0 * t * t},
-           bent[N_COEFFICIENT] = {0.0, 0.0, 2.0, 6.0 * t}, row[N_COEFFICIENT];
-    m->curvature = 2.0 * sqrt(root2);
+    double t = 0.0, slope[N_COEFFICIENT], bent[N_COEFFICIENT];
+    if (!find_vertex(p, o, &t)) return false;
+    derivative_row(p->n, 1, t, slope);
+    derivative_row(p->n, 2, t, bent);
+    m->curvature = derivative(p, 2, t);
     m->curvature_se = sqrt(variance_of(p, bent));
     m->u = p->u0 + t;
     m->u_se = sqrt(variance_of(p, slope)) / m->curvature;
-    m->at_bound = m->u <= o->lower || m->u >= o->upper;
-    m->u = fmin(fmax(m->u, o->lower), o->upper);
-    powers(m->u - p->u0, p->n, row);
-    m->f = 0.0;
-    for (size_t k = 0; k < p->n; k++) m->f += p->x[k] * row[k];
-    return true;
+    m->f = derivative(p, 0, t);
+    m->at_bound = false;
+    return m->curvature > 0.0;
 }
 
 /* Nothing is curved: downhill to a bound, when there is a slope beyond doubt. */
@@ -112,12 +147,12 @@ static void set_slope(struct noisy_minimum *m, const struct noisy_minimum_option
     m->at_bound = true;
 }
 
-/* From what is known; false when it is no minimum. */
+/* From what is known; false when it is no minimum. The highest degree whose curvature is beyond doubt. */
 static bool locate(struct noisy_minimum *m, const struct noisy_minimum_option *o)
 {
     struct polynomial p;
-    for (size_t n = m->n_point >= N_FOR_CUBIC ? 4 : 3; n >= 3; n--)
-        if (fit_polynomial(m, n, &p) && set_vertex(m, o, &p) && !(n == 4 && m->at_bound) &&
+    for (size_t n = N_COEFFICIENT; n >= 3; n--)
+        if (m->n_point >= n_for[n] && fit_polynomial(m, n, &p) && set_vertex(m, o, &p) &&
             (n == 3 || m->curvature > 2.0 * m->curvature_se))
             return true;
     set_slope(m, o);
