@@ -206,6 +206,7 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
     s->model->sample(w->state, wo, w->throughput, u, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    if (pdf == 0) return false; /* rounded to a direction along the fiber, where nothing is scattered to */
     float weight = cos_theta(wi) / pdf, most = 0, next[3];
     for (int c = 0; c < 3; c++) {
         next[c] = w->throughput[c] * s_rgb[c] * weight;

@@ -206,6 +206,7 @@ static bool scatter(const struct volume_setting *s, struct lane *l)
     for (int a = 0; a < 3; a++) u[a] = rng_float(&l->rng);
     s->model->sample(s->state, l->wo, l->throughput, u, wi);
     l->pdf = s->model->eval_pdf(s->state, wi, l->wo, l->throughput, f_rgb, s->want_jacobian ? score : NULL);
+    if (l->pdf == 0) return false; /* rounded to a direction that has no density */
     for (int c = 0; c < 3; c++) next[c] = l->throughput[c] * f_rgb[c] / l->pdf;
     float most = largest(next);
     if (!(most > 0)) {
