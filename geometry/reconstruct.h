@@ -11,6 +11,7 @@
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/fibers/radius.h"
 #include "geometry/orientation/main_directions.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
@@ -36,7 +37,7 @@ struct reconstruct_option {
     size_t min_vertex;           /* 10 in the thesis */
     double smooth_alpha;         /* 0.1 in the thesis */
     double radius_m[3];          /* per axis class; NaN: determine */
-    bool radius_per_axis;
+    enum radius_rule radius_rule; /* automatic by default (radius.h) */
 };
 
 void reconstruct_option_default(struct reconstruct_option *o);
@@ -64,6 +65,8 @@ struct reconstruct_report {
     size_t n_fiber, n_vertex;
     double total_length_m;
     double radius_m[3], radius_score[3];
+    double radius_se_m[3];                 /* standard error; NaN where the radius was given */
+    bool radius_per_axis;                  /* one radius for each class */
     double dice;                           /* of fibers (radius r) against kept voxels */
     double direction_noise_deg[2];         /* direction_noise.h, before and after the transfer */
     double direction_change_mean_deg;      /* between filtered and transferred directions */

@@ -246,23 +246,27 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
 
 static status find_radius(struct fiber_job *job, const struct polyline_set *lines, struct error *err)
 {
-    struct distance_histogram *h = malloc(sizeof *h);
-    if (h == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
+    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *all = part + RADIUS_PARTS;
+    struct reconstruct_report *report = job->report;
+    struct radius_measure m;
     double voxel_m = job->v->voxel_size_m[0];
+    if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     enter_part(job, 0.65, 1.0);
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool, &job->inner,
-                                          h, err);
+                                          part, err);
+    if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);
     if (s == STATUS_OK) {
-        double all = radius_from_mass(h, 7u, radius_best_score(h, 7u));
+        distance_histogram_sum(part, RADIUS_PARTS, all);
+        report->radius_per_axis = m.per_axis;
         for (unsigned a = 0; a < 3; a++) {
-            unsigned classes = job->o->radius_per_axis ? 1u << a : 7u;
-            double r = job->o->radius_per_axis ? radius_from_mass(h, classes, radius_best_score(h, classes)) : all;
-            if (isnan(job->o->radius_m[a])) job->o->radius_m[a] = (r > 0.0 ? r : all) * voxel_m;
-            job->report->radius_m[a] = job->o->radius_m[a];
-            job->report->radius_score[a] = radius_score(h, classes, job->o->radius_m[a] / voxel_m);
+            bool given = !isnan(job->o->radius_m[a]);
+            if (!given) job->o->radius_m[a] = m.radius_voxel[a] * voxel_m;
+            report->radius_m[a] = job->o->radius_m[a];
+            report->radius_se_m[a] = given ? NAN : m.se_voxel[a] * voxel_m;
+            report->radius_score[a] = radius_score(all, m.per_axis ? 1u << a : 7u, job->o->radius_m[a] / voxel_m);
         }
     }
-    free(h);
+    free(part);
     return s;
 }
 

@@ -27,7 +27,7 @@ void reconstruct_option_default(struct reconstruct_option *o)
         .min_vertex = 10,
         .smooth_alpha = 0.1,
         .radius_m = {NAN, NAN, NAN},
-        .radius_per_axis = false,
+        .radius_rule = RADIUS_AUTO,
     };
 }
 

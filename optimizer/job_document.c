@@ -52,6 +52,7 @@ static struct job_document *document_new(void)
     d->matrix[0] = d->matrix[4] = d->matrix[8] = 1.0;
     d->density_low = d->density_high = d->filter_s = d->filter_t = d->filter_eps_d = d->filter_eps_j = NAN;
     d->link_sigma_voxel = d->radius_um = d->crop_keep = NAN;
+    d->radius_per_axis = -1;
     d->join_seams = true;
     fill_nan(d->tile_mm, 2);
     d->voxel_um = NAN;

@@ -98,7 +98,7 @@ struct job_document {
     size_t filter_h;                                                                  /* 0: not given */
     double link_sigma_voxel, radius_um;                                               /* NaN: not given */
     size_t min_vertex;
-    bool radius_per_axis;
+    int radius_per_axis; /* -1: by what is measured (not given) */
     /* fibers */
     char fiber_file[JOB_MAX_NAME_BYTES];
     double tile_mm[2]; /* NaN: from the file */

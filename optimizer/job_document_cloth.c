@@ -188,7 +188,9 @@ status job_parse_volume(const struct json_field *f, struct job_document *doc, st
     if (s == STATUS_OK) s = json_field_number(f, "link_sigma_voxel", 0.1, 100.0, &doc->link_sigma_voxel, err);
     if (s == STATUS_OK) s = json_field_size(f, "min_vertices", 2, 100000, &doc->min_vertex, err);
     if (s == STATUS_OK) s = json_field_number(f, "radius_um", 0.05, 1000.0, &doc->radius_um, err);
-    if (s == STATUS_OK) s = json_field_bool(f, "radius_per_axis", &doc->radius_per_axis, err);
+    bool per_axis = false;
+    if (s == STATUS_OK) s = json_field_bool(f, "radius_per_axis", &per_axis, err);
+    if (json_object_get(f->object, "radius_per_axis") != NULL) doc->radius_per_axis = per_axis;
     return s;
 }
 

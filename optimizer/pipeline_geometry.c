@@ -36,7 +36,7 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
     if (doc->min_vertex > 0) o->min_vertex = doc->min_vertex;
     if (!isnan(doc->radius_um))
         for (int a = 0; a < 3; a++) o->radius_m[a] = doc->radius_um * um;
-    o->radius_per_axis = doc->radius_per_axis;
+    o->radius_rule = doc->radius_per_axis < 0 ? RADIUS_AUTO : doc->radius_per_axis > 0 ? RADIUS_PER_AXIS : RADIUS_COMMON;
 }
 
 static void warn_geometry(void *context, const char *text)

@@ -11,10 +11,11 @@ struct radius_job {
     const struct volume *v;
     const struct segment_bricks *bricks;
     float eps_d;
-    struct distance_histogram *histogram; /* per thread */
+    struct distance_histogram *histogram; /* per thread: RADIUS_PARTS */
     float *distance2;                     /* per thread: FINE^3 */
     uint32_t *nearest;
     const uint32_t *chosen;               /* bricks */
+    uint8_t *part;                        /* of each segment */
 };
 
 /* Density between voxel centres, trilinear, edge values repeated. */
@@ -35,17 +36,32 @@ static float density_between_centres(const struct volume *v, const float x[3])
     return (1.0f - f[2]) * ((1.0f - f[0]) * a0 + f[0] * a1) + f[2] * ((1.0f - f[0]) * b0 + f[0] * b1);
 }
 
+static size_t part_of(size_t i_brick) { return (uint32_t)(i_brick * 2246822519u) >> 29; }
+
+/* Brick of the middle of a segment; false when that lies outside of the volume (in the nearest brick then). */
+static bool brick_of(const struct segment_bricks *b, const struct segment *g, size_t *brick)
+{
+    bool inside = true;
+    *brick = 0;
+    for (int a = 2; a >= 0; a--) {
+        float middle = 0.5f * (g->a[a] + g->b[a]), last = (float)b->n_voxel[a] - 0.5f;
+        inside = inside && middle >= 0.0f && middle < (float)b->n_voxel[a];
+        *brick = *brick * b->n_brick[a] + (size_t)fminf(last, fmaxf(0.0f, middle)) / b->edge;
+    }
+    return inside;
+}
+
 static void measure_brick(void *context, size_t i_task, size_t i_thread)
 {
     struct radius_job *job = context;
     size_t i_brick = job->chosen[i_task];
     scratch_keep_within(job->v->space);
-    struct distance_histogram *h = &job->histogram[i_thread];
+    struct distance_histogram *own = &job->histogram[i_thread * RADIUS_PARTS], *far = own + part_of(i_brick);
     float *distance2 = job->distance2 + i_thread * FINE * FINE * FINE;
     uint32_t *nearest = job->nearest + i_thread * FINE * FINE * FINE;
     struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, RADIUS_UPSAMPLING);
     segment_distances(job->bricks, i_brick, &l, distance2, nearest);
-    float inverse_bin = (float)(1.0 / h->bin_voxel);
+    float inverse_bin = (float)(1.0 / own->bin_voxel);
     size_t at = 0;
     for (size_t k = 0; k < l.n[2]; k++)
         for (size_t j = 0; j < l.n[1]; j++)
@@ -55,12 +71,14 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
                 float density = density_between_centres(job->v, x);
                 size_t bin = (size_t)(sqrtf(distance2[at]) * inverse_bin);
                 if (nearest[at] == UINT32_MAX || bin >= RADIUS_BINS) {
-                    h->far_inside += density >= job->eps_d;
-                    h->far_count++;
-                    h->far_density_sum += (uint64_t)(255.0f * density + 0.5f);
+                    far->far_inside += density >= job->eps_d;
+                    far->far_count++;
+                    far->far_density_sum += (uint64_t)(255.0f * density + 0.5f);
                     continue;
                 }
-                uint8_t axis = job->bricks->segment[nearest[at]].axis;
+                const struct segment *g = &job->bricks->segment[nearest[at]];
+                struct distance_histogram *h = own + job->part[nearest[at]]; /* a fiber's mass goes where its length goes */
+                uint8_t axis = g->axis;
                 (density >= job->eps_d ? h->inside : h->outside)[axis][bin]++;
                 h->density_sum[axis][bin] += (uint64_t)(255.0f * density + 0.5f);
             }
@@ -77,6 +95,7 @@ static void add_histogram(struct distance_histogram *to, const struct distance_h
     to->far_inside += from->far_inside;
     to->far_count += from->far_count;
     to->far_density_sum += from->far_density_sum;
+    for (int a = 0; a < 3; a++) to->length_voxel[a] += from->length_voxel[a];
 }
 
 /* Bricks with fibers near them, at most MAX_BRICK of them spread evenly: millions of fiber points are enough for a mean. */
@@ -92,56 +111,69 @@ static size_t choose_bricks(const struct segment_bricks *b, uint32_t *chosen)
 }
 
 /* Length of the lines inside of the chosen bricks: each segment counts where its middle is. */
-static void add_lengths(const struct segment_bricks *bricks, const bool *is_chosen, struct distance_histogram *h)
+static void add_lengths(const struct segment_bricks *bricks, const bool *is_chosen, struct distance_histogram *part)
 {
     for (size_t i = 0; i < bricks->n_segment; i++) {
         const struct segment *g = &bricks->segment[i];
         double length2 = 0.0;
-        bool inside = true;
-        size_t brick = 0;
-        for (int a = 2; a >= 0; a--) {
-            float middle = 0.5f * (g->a[a] + g->b[a]), d = g->b[a] - g->a[a];
-            inside = inside && middle >= 0.0f && middle < (float)bricks->n_voxel[a];
-            brick = brick * bricks->n_brick[a] + (inside ? (size_t)middle / bricks->edge : 0);
-            length2 += (double)(d * d);
-        }
-        if (inside && is_chosen[brick]) h->length_voxel[g->axis] += sqrt(length2);
+        size_t brick;
+        for (int a = 0; a < 3; a++) length2 += (double)((g->b[a] - g->a[a]) * (g->b[a] - g->a[a]));
+        if (brick_of(bricks, g, &brick) && is_chosen[brick]) part[part_of(brick)].length_voxel[g->axis] += sqrt(length2);
+    }
+}
+
+static void file_segments(const struct segment_bricks *bricks, uint8_t *part)
+{
+    for (size_t i = 0; i < bricks->n_segment; i++) {
+        size_t brick;
+        brick_of(bricks, &bricks->segment[i], &brick);
+        part[i] = (uint8_t)part_of(brick);
     }
 }
 
 status distance_histogram_measure(const struct volume *v, const struct polyline_set *lines, double eps_d,
                                   double farthest_voxel, struct thread_pool *pool, const struct progress *progress,
-                                  struct distance_histogram *h, struct error *err)
+                                  struct distance_histogram part[RADIUS_PARTS], struct error *err)
 {
     struct segment_bricks bricks = {0};
     size_t n_thread = thread_pool_n_thread(pool);
-    *h = (struct distance_histogram){.bin_voxel = farthest_voxel / RADIUS_BINS};
+    for (size_t p = 0; p < RADIUS_PARTS; p++) part[p] = (struct distance_histogram){.bin_voxel = farthest_voxel / RADIUS_BINS};
     struct radius_job job = {.v = v, .bricks = &bricks, .eps_d = (float)eps_d};
     status s = segment_bricks_init(&bricks, lines, v->n, BRICK, (float)farthest_voxel, err);
-    job.histogram = calloc(n_thread, sizeof *job.histogram);
+    job.histogram = calloc(n_thread * RADIUS_PARTS, sizeof *job.histogram);
     job.distance2 = malloc(n_thread * FINE * FINE * FINE * sizeof *job.distance2);
     job.nearest = malloc(n_thread * FINE * FINE * FINE * sizeof *job.nearest);
     uint32_t *chosen = s == STATUS_OK ? malloc(segment_n_brick(&bricks) * sizeof *chosen) : NULL;
     bool *is_chosen = s == STATUS_OK ? calloc(segment_n_brick(&bricks), sizeof *is_chosen) : NULL;
     job.chosen = chosen;
-    if (s == STATUS_OK && (chosen == NULL || is_chosen == NULL || job.histogram == NULL || job.distance2 == NULL || job.nearest == NULL))
+    job.part = s == STATUS_OK ? malloc(bricks.n_segment + 1) : NULL;
+    if (s == STATUS_OK && (chosen == NULL || job.part == NULL || is_chosen == NULL || job.histogram == NULL || job.distance2 == NULL || job.nearest == NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     if (s == STATUS_OK) {
-        for (size_t t = 0; t < n_thread; t++) job.histogram[t].bin_voxel = h->bin_voxel;
+        for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) job.histogram[t].bin_voxel = part[0].bin_voxel;
         size_t n_chosen = choose_bricks(&bricks, chosen);
         for (size_t i = 0; i < n_chosen; i++) is_chosen[chosen[i]] = true;
+        file_segments(&bricks, job.part);
         s = thread_pool_run(pool, n_chosen, measure_brick, &job, progress);
         if (s != STATUS_OK) error_set(err, s, "measuring the fiber radius was cancelled");
-        for (size_t t = 0; t < n_thread; t++) add_histogram(h, &job.histogram[t]);
-        add_lengths(&bricks, is_chosen, h);
+        for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) add_histogram(&part[t % RADIUS_PARTS], &job.histogram[t]);
+        add_lengths(&bricks, is_chosen, part);
     }
     free(chosen);
+    free(job.part);
     free(is_chosen);
     free(job.histogram);
     free(job.distance2);
     free(job.nearest);
     segment_bricks_release(&bricks);
     return s;
+}
+
+void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], size_t without, struct distance_histogram *sum)
+{
+    *sum = (struct distance_histogram){.bin_voxel = part[0].bin_voxel};
+    for (size_t p = 0; p < RADIUS_PARTS; p++)
+        if (p != without) add_histogram(sum, &part[p]);
 }
 
 /* Points of the classes in bin b. */

@@ -12,7 +12,9 @@
 #include "geometry/fibers/segment_bricks.h"
 #include "geometry/volume/volume.h"
 
-enum { RADIUS_BINS = 512, RADIUS_UPSAMPLING = 4 };
+#include <stdbool.h>
+
+enum { RADIUS_BINS = 512, RADIUS_UPSAMPLING = 4, RADIUS_PARTS = 8 };
 
 /* Points of the fine grid by distance to the nearest polyline and the axis class of that polyline. */
 struct distance_histogram {
@@ -24,10 +26,14 @@ struct distance_histogram {
     double length_voxel[3];                  /* of the polylines of each class */
 };
 
-/* eps_d: density that counts as material (the density is interpolated, so V has smooth surfaces). */
+/* part: RADIUS_PARTS histograms, of disjoint sets of bricks scattered over the volume (their sum is that of the volume); they tell how
+ * sure a radius is.
+ * eps_d: density that counts as material (the density is interpolated, so V has smooth surfaces). */
 status distance_histogram_measure(const struct volume *v, const struct polyline_set *lines, double eps_d,
                                   double farthest_voxel, struct thread_pool *pool, const struct progress *progress,
-                                  struct distance_histogram *h, struct error *err);
+                                  struct distance_histogram part[RADIUS_PARTS], struct error *err);
+/* Sum of all parts but one; RADIUS_PARTS: of all. */
+void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], size_t without, struct distance_histogram *sum);
 
 /* score(r) / |V| over the classes with bit set in `classes`, V within reach of a polyline; and the r >= 0.25 voxels of the best score.
  * 0 when the classes have no polyline. */
@@ -39,5 +45,19 @@ double radius_best_score(const struct distance_histogram *h, unsigned classes);
  * pi r^2 times the length of the polylines is the amount of material around them, sum of (density - void) / (solid - void)
  * over points nearer than 1.7 r (a few rounds, from r_start); solid is the density within 0.4 r of the polylines. */
 double radius_from_mass(const struct distance_histogram *h, unsigned classes, double r_start_voxel);
+
+enum radius_rule { RADIUS_AUTO, RADIUS_COMMON, RADIUS_PER_AXIS };
+
+struct radius_measure {
+    double radius_voxel[3], se_voxel[3]; /* per axis class; the standard error by leaving out one part at a time (jackknife) */
+    bool per_axis;
+};
+
+/* One radius for all classes, or one each. RADIUS_AUTO: one each when two of them differ by more than RADIUS_SIGMAS standard errors of the
+ * difference and by more than RADIUS_SYSTEMATIC of the radius (blur and touching neighbours shift radii by up to so much). Classes
+ * without fibers take the common one. STATUS_NO_MEMORY. */
+#define RADIUS_SIGMAS 3.0
+#define RADIUS_SYSTEMATIC 0.05
+status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum radius_rule rule, struct radius_measure *m, struct error *err);
 
 #endif

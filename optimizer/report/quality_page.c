@@ -43,6 +43,7 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
             if (c->fiber.axis_class[i] == k) radius += (double)c->fiber.radius_m[i] / (double)l->n[k];
         fprintf(out, "<tr><td>%s</td><td class=\"number\">%zu</td><td class=\"number\">%.3g</td><td class=\"number\">", name[k], l->n[k], l->total_m[k] * 1e3);
         if (l->n[k] > 0) fprintf(out, "%.2f", radius * 1e6);
+        if (l->n[k] > 0 && c->doc->has_volume && isfinite(g->radius_se_m[k])) fprintf(out, " &plusmn; %.2f", g->radius_se_m[k] * 1e6);
         fputs("</td>", out);
         if (c->doc->has_volume)
             fprintf(out, "<td class=\"number\">%zu</td><td class=\"number\">%zu</td><td class=\"number\">%zu</td>", g->n_center[k], g->n_chain[k],

@@ -47,6 +47,8 @@ static json_t *options_json(const struct reconstruct_option *o)
                              json_count(o->h), "eps_d", json_number(o->eps_d), "eps_J", json_number(o->eps_j), "link_sigma_voxel",
                              json_number(o->link_sigma_voxel), "min_vertices", json_count(o->min_vertex), "smooth_alpha",
                              json_number(o->smooth_alpha));
+    json_object_set_new(json, "density_low", json_number(o->density_low));
+    json_object_set_new(json, "density_high", json_number(o->density_high));
     json_object_set_new(json, "matrix", json_number_list(o->matrix, 9, 1.0));
     bool cropped = false;
     for (int i = 0; i < 6; i++) cropped = cropped || o->crop_voxel[i] > 0;
@@ -85,6 +87,8 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "n_gap_bridged", json_count(g->n_gap_bridged));
     json_object_set_new(json, "n_joined", json_count(g->n_joined));
     json_object_set_new(json, "radius_um", json_number_list(g->radius_m, 3, um));
+    json_object_set_new(json, "radius_se_um", json_number_list(g->radius_se_m, 3, um));
+    json_object_set_new(json, "radius_per_axis", json_boolean(g->radius_per_axis));
     json_object_set_new(json, "radius_score", json_number_list(g->radius_score, 3, 1.0));
     json_object_set_new(json, "dice", json_number(g->dice));
     json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));

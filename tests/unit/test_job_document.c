@@ -60,6 +60,7 @@ static void test_defaults(void **state)
     assert_string_equal(d->model[0].id, "two_lobe.v1");
     assert_string_equal(d->method, METHOD_GAUSS_NEWTON);
     assert_int_equal(d->n_photograph, 0);
+    assert_int_equal(d->radius_per_axis, -1);
     assert_string_equal(d->measurement_file, "a.csv");
     job_document_free(d);
 }

@@ -43,14 +43,12 @@ struct result {
     struct reconstruct_report r;
 };
 
-static void run_in(struct scratch_space *space, const char *path, const char *axes, size_t n_thread, struct result *x)
+static void run_with_in(struct scratch_space *space, const char *path, const struct reconstruct_option *o, size_t n_thread, struct result *x)
 {
     struct error err = {0};
     struct thread_pool *pool;
     memset(x, 0, sizeof *x);
-    reconstruct_option_default(&x->o);
-    snprintf(x->o.axes, sizeof x->o.axes, "%s", axes);
-    for (int a = 0; a < 3; a++) x->o.voxel_size_m[a] = 2e-6;
+    x->o = *o;
     assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
     assert_int_equal(reconstruct_read(&path, 1, &x->o, space, pool, NULL, &x->v, &x->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_orientation(&x->v, &x->o, pool, NULL, &x->d, &x->r, &err), STATUS_OK);
@@ -59,6 +57,17 @@ static void run_in(struct scratch_space *space, const char *path, const char *ax
     assert_int_equal(reconstruct_transfer(&x->f, &x->d, pool, NULL, &x->r, &err), STATUS_OK);
     thread_pool_free(pool);
 }
+
+static void run_in(struct scratch_space *space, const char *path, const char *axes, size_t n_thread, struct result *x)
+{
+    struct reconstruct_option o;
+    reconstruct_option_default(&o);
+    snprintf(o.axes, sizeof o.axes, "%s", axes);
+    for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
+    run_with_in(space, path, &o, n_thread, x);
+}
+
+static void run_with(const char *path, const struct reconstruct_option *o, size_t n_thread, struct result *x) { run_with_in(NULL, path, o, n_thread, x); }
 
 static void run(const char *path, const char *axes, size_t n_thread, struct result *x) { run_in(NULL, path, axes, n_thread, x); }
 
@@ -133,6 +142,42 @@ static void test_chain(void **state)
     assert_true(red >= 3 * 13); /* crosses of 13 pixels for the three fibers along x */
     free(rgb);
     assert_int_equal(reconstruct_slice_picture(&x.v, &x.f, 0, NX, &rgb, &width, &height, NULL), STATUS_INVALID);
+    release(&x);
+}
+
+/* What is chosen from the data is written into the options; a run that is given these values does the same, one that is given others takes
+ * them. */
+static void test_choices_are_reported_and_overridable(void **state)
+{
+    (void)state;
+    struct result x, y;
+    run(path, "xyz", 2, &x);
+    const struct reconstruct_option *o = &x.o;
+    const double chosen[] = {o->density_low, o->density_high, o->s, o->t, (double)o->h, o->eps_d, o->eps_j, o->radius_m[0], o->radius_m[1], o->radius_m[2]};
+    for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++) assert_true(isfinite(chosen[i]) && chosen[i] != 0.0);
+    assert_true(x.r.density_low == o->density_low && x.r.density_high == o->density_high);
+    for (int a = 0; a < 3; a++) assert_true(x.r.radius_m[a] == o->radius_m[a] && x.r.radius_se_m[a] > 0.0);
+    run_with(path, o, 2, &y);
+    assert_int_equal(y.f.n_vertex, x.f.n_vertex);
+    assert_memory_equal(y.f.position_m, x.f.position_m, x.f.n_vertex * 3 * sizeof(float));
+    assert_true(isnan(y.r.radius_se_m[0])); /* given, not measured */
+    release(&y);
+    struct reconstruct_option other = *o;
+    other.density_low += 500.0;
+    other.density_high -= 500.0;
+    other.s *= 1.2;
+    other.t *= 1.1;
+    other.h += 2;
+    other.eps_d += 0.03;
+    other.eps_j *= 0.9;
+    for (int a = 0; a < 3; a++) other.radius_m[a] *= 1.1;
+    run_with(path, &other, 2, &y);
+    assert_true(y.o.density_low == other.density_low && y.o.density_high == other.density_high && y.o.s == other.s && y.o.t == other.t);
+    assert_true(y.o.h == other.h && y.o.eps_d == other.eps_d && y.o.eps_j == other.eps_j && y.o.radius_m[1] == other.radius_m[1]);
+    assert_true(y.r.density_low == other.density_low && y.r.radius_m[1] == other.radius_m[1]);
+    assert_true(y.r.n_kept_voxel != x.r.n_kept_voxel);
+    assert_true(fabs((double)y.f.radius_m[0] / other.radius_m[y.f.axis_class[0]] - 1.0) < 1e-6);
+    release(&y);
     release(&x);
 }
 
@@ -220,7 +265,7 @@ static void test_cancel(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_choices_are_reported_and_overridable), cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
                                        cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit)};
     return cmocka_run_group_tests(tests, make_scan, NULL);
 }

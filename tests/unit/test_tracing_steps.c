@@ -189,7 +189,7 @@ static void test_radius(void **state)
     struct test_cylinder c[N_FIBER];
     struct polyline_set lines;
     struct volume v;
-    struct distance_histogram *h = malloc(sizeof *h);
+    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *h = part + RADIUS_PARTS;
     polyline_set_init(&lines);
     for (int i = 0; i < N_FIBER; i++) {
         double y = 24.0 + (i > 0 ? 7.0 * cos(i * M_PI / 3.0) : 0.0), z = 24.0 + (i > 0 ? 7.0 * sin(i * M_PI / 3.0) : 0.0);
@@ -200,7 +200,8 @@ static void test_radius(void **state)
     }
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, N_FIBER, 0.0, 1);
-    assert_int_equal(distance_histogram_measure(&v, &lines, 0.5, 8.0, NULL, NULL, h, NULL), STATUS_OK);
+    assert_int_equal(distance_histogram_measure(&v, &lines, 0.5, 8.0, NULL, NULL, part, NULL), STATUS_OK);
+    distance_histogram_sum(part, RADIUS_PARTS, h);
     uint64_t total = h->far_count, inside = h->far_inside;
     for (int b = 0; b < RADIUS_BINS; b++) {
         total += h->inside[0][b] + h->outside[0][b];
@@ -219,7 +220,52 @@ static void test_radius(void **state)
     assert_true(radius_best_score(h, 2) == 0.0);
     polyline_set_release(&lines);
     volume_release(&v);
-    free(h);
+    free(part);
+}
+
+/* Fibers along x and along y: when their radii differ they get one each, with an error that says so; when not, or when asked, one for all. */
+static void test_radius_of_each_class(void **state)
+{
+    (void)state;
+    const size_t n[3] = {96, 96, 32};
+    static const struct {
+        double along_y;
+        enum radius_rule rule;
+        bool per_axis;
+    } check[] = {{4.5, RADIUS_AUTO, true}, {3.5, RADIUS_AUTO, false}, {4.5, RADIUS_COMMON, false}, {3.5, RADIUS_PER_AXIS, true}};
+    struct distance_histogram *part = malloc(RADIUS_PARTS * sizeof *part);
+    for (size_t k = 0; k < sizeof check / sizeof *check; k++) {
+        struct test_cylinder c[6];
+        struct polyline_set lines;
+        struct volume v;
+        struct radius_measure m;
+        polyline_set_init(&lines);
+        for (int i = 0; i < 6; i++) {
+            int along = i % 2;
+            double at = 20.0 + 28.0 * (i / 2), z = along == 0 ? 8.0 : 23.0;
+            c[i] = (struct test_cylinder){{along == 0 ? 0.0 : at, along == 0 ? at : 0.0, z}, {along == 0, along == 1, 0.0}, along == 0 ? 3.5 : check[k].along_y};
+            assert_int_equal(polyline_begin(&lines, (uint8_t)along, NULL), STATUS_OK);
+            for (int x = 0; x <= 96; x++)
+                assert_int_equal(polyline_add(&lines, (const float[3]){(float)(along == 0 ? x : at), (float)(along == 0 ? at : x), (float)z}, NULL), STATUS_OK);
+        }
+        assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+        test_fill_cylinders(&v, c, 6, 0.1, 1);
+        for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i])); /* as the mapping does */
+        assert_int_equal(distance_histogram_measure(&v, &lines, 0.5, 8.0, NULL, NULL, part, NULL), STATUS_OK);
+        assert_int_equal(radius_choose(part, check[k].rule, &m, NULL), STATUS_OK);
+        print_message("radii 3.5 and %.1f: %.3f (%.3f) and %.3f (%.3f)\n", check[k].along_y, m.radius_voxel[0], m.se_voxel[0], m.radius_voxel[1], m.se_voxel[1]);
+        assert_int_equal(m.per_axis, check[k].per_axis);
+        assert_int_equal(m.radius_voxel[0] != m.radius_voxel[1], check[k].per_axis);
+        assert_true(m.radius_voxel[2] > 3.3 && m.se_voxel[2] > 0.0); /* no fiber along z: that of all */
+        assert_true(m.se_voxel[0] > 0.0 && m.se_voxel[0] < 0.1);
+        if (check[k].per_axis) {
+            assert_true(fabs(m.radius_voxel[0] - 3.5) < 0.03 * 3.5);
+            assert_true(fabs(m.radius_voxel[1] - check[k].along_y) < 0.03 * check[k].along_y);
+        }
+        polyline_set_release(&lines);
+        volume_release(&v);
+    }
+    free(part);
 }
 
 static void test_alignment(void **state)
@@ -260,7 +306,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_smoothing), cmocka_unit_test(test_linking_leaning_neighbours),
         cmocka_unit_test(test_duplicates_and_joins), cmocka_unit_test(test_relax), cmocka_unit_test(test_axis_fit),
-        cmocka_unit_test(test_radius),    cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_radius), cmocka_unit_test(test_radius_of_each_class),    cmocka_unit_test(test_alignment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
