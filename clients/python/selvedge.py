@@ -187,6 +187,11 @@ class Job:
         """Fitted parameters: dicts with name, unit, value, standard_error, lower, upper, determined ... None before the end."""
         return self.state()["parameters"]
 
+    def models(self):
+        """Every model of the job, in its order: dicts with id, best, fit_rel_rms, heldout_rel_rms, parameters ... None before the end."""
+        result = self.state()["result"]
+        return result and result.get("models")
+
     def series(self):
         """All points of the fit's curve, oldest first (more than 5000 are thinned by the server)."""
         points, after = [], -1

@@ -1,10 +1,14 @@
 """Several models in one job, through daemon, real worker and command line: surface and volume models on one cloth of fibers."""
 import os
 import subprocess
+import sys
 
 import pytest
 from daemon_under_test import Daemon, program
 from small_cloth import TABLE, hair
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), "clients", "python"))
+import selvedge  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 MODELS = ["microflake.v1", "two_lobe.v1"]
@@ -66,6 +70,11 @@ def test_series_says_what_its_numbers_are(real, finished):
     assert few["models"] == series["models"] and len(few["points"]) == 3
     for p in few["points"]:
         assert len(p.get("parameter_min", p["parameter"])) == len(few["models"][p["i_model"]]["parameters"])
+
+
+def test_python_client(real, finished):
+    job, state = finished
+    assert selvedge.Server(real.url).job(job).models() == state["result"]["models"]
 
 
 def test_command_line_prints_the_comparison(real, finished):
