@@ -3,6 +3,7 @@
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
+#include "optimizer/photographs/observation_check.h"
 #include "optimizer/pipeline_context.h"
 
 #include <math.h>
@@ -206,6 +207,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = claim_inputs(c, err);
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
+    if (s == STATUS_OK) observation_set_check(&c->observation, warn_observation, c);
     if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);
