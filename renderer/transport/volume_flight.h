@@ -61,7 +61,7 @@ static inline float empty_mm(const struct volume_scene *v, const struct volume_r
     for (int a = 0; a < 3; a++) {
         int32_t brick = (int32_t)ray->at[a] >> VOLUME_BRICK_SHIFT;
         bool up = ray->mm_per[a] > 0; /* sound for 0 and -0, too */
-        float face = (float)((up ? brick + n_empty : brick - n_empty + 1) << VOLUME_BRICK_SHIFT);
+        float face = (float)((up ? brick + n_empty : brick - n_empty + 1) * VOLUME_BRICK_EDGE);
         face = up ? (face < most[a] ? face : most[a]) : (face > least[a] ? face : least[a]);
         float to = (face - ray->at[a]) * ray->mm_per[a];
         t = to < t ? to : t; /* false for 0 times infinity */

@@ -72,12 +72,12 @@ struct lane {
     float h[VOLUME_N_DERIVATIVE]; /* running score sums of the phase function, [c * n_param + p] */
 };
 
+/* The next event of the record; NULL: none is kept, or it is full. */
 static struct volume_event *note(struct lane *l, int kind)
 {
     struct volume_record *r = l->record;
-    size_t i = r->n_event++;
-    static _Thread_local struct volume_event unused;
-    struct volume_event *e = i < r->capacity ? &r->event[i] : &unused;
+    if (r == NULL || r->n_event++ >= r->capacity) return NULL;
+    struct volume_event *e = &r->event[r->n_event - 1];
     memset(e, 0, sizeof *e);
     e->kind = kind;
     return e;
@@ -85,16 +85,16 @@ static struct volume_event *note(struct lane *l, int kind)
 
 static void note_lookup(struct lane *l, int kind, const struct lookup *k)
 {
-    if (l->record == NULL) return;
     struct volume_event *e = note(l, kind);
+    if (e == NULL) return;
     e->density = k->density;
     e->sine = k->sine;
 }
 
 static void note_light(struct lane *l, int kind, const float *wi, const float weight[3])
 {
-    if (l->record == NULL) return;
     struct volume_event *e = note(l, kind);
+    if (e == NULL) return;
     memcpy(e->weight, weight, sizeof e->weight);
     if (wi == NULL) return;
     memcpy(e->wi, wi, sizeof e->wi);
