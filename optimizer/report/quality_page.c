@@ -76,15 +76,24 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     close_table(out);
 }
 
+/* A cell with a figure, or with a dash where there is none. */
+static void figure(FILE *out, double v)
+{
+    if (isfinite(v)) fprintf(out, "<td class=\"number\">%.2f</td>", v);
+    else fputs("<td class=\"number\">&ndash;</td>", out);
+}
+
 static void print_seam(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
     fputs("<h2>Tile and seams</h2>\n<table>\n<tr><th></th><th class=\"number\">across x</th><th class=\"number\">across y</th></tr>\n", out);
     fprintf(out, "<tr><td>edge of the tile, mm</td><td class=\"number\">%.4f</td><td class=\"number\">%.4f</td></tr>\n", c->fiber.tile_size_m[0] * 1e3,
             c->fiber.tile_size_m[1] * 1e3);
-    if (c->doc->has_volume)
-        fprintf(out, "<tr><td>density step at the seam over that of neighbouring slices (1: no seam)</td><td class=\"number\">%.2f</td><td class=\"number\">%.2f</td></tr>\n",
-                g->seam_density.ratio[0], g->seam_density.ratio[1]);
+    if (c->doc->has_volume) {
+        fputs("<tr><td>density step at the seam over that of neighbouring slices (1: no seam)</td>", out);
+        for (int a = 0; a < 2; a++) figure(out, g->seam_density.ratio[a]);
+        fputs("</tr>\n", out);
+    }
     const struct fiber_seam *s = &g->seam_fiber;
     fputs("<tr><td>fiber ends that continue in the next tile</td>", out);
     for (int a = 0; a < 2; a++)
@@ -93,16 +102,16 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
     fputs("</tr>\n", out);
     if (g->n_seam_joined > 0) {
         fputs("<tr><td>their mean offset before the ends were brought together, um</td>", out);
-        for (int a = 0; a < 2; a++)
-            if (isfinite(g->seam_found.offset_m[a])) fprintf(out, "<td class=\"number\">%.2f</td>", g->seam_found.offset_m[a] * 1e6);
-            else fputs("<td></td>", out);
+        for (int a = 0; a < 2; a++) figure(out, g->seam_found.offset_m[a] * 1e6);
+        fputs("</tr>\n", out);
+    }
+    if (c->option.crop) {
+        fprintf(out, "<tr><td>mismatch of the best box (0 is a repeat, 1 is chance; used up to %.1f)</td>", TILE_MOST_MISMATCH);
+        for (int a = 0; a < 2; a++) figure(out, g->tile.mismatch[a]);
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
     if (g->n_seam_joined > 0) fprintf(out, "<p>%zu pairs of ends were brought together across the seams.</p>\n", g->n_seam_joined);
-    if (c->option.crop)
-        fprintf(out, "<p>Best place to cut: mismatch %.2f across x, %.2f across y (0 is a repeat, 1 is chance; used up to %.1f).</p>\n", g->tile.mismatch[0],
-                g->tile.mismatch[1], TILE_MOST_MISMATCH);
 }
 
 static void print_chosen(const struct pipeline_context *c, FILE *out)
