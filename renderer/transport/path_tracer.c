@@ -52,7 +52,11 @@ static inline void unwrapped(const float local_mm[3], const double offset_mm[2],
 struct walk {
     const struct path_setting *s;
     struct rng *rng;
-    struct path_result *out;
+    const struct lamp *lamp;
+    size_t n_lamp;
+    struct path_result *out; /* of one lamp: what is added now goes there */
+    struct path_result *first_out;
+    size_t n_out;           /* a result for each lamp, one without lamps */
     struct path_step *step; /* being recorded, or NULL */
     const struct scattering_state *state; /* of the fiber that was hit */
     size_t i_set;                         /* its parameter set */
@@ -80,20 +84,28 @@ static void keep_nan(struct walk *w, const float value[3])
     if (isnan(value[0] + value[1] + value[2])) w->out->radiance[0] = NAN;
 }
 
+static void add_light_to_all(struct walk *w, const float value[3], const float *score)
+{
+    for (size_t i = 0; i < w->n_out; i++) {
+        w->out = w->first_out + i;
+        add_light(w, value, score);
+    }
+}
+
 /* Next-event estimation: one point on the lamp. */
-static void connect_lamp(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
-                         const struct fiber_frame *f, const float wo[3])
+static void connect_lamp(struct walk *w, const struct lamp *lamp, const struct scene_ray *ray,
+                         const struct scene_hit *hit, const struct fiber_frame *f, const float wo[3])
 {
     const struct path_setting *s = w->s;
     float position[3], u[2], direction[3], pdf_lamp, wi[3], s_rgb[3];
     unwrapped(hit->position_mm, ray->offset_mm, position);
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
-    if (!lamp_sample(&s->lamp, position, u, direction, &pdf_lamp)) return;
+    if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
     to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float light = s->lamp.radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
+    float light = lamp->radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
     for (int c = 0; c < 3; c++) {
         value[c] = w->throughput[c] * s_rgb[c] * light;
         most = value[c] > most ? value[c] : most;
@@ -152,7 +164,7 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
     struct scene_ray shadow;
     scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
-    add_light(w, value, w->score);
+    add_light_to_all(w, value, w->score);
     if (w->step != NULL) {
         memcpy(w->step->image_wi, wi, sizeof wi);
         memcpy(w->step->image, radiance, sizeof radiance);
@@ -168,24 +180,32 @@ static void add_image(const struct path_setting *s, const float direction[3], fl
     for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
 }
 
+static float lamp_beyond(const struct lamp *lamp, const struct scene_ray *ray, float pdf)
+{
+    float position[3];
+    unwrapped(ray->origin_mm, ray->offset_mm, position);
+    float pdf_lamp = lamp_pdf(lamp, position, ray->direction);
+    return pdf_lamp > 0 ? lamp->radiance * (pdf > 0 ? power_heuristic(pdf, pdf_lamp) : 1) : 0;
+}
+
 /* Radiance that a ray meets beyond the cloth. pdf: of the scattering sample that made it, 0 for a camera ray. */
 static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 {
     const struct path_setting *s = w->s;
     if (ray->direction[2] < 0 && scene_has_black_sheet(s->scene)) return;
-    float beyond[3] = {0, 0, 0}, value[3];
-    if (s->has_lamp) {
-        float position[3];
-        unwrapped(ray->origin_mm, ray->offset_mm, position);
-        float pdf_lamp = lamp_pdf(&s->lamp, position, ray->direction);
-        float share = pdf_lamp > 0 ? s->lamp.radiance * (pdf > 0 ? power_heuristic(pdf, pdf_lamp) : 1) : 0;
-        for (int c = 0; c < 3; c++) beyond[c] = share;
+    float around[3] = {0, 0, 0};
+    for (int c = 0; c < 3 && s->has_environment; c++) around[c] += s->environment[c];
+    if (s->image != NULL) add_image(s, ray->direction, pdf, around);
+    for (size_t i = 0; i < w->n_out; i++) {
+        float beyond[3], value[3], lamp = i < w->n_lamp ? lamp_beyond(&w->lamp[i], ray, pdf) : 0;
+        for (int c = 0; c < 3; c++) {
+            beyond[c] = lamp + around[c];
+            value[c] = w->throughput[c] * beyond[c];
+        }
+        w->out = w->first_out + i;
+        if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
+        if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
     }
-    for (int c = 0; c < 3 && s->has_environment; c++) beyond[c] += s->environment[c];
-    if (s->image != NULL) add_image(s, ray->direction, pdf, beyond);
-    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * beyond[c];
-    if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
-    if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
 }
 
 static inline void add_scores(struct walk *w)
@@ -244,50 +264,72 @@ static struct path_step *next_step(struct path_record *r)
 
 static void walk_start(struct walk *w, const struct path_setting *s, struct rng *rng, struct path_result *out)
 {
+    size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0;
     w->s = s;
     w->rng = rng;
-    w->out = out;
+    w->first_out = w->out = out;
+    w->n_out = w->n_lamp > 0 ? w->n_lamp : 1;
     w->step = NULL;
     w->state = s->state[0];
     w->i_set = 0;
-    for (int c = 0; c < 3; c++) {
-        w->throughput[c] = 1;
-        out->radiance[c] = 0;
+    for (int c = 0; c < 3; c++) w->throughput[c] = 1;
+    memset(w->h, 0, n_flat * sizeof *w->h);
+    for (size_t i = 0; i < w->n_out; i++) {
+        memset(out[i].radiance, 0, sizeof out[i].radiance);
+        memset(out[i].jac, 0, n_flat * sizeof *out[i].jac);
+        out[i].n_vertex = 0;
     }
-    out->n_vertex = 0;
+}
+
+static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *record)
+{
+    const struct path_setting *s = w->s;
+    float pdf = 0;
+    for (uint32_t i = 0; i < PATH_MAX_VERTEX; i++) {
+        struct scene_hit hit;
+        if (!scene_trace(s->scene, ray, &hit)) {
+            add_beyond(w, ray, pdf);
+            return;
+        }
+        w->first_out->n_vertex++;
+        w->step = next_step(record);
+        struct fiber_frame f;
+        fiber_frame_from(&f, hit.tangent);
+        float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
+        to_local(&f, back, wo);
+        if (s->n_set > 1) {
+            w->i_set = scene_group_of(s->scene, hit.i_segment);
+            w->state = s->state[w->i_set];
+        }
+        if (w->step != NULL) {
+            memcpy(w->step->wo, wo, sizeof wo);
+            w->step->i_group = scene_group_of(s->scene, hit.i_segment);
+        }
+        for (size_t k = 0; k < w->n_lamp; k++) {
+            w->out = w->first_out + k;
+            connect_lamp(w, &w->lamp[k], ray, &hit, &f, wo);
+        }
+        if (s->image != NULL) connect_image(w, ray, &hit, &f, wo);
+        if (!scatter(w, ray, &hit, &f, wo, &pdf)) return;
+    }
 }
 
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record)
 {
     struct walk w; /* large: only what is used is set */
-    size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0;
+    w.lamp = &s->lamp;
+    w.n_lamp = s->has_lamp;
     walk_start(&w, s, rng, out);
-    memset(w.h, 0, n_flat * sizeof *w.h);
-    memset(out->jac, 0, n_flat * sizeof *out->jac);
-    float pdf = 0;
-    for (uint32_t i = 0; i < PATH_MAX_VERTEX; i++) {
-        struct scene_hit hit;
-        if (!scene_trace(s->scene, ray, &hit)) {
-            add_beyond(&w, ray, pdf);
-            return;
-        }
-        out->n_vertex++;
-        w.step = next_step(record);
-        struct fiber_frame f;
-        fiber_frame_from(&f, hit.tangent);
-        float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
-        to_local(&f, back, wo);
-        if (s->n_set > 1) {
-            w.i_set = scene_group_of(s->scene, hit.i_segment);
-            w.state = s->state[w.i_set];
-        }
-        if (w.step != NULL) {
-            memcpy(w.step->wo, wo, sizeof wo);
-            w.step->i_group = scene_group_of(s->scene, hit.i_segment);
-        }
-        if (s->has_lamp) connect_lamp(&w, ray, &hit, &f, wo);
-        if (s->image != NULL) connect_image(&w, ray, &hit, &f, wo);
-        if (!scatter(&w, ray, &hit, &f, wo, &pdf)) return;
-    }
+    walk_on(&w, ray, record);
+}
+
+void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
+                      struct rng *rng, struct path_result *out)
+{
+    struct walk w;
+    w.lamp = lamp;
+    w.n_lamp = n_lamp;
+    walk_start(&w, s, rng, out);
+    walk_on(&w, ray, NULL);
 }

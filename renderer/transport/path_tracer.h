@@ -13,7 +13,7 @@
 #include "renderer/transport/lamp.h"
 #include "renderer/transport/parameter_sets.h"
 
-enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT };
+enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT, PATH_MAX_LAMP = 16 };
 
 struct path_setting {
     const struct scene *scene;
@@ -65,5 +65,10 @@ struct path_record {
 /* ray: as camera_ray made it; changed. record: NULL, or n_step set to 0 by the caller. */
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record);
+
+/* The same path under n_lamp lamps in turn, in place of the setting's: each result is that of path_trace with this lamp
+ * alone (environments count in all), and costs its lamp connections only. The results' errors go together. */
+void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
+                      struct rng *rng, struct path_result *out);
 
 #endif

@@ -4,6 +4,8 @@
  *   transport.<set>.s_to_5pct_derivative  the same for the derivative by C_TT (mean of the channels)
  *   transport.<set>.<parameter>.s_to_5pct_derivative   the same for each of C_R, beta_R, beta_TT, gamma_TT. The median
  *       over the 16 configurations: some derivatives pass through 0, where a relative error means nothing
+ *   transport.<set>.shared_camera_speedup   time of the 16 configurations over the time when those that differ in their
+ *       lamp only (two and two) share their paths
  *   transport.fleece.peak_bytes   largest resident memory of a process that makes the fibers (as many as the Fleece
  *       cloth has: 31,091 with 580,660 segments) into a scene and traces 16 x 256 paths with derivatives
  *   transport.published_iteration_s.gabardine   16 configurations x 2 replicas x 64 x 64 x 64 paths
@@ -205,6 +207,13 @@ int main(int argc, char **argv)
                      {"gamma_TT.s_to_5pct_derivative", 8, false}};
         for (size_t p = 0; p < sizeof other / sizeof other[0]; p++)
             print(fabric[k].name, other[p].name, s_to_derivative(e, other[p].first, other[p].colour, per_path), "s", "lower");
+        q.share_camera_paths = true;
+        t0 = processor_s();
+        if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
+            fprintf(stderr, "%s\n", err.text);
+            return 1;
+        }
+        print(fabric[k].name, "shared_camera_speedup", spent / (processor_s() - t0), "", "higher");
         print(fabric[k].name, "relative_sd_per_path", sd, "", "lower");
         print(fabric[k].name, "vertices_per_path", vertex, "", "lower");
         if (strcmp(fabric[k].name, "gabardine") == 0)

@@ -4,10 +4,12 @@
  *                                                           colours (material groups) under a lamp and a soft sky
  *   documentation_pictures derivatives FILE.png [samples]   docs/images/derivatives.png: after figure 5.5 of the fabric
  *       thesis. Two configurations (rows); the rendering, then the derivatives by C_R, C_TT, beta_R, beta_TT, gamma_TT
- *       (columns). Grey is 0, lighter positive, darker negative; a colour parameter's channels are its own.
+ *       (columns). Mean of the channels, a colour parameter's by its own component; white is 0, the ends of each scale
+ *       are what 97 % of the column's pixels stay below.
  */
 #include "geometry/phantom/phantom.h"
 #include "renderer/transport/render.h"
+#include "tests/support/tiny_text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -62,7 +64,24 @@ static status make_twill(struct thread_pool *pool, const struct scene *scene, si
     return st;
 }
 
-enum { PANEL = 116, GAP = 6, N_COLUMN = 6, N_ROW = 2, WIDTH = N_COLUMN * (PANEL + GAP) - GAP, HEIGHT = N_ROW * (PANEL + GAP) - GAP };
+enum {
+    PANEL = 128,
+    GAP = 8,
+    N_COLUMN = 6,
+    N_ROW = 2,
+    TITLE = 24, /* names above the panels, scales below */
+    SCALE_BAR = 8,
+    WIDTH = N_COLUMN * (PANEL + GAP) - GAP,
+    BELOW = TITLE + N_ROW * (PANEL + GAP),
+    HEIGHT = BELOW + SCALE_BAR + 24
+};
+
+static const struct {
+    const char *name, *unit;
+    size_t first_param;
+    bool colour;
+} column_of[N_COLUMN] = {{"rendering", "", 0, true}, {"C_R", "", 0, true},          {"C_TT", "", 3, true},
+                         {"beta_R", "/deg", 6, false}, {"beta_TT", "/deg", 7, false}, {"gamma_TT", "/deg", 8, false}};
 
 static int by_size(const void *a, const void *b)
 {
@@ -70,31 +89,69 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What a pixel shows in one column, channel c: radiance, or the derivative by the parameter (of that channel). */
-static double shown(const struct image *im, size_t pixel, size_t column, size_t c)
+/* What a pixel shows in a column of derivatives, by the units of files. */
+static double derivative(const struct image *im, size_t pixel, size_t column)
 {
-    static const size_t first_param[N_COLUMN] = {0, 0, 3, 6, 7, 8};
-    if (column == 0) return (double)im->pixel[pixel * im->n_channel + c];
-    size_t p = first_param[column] + (column <= 2 ? c : 0);
-    return (double)im->pixel[pixel * im->n_channel + 6 + 3 * p + c];
+    double sum = 0;
+    for (size_t c = 0; c < 3; c++) {
+        size_t p = column_of[column].first_param + (column_of[column].colour ? c : 0);
+        sum += (double)im->pixel[pixel * im->n_channel + 6 + 3 * p + c];
+    }
+    return sum / 3 * (column_of[column].colour ? 1 : DEG);
 }
 
-/* The size that 97 % of the values of a column stay below. */
+/* The size that 97 % of the values of a column stay below, rounded up to two digits. */
 static double scale_of(const struct image im[N_ROW], size_t column)
 {
-    static double size[N_ROW * PANEL * PANEL * 3];
+    static double size[N_ROW * PANEL * PANEL];
     size_t n = 0;
     for (size_t r = 0; r < N_ROW; r++)
-        for (size_t i = 0; i < PANEL * PANEL; i++)
-            for (size_t c = 0; c < 3; c++) size[n++] = fabs(shown(&im[r], i, column, c));
+        for (size_t i = 0; i < PANEL * PANEL; i++) size[n++] = fabs(derivative(&im[r], i, column));
     qsort(size, n, sizeof *size, by_size);
-    return size[n - n * 3 / 100];
+    double digit = pow(10, floor(log10(size[n - n * 3 / 100])) - 1);
+    return ceil(size[n - n * 3 / 100] / digit) * digit;
 }
 
-static uint8_t byte_of(double value, double scale, bool signed_value)
+/* Blue for -1, white for 0, red for 1. */
+static void paint(double value, uint8_t *rgb)
 {
-    double v = signed_value ? 0.5 + 0.5 * tanh(value / scale) : pow(fmin(1, 0.7 * value / scale), 1 / 2.2);
-    return (uint8_t)lround(255 * fmin(1, fmax(0, v)));
+    static const double end[2][3] = {{0.02, 0.19, 0.38}, {0.40, 0.0, 0.12}}, middle[2][3] = {{0.26, 0.58, 0.76}, {0.84, 0.38, 0.30}};
+    double v = fmin(1, fabs(value)), t = v < 0.5 ? 2 * v : 2 * v - 1;
+    for (int k = 0; k < 3; k++) {
+        double far = end[value > 0][k], half = middle[value > 0][k];
+        rgb[k] = (uint8_t)lround(255 * (v < 0.5 ? 1 + t * (half - 1) : half + t * (far - half)));
+    }
+}
+
+static void draw_scale(uint8_t *rgb, size_t x0, double scale, const char *unit)
+{
+    char text[3][32];
+    for (size_t y = BELOW; y < BELOW + SCALE_BAR; y++)
+        for (size_t x = 0; x < PANEL; x++) paint(2.0 * (double)x / (PANEL - 1) - 1, rgb + 3 * (y * WIDTH + x0 + x));
+    snprintf(text[0], sizeof text[0], "-%.2g", scale);
+    snprintf(text[1], sizeof text[1], "0");
+    snprintf(text[2], sizeof text[2], "%.2g", scale);
+    for (size_t k = 0; k < 3; k++)
+        tiny_text_draw(rgb, WIDTH, HEIGHT, x0 + k * (PANEL - tiny_text_width(text[k], 1)) / 2, BELOW + SCALE_BAR + 4, 1,
+                       text[k]);
+    tiny_text_draw(rgb, WIDTH, HEIGHT, x0 + (PANEL - tiny_text_width(unit, 1)) / 2, BELOW + SCALE_BAR + 15, 1, unit);
+}
+
+static void draw_column(uint8_t *rgb, const struct image im[N_ROW], size_t column)
+{
+    size_t x0 = column * (PANEL + GAP);
+    const char *name = column_of[column].name;
+    double scale = column > 0 ? scale_of(im, column) : 1;
+    tiny_text_draw(rgb, WIDTH, HEIGHT, x0 + (PANEL - tiny_text_width(name, 2)) / 2, 4, 2, name);
+    for (size_t r = 0; r < N_ROW; r++)
+        for (size_t i = 0; i < PANEL * PANEL; i++) {
+            uint8_t *out = rgb + 3 * ((TITLE + r * (PANEL + GAP) + i / PANEL) * WIDTH + x0 + i % PANEL);
+            const float *radiance = im[r].pixel + i * im[r].n_channel;
+            for (size_t k = 0; k < 3 && column == 0; k++)
+                out[k] = (uint8_t)lround(255 * pow(fmin(1, 1.8 * fmax(0, (double)radiance[k])), 1 / 2.2));
+            if (column > 0) paint(derivative(&im[r], i, column) / scale, out);
+        }
+    if (column > 0) draw_scale(rgb, x0, scale, column_of[column].unit);
 }
 
 static status make_derivatives(struct thread_pool *pool, const struct scene *scene, size_t n_sample, size_t width,
@@ -118,15 +175,7 @@ static status make_derivatives(struct thread_pool *pool, const struct scene *sce
                                          .seed = 8, .stream = (uint32_t)r, .want_derivative = true};
         st = render_run(&q, pool, NULL, &im[r], err);
     }
-    for (size_t column = 0; column < N_COLUMN && st == STATUS_OK; column++) {
-        double scale = scale_of(im, column);
-        for (size_t r = 0; r < N_ROW; r++)
-            for (size_t i = 0; i < PANEL * PANEL; i++)
-                for (size_t k = 0; k < 3; k++) {
-                    size_t y = r * (PANEL + GAP) + i / PANEL, x = column * (PANEL + GAP) + i % PANEL;
-                    rgb[3 * (y * WIDTH + x) + k] = byte_of(shown(&im[r], i, column, k), scale, column > 0);
-                }
-    }
+    for (size_t column = 0; column < N_COLUMN && st == STATUS_OK; column++) draw_column(rgb, im, column);
     if (st == STATUS_OK) st = image_write_png_rgb8(rgb, WIDTH, HEIGHT, path, err);
     for (size_t r = 0; r < N_ROW; r++) image_release(&im[r]);
     return st;
@@ -139,7 +188,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "documentation_pictures twill|derivatives FILE.png [samples]\n");
         return 2;
     }
-    size_t n_sample = argc > 3 ? strtoul(argv[3], NULL, 10) : twill ? 256 : 512;
+    size_t n_sample = argc > 3 ? strtoul(argv[3], NULL, 10) : 256;
     size_t width = argc > 4 ? strtoul(argv[4], NULL, 10) : 600;
     struct thread_pool *pool = NULL;
     struct scene *scene = NULL;

@@ -131,6 +131,49 @@ static void agrees_without_avx512(void **state)
     fiber_set_release(&f);
 }
 
+/* Shared paths: the same means and derivatives as separate ones within their errors, the same bits for any threads. */
+static void shared_paths_agree_with_separate_ones(void **state)
+{
+    (void)state;
+    enum { N = 5, N_PARAM = 9 };
+    const size_t n_path[N] = {16384, 8192, 0, 4096, 16384};
+    struct configuration c[N];
+    struct estimate separate[N], shared[N], again[N];
+    struct estimate_request q = request(n_path, N);
+    for (int i = 0; i < N; i++) {
+        c[i] = configuration[i == 3 ? 4 : 0]; /* one of them with the cloth turned: alone in its group */
+        c[i].light_theta_rad = 0.2 + 0.25 * i;
+        c[i].light_phi_rad = 2.0 + 0.7 * i;
+    }
+    c[4].environment_rgb[1] = 0.1; /* differs in more than its lamp: alone, too */
+    q.configuration = c;
+    run(&q, 2, separate);
+    q.share_camera_paths = true;
+    run(&q, 2, shared);
+    run(&q, 1, again);
+    assert_memory_equal(shared, again, sizeof shared);
+    assert_int_equal(shared[2].n_path, 0);
+    assert_int_equal(shared[1].n_path, 16384); /* as many as configuration 0 asks for */
+    for (int i = 0; i < N; i++)
+        for (int k = 0; k < 3 && i != 2; k++) {
+            double se = sqrt(separate[i].var[k] + shared[i].var[k]);
+            if (!(fabs(separate[i].mean[k] - shared[i].mean[k]) < 4 * se && shared[i].mean[k] > 0))
+                fail_msg("configuration %d, channel %d: %g and %g, +- %g", i, k, separate[i].mean[k], shared[i].mean[k], se);
+            for (int p = 0; p < N_PARAM; p++) {
+                double jac_se = sqrt(separate[i].jac_var[k * N_PARAM + p] + shared[i].jac_var[k * N_PARAM + p]);
+                if (fabs(separate[i].jac[k * N_PARAM + p] - shared[i].jac[k * N_PARAM + p]) > 4.5 * jac_se)
+                    fail_msg("configuration %d, derivative %d of channel %d: %g and %g, +- %g", i, p, k, separate[i].jac[k * N_PARAM + p], shared[i].jac[k * N_PARAM + p], jac_se);
+            }
+        }
+    /* a group of one has the paths of its own estimate when it is first: same key, same numbers */
+    q.n_configuration = 1;
+    run(&q, 1, again);
+    q.share_camera_paths = false;
+    run(&q, 1, separate);
+    assert_memory_equal(&again[0].mean, &separate[0].mean, sizeof again[0].mean);
+    assert_memory_equal(&again[0].jac, &separate[0].jac, sizeof again[0].jac);
+}
+
 struct canceller {
     atomic_bool flag;
     double at_s;
@@ -263,6 +306,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(same_bits_for_any_threads),
         cmocka_unit_test(variances_are_honest),
+        cmocka_unit_test(shared_paths_agree_with_separate_ones),
         cmocka_unit_test(agrees_without_avx512),
         cmocka_unit_test(cancels_within_100_ms),
         cmocka_unit_test(bad_requests),
