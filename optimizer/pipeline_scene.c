@@ -20,7 +20,9 @@ static bool wants_volume_scene(const struct pipeline_context *c)
 static status voxelise(struct pipeline_context *c, struct error *err)
 {
     const struct voxelise_option option = {.voxel_size_m = c->doc->voxel_um * um,
-                                           .limit_bytes = c->memory_limit_bytes / VOXELISE_MEMORY_SHARE};
+                                           .limit_bytes = c->memory_limit_bytes > 0
+                                                              ? c->memory_limit_bytes / VOXELISE_MEMORY_SHARE
+                                                              : SIZE_MAX};
     double radius_m = 0.0, voxel_m;
     char warning[300];
     status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
