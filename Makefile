@@ -149,7 +149,7 @@ asan:              ## unit and physics tests under the address and undefined-beh
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build build/asan
 
-asan-physics:      ## the renderer's physics tests under the same sanitizers (about half an hour)
+asan-physics:      ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \
 		$(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER))
 	@for t in $(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER)); do \

@@ -4,6 +4,8 @@
  *   transport.<set>.s_to_5pct_derivative  the same for the derivative by C_TT (mean of the channels)
  *   transport.<set>.<parameter>.s_to_5pct_derivative   the same for each of C_R, beta_R, beta_TT, gamma_TT. The median
  *       over the 16 configurations: some derivatives pass through 0, where a relative error means nothing
+ *   transport.<set>.<width>.s_to_1pct_of_mean   seconds a configuration on one core until the standard error of
+ *       d R / d ln(width) is 1 % of R, mean over the configurations: says something where the derivative is nearly 0, too
  *   transport.<set>.shared_camera_speedup   time of the 16 configurations over the time when those that differ in their
  *       lamp only (two and two) share their paths
  *   transport.fleece.peak_bytes   largest resident memory of a process that makes the fibers (as many as the Fleece
@@ -70,6 +72,21 @@ static double s_to_derivative(const struct estimate e[16], size_t first, bool co
     }
     qsort(s, 16, sizeof *s, by_size);
     return 0.5 * (s[7] + s[8]);
+}
+
+/* Seconds on one core until the standard error of d R / d ln p is 1 % of R, mean over the configurations. */
+static double s_to_log_derivative(const struct estimate e[16], size_t p, double at, double per_path)
+{
+    double s = 0;
+    for (int i = 0; i < 16; i++) {
+        double mean = 0, se = 0;
+        for (size_t ch = 0; ch < 3; ch++) {
+            mean += e[i].mean[ch];
+            se += sqrt(e[i].jac_var[ch * 9 + p]) * at;
+        }
+        s += se * se / (mean * mean) * (double)e[i].n_path / 1e-4 * per_path / 16;
+    }
+    return s;
 }
 
 /* 31,091 fibers of 18 or 19 segments, 580,660 in all, lying in the plane in every direction. */
@@ -207,6 +224,10 @@ int main(int argc, char **argv)
                      {"gamma_TT.s_to_5pct_derivative", 8, false}};
         for (size_t p = 0; p < sizeof other / sizeof other[0]; p++)
             print(fabric[k].name, other[p].name, s_to_derivative(e, other[p].first, other[p].colour, per_path), "s", "lower");
+        static const char *const width[3] = {"beta_R.s_to_1pct_of_mean", "beta_TT.s_to_1pct_of_mean",
+                                             "gamma_TT.s_to_1pct_of_mean"};
+        for (size_t p = 0; p < 3; p++)
+            print(fabric[k].name, width[p], s_to_log_derivative(e, 6 + p, param[6 + p], per_path), "s", "lower");
         q.share_camera_paths = true;
         t0 = processor_s();
         if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
