@@ -116,6 +116,15 @@ static char *record_text(const struct fit_step *step, const struct worker_series
                              number(step->damping), "noise", number(step->noise), "note",
                              step->note != NULL ? step->note : "");
     if (json != NULL && step->step == 0) json_object_set_new(json, "parameters", parameters_json(model));
+    if (json != NULL) {
+        json_t *paths = json_array(); /* of both replicas, a row */
+        for (size_t i = 0; i < step->n_configuration; i++)
+            json_array_append_new(paths, json_integer((json_int_t)(step->replica[0][i].n_path + step->replica[1][i].n_path)));
+        json_object_set_new(json, "n_path_row", paths);
+        json_object_set_new(json, "step_length", number(step->step_length));
+        json_object_set_new(json, "step_limit", number(step->step_limit));
+        json_object_set_new(json, "gain", number(step->gain));
+    }
     if (json != NULL && step->nuisance != NULL) {
         json_t *nuisance = json_object();
         for (size_t i = 0; i < step->nuisance->n; i++)

@@ -37,6 +37,8 @@ struct fit_step {
     const double *param;    /* where the objective was estimated */
     const double *param_se; /* NULL when unknown */
     const struct estimate *replica[2];
+    double step_length, step_limit, gain; /* of the step that led here, as damping is: the largest move and the limit
+                                             it had, in step limits (coordinate.h); the fall of f that it promised */
     double damping,
         noise; /* mean damping added to the diagonal; Monte-Carlo variance per residual of the pooled model */
     const char *note;

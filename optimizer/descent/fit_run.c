@@ -189,13 +189,13 @@ static double difference(const struct fit_start *a, const struct fit_start *b, d
     return b->objective + b->prior_penalty - a->objective - a->prior_penalty;
 }
 
-/* Marks starts that the objective cannot tell from the kept one, although a determined parameter ended more than four
+/* Marks converged starts that the objective cannot tell from the kept one, although a determined parameter ended more than four
  * standard errors away. */
 static void mark_elsewhere(struct fit_result *r, size_t kept)
 {
     for (size_t k = 0; k < r->n_start; k++) {
         double se, change = difference(&r->start[kept], &r->start[k], &se);
-        if (k == kept || change > 2.0 * se) continue;
+        if (k == kept || change > 2.0 * se || !r->start[k].converged || !r->converged) continue;
         for (size_t p = 0; p < r->uncertainty.n_param; p++)
             if (r->uncertainty.determined[p] &&
                 fabs(r->start[k].param[p] - r->start[kept].param[p]) > 4.0 * r->uncertainty.se_param[p])

@@ -136,6 +136,9 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
     struct uncertainty u;
     struct fit_step step = {
         .phase = "gauss_newton", .param = param, .damping = g->damping, .noise = g->noise, .note = note};
+    step.step_length = g->largest_step;
+    step.step_limit = g->limit_scale;
+    step.gain = g->promised;
     param_of(g, g->x, param);
     uncertainty_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed, &u);
     step.param_se = u.se_param;
