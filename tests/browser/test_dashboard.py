@@ -55,7 +55,7 @@ def real(tmp_path_factory):
                     "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
     photographs = json.loads((sample / "photographs.json").read_text())
     document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
-                "photographs": photographs[:9] + photographs[16:20], "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4}}
+                "photographs": photographs[:9] + photographs[16:20], "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4, "candidates": [{"light_theta_deg": t, "light_phi_deg": 0, "camera_theta_deg": 60, "camera_phi_deg": 180} for t in (20, 65)]}}
     (sample / "job.json").write_text(json.dumps(document))
     process, url = start_daemon(folder / "data")
     yield url, selvedge.Server(url).submit(str(sample / "job.json"))
@@ -155,6 +155,8 @@ def test_real_job_live_and_finished(real, browser):
     wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert len(browser.find_elements(By.CSS_SELECTOR, ".pair img")) == 26
     assert len(browser.find_elements(By.CSS_SELECTOR, ".slices img")) == 3
+    assert "passed" in browser.find_element(By.ID, "certificate").text
+    assert len(browser.find_elements(By.CSS_SELECTOR, "#next-photograph tbody tr")) == 2
     listed = browser.find_element(By.ID, "files").text
     assert "result.json" in listed and "fibers.hair" in listed and "density.vol" in listed
     assert "stage" in browser.find_element(By.CSS_SELECTOR, "pre.log").text
