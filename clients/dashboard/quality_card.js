@@ -1,12 +1,14 @@
 // What the job's geometry is worth: the key figures, the length distribution, and the way to the whole report.
-import { el, isNumber, percent } from "./page_parts.js";
+import { el, isNumber, percent, withError } from "./page_parts.js";
 
 const number = (x, digits = 3) => (isNumber(x) ? String(Number(x.toPrecision(digits))) : "–");
 const pair = (v, show) => (v ? v.map((x) => (isNumber(x) ? show(x) : "–")).join(" / ") : "–");
 
+const radius = (g) => (g.radius_per_axis ? g.radius_um.map((r, i) => withError(r, g.radius_se_um?.[i])).join(" / ") : withError(g.mean_radius_um, g.radius_se_um?.[0])) + " µm";
+
 // [[name, value, what it means]] from result.json's geometry
 export function qualityRows(g) {
-  const rows = [["fibers", `${g.n_fiber}, ${number(g.total_length_mm)} mm`, ""], ["mean radius", `${number(g.mean_radius_um, 4)} µm`, ""]];
+  const rows = [["fibers", `${g.n_fiber}, ${number(g.total_length_mm)} mm`, ""], ["radius", radius(g), g.radius_per_axis ? "weft / warp / pile" : ""]];
   if (g.input === "volume") rows.push(
     ["material explained (Dice)", number(g.dice), "overlap of fibers and material, 1 is all"],
     ["gaps bridged, pieces joined", `${g.n_gap_bridged}, ${g.n_joined}`, ""],

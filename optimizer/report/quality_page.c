@@ -51,6 +51,8 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
+    if (c->doc->has_volume)
+        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", g->radius_per_axis ? "one for each class" : "one for all fibers");
     fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n", l->median_m * 1e3, l->mean_m * 1e3,
             l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
     fputs("<figure><img class=\"plot\" src=\"pictures/fiber-lengths.svg\" alt=\"length distribution of the fibers\"><figcaption>Summed length over the length "
