@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_TRIM = 6, TRIM_STEP = 2 };
+enum { MAX_TRIM = 6, TRIM_STEP = 3 };
 /* Limits of a join. Lines keep within a tenth of a diameter of smooth curves; fibers bend with radii of more than a diameter or so. */
 static const float FACE_STEPS = 1.5f; /* voxels along the fiber to a face */
 static const double MAX_RMS = 0.13, MAX_BEND = 1.2, MAX_GAP = 1.5; /* diameters, per diameter, diameters */
@@ -86,10 +86,37 @@ static bool is_way_free(const struct join_job *job, const struct join_curve *j, 
     return sum >= job->eps_d * (n + 1);
 }
 
+/* Outward tangent of an end. */
+static void end_tangent(const struct polyline_set *p, uint32_t end, float t[3])
+{
+    size_t length = polyline_length(p, end / 2);
+    const float *x = line_end_vertex(p, end, 0), *before = line_end_vertex(p, end, length < 7 ? length - 1 : 6);
+    float norm = 0.0f;
+    for (int a = 0; a < 3; a++) norm += (x[a] - before[a]) * (x[a] - before[a]);
+    for (int a = 0; a < 3; a++) t[a] = norm > 0.0f ? (x[a] - before[a]) / sqrtf(norm) : 0.0f;
+}
+
+/* Spares most pairs the fits: ends that do not face each other, even when they are trimmed and the fiber bends a good deal. */
+static bool may_face(const struct join_job *job, uint32_t a, uint32_t b)
+{
+    const float *x = line_end_vertex(job->lines, a, 0), *y = line_end_vertex(job->lines, b, 0);
+    float ta[3], tb[3], cosine = 0.0f, ahead = 0.0f, length2 = 0.0f;
+    end_tangent(job->lines, a, ta);
+    end_tangent(job->lines, b, tb);
+    for (int c = 0; c < 3; c++) {
+        cosine -= ta[c] * tb[c];
+        ahead += 0.5f * (y[c] - x[c]) * (ta[c] - tb[c]);
+        length2 += (y[c] - x[c]) * (y[c] - x[c]);
+    }
+    float side2 = fmaxf(0.0f, length2 - ahead * ahead), free_way = fmaxf(0.0f, ahead) + (float)MAX_TRIM, wide = 0.4f * (float)job->diameter;
+    return cosine > -0.2f && ahead > -(float)MAX_TRIM && side2 < (wide + 0.4f * free_way) * (wide + 0.4f * free_way);
+}
+
 /* Best of the ways to join two ends; cost INFINITY if they do not belong together. */
 static struct join best_join(const struct join_job *job, uint32_t a, uint32_t b)
 {
     struct join best = {.cost = INFINITY, .a = a, .b = b};
+    if (!may_face(job, a, b)) return best;
     size_t longest[2] = {polyline_length(job->lines, a / 2) / 4, polyline_length(job->lines, b / 2) / 4};
     uint8_t trim[2];
     for (trim[0] = 0; trim[0] <= MAX_TRIM && trim[0] <= longest[0]; trim[0] = (uint8_t)(trim[0] + TRIM_STEP))

@@ -35,8 +35,10 @@ static void test_twill(void **state)
     assert_true(c.center_recall >= 0.95);
     assert_true(c.length_recovered >= 0.95);
     assert_true(fabs(c.length_found_m / c.length_true_m - 1.0) < 0.03);
-    assert_true(c.centerline_rms_voxel <= 0.5);
-    assert_true(c.direction_mean_deg <= 4.0);
+    assert_true(c.centerline_rms_voxel <= 0.35);
+    assert_true(c.fragments_per_fiber <= 1.3);
+    assert_true(c.direction_mean_deg <= 3.0);
+    assert_true(c.direction_p95_deg <= 8.0);
     assert_true(fabs(c.radius_bias_percent) <= 3.0);
 }
 
@@ -49,7 +51,10 @@ static void test_knit(void **state)
     assert_true(c.center_recall >= 0.95);
     assert_true(c.length_recovered >= 0.95);
     assert_true(c.centerline_rms_voxel <= 0.35);
+    assert_true(c.fragments_per_fiber <= 1.3);
+    assert_true(c.merges_per_fiber <= 0.02);
     assert_true(c.direction_mean_deg <= 3.0);
+    assert_true(c.direction_p95_deg <= 8.0);
     assert_true(fabs(c.radius_bias_percent) <= 3.0);
 }
 
