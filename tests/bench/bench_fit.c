@@ -1,7 +1,7 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
  *             [--sgd-budget N] [--curve-paths N] [--journal FILE]
- * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "real"; nothing: all. "published": the published method
+ * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real"; nothing: all. "published": the published method
  * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 400,000 a held-out mean of the truth, 2 x 50,000
  * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ is.
@@ -13,6 +13,8 @@
  *   fit.seeds.worst_over_median          10 fits of gabardine with other seeds: held-out error
  *   fit.curve.<method>                   held-out error of gabardine against paths and seconds, one line a point; the
  *                                        published method with --sgd-budget paths (20 million) in all
+ *   fit.analytic.<method>                error of the fitted means against the exact ones, Gabardine's parameters on the
+ *                                        analytic cloth of the tests, both methods with their own budgets, 10 seeds
  *   fit.published.{wall_s,paths,heldout_rel_rms}   gabardine by the published method
  *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave, felts on felt
  */
@@ -21,6 +23,7 @@
 #include "optimizer/descent/estimate_journal.h"
 #include "optimizer/descent/method_names.h"
 #include "optimizer/photographs/measurement_table.h"
+#include "tests/support/fake_estimator.h"
 #include "tests/support/fit_fabrics.h"
 #include "tests/support/fit_phantom.h"
 
@@ -267,6 +270,50 @@ static void bench_published(const struct bench *b)
     fit_phantom_release(&f);
 }
 
+/* ---- both methods with their own budgets, on the cloth without a cloth (fake_estimator.h): seconds ---- */
+
+static void fit_analytic(const char *method, uint64_t seed, struct curve *c)
+{
+    struct fake_cloth f;
+    struct observation_set o;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct fit_result r;
+    struct error err = {0};
+    double truth[FAKE_N_PARAM];
+    fake_cloth_init(&f, seed, FAKE_N_FIT);
+    struct estimator e = fake_estimator(&f);
+    fake_param_set(fit_fabric_find("gabardine")->truth, truth);
+    observation_set_init(&o);
+    fit_check(fake_observe(&f, truth, 0.005, seed, &o), &err);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
+    const struct fit_problem problem = {.n_param = FAKE_N_PARAM,
+                                        .info = fake_param,
+                                        .param = parameter,
+                                        .observation = &o,
+                                        .estimator = &e,
+                                        .report = on_step,
+                                        .report_context = c};
+    c->n = 0;
+    fit_check(descent_find(method)->run(&problem, &r, &err), &err);
+    for (size_t i = 0; i <= c->n; i++) /* the result last: the published method returns the best of its runs */
+        printf("{\"name\":\"fit.analytic.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"seed\":%d}\n",
+               method, fake_rel_rms(&f, 0, FAKE_N_FIT, i < c->n ? c->param[i] : r.param, truth),
+               i < c->n ? c->paths[i] : (double)r.n_path, (int)seed);
+    observation_set_release(&o);
+}
+
+static void bench_analytic(void)
+{
+    struct curve *c = calloc(1, sizeof *c);
+    if (c == NULL) exit(1);
+    for (uint64_t seed = 1; seed <= N_SEED; seed++) {
+        fit_analytic(METHOD_GAUSS_NEWTON, seed, c);
+        fit_analytic(METHOD_PUBLISHED_SGD, seed, c);
+    }
+    free(c);
+}
+
 /* ---- measured tables ---- */
 
 enum { N_REAL_MODEL = 4, MAX_REAL = 32 };
@@ -360,6 +407,8 @@ static void run_one(const struct bench *b, const char *what)
         bench_seeds(b);
     else if (strcmp(what, "curve") == 0)
         bench_curve(b);
+    else if (strcmp(what, "analytic") == 0)
+        bench_analytic();
     else if (strcmp(what, "published") == 0)
         bench_published(b);
     else if (strcmp(what, "real") == 0)
@@ -399,7 +448,7 @@ static bool take_option(struct bench *b, const char *name, const char *value)
 
 int main(int argc, char **argv)
 {
-    static const char *const more[] = {"coverage", "seeds", "curve", "real"};
+    static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "real"};
     struct bench b = {
         .folder = "build/bench-fit", .photograph_paths = 1000000, .kept_paths = 400000, .score_paths = 50000,
                       .curve_paths = 10000,
