@@ -18,7 +18,7 @@
 enum {
     MIN_PIECE = 4, /* centers in a chain before joining */
     N_MEND = 2,    /* rounds of growing and cutting */
-    N_FIT = 5,     /* rounds of fitting axes to the scan */
+    N_FIT = 4,     /* rounds of fitting axes to the scan */
     MAX_GROWTH = 64 /* voxels that an end may grow */
 };
 
@@ -183,15 +183,14 @@ static status keep_inside(const struct fiber_job *job, const struct polyline_set
 }
 
 /* Lines are moved to where they explain the scan best. */
-static status fit_axes(struct fiber_job *job, struct polyline_set *lines, struct error *err)
+static status fit_axes(struct fiber_job *job, struct polyline_set *lines, int n_round, struct error *err)
 {
     struct axis_profile profile = {0.5 * job->diameter, 0.8, 0.0, 1.0};
     struct polyline_set even, inside;
     polyline_set_init(&even);
     polyline_set_init(&inside);
-    status s = relax(job, lines, 2, err);
-    if (s == STATUS_OK) s = polylines_resample(lines, &even, err);
-    if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, N_FIT, &profile, job->pool, &job->inner, err);
+    status s = polylines_resample(lines, &even, err);
+    if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, n_round, &profile, job->pool, &job->inner, err);
     if (s == STATUS_OK) s = keep_inside(job, &even, &inside, err);
     if (s == STATUS_OK) {
         polyline_set_release(lines);
@@ -231,7 +230,11 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         classify(&part[0]); /* from subvolumes to axes */
         s = smooth_and_drop(job, &part[0], lines, err);
     }
-    if (s == STATUS_OK) s = fit_axes(job, lines, err);
+    if (s == STATUS_OK) s = relax(job, lines, 2, err);
+    if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
+    if (s == STATUS_OK) s = mend(job, lines, true, &part[1], &counts, err); /* lines on their axes are easier to tell apart and to join */
+    if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
+    if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
     if (s == STATUS_OK) {
         job->report->n_gap_bridged = counts.n_gap_bridged;
         job->report->n_joined = counts.n_joined;
