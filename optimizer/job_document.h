@@ -30,6 +30,8 @@
  *           "fit_radius": true | {"lower_um": v, "upper_um": v},         one mean radius of all fibers; default: half to
  *                                                                        twice the one that the cloth has
  *           "candidates": [{"light_theta_deg":, ...}] | {"grid": true}, which photograph to take next
+ *           "texture": {"block_mm": 0.5, "weight": 1},                  contrast of photographs (model.md); weight 0: only
+ *                                                                        reported
  *           "tied", "bounds", "priors", "starts", "nuisance":           see job_fit_option.h
  *           "render_px": 96, "render_samples": 16}
  * }
@@ -122,6 +124,7 @@ struct job_document {
     bool fit_density;
     bool fit_radius;
     double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
+    double texture_block_mm, texture_weight; /* block 0: not asked for */
     size_t n_candidate; /* for the next photograph; 0: not asked for */
     struct job_candidate *candidate;
     size_t render_px, render_sample;
@@ -136,6 +139,9 @@ struct param_info;
  * with the field at fault when they contradict each other. */
 status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
                        struct job_fit_parameter *out, struct error *err);
+
+/* Blocks a side of the crop whose means are compared; texture_block_mm > 0. */
+size_t job_texture_cells(const struct job_document *doc);
 
 /* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
 void job_document_visit_files(const struct job_document *doc,

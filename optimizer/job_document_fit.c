@@ -253,7 +253,7 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
                                       "fit_density", "render_px",    "render_samples",
                                       "tied",      "bounds",         "priors",
                                       "starts",    "nuisance",       "fit_radius",
-                                      "candidates", NULL};
+                                      "candidates",  "texture",        NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_models(f, doc, err);
     if (s == STATUS_OK) s = parse_method(f, doc, err);
@@ -263,5 +263,6 @@ status job_parse_fit(const struct json_field *f, struct job_document *doc, struc
     if (s == STATUS_OK) s = json_field_size(f, "render_px", 8, 2048, &doc->render_px, err);
     if (s == STATUS_OK) s = json_field_size(f, "render_samples", 1, 65536, &doc->render_sample, err);
     if (s == STATUS_OK) s = job_parse_candidates(f, doc, err);
-    return s == STATUS_OK ? parse_parameters(f, doc, err) : s;
+    if (s == STATUS_OK) s = parse_parameters(f, doc, err);
+    return s == STATUS_OK ? job_parse_texture(f, doc, err) : s;
 }

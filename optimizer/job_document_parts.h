@@ -18,6 +18,8 @@ void job_fit_option_init(struct job_fit_option *o);
  * of the section is read before. model: those of the document, in its order. */
 status job_parse_fit_options(const struct json_field *f, const struct appearance *model, struct job_document *doc,
                              struct error *err);
+/* "texture" of the section "fit"; the set-up, the observations and the rest of the section are read before. */
+status job_parse_texture(const struct json_field *fit, struct job_document *doc, struct error *err);
 /* "candidates" of the section "fit". */
 status job_parse_candidates(const struct json_field *fit, struct job_document *doc, struct error *err);
 /* The angle of a lamp, which may be behind a cloth without its black sheet. */

@@ -37,6 +37,8 @@ void pipeline_context_init(struct pipeline_context *c)
     memset(c, 0, sizeof *c);
     observation_set_init(&c->observation);
     observation_set_init(&c->fitted);
+    observation_set_init(&c->row);
+    observation_set_init(&c->contrast);
     fiber_set_init(&c->fiber);
     for (size_t i = 0; i < sizeof c->stage_wall_s / sizeof c->stage_wall_s[0]; i++) c->stage_wall_s[i] = NAN;
 }
@@ -46,6 +48,8 @@ void pipeline_context_release(struct pipeline_context *c)
     job_document_free(c->doc);
     observation_set_release(&c->observation);
     observation_set_release(&c->fitted);
+    observation_set_release(&c->row);
+    observation_set_release(&c->contrast);
     volume_release(&c->volume);
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);
@@ -54,7 +58,10 @@ void pipeline_context_release(struct pipeline_context *c)
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
     for (size_t i = 0; i < c->n_model; i++)
         {
-        for (int q = 0; q < 2; q++) free(c->model[i].validation.replica[q]);
+        for (int q = 0; q < 2; q++) {
+            free(c->model[i].validation.replica[q]);
+            free(c->model[i].validation.contrast[q]);
+        }
         free(c->model[i].candidate);
     }
     free(c->model);
@@ -193,6 +200,19 @@ static status claim_inputs(struct pipeline_context *c, struct error *err)
     return s;
 }
 
+/* What the fit sees, and the contrasts. */
+static status select_rows(struct pipeline_context *c, struct error *err)
+{
+    const struct job_document *doc = c->doc;
+    status s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
+    if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->row, err);
+    if (s != STATUS_OK || !(doc->texture_block_mm > 0.0)) return s;
+    s = observation_set_append_contrasts(&c->observation, doc->texture_weight, &c->contrast, err);
+    return s == STATUS_OK && doc->texture_weight > 0.0
+               ? observation_set_append_contrasts(&c->fitted, doc->texture_weight, &c->row, err)
+               : s;
+}
+
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -208,7 +228,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
     if (s == STATUS_OK) observation_set_check(&c->observation, warn_observation, c);
-    if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
+    if (s == STATUS_OK) s = select_rows(c, err);
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);
     return s;

@@ -27,6 +27,7 @@
 /* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */
 struct validation {
     struct estimate *replica[2];
+    struct estimate *contrast[2]; /* of pipeline_context.contrast, as many as observations; unused without one */
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
     double
         worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
@@ -72,6 +73,8 @@ struct pipeline_context {
     uint64_t fingerprint;               /* of the job document's text */
     struct observation_set observation; /* all */
     struct observation_set fitted;      /* those of the set "fit" */
+    struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */
+    struct observation_set contrast;    /* of all observations, in their order; empty when not asked for */
     size_t n_model;
     struct pipeline_model *model; /* in the order of the document */
     struct pipeline_radius radius; /* when the job has the radius fitted */

@@ -44,7 +44,7 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
     struct fit_problem problem = {.n_param = m->appearance.n_param,
                                   .info = m->appearance.param,
                                   .param = m->parameter,
-                                  .observation = &c->fitted,
+                                  .observation = &c->row,
                                   .estimator = estimator,
                                   .path_budget = c->doc->path_budget,
                                   .max_iteration = c->doc->max_iteration,
@@ -111,7 +111,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
         worker_status_message(c->status, message);
         log_info(c->log, "%s", message);
     }
-    status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", listener->i_model, &c->fitted, err);
+    status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", listener->i_model, &c->row, err);
     if (s != STATUS_OK) goto out;
     listener->journal = trace.journal;
     estimator = estimate_journal_estimator(trace.journal);

@@ -1,5 +1,6 @@
 /* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
  * rows apart. */
+#include "optimizer/pipeline_contrast.h"
 #include "optimizer/pipeline_trace.h"
 #include "optimizer/work_file.h"
 
@@ -79,8 +80,9 @@ static void score_validation(const struct pipeline_context *c, struct pipeline_m
 
 static status allocate_validations(struct pipeline_context *c, struct error *err)
 {
-    for (size_t i = 0; i < 2 * c->n_model; i++) {
-        struct estimate **replica = &c->model[i / 2].validation.replica[i % 2];
+    for (size_t i = 0; i < 4 * c->n_model; i++) {
+        struct validation *v = &c->model[i / 4].validation;
+        struct estimate **replica = i % 4 < 2 ? &v->replica[i % 2] : &v->contrast[i % 2];
         free(*replica);
         *replica = calloc(c->observation.n, sizeof **replica);
         if (*replica == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
@@ -115,13 +117,17 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
 {
     struct pipeline_model *m = &c->model[i_model];
     struct pipeline_trace trace;
-    struct pipeline_part part;
+    struct pipeline_part part, means, contrasts;
     struct progress progress = pipeline_model_progress(&part, &c->progress, c, i_model);
+    double share = c->contrast.n > 0 ? 0.5 : 1.0;
+    struct progress of_means = pipeline_sub_progress(&means, &progress, 0.0, share);
+    struct progress of_contrasts = pipeline_sub_progress(&contrasts, &progress, share, 1.0 - share);
     struct estimator estimator;
     status s = pipeline_trace_open(&trace, c, "validation", "estimates.journal", i_model, &c->observation, err);
     if (s != STATUS_OK) goto out;
     estimator = estimate_journal_estimator(trace.journal);
-    s = estimate_validation(c, m, &estimator, &progress, n_path, err);
+    s = estimate_validation(c, m, &estimator, &of_means, n_path, err);
+    if (s == STATUS_OK) s = pipeline_validate_contrast(c, i_model, n_path, &of_contrasts, err);
     if (s != STATUS_OK) goto out;
     score_validation(c, m);
     log_info(c->log,
@@ -134,32 +140,34 @@ out:
     return s;
 }
 
-static void estimate_sections(struct pipeline_context *c, struct work_section section[2 * JOB_MAX_MODEL])
+static void estimate_sections(struct pipeline_context *c, struct work_section section[4 * JOB_MAX_MODEL])
 {
-    for (size_t i = 0; i < 2 * c->n_model; i++)
-        section[i] = (struct work_section){c->model[i / 2].validation.replica[i % 2],
+    for (size_t i = 0; i < 4 * c->n_model; i++) {
+        struct validation *v = &c->model[i / 4].validation;
+        section[i] = (struct work_section){i % 4 < 2 ? v->replica[i % 2] : v->contrast[i % 2],
                                            c->observation.n * sizeof(struct estimate)};
+    }
 }
 
 static status store_validations(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[2 * JOB_MAX_MODEL];
+    struct work_section section[4 * JOB_MAX_MODEL];
     estimate_sections(c, section);
     status s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "validation.1", section, 2 * c->n_model, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "validation.2", section, 4 * c->n_model, err) : s;
 }
 
 status stage_validation_load(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[2 * JOB_MAX_MODEL];
+    struct work_section section[4 * JOB_MAX_MODEL];
     status s = allocate_validations(c, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
     if (s != STATUS_OK) return s;
     estimate_sections(c, section);
-    s = work_file_read(path, "validation.1", section, 2 * c->n_model, err);
+    s = work_file_read(path, "validation.2", section, 4 * c->n_model, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) score_validation(c, &c->model[i]);
     return s;
 }

@@ -1,4 +1,4 @@
-// What the options of a fit gave beyond the parameters: certificate, nuisance terms, gains of photographs, several starts.
+// What the options of a fit gave beyond the parameters: certificate, nuisance terms, gains of photographs, textures, several starts.
 import { el, isNumber, percent, withError } from "./page_parts.js";
 
 function table(id, heads, rows) {
@@ -23,6 +23,21 @@ function gains(result) {
     el("p", { class: "hint" }, `With them the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}.`),
     table("gains", ["Photograph", "#Gain ± standard error", ""], rows.map((r) => el("tr", {}, el("td", { class: "mono" }, r.name), number(withError(r.gain, r.gain_se)),
       el("td", {}, Math.abs(r.gain - 1) > 3 * r.gain_se && Math.abs(r.gain - 1) > 0.05 ? tag("differs from the others") : "")))));
+}
+
+// Contrasts are squared: the scatter of the blocks' means, in per cent of their mean, is the root of the mean over channels.
+function textures(result) {
+  const rows = (result.rows ?? []).filter((r) => r.texture);
+  if (!rows.length) return null;
+  const mean = (rgb) => (rgb[0] + rgb[1] + rgb[2]) / 3;
+  const scatter = (rgb) => Math.sqrt(Math.max(0, mean(rgb)));
+  return el("div", {}, el("h3", {}, "Texture"),
+    el("p", { class: "hint" }, `Scatter of the means of ${rows[0].texture.block_mm} mm blocks, in per cent of the mean.`),
+    table("textures", ["Photograph", "Set", "#Measured", "#Rendered", ""], rows.map(({ name, set, texture: t }) => {
+      const apart = Math.abs(mean(t.rendered) - mean(t.measured)), noise = Math.hypot(mean(t.rendered_se), mean(t.measured_se));
+      return el("tr", {}, el("td", { class: "mono" }, name), el("td", {}, set), number(percent(scatter(t.measured), 1)), number(percent(scatter(t.rendered), 1)),
+        el("td", {}, apart > 3 * noise && apart > 0.3 * mean(t.measured) ? tag("differs") : ""));
+    })));
 }
 
 function starts(result) {
@@ -59,6 +74,6 @@ function nextPhotograph(result) {
 // The content of the card, or null when there is nothing to say.
 export function fitDetails(job) {
   if (!job.result) return null;
-  const parts = [certificate, nuisance, gains, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
+  const parts = [certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
   return parts.length ? el("div", { id: "fit-details" }, parts) : null;
 }

@@ -49,7 +49,8 @@ struct fit_problem {
     size_t n_param;
     const struct param_info *info; /* of the model */
     const struct fit_parameter *param;
-    const struct observation_set *observation; /* fitted ones only; one configuration of the estimator each */
+    const struct observation_set *observation; /* fitted ones only; one configuration of the estimator each; contrasts
+                                                  behind all radiances */
     const struct estimator *estimator;
     uint64_t path_budget;                                                            /* 0: the method's default */
     size_t max_iteration;                                                            /* 0: the method's default */

@@ -33,8 +33,12 @@ static status estimate(void *context, const struct estimator_call *call, const s
     inner.param = full;
     inner.iteration += (uint32_t)(f->i_start * KEY_STRIDE);
     status s = e->run(e->context, &inner, progress, f->buffer, wall_s, err);
-    for (size_t i = 0; i < e->n_configuration && s == STATUS_OK; i++)
-        fit_layout_estimate(&f->layout, call->param, call->want_jacobian, &f->buffer[i], &out[i]);
+    struct fit_layout bare = f->layout; /* contrasts do not change with a gain */
+    bare.i_gain = bare.i_stray = SIZE_MAX;
+    for (size_t i = 0; i < e->n_configuration && s == STATUS_OK; i++) {
+        bool contrast = observation_is_contrast(&f->problem->observation->item[i]);
+        fit_layout_estimate(contrast ? &bare : &f->layout, call->param, call->want_jacobian, &f->buffer[i], &out[i]);
+    }
     return s;
 }
 
@@ -62,6 +66,8 @@ static status report(void *context, const struct fit_step *step, struct error *e
     fit_layout_full(&f->layout, step->param, full);
     if (step->param_se != NULL) fit_layout_full(&f->layout, step->param_se, se);
     nuisance_of(&f->layout, step->param, step->param_se, NULL, &nuisance);
+    while (outer.n_configuration > 0 && observation_is_contrast(&f->problem->observation->item[outer.n_configuration - 1]))
+        outer.n_configuration--;
     if (f->option->n_start > 1) {
         snprintf(phase, sizeof phase, "start %zu of %zu: %.30s", f->i_start + 1, f->option->n_start, step->phase);
         outer.phase = phase;

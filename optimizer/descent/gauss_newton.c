@@ -23,6 +23,7 @@ enum {
     BLOCK = 256,
     MIN_PATH = 1024,
     FIRST_PATH = 2048,
+    PATH_PER_CELL = 16, /* of a contrast, at least: its noise falls with the square of these */
     MAX_ITERATION = 80,
     DEFAULT_BUDGET = 6000000
 };
@@ -63,6 +64,8 @@ static void spread_paths(struct gauss_newton *g)
     for (size_t i = 0; i < n; i++) {
         double share = sum > 0.0 ? (double)n * sqrt(linear_history_path_variance(&g->history, i)) / sum : 1.0;
         double paths = fmax(MIN_PATH, g->n_path_mean * fmin(fmax(share, 0.25), 4.0));
+        double side = g->run.problem->observation->item[i].configuration.contrast_cells;
+        paths = fmax(paths, PATH_PER_CELL * side * side);
         g->run.n_path[i] = ((size_t)ceil(paths / BLOCK)) * BLOCK;
     }
 }

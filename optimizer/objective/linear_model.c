@@ -91,6 +91,28 @@ void linear_model_release(struct linear_model *m)
 
 /* ---- pooling ---- */
 
+/* Paths that noise falls with: the variance of a mean is v / n, that of a contrast of few paths nearer v / n^2. */
+static double strength(const struct linear_history *h, size_t i, double n_path)
+{
+    return observation_is_contrast(&h->observation->item[i]) ? n_path * n_path : n_path;
+}
+
+/* v of that, of residuals. */
+static double noise_variance(const struct linear_history *h, size_t i)
+{
+    double sum = 0.0, n = 0.0;
+    if (!observation_is_contrast(&h->observation->item[i])) return linear_history_path_variance(h, i);
+    for (size_t k = 0; k < h->n_step; k++) {
+        for (int q = 0; q < 2; q++) {
+            const struct estimate *e = &h->step[k].replica[q][i];
+            double paths = (double)e->n_path;
+            sum += paths * strength(h, i, paths) * (e->var[0] + e->var[1] + e->var[2]) / 3.0;
+            n += paths;
+        }
+    }
+    return n > 0.0 ? objective_weight(&h->observation->item[i]) * sum / n : 0.0;
+}
+
 /* Mean derivatives by coordinates over all steps, weighted by paths: n_row x n_param. One set for all steps: measured
  * with its own derivatives, a step that happens to hold a rare bright path would seem farther away, count less, and the
  * mean would come out too dark. */
@@ -188,7 +210,8 @@ static void derivative_scale(const struct linear_history *h, const double *mean,
             for (int q = 0; q < 2; q++) {
                 const struct estimate *e = &h->step[k].replica[q][i];
                 double n = (double)e->n_path;
-                for (size_t c = 0; c < 3; c++) sum += n * n * w * slope * slope * e->jac_var[c * h->n_param + p];
+                for (size_t c = 0; c < 3; c++)
+                    sum += n * strength(h, i, n) * w * slope * slope * e->jac_var[c * h->n_param + p];
                 if (p == 0) n_path += n;
             }
         }
@@ -205,11 +228,11 @@ static void pool_weights(const struct linear_history *h, const double *mean, siz
                          struct pool_weight *weight, double *n_effective)
 {
     const double bend_r = 64.0, bend_j = 16.0, hidden = 16.0;
-    double path_variance = linear_history_path_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0, j_variance,
+    double path_variance = noise_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0, j_variance,
            j_square;
     derivative_scale(h, mean, i, &j_variance, &j_square);
     for (size_t k = 0; k < h->n_step; k++) {
-        double n = (double)h->step[k].replica[0][i].n_path, per_path = n > 0.0 ? 1.0 / n : INFINITY;
+        double n = (double)h->step[k].replica[0][i].n_path, per_path = n > 0.0 ? 1.0 / strength(h, i, n) : INFINITY;
         weight[k].r = 1.0 / (path_variance * per_path + bend_r * change[k].net * change[k].net + hidden * change[k].r + 1e-12);
         weight[k].j = 1.0 / (j_variance * per_path + bend_j * change[k].net * j_square + hidden * change[k].j + 1e-12);
         sum_r += weight[k].r;
@@ -258,7 +281,7 @@ static double gain_share(const struct linear_model *m, const struct observation 
         noise += 0.25 * (m->r_var[0][3 * i + c] + m->r_var[1][3 * i + c]) / 3.0;
     }
     length2 = dot3(unit, unit);
-    if (!(length2 > 0.0)) return 0.0;
+    if (!(length2 > 0.0) || observation_is_contrast(o)) return 0.0; /* a gain leaves a contrast as it is */
     for (size_t c = 0; c < 3; c++) unit[c] /= sqrt(length2);
     return 1.0 - 1.0 / sqrt(1.0 + m->gain_sd * m->gain_sd * length2 / (misfit + noise));
 }

@@ -6,7 +6,7 @@
 double objective_relative_weight(const struct observation *o)
 {
     double a = (o->mean_rgb[0] + o->mean_rgb[1] + o->mean_rgb[2]) / 3.0;
-    double scale = fmax(a, OBJECTIVE_TAU);
+    double scale = observation_is_contrast(o) ? 2.0 * fmax(a, OBJECTIVE_CONTRAST_TAU) : fmax(a, OBJECTIVE_TAU);
     return 1.0 / (scale * scale);
 }
 
@@ -22,7 +22,7 @@ double objective_image_difference(const double x_rgb[3], const double y_rgb[3])
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out)
 {
-    double value = 0.0, var = 0.0, relative = 0.0;
+    double value = 0.0, var = 0.0, relative = 0.0, n_radiance = 0.0;
     for (size_t i = 0; i < o->n; i++) {
         double product = 0.0, sd = 0.0;
         for (int c = 0; c < 3; c++) {
@@ -34,11 +34,13 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
         double w = objective_weight(&o->item[i]);
         value += w * product;
         var += w * w * sd * sd;
+        if (observation_is_contrast(&o->item[i])) continue;
         relative += objective_relative_weight(&o->item[i]) * product;
+        n_radiance += 3.0;
     }
     out->value = value;
     out->se = sqrt(var);
-    out->rel_rms = o->n > 0 ? sqrt(fmax(0.0, relative) / (3.0 * (double)o->n)) : 0.0;
+    out->rel_rms = n_radiance > 0.0 ? sqrt(fmax(0.0, relative) / n_radiance) : 0.0;
 }
 
 void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,

@@ -12,7 +12,7 @@
  * an upper estimate, too large by at most a factor sqrt(3).
  *
  * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out.
- * The Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer
+ * Contrasts are left out of that figure. The Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer
  * paths are used.
  */
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H
@@ -22,6 +22,10 @@
 #include "renderer/transport/estimate.h"
 
 #define OBJECTIVE_TAU 0.02
+/* Contrasts (observation_is_contrast): C is a squared coefficient of variation, so half its relative error is that of the
+ * scatter itself; w_i = weight_i / (2 max(a_i, tau_C))^2 with a_i the mean over channels of C, and cloth that scatters by
+ * less than 2 % counts as if it did. */
+#define OBJECTIVE_CONTRAST_TAU 4e-4
 
 struct objective_value {
     double value, se;

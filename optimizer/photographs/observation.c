@@ -2,6 +2,7 @@
 #include "base/durable.h"
 #include "optimizer/photographs/measurement_table.h"
 #include "optimizer/photographs/photograph.h"
+#include "optimizer/photographs/photograph_contrast.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -48,6 +49,29 @@ status observation_set_select(const struct observation_set *o, enum job_set set,
         if (s != STATUS_OK) return s;
     }
     return STATUS_OK;
+}
+
+bool observation_is_contrast(const struct observation *o) { return o->configuration.contrast_cells > 0; }
+
+struct observation observation_of_contrast(const struct observation *o, double weight)
+{
+    struct observation row = *o;
+    row.configuration.contrast_cells = (uint32_t)o->n_cell;
+    row.weight = weight * o->weight;
+    memcpy(row.mean_rgb, o->contrast_rgb, sizeof row.mean_rgb);
+    memcpy(row.se_rgb, o->contrast_se_rgb, sizeof row.se_rgb);
+    return row;
+}
+
+status observation_set_append_contrasts(const struct observation_set *from, double weight, struct observation_set *to,
+                                        struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i < from->n && s == STATUS_OK; i++) {
+        struct observation row = observation_of_contrast(&from->item[i], weight);
+        s = observation_set_append(to, &row, err);
+    }
+    return s;
 }
 
 struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
@@ -101,6 +125,14 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
     }
     if (mean.warning[0] != '\0' && warn != NULL) warn(context, mean.warning);
     snprintf(item.name, sizeof item.name, "%s", p->file);
+    if (doc->texture_block_mm > 0.0) {
+        item.n_cell = job_texture_cells(doc);
+        s = photograph_contrast(path, p, item.n_cell, item.contrast_rgb, item.contrast_se_rgb, err);
+        if (s != STATUS_OK) {
+            if (err != NULL) snprintf(err->field, sizeof err->field, "fit.texture.block_mm");
+            return s;
+        }
+    }
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
     item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,

@@ -9,6 +9,8 @@
 #include "optimizer/job_document.h"
 #include "renderer/scene/configuration.h"
 
+#include <stdbool.h>
+
 struct observation {
     char name[JOB_MAX_NAME_BYTES]; /* file name of the photograph, or "fit-03" for a row of a table */
     enum job_set set;
@@ -16,6 +18,8 @@ struct observation {
     double mean_rgb[3];
     double se_rgb[3]; /* 0 when the source states none */
     double weight;    /* factor of the objective's weight of this observation; 1 */
+    size_t n_cell;    /* a side, of the contrast; 0: not measured */
+    double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
 };
 
 struct observation_set {
@@ -30,6 +34,15 @@ size_t observation_set_count(const struct observation_set *o, enum job_set set);
 /* Copies the observations of one set, in order, into `part` (initialised). */
 status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
                               struct error *err);
+
+/* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb are those of the
+ * contrast, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
+bool observation_is_contrast(const struct observation *o);
+/* That observation from one with n_cell > 0. */
+struct observation observation_of_contrast(const struct observation *o, double weight);
+/* Appends the contrasts of all observations of `from` to `to`. */
+status observation_set_append_contrasts(const struct observation_set *from, double weight, struct observation_set *to,
+                                        struct error *err);
 
 /* Configuration in SI units from the document's angles and set-up. */
 struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,

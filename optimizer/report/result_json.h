@@ -10,7 +10,8 @@
  * the row's brightness
  *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg",
  *           "weight","measured":[r,g,b],"measured_se":[3],"rendered":[3],"rendered_se":[3],
- *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null,"gain":null|number,"gain_se":null|number}],
+ *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null,"gain":null|number,"gain_se":null|number,
+ *           "texture":null|{"block_mm","blocks_a_side","measured":[3],"measured_se":[3],"rendered":[3],"rendered_se":[3]}}],  contrasts
  *  "next_photograph":[{"candidate","light_theta_deg",...,"information_nats","standard_error_after":[...],"determines":[names]}],  best first
  *  "certificate":{"worst_rel_error","worst_rel_error_se","worst_parameter","n_path","parameters":[{"name","rel_error","rel_error_se"}]},
  *  "prior_penalty", "nuisance":[{"name","value","standard_error","at_bound":bool}], "fit_rel_rms_with_gains":number|null,

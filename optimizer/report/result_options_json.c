@@ -1,5 +1,7 @@
 #include "optimizer/report/result_options_json.h"
 
+#include "optimizer/pipeline_contrast.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -26,12 +28,25 @@ static void row_gain(const struct pipeline_context *c, const struct pipeline_mod
                              m->fit.uncertainty.misfit_var, gain, se);
 }
 
+static json_t *rgb_json(const double v[3]) { return json_pack("[o, o, o]", number(v[0]), number(v[1]), number(v[2])); }
+
+static json_t *texture_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i)
+{
+    const struct observation *o = &c->contrast.item[i];
+    double rendered[3], se[3];
+    pipeline_rendered_contrast(m, i, rendered, se);
+    return json_pack("{s:f, s:I, s:o, s:o, s:o, s:o}", "block_mm", c->doc->texture_block_mm, "blocks_a_side",
+                     (json_int_t)o->n_cell, "measured", rgb_json(o->mean_rgb), "measured_se", rgb_json(o->se_rgb),
+                     "rendered", rgb_json(rendered), "rendered_se", rgb_json(se));
+}
+
 void result_row_options(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, json_t *row)
 {
     double gain = NAN, se = NAN;
     if (m->option->gain == JOB_GAIN_PER_PHOTOGRAPH) row_gain(c, m, i, &gain, &se);
     json_object_set_new(row, "gain", number(gain));
     json_object_set_new(row, "gain_se", number(se));
+    json_object_set_new(row, "texture", c->contrast.n > 0 ? texture_json(c, m, i) : json_null());
 }
 
 /* Relative RMS error of the fitted rows after each has had its gain. */
@@ -134,6 +149,29 @@ void result_fit_options(const struct pipeline_context *c, const struct pipeline_
     json_object_set_new(result, "fit_rel_rms_with_gains", number(rel_rms_with_gains(c, m)));
 }
 
+/* Scatter of blocks about their mean, in per cent of it, mean over channels. */
+static double scatter_percent(const double contrast_rgb[3])
+{
+    return 100.0 * sqrt(fmax(0.0, contrast_rgb[0] + contrast_rgb[1] + contrast_rgb[2]) / 3.0);
+}
+
+static void print_textures(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
+{
+    if (c->contrast.n == 0) return;
+    fprintf(out, "\ntexture: scatter of the means of %.3g mm blocks, per cent of the mean%s\n%-14s %-8s %9s %9s %s\n",
+            c->doc->texture_block_mm, c->doc->texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row", "set",
+            "measured", "rendered", "+-");
+    for (size_t i = 0; i < c->contrast.n; i++) {
+        const struct observation *o = &c->contrast.item[i];
+        double rendered[3], se[3];
+        pipeline_rendered_contrast(m, i, rendered, se);
+        double shown = scatter_percent(rendered), mean_se = (se[0] + se[1] + se[2]) / 3.0;
+        fprintf(out, "%-14.14s %-8s %9.2f %9.2f %.2g\n", o->name, o->set == JOB_SET_FIT ? "fit" : "held-out",
+                scatter_percent(o->mean_rgb), shown,
+                shown > 0.0 ? 1e4 * mean_se / (2.0 * fmax(shown, 100.0 * sqrt(mean_se))) : 100.0 * sqrt(mean_se));
+    }
+}
+
 void result_summary_options(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
     const struct fit_nuisance *n = &m->fit.nuisance;
@@ -152,6 +190,7 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
     for (size_t i = 0; i < n->n; i++)
         fprintf(out, "%-12s %10.5f %10.5f  nuisance term%s\n", n->name[i], n->value[i], n->se[i],
                 n->at_bound[i] ? ", at a bound" : "");
+    print_textures(c, m, out);
     if (isfinite(with_gains))
         fprintf(out, "one gain for each photograph: relative RMS error over the fitted rows with them %.2f %%\n",
                 100.0 * with_gains);

@@ -11,6 +11,8 @@
 #ifndef SELVEDGE_RENDERER_CONFIGURATION_H
 #define SELVEDGE_RENDERER_CONFIGURATION_H
 
+#include <stdint.h>
+
 struct environment; /* renderer/transport/environment.h */
 
 enum configuration_light {
@@ -18,6 +20,8 @@ enum configuration_light {
     LIGHT_DIRECTIONAL, /* parallel light from (light_theta, light_phi) with irradiance pi; no distance, no side */
     LIGHT_NO_LAMP      /* only the environment, if any */
 };
+
+enum { CONFIGURATION_MAX_CELLS = 32 };
 
 enum configuration_camera {
     CAMERA_PERSPECTIVE = 0,
@@ -40,6 +44,9 @@ struct configuration {
                                               besides the lamp; not owned; NULL: none */
     enum configuration_light light;
     enum configuration_camera camera;
+    uint32_t contrast_cells; /* 0: estimates are of the crop's mean radiance; 2 or more: of the contrast between so many
+                                equal parts of the crop a side (transport/contrast_blocks.h) */
+    uint32_t reserved;       /* 0 */
 };
 
 #endif

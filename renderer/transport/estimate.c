@@ -150,11 +150,17 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
         goto out;
     }
     for (size_t i = 0; i < q->n_configuration; i++) {
+        if (q->share_camera_paths && q->configuration[i].contrast_cells > 0) {
+            st = error_set_field(err, STATUS_INVALID, "configuration",
+                                 "cannot estimate the contrast of configuration %zu from shared paths", i);
+            goto out;
+        }
         path_setting_init_sets(&r.setting[i], q->scene, &sets, &q->configuration[i], q->want_jacobian);
         camera_init(&r.camera[i], &q->configuration[i]);
     }
     struct estimate_blocks blocks = {.n_configuration = q->n_configuration,
                                      .n_path = q->n_path,
+                                     .configuration = q->configuration,
                                      .seed = q->seed,
                                      .iteration = q->iteration,
                                      .replica = q->replica,
@@ -168,6 +174,7 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
         for (size_t g = 0; g < r.n_group; g++) largest = r.group[g].n > largest ? r.group[g].n : largest;
         blocks.n_configuration = r.n_group;
         blocks.n_path = r.n_path;
+        blocks.configuration = NULL;
         blocks.n_jac = largest * (3 + r.n_jac) - 3;
         blocks.trace = trace_group;
     }

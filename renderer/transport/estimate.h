@@ -30,7 +30,7 @@ struct estimate_request {
                                 whose noise model takes them as independent. */
 };
 
-/* rgb means in radiance units. */
+/* rgb means in radiance units; for a configuration with contrast_cells its contrast and the derivatives of that. */
 struct estimate {
     double mean[3], var[3];               /* var: of the mean */
     double jac[3 * SCATTERING_MAX_FLAT];  /* d mean[c] / d flat param p at [c * n_flat + p], by internal unit, with

@@ -1,4 +1,4 @@
-#include "renderer/transport/estimate_blocks.h"
+#include "renderer/transport/contrast_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,6 +22,7 @@ struct run {
     struct task *task;
     size_t n_task;
     struct task_sum *sum; /* per task */
+    struct contrast_plan *contrast; /* per configuration; n_cell 0: its mean is wanted */
     double *sum_storage;
 };
 
@@ -57,11 +58,33 @@ static void run_task(void *context, size_t i_task, size_t i_thread)
     struct run *r = context;
     const struct task *t = &r->task[i_task];
     float value[BLOCK_PATHS * N_VALUE];
+    const struct contrast_plan *contrast = &r->contrast[t->i_configuration];
+    if (contrast->n_cell > 0) {
+        r->sum[i_task].n_vertex =
+            contrast_trace_task(r->b, contrast, t->i_configuration, t->first_block, r->progress, value);
+        return;
+    }
     for (uint32_t b = 0; b < t->n_block && !progress_cancelled(r->progress); b++)
         trace_block(r, t->i_configuration, t->first_block + b, &r->sum[i_task], value);
 }
 
-/* Tasks of whole blocks; how many depends on the counts alone, so that sums do not depend on the threads. */
+static status plan_contrasts(struct run *r, struct error *err)
+{
+    const struct estimate_blocks *q = r->b;
+    r->contrast = calloc(q->n_configuration + 1, sizeof *r->contrast);
+    if (r->contrast == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: out of memory");
+    for (size_t i = 0; i < q->n_configuration && q->configuration != NULL; i++) {
+        if (q->configuration[i].contrast_cells == 0 || q->n_path[i] == 0) continue;
+        if (q->n_path[i] > UINT32_MAX)
+            return error_set_field(err, STATUS_TOO_LARGE, "n_path",
+                                   "cannot trace %zu paths for configuration %zu: too many", q->n_path[i], i);
+        status s = contrast_plan_init(&r->contrast[i], q->configuration[i].contrast_cells, q->n_path[i], q->n_jac, err);
+        if (s != STATUS_OK) return s;
+    }
+    return STATUS_OK;
+}
+
+/* Tasks of whole blocks (of a contrast: of whole cells, numbered); how many depends on the counts alone, so that sums do not depend on the threads. */
 static status make_tasks(struct run *r, struct error *err)
 {
     const struct estimate_blocks *q = r->b;
@@ -74,6 +97,10 @@ static status make_tasks(struct run *r, struct error *err)
                 return error_set_field(err, STATUS_TOO_LARGE, "n_path",
                                        "cannot trace %zu paths for configuration %zu: too many", q->n_path[i], i);
             uint64_t per_task = 1 + n_block / TASKS_PER_CONFIGURATION;
+            if (r->contrast[i].n_cell > 0) {
+                n_block = r->contrast[i].n_task;
+                per_task = 1;
+            }
             for (uint64_t b = 0; b < n_block; b += per_task, n++)
                 if (pass == 1)
                     r->task[n] = (struct task){(uint32_t)i, (uint32_t)b,
@@ -120,7 +147,11 @@ static status reduce(const struct run *r, struct estimate *out, size_t *bad_conf
         }
         struct estimate *e = &out[i];
         memset(e, 0, sizeof *e);
-        e->n_path = total.n_path;
+        if (r->contrast[i].n_cell > 0 && !contrast_reduce(&r->contrast[i], e, bad_value)) {
+            *bad_configuration = i;
+            return error_set(err, STATUS_NUMERIC, "a path gave a value that is not finite in configuration %zu", i);
+        }
+        if (r->contrast[i].n_cell == 0) e->n_path = total.n_path;
         e->n_vertex = total.n_vertex;
         if (total.n_path == 0) continue;
         double n = (double)total.n_path;
@@ -147,7 +178,8 @@ status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *
                            struct estimate *out, size_t *bad_configuration, size_t *bad_value, struct error *err)
 {
     struct run r = {.b = b, .progress = progress};
-    status st = make_tasks(&r, err);
+    status st = plan_contrasts(&r, err);
+    if (st == STATUS_OK) st = make_tasks(&r, err);
     if (st != STATUS_OK) goto out;
     st = thread_pool_run(pool, r.n_task, run_task, &r, progress);
     if (st == STATUS_OK && progress_cancelled(progress)) st = STATUS_CANCELLED; /* a task may have stopped early */
@@ -157,6 +189,8 @@ status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *
     }
     st = reduce(&r, out, bad_configuration, bad_value, err);
 out:
+    for (size_t i = 0; i < b->n_configuration && r.contrast != NULL; i++) contrast_plan_release(&r.contrast[i]);
+    free(r.contrast);
     free(r.sum_storage);
     free(r.sum);
     free(r.task);
@@ -172,7 +206,8 @@ static bool configuration_makes_sense(const struct configuration *c)
     for (int k = 0; k < 3; k++) environment &= c->environment_rgb[k] >= 0 && isfinite(c->environment_rgb[k]);
     return isfinite(sum) && c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2 && lamp && environment &&
            c->light <= LIGHT_NO_LAMP && c->camera <= CAMERA_FAR_FIELD && c->crop_m > 0 && c->crop_aspect >= 0 &&
-           isfinite(c->crop_aspect) && (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0);
+           isfinite(c->crop_aspect) && c->contrast_cells != 1 && c->contrast_cells <= CONFIGURATION_MAX_CELLS &&
+           (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0);
 }
 
 status estimate_check_configurations(const struct configuration *configuration, size_t n_configuration,

@@ -11,6 +11,8 @@ enum { ESTIMATE_BLOCK_PATHS = 256 };
 struct estimate_blocks {
     size_t n_configuration;
     const size_t *n_path; /* per configuration; rounded up to whole blocks; 0: skip */
+    const struct configuration *configuration; /* those with contrast_cells give a contrast (contrast_blocks.h) in place
+                                                  of a mean; NULL: none does */
     uint64_t seed;
     uint32_t iteration, replica;
     size_t n_jac; /* 3 * number of parameters, 0 without derivatives; at most 3 * SCATTERING_MAX_FLAT */

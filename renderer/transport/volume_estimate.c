@@ -64,6 +64,7 @@ status volume_estimate_run(const struct volume_estimate_request *q, struct threa
     }
     const struct estimate_blocks blocks = {.n_configuration = q->n_configuration,
                                            .n_path = q->n_path,
+                                           .configuration = q->configuration,
                                            .seed = q->seed,
                                            .iteration = q->iteration,
                                            .replica = q->replica,

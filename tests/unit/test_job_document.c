@@ -238,6 +238,32 @@ static void test_fit_options(void **state)
     job_document_free(d);
 }
 
+/* PHOTO's crop is 10 mm. */
+static void test_texture(void **state)
+{
+    (void)state;
+    struct job_document *d = parse(FIT_OF("{\"texture\":{\"block_mm\":0.5}}"));
+    assert_true(d->texture_block_mm == 0.5 && d->texture_weight == 1.0 && job_texture_cells(d) == 20);
+    job_document_free(d);
+    d = parse(FIT_OF("{\"texture\":{\"block_mm\":5,\"weight\":0},\"method\":\"published_sgd.v1\"}"));
+    assert_true(d->texture_block_mm == 5.0 && d->texture_weight == 0.0 && job_texture_cells(d) == 2);
+    job_document_free(d);
+    d = parse(FIT_OF("{}"));
+    assert_true(d->texture_block_mm == 0.0);
+    job_document_free(d);
+    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"fit\":{\"texture\":{\"block_mm\":1}}}",
+                "fit.texture", "needs photographs");
+    check_error(FIT_OF("{\"texture\":{}}"), "fit.texture.block_mm", "missing");
+    check_error(FIT_OF("{\"texture\":{\"block_mm\":5.1}}"), "fit.texture.block_mm", "2 to 32 blocks");
+    check_error(FIT_OF("{\"texture\":{\"block_mm\":0.3}}"), "fit.texture.block_mm", "2 to 32 blocks");
+    check_error(FIT_OF("{\"texture\":{\"block_mm\":1,\"weight\":-1}}"), "fit.texture.weight", "-1");
+    check_error(FIT_OF("{\"texture\":{\"block_um\":1}}"), "fit.texture.block_um", "unknown field");
+    check_error(FIT_OF("{\"texture\":{\"block_mm\":1},\"method\":\"published_sgd.v1\"}"), "fit.texture",
+                METHOD_GAUSS_NEWTON);
+    check_error(FIT_OF("{\"texture\":{\"block_mm\":1},\"nuisance\":{\"stray_light\":true}}"), "fit.texture",
+                "stray_light");
+}
+
 static void test_fit_option_errors(void **state)
 {
     (void)state;
@@ -382,7 +408,8 @@ int main(void)
         cmocka_unit_test(test_volume),
         cmocka_unit_test(test_photographs),
         cmocka_unit_test(test_fit),
-        cmocka_unit_test(test_fit_options), cmocka_unit_test(test_fit_option_errors),
+        cmocka_unit_test(test_fit_options), cmocka_unit_test(test_texture),
+        cmocka_unit_test(test_fit_option_errors),
         cmocka_unit_test(test_bounds_are_values),
         cmocka_unit_test(test_file_names),
         cmocka_unit_test(test_damage),
