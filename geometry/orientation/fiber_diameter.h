@@ -4,6 +4,7 @@
  * sigma = R / sqrt 2, in three dimensions as in two. The scale at which the bright ridges of the volume answer most
  * strongly (mean third power of the positive part; the finest such scale, coarser ones are yarns) gives the diameter. Neighbours in a
  * bundle and the scanner's blur shift it by some ten percent, which is near enough for choosing filters. The radius that the fibers get is measured later.
+ * What noise adds to the answers is taken off: its variance is measured at the finest differences, which fibers hardly touch.
  */
 #ifndef SELVEDGE_GEOMETRY_FIBER_DIAMETER_H
 #define SELVEDGE_GEOMETRY_FIBER_DIAMETER_H

@@ -155,6 +155,34 @@ static void test_straight_fibers(void **state)
     }
 }
 
+/* The diameter of fibers side by side is the same at signal-to-noise 2 (after clamping to 0..1, as scans are mapped) as without noise. */
+static void test_diameter_in_strong_noise(void **state)
+{
+    (void)state;
+    enum { N = 64, N_FIBER = 16 };
+    const size_t n[3] = {N, N, N};
+    static const double diameter[3] = {4.0, 7.0, 12.0};
+    for (int k = 0; k < 3; k++) {
+        struct test_cylinder c[N_FIBER];
+        double measured[2];
+        for (int i = 0; i < N_FIBER; i++) {
+            double y = 32.0 + 1.15 * diameter[k] * (i % 4 - 1.5), z = 32.0 + 1.15 * diameter[k] * (i / 4 - 1.5);
+            c[i] = (struct test_cylinder){{32.0, y, z}, {1.0, 0.1 * (i % 3), 0.05 * (i % 2)}, 0.5 * diameter[k]};
+        }
+        for (int noisy = 0; noisy < 2; noisy++) {
+            struct volume v;
+            assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+            test_fill_cylinders(&v, c, N_FIBER, noisy ? 0.5 : 0.0, 7);
+            for (size_t i = 0; i < N * N * N; i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i]));
+            assert_int_equal(fiber_diameter_measure(&v, NULL, NULL, &measured[noisy], NULL), STATUS_OK);
+            volume_release(&v);
+        }
+        print_message("diameter %g: measured %.2f, in strong noise %.2f\n", diameter[k], measured[0], measured[1]);
+        assert_true(fabs(measured[0] / diameter[k] - 1.0) < 0.2);
+        assert_true(fabs(measured[1] / measured[0] - 1.0) < 0.1);
+    }
+}
+
 static void test_nothing_kept(void **state)
 {
     (void)state;
@@ -179,6 +207,7 @@ int main(void)
         cmocka_unit_test(test_j_is_the_published_filter),
         cmocka_unit_test(test_search_agrees_with_brute_force),
         cmocka_unit_test(test_straight_fibers),
+        cmocka_unit_test(test_diameter_in_strong_noise),
         cmocka_unit_test(test_nothing_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -242,7 +242,8 @@ static void test_axes(void **state)
                 assert_true(plain.v.density[volume_index(plain.v.n, i, j, k)] ==
                             turned.v.density[volume_index(turned.v.n, k, i, NY - 1 - j)]);
     assert_int_equal(turned.f.n_fiber, N_CYLINDER);
-    assert_true(fabs(turned.r.total_length_m / plain.r.total_length_m - 1.0) < 0.01);
+    /* Where a fiber ends that leaves the scan aslant is known to about half a diameter: one fiber has two such ends. */
+    assert_true(fabs(turned.r.total_length_m - plain.r.total_length_m) < 14e-6);
     release(&plain);
     release(&turned);
 }
