@@ -181,7 +181,8 @@ static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_obse
     double per_mean = 2.0 * (double)n_observation;
     if (!gain_is_clear) g->n_path_mean *= 1.3;
     double left = (double)g->run.path_budget - (double)g->run.n_path_total;
-    double most = fmin(largest_share * (double)g->run.path_budget, left) / per_mean;
+    double share = fmax(largest_share * (double)g->run.path_budget, MIN_PATH * per_mean); /* small budgets: a few steps */
+    double most = fmin(share, left) / per_mean;
     g->n_path_mean = fmin(g->n_path_mean, most);
     return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
 }
