@@ -55,7 +55,7 @@ def real(tmp_path_factory):
                     "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
     photographs = json.loads((sample / "photographs.json").read_text())
     document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
-                "photographs": photographs[:9] + photographs[16:20], "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4, "texture": {"block_mm": 2.5}, "candidates": [{"light_theta_deg": t, "light_phi_deg": 0, "camera_theta_deg": 60, "camera_phi_deg": 180} for t in (20, 65)]}}
+                "photographs": photographs[:9] + photographs[16:20], "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4, "texture": {"block_mm": 2.5, "weight": 0.01}, "candidates": [{"light_theta_deg": t, "light_phi_deg": 0, "camera_theta_deg": 60, "camera_phi_deg": 180} for t in (20, 65)]}}
     (sample / "job.json").write_text(json.dumps(document))
     process, url = start_daemon(folder / "data")
     yield url, selvedge.Server(url).submit(str(sample / "job.json"))
