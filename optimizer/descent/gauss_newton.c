@@ -7,8 +7,9 @@
  * J, a damping that fades as paths add up; damping     plus 2 noise / limit^2: moving by the whole step limit must gain
  * more than one residual's Monte-Carlo variance. A step after which the objective is higher beyond doubt halves the
  * limits and is taken back. Paths: few at first; 1.3 times as many when the predicted gain is no longer clear of the
- * noise; spread over configurations by the standard deviation of a path (Neyman allocation). Ends when the predicted
- * gain is within the noise and the noise is small against what is left of the objective.
+ * noise; spread over configurations by the standard deviation of a path (Neyman allocation). Ends when what several
+ * undamped steps could gain is within the noise and the noise is small against what is left of the objective (where a
+ * model does not fit, steps are short and each gains little: one step's gain would end such fits on their way).
  */
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/method_names.h"
@@ -30,10 +31,11 @@ enum {
 
 /* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of
  * the objective that is. */
-static const double target_rel_rms = 0.0007, target_share = 0.01;
+static const double target_rel_rms = 0.0007, target_share = 0.002;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
 static const double largest_share = 0.1;
 static const double least_limit = 1.0 / 32.0; /* of the step limits */
+static const double far_reach = 6.0;          /* step limits within which far_gain looks */
 
 struct gauss_newton {
     struct descent_run run;
@@ -45,7 +47,7 @@ struct gauss_newton {
     double limit_scale;     /* of the step limits, 1 or less */
     double n_path_mean;     /* a configuration and replica, of the next iteration */
     double promised;        /* fall of f by the last step, as the model saw it */
-    double gain, noise, damping, largest_step;
+    double gain, far_gain, noise, damping, largest_step;
     size_t n_free;
 };
 
@@ -79,37 +81,73 @@ static size_t free_index(const struct gauss_newton *g, size_t index[N])
     return n;
 }
 
-/* Best step from the pooled model; scaled by the step limits inside, so that all unknowns are of order one. */
+/* The pooled quadratic model of the free parameters, scaled by the step limits, so that all unknowns are of order one. */
+struct scaled_model {
+    size_t n, index[N];
+    double h[N * N], g[N], trace;
+};
+
+/* cross: curvature without the noise of J, which would hide what a parameter with a noisy derivative has to gain. */
+static void scale_model(const struct gauss_newton *g, bool cross, struct scaled_model *m)
+{
+    double h[N * N], gradient[N];
+    size_t n_param = g->model.n_param;
+    m->n = free_index(g, m->index);
+    m->trace = 0.0;
+    linear_model_hessian(&g->model, cross, h);
+    linear_model_gradient(&g->model, gradient);
+    for (size_t a = 0; a < m->n; a++) {
+        double limit = g->run.coordinate[m->index[a]].step_limit;
+        for (size_t b = 0; b < m->n; b++)
+            m->h[a * m->n + b] = h[m->index[a] * n_param + m->index[b]] * limit * g->run.coordinate[m->index[b]].step_limit;
+        m->g[a] = gradient[m->index[a]] * limit;
+        m->trace += m->h[a * m->n + a];
+    }
+    if (cross) small_clip_eigenvalues(m->h, m->n, 2.0 * linear_model_noise(&g->model));
+}
+
+/* Its minimum inside the bounds and reach times the step limits, with `damping` on the diagonal: where it is, and by how
+ * much it lies below zero. */
+static status lowest(const struct gauss_newton *g, const struct scaled_model *m, double reach, double damping, double y[N],
+                     double *gain, struct error *err)
+{
+    double h[N * N], lower[N], upper[N];
+    memcpy(h, m->h, m->n * m->n * sizeof *h);
+    for (size_t a = 0; a < m->n; a++) {
+        const struct coordinate *k = &g->run.coordinate[m->index[a]];
+        double at = g->model.x_ref[m->index[a]];
+        lower[a] = fmax(-reach, (k->lower - at) / k->step_limit);
+        upper[a] = fmin(reach, (k->upper - at) / k->step_limit);
+        h[a * m->n + a] += damping + 1e-9 * m->trace;
+    }
+    status s = bounded_quadratic(h, m->g, lower, upper, m->n, y, err);
+    *gain = 0.0;
+    for (size_t a = 0; s == STATUS_OK && a < m->n; a++) {
+        double hy = 0.0;
+        for (size_t b = 0; b < m->n; b++) hy += h[a * m->n + b] * y[b];
+        *gain -= y[a] * (m->g[a] + 0.5 * hy);
+    }
+    return s;
+}
+
+/* Best step from the pooled model; and what several such steps would gain (far_gain), which tells a fit that has arrived
+ * from one that moves along a valley in steps too short to show. */
 static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
 {
-    size_t index[N], n = free_index(g, index), n_param = g->model.n_param;
-    double h[N * N], gradient[N], hs[N * N], gs[N], lower[N], upper[N], y[N], trace = 0.0;
-    linear_model_hessian(&g->model, false, h);
-    linear_model_gradient(&g->model, gradient);
+    struct scaled_model m;
+    double y[N];
     g->noise = linear_model_noise(&g->model);
     g->damping = 2.0 * g->noise;
-    for (size_t a = 0; a < n; a++) {
-        const struct coordinate *k = &g->run.coordinate[index[a]];
-        double limit = k->step_limit;
-        for (size_t b = 0; b < n; b++)
-            hs[a * n + b] = h[index[a] * n_param + index[b]] * limit * g->run.coordinate[index[b]].step_limit;
-        gs[a] = gradient[index[a]] * limit;
-        lower[a] = fmax(-g->limit_scale, (k->lower - g->model.x_ref[index[a]]) / limit);
-        upper[a] = fmin(g->limit_scale, (k->upper - g->model.x_ref[index[a]]) / limit);
-        trace += hs[a * n + a];
-    }
-    for (size_t a = 0; a < n; a++) hs[a * n + a] += g->damping + 1e-9 * trace;
-    status s = bounded_quadratic(hs, gs, lower, upper, n, y, err);
+    scale_model(g, true, &m);
+    status s = lowest(g, &m, far_reach, 0.0, y, &g->far_gain, err);
+    scale_model(g, false, &m);
+    if (s == STATUS_OK) s = lowest(g, &m, g->limit_scale, g->damping, y, &g->gain, err);
     if (s != STATUS_OK) return s;
-    memset(dx, 0, n_param * sizeof *dx);
-    g->gain = 0.0;
+    memset(dx, 0, g->model.n_param * sizeof *dx);
     g->largest_step = 0.0;
-    for (size_t a = 0; a < n; a++) {
-        double hy = 0.0;
-        for (size_t b = 0; b < n; b++) hy += hs[a * n + b] * y[b];
-        g->gain -= y[a] * (gs[a] + 0.5 * hy);
+    for (size_t a = 0; a < m.n; a++) {
         g->largest_step = fmax(g->largest_step, fabs(y[a]));
-        dx[index[a]] = y[a] * g->run.coordinate[index[a]].step_limit;
+        dx[m.index[a]] = y[a] * g->run.coordinate[m.index[a]].step_limit;
     }
     return STATUS_OK;
 }
@@ -118,10 +156,15 @@ static status solve_step(struct gauss_newton *g, double *dx, struct error *err)
  * three times that because the three channels of a configuration share their paths. */
 static double noise_gain(const struct gauss_newton *g) { return 2.0 * (double)g->n_free * g->noise; }
 
+/* What of the objective f need not be won any more. */
+static double good_enough(const struct gauss_newton *g, double f)
+{
+    return fmax(target_share * f, target_rel_rms * target_rel_rms * (double)g->model.n_row);
+}
+
 static bool precise_enough(const struct gauss_newton *g, double f, double se)
 {
-    double n_row = (double)g->model.n_row;
-    return noise_gain(g) <= fmax(target_share * (f - 2.0 * se), target_rel_rms * target_rel_rms * n_row);
+    return noise_gain(g) <= good_enough(g, f - 2.0 * se);
 }
 
 static status estimate_here(struct gauss_newton *g, struct error *err)
@@ -208,11 +251,11 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         g->promised = g->gain;
         for (size_t p = 0; p < g->model.n_param; p++) g->x[p] += dx[p];
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
-        bool small = g->gain <= 4.0 * noise_gain(g) || g->gain <= 0.01 * fabs(f);
+        bool small = g->far_gain <= fmax(noise_gain(g), good_enough(g, f));
         result->converged = small && !failed && g->history.n_step > 2;
         if (result->converged && precise_enough(g, f, se)) {
             snprintf(result->reason, sizeof result->reason,
-                     "the next step promises %.2g, the objective is %.3g with a noise of %.1g", g->gain, f, se);
+                     "further steps promise %.2g, the objective is %.3g with a noise of %.1g", g->far_gain, f, se);
             return STATUS_OK;
         }
         bool paths_left = plan_paths(g, clear, problem->observation->n);
