@@ -339,7 +339,7 @@ static void test_damage(void **state)
     (void)state;
     const char *text = FIT_OF("{\"fixed\":{\"beta_R\":5},\"start\":{\"C_TT\":[0.1,0.2,0.3]},\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":2}],"
                                "\"bounds\":{\"C_TT\":[0.1,0.9]},\"priors\":{\"C_R.r\":{\"mean\":0.2,\"se\":0.1}},\"starts\":2,"
-                               "\"nuisance\":{\"gain\":\"global\",\"stray_light\":true},\"candidates\":[{\"light_theta_deg\":1,"
+                               "\"nuisance\":{\"gain\":\"global\",\"stray_light\":false},\"texture\":{\"block_mm\":1},\"candidates\":[{\"light_theta_deg\":1,"
                                "\"light_phi_deg\":2,\"camera_theta_deg\":3,\"camera_phi_deg\":4}]}");
     size_t n = strlen(text);
     char *copy = malloc(n + 1);
