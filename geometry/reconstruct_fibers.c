@@ -6,6 +6,7 @@
 #include "geometry/fibers/disagreement.h"
 #include "geometry/fibers/growing.h"
 #include "geometry/fibers/joining.h"
+#include "geometry/fibers/kinks.h"
 #include "geometry/fibers/linking.h"
 #include "geometry/fibers/radius.h"
 #include "geometry/fibers/relax.h"
@@ -21,6 +22,10 @@ enum {
     N_FIT = 4,     /* rounds of fitting axes to the scan */
     MAX_GROWTH = 64 /* voxels that an end may grow */
 };
+
+#define OVER_USUAL_TURN 2.1 /* kinks; less cuts fibers of plain weaves to pieces, more leaves changes from fiber to fiber */
+#define END_DIAMETERS 1.0 /* as far as an end may be astray */
+#define MAX_DISAGREEMENT_RAD (30.0 * M_PI / 180.0)
 
 struct fiber_job {
     const struct volume *v;
@@ -139,7 +144,7 @@ static status mend(struct fiber_job *job, struct polyline_set *in, bool grow, st
     polyline_set_init(&agreeing);
     polyline_set_init(&single);
     polyline_set_init(&grown);
-    status s = polylines_cut_disagreeing(in, job->d, 30.0 * M_PI / 180.0, MIN_PIECE, &agreeing, &n_cut, err);
+    status s = polylines_cut_disagreeing(in, job->d, MAX_DISAGREEMENT_RAD, MIN_PIECE, &agreeing, &n_cut, err);
     if (s == STATUS_OK)
         s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, MIN_PIECE, &single, counts, err);
     if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
@@ -202,6 +207,29 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, int n_
     return s;
 }
 
+/* Lines without their kinks, where they change over to another fiber; the last time without ends that go astray, too. */
+static status straighten(struct fiber_job *job, struct polyline_set *lines, bool last, size_t min_vertex, struct error *err)
+{
+    struct polyline_set out;
+    size_t n_cut;
+    polyline_set_init(&out);
+    status s = polylines_cut_kinks(lines, job->diameter, OVER_USUAL_TURN, min_vertex, &out, &n_cut, err);
+    if (s == STATUS_OK) {
+        polyline_set_release(lines);
+        *lines = out;
+        polyline_set_init(&out);
+    }
+    if (s == STATUS_OK && last)
+        s = polylines_trim_disagreeing(lines, job->d, MAX_DISAGREEMENT_RAD, (size_t)(END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, &n_cut, err);
+    if (s == STATUS_OK && last) {
+        polyline_set_release(lines);
+        *lines = out;
+        polyline_set_init(&out);
+    }
+    polyline_set_release(&out);
+    return s;
+}
+
 static void finish_lines(struct fiber_job *job, struct polyline_set *lines)
 {
     classify(lines);
@@ -232,9 +260,11 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     }
     if (s == STATUS_OK) s = relax(job, lines, 2, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
+    if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
     if (s == STATUS_OK) s = mend(job, lines, true, &part[1], &counts, err); /* lines on their axes are easier to tell apart and to join */
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
+    if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
     if (s == STATUS_OK) {
         job->report->n_gap_bridged = counts.n_gap_bridged;
         job->report->n_joined = counts.n_joined;

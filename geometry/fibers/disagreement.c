@@ -61,3 +61,27 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
     free(value);
     return s;
 }
+
+status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d, double max_angle_rad, size_t reach,
+                                  size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
+{
+    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), *value = malloc((lines->n_vertex + 1) * sizeof *value);
+    if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
+    status s = STATUS_OK;
+    *n_cut = 0;
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
+        size_t n = polyline_length(lines, l), from = 0, to = n;
+        scratch_keep_within(d->space);
+        for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
+        for (size_t i = 0; i < n && i < reach; i++) {
+            if (disagrees(value, n, i, limit)) from = i + 1;
+            if (disagrees(value, n, n - 1 - i, limit)) to = n - 1 - i;
+        }
+        *n_cut += to > from ? n - (to - from) : n;
+        if (to < from + min_vertex) continue;
+        s = polyline_begin(result, lines->axis[l], err);
+        for (size_t k = from; k < to && s == STATUS_OK; k++) s = polyline_add(result, lines->vertex[lines->first[l] + k], err);
+    }
+    free(value);
+    return s;
+}
