@@ -3,6 +3,7 @@
  * resolved there, so only the directions are judged. Pictures of slices go to the folder named by SELVEDGE_PICTURES, if set. */
 #include "base/clock.h"
 #include "geometry/reconstruct.h"
+#include "geometry/volume/tile_crop.h"
 #include "tests/support/weave_labels.h"
 
 #include <math.h>
@@ -49,7 +50,8 @@ static void save_pictures(const struct scan *s, const char *name)
     }
 }
 
-static void reconstruct_scan(const char *path, const char *axes, const char *name, struct scan *s)
+/* edge: voxels of the cube that is taken from the middle of the scan; 0: all of it. */
+static void reconstruct_scan(const char *path, const char *axes, const char *name, size_t edge, struct scan *s)
 {
     struct error err = {0};
     struct thread_pool *pool;
@@ -60,6 +62,10 @@ static void reconstruct_scan(const char *path, const char *axes, const char *nam
     assert_int_equal(thread_pool_new(0, &pool, &err), STATUS_OK);
     double start = clock_monotonic_s();
     assert_int_equal(reconstruct_read(&path, 1, &s->o, NULL, pool, NULL, &s->v, &s->r, &err), STATUS_OK);
+    for (size_t a = 0; edge > 0 && a < 3; a++) assert_true(s->v.n[a] >= edge);
+    const size_t from[3] = {(s->v.n[0] - edge) / 2, (s->v.n[1] - edge) / 2, (s->v.n[2] - edge) / 2};
+    const size_t box[6] = {from[0], from[1], from[2], from[0] + edge, from[1] + edge, from[2] + edge};
+    if (edge > 0) volume_crop(&s->v, box);
     assert_int_equal(reconstruct_orientation(&s->v, &s->o, pool, NULL, &s->d, &s->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_fibers(&s->v, &s->d, &s->o, pool, NULL, &s->f, &s->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_transfer(&s->f, &s->d, pool, NULL, &s->r, &err), STATUS_OK);
@@ -86,7 +92,7 @@ static void test_fiber_ct(void **state)
     char path[512];
     struct scan s;
     data_path(path, "fiber-ct/crop256.tif");
-    reconstruct_scan(path, "xyz", "fiber_ct", &s);
+    reconstruct_scan(path, "xyz", "fiber_ct", 112, &s);
     double diameter = 2.0 * s.r.radius_m[0] / s.v.voxel_size_m[0];
     assert_true(diameter > 4.0 && diameter < 9.0);
     assert_true(s.r.dice > 0.8);
@@ -105,7 +111,7 @@ static void test_weave_ct(void **state)
     double accuracy, kept;
     data_path(path, "weave-ct/small_weave.tif");
     data_path(labels, "weave-ct/labels.tif");
-    reconstruct_scan(path, "zxy", "weave_ct", &s);
+    reconstruct_scan(path, "zxy", "weave_ct", 0, &s);
     assert_int_equal(weave_label_accuracy(&s.d, labels, &accuracy, &kept, NULL), STATUS_OK);
     print_message("weave_ct: %.1f %% of the labelled tow voxels kept, %.1f %% of those in the right axis class\n", 100.0 * kept, 100.0 * accuracy);
     assert_true(accuracy >= 0.9);
