@@ -32,6 +32,8 @@ enum {
 /* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of
  * the objective that is. */
 static const double target_rel_rms = 0.0007, target_share = 0.002;
+/* Share of the objective below which a promised gain is not told from the model's curvature any more. */
+static const double arrived_share = 0.02;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
 static const double largest_share = 0.1;
 static const double least_limit = 1.0 / 32.0; /* of the step limits */
@@ -251,7 +253,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         g->promised = g->gain;
         for (size_t p = 0; p < g->model.n_param; p++) g->x[p] += dx[p];
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
-        bool small = g->far_gain <= fmax(noise_gain(g), good_enough(g, f));
+        bool small = g->far_gain <= fmax(noise_gain(g), fmax(arrived_share * f, good_enough(g, f)));
         result->converged = small && !failed && g->history.n_step > 2;
         if (result->converged && precise_enough(g, f, se)) {
             snprintf(result->reason, sizeof result->reason,
