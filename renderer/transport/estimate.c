@@ -46,7 +46,7 @@ static uint32_t trace_group(void *context, size_t i_group, double x, double y, s
     struct scene_ray ray;
     struct path_result path[PATH_MAX_LAMP];
     if (!camera_ray(&r->camera[i], r->q->scene, x, y, &ray)) return 0;
-    path_trace_lamps(&r->setting[i], r->lamp + g->first, g->n, &ray, rng, path);
+    path_trace_lamps(&r->setting[i], r->lamp + g->first, r->setting[i].has_lamp ? g->n : 0, &ray, rng, path);
     for (size_t k = 0; k < g->n; k++, value += 3 + r->n_jac) {
         memcpy(value, path[k].radiance, sizeof path[k].radiance);
         memcpy(value + 3, path[k].jac, r->n_jac * sizeof *value);

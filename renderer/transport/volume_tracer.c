@@ -158,11 +158,11 @@ static void add_beyond(const struct volume_setting *s, struct lane *l)
 
 static bool connect(const struct volume_setting *s, struct lane *l, enum connection to);
 
-/* The ray is out of the cloth, or lost in it. False: so ends the path. */
+/* The ray is out of the cloth, or lost in it (VOLUME_MAX_LOOKUP steps: no light can be said to have come through). False: so ends the path. */
 static bool leave(const struct volume_setting *s, struct lane *l, bool lost)
 {
     if (l->purpose == FLIGHT) {
-        add_beyond(s, l);
+        if (!lost) add_beyond(s, l);
         return false;
     }
     if (!lost && l->passed > 0) {

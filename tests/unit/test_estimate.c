@@ -174,6 +174,30 @@ static void shared_paths_agree_with_separate_ones(void **state)
     assert_memory_equal(&again[0].jac, &separate[0].jac, sizeof again[0].jac);
 }
 
+/* Without a lamp there is nothing to share: an environment alone gives what separate paths give. */
+static void shared_paths_without_a_lamp(void **state)
+{
+    (void)state;
+    const size_t n_path[2] = {4096, 4096};
+    struct configuration c[2] = {configuration[0], configuration[0]};
+    struct estimate separate[2], shared[2];
+    struct estimate_request q = request(n_path, 2);
+    for (int i = 0; i < 2; i++) {
+        c[i].light = LIGHT_NO_LAMP;
+        c[i].environment_rgb[0] = c[i].environment_rgb[1] = c[i].environment_rgb[2] = 0.5 + i;
+    }
+    q.configuration = c;
+    run(&q, 2, separate);
+    q.share_camera_paths = true;
+    run(&q, 2, shared);
+    assert_memory_equal(shared[0].mean, separate[0].mean, sizeof shared[0].mean); /* first in the order: same key, same numbers */
+    for (int k = 0; k < 3; k++) {
+        double se = sqrt(separate[1].var[k] + shared[1].var[k]);
+        if (!(fabs(shared[1].mean[k] - separate[1].mean[k]) < 4 * se && shared[1].mean[k] > 0))
+            fail_msg("channel %d: %g, alone %g, +- %g", k, shared[1].mean[k], separate[1].mean[k], se);
+    }
+}
+
 struct canceller {
     atomic_bool flag;
     double at_s;
@@ -307,6 +331,7 @@ int main(void)
         cmocka_unit_test(same_bits_for_any_threads),
         cmocka_unit_test(variances_are_honest),
         cmocka_unit_test(shared_paths_agree_with_separate_ones),
+        cmocka_unit_test(shared_paths_without_a_lamp),
         cmocka_unit_test(agrees_without_avx512),
         cmocka_unit_test(cancels_within_100_ms),
         cmocka_unit_test(bad_requests),
