@@ -56,8 +56,7 @@ void pipeline_context_release(struct pipeline_context *c)
     scratch_space_free(c->space);
     scene_free(c->scene);
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
-    for (size_t i = 0; i < c->n_model; i++)
-        {
+    for (size_t i = 0; i < c->n_model; i++) {
         for (int q = 0; q < 2; q++) {
             free(c->model[i].validation.replica[q]);
             free(c->model[i].validation.contrast[q]);
@@ -242,6 +241,15 @@ static void report_fraction(void *context, double fraction)
     worker_status_fraction(c->status, fraction);
 }
 
+/* A stage that runs outdates what later ones have stored, also for an attempt after this one. */
+static status forget_from(struct pipeline_context *c, size_t i, struct error *err)
+{
+    status s = STATUS_OK;
+    for (; i < sizeof stage_code / sizeof stage_code[0] && s == STATUS_OK; i++)
+        s = worker_folder_unmark_stage(c->folder, stage_code[i].name, err);
+    return s;
+}
+
 /* A finished stage is loaded; if its checkpoint cannot be read it runs again, and so do all later ones. */
 static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, struct error *err)
 {
@@ -257,9 +265,10 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
         }
         log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
     }
+    status s = code->load != NULL && !*earlier_ran ? forget_from(c, i, err) : STATUS_OK;
     if (code->load != NULL) *earlier_ran = true;
     log_info(c->log, "stage %s", code->name);
-    status s = code->run(c, err);
+    if (s == STATUS_OK) s = code->run(c, err);
     if (s != STATUS_OK) return s;
     c->stage_wall_s[i] = clock_monotonic_s() - start_s;
     log_info(c->log, "stage %s: %.1f s", code->name, c->stage_wall_s[i]);

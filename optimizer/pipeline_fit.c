@@ -70,13 +70,10 @@ static void warn_of_starts(struct pipeline_context *c, const struct pipeline_mod
     }
 }
 
-static void log_fit(struct pipeline_context *c, const struct pipeline_model *m)
+static void warn_convergence(struct pipeline_context *c, const struct pipeline_model *m)
 {
-    log_info(c->log, "fit of %s %s after %zu steps, %.3g paths, %.1f s: %s", m->appearance.id,
-             m->fit.converged ? "converged" : "did NOT converge", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s,
-             m->fit.reason);
-    if (m->fit.converged) return;
     char warning[400];
+    if (m->fit.converged) return;
     snprintf(warning, sizeof warning, "the fit%s%s has not converged: %s", c->n_model > 1 ? " of " : "",
              c->n_model > 1 ? m->appearance.id : "", m->fit.reason);
     worker_status_warn(c->status, warning);
@@ -92,6 +89,17 @@ static void warn_density(struct pipeline_context *c, const struct pipeline_model
              "the cloth, or too much",
              m->appearance.id);
     worker_status_warn(c->status, warning);
+}
+
+/* Of a fit that was made, now or by an earlier attempt. */
+static void tell(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    log_info(c->log, "fit of %s %s after %zu steps, %.3g paths, %.1f s: %s", m->appearance.id,
+             m->fit.converged ? "converged" : "did NOT converge", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s,
+             m->fit.reason);
+    warn_convergence(c, m);
+    warn_of_starts(c, m);
+    warn_density(c, m);
 }
 
 static status fit_model(struct fit_listener *listener, struct error *err)
@@ -119,9 +127,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     if (s != STATUS_OK) goto out;
     if (estimate_journal_n_replayed(trace.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
-    log_fit(c, m);
-    warn_of_starts(c, m);
-    warn_density(c, m);
+    tell(c, m);
     listener->step_base += m->fit.n_step;
 out:
     pipeline_trace_close(&trace);
@@ -153,7 +159,9 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = work_file_read(path, "fit.4", section, n, err);
-    return s == STATUS_OK && c->doc->fit_radius ? pipeline_radius_apply(c, err) : s;
+    if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) tell(c, &c->model[i]);
+    return s;
 }
 
 status stage_fit(struct pipeline_context *c, struct error *err)

@@ -126,16 +126,17 @@ status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t finger
     snprintf(want, sizeof want, "%016" PRIx64 "\n", fingerprint);
     worker_folder_path(f, JOB_FOLDER_WORK, "inputs.fingerprint", path);
     *changed = false;
-    if (access(path, F_OK) == 0 && file_read_all(path, 64, &have, &n, NULL) == STATUS_OK)
+    if (file_read_all(path, 64, &have, &n, NULL) == STATUS_OK) {
         *changed = strcmp(have, want) != 0;
-    free(have);
-    if (n > 0 && !*changed) return STATUS_OK;
+        free(have);
+        if (!*changed) return STATUS_OK;
+    }
+    /* also without a fingerprint: a worker that was killed here may have removed it and left the marks of stages */
     status s = worker_folder_check(f, err);
-    if (s == STATUS_OK && *changed) s = empty_folder(f, JOB_FOLDER_WORK, err);
-    if (s == STATUS_OK && *changed) s = empty_folder(f, JOB_FOLDER_RESULTS, err);
+    if (s == STATUS_OK) s = empty_folder(f, JOB_FOLDER_WORK, err);
+    if (s == STATUS_OK) s = empty_folder(f, JOB_FOLDER_RESULTS, err);
     worker_folder_path(f, JOB_FILE_SERIES, NULL, series);
-    if (s == STATUS_OK && *changed && unlink(series) != 0 && errno != ENOENT)
-        s = error_set_errno(err, "cannot remove '%s'", series);
+    if (s == STATUS_OK && unlink(series) != 0 && errno != ENOENT) s = error_set_errno(err, "cannot remove '%s'", series);
     return s == STATUS_OK ? worker_folder_replace(f, path, want, strlen(want), err) : s;
 }
 
@@ -158,4 +159,14 @@ status worker_folder_mark_stage(const struct worker_folder *f, const char *stage
     char path[WORKER_PATH_BYTES];
     mark_path(f, stage, path);
     return worker_folder_replace(f, path, "done\n", 5, err);
+}
+
+status worker_folder_unmark_stage(const struct worker_folder *f, const char *stage, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    mark_path(f, stage, path);
+    status s = worker_folder_check(f, err);
+    if (s != STATUS_OK) return s;
+    if (unlink(path) == 0) return durable_sync_folder_of(path, err);
+    return errno == ENOENT ? STATUS_OK : error_set_errno(err, "cannot remove '%s'", path);
 }

@@ -28,13 +28,16 @@ void worker_folder_path(const struct worker_folder *f, const char *a, const char
 status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes,
                              struct error *err);
 
-/* Compares the fingerprint of the inputs with that of the run before. When it has changed (a document or a file was
- * edited by hand), everything that was computed from the old inputs is removed: work/, results/, series.rec. */
+/* Compares the fingerprint of the inputs with that of the run before. When it is another one (a document or a file was
+ * edited by hand) or there is none, everything that was computed before is removed: work/, results/, series.rec.
+ * *changed: there was another one. */
 status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed,
                                   struct error *err);
 
 /* Marks of stages whose outputs are whole: work/<stage>.done. */
 bool worker_folder_stage_done(const struct worker_folder *f, const char *stage);
 status worker_folder_mark_stage(const struct worker_folder *f, const char *stage, struct error *err);
+/* The stage is to run again, its mark goes; none there is no error. */
+status worker_folder_unmark_stage(const struct worker_folder *f, const char *stage, struct error *err);
 
 #endif
