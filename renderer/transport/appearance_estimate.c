@@ -35,12 +35,18 @@ static status estimate_volume(const struct appearance_request *q, struct thread_
     return volume_estimate_run(&request, pool, progress, out, err);
 }
 
+status appearance_scene_check(const struct appearance_scene *scene, const struct appearance *model, const char *what, struct error *err)
+{
+    bool surface = model->kind == APPEARANCE_SURFACE;
+    if (surface ? scene->fibers != NULL : scene->volume != NULL) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "model", "cannot %s model '%s': the cloth has no %s", what, model->id,
+                           surface ? "fibers" : "density volume");
+}
+
 status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
                                const struct progress *progress, struct estimate *out, struct error *err)
 {
-    bool surface = q->model->kind == APPEARANCE_SURFACE;
-    if (surface ? q->scene.fibers == NULL : q->scene.volume == NULL)
-        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s': the cloth has no %s",
-                               q->model->id, surface ? "fibers" : "density volume");
-    return surface ? estimate_surface(q, pool, progress, out, err) : estimate_volume(q, pool, progress, out, err);
+    status s = appearance_scene_check(&q->scene, q->model, "render", err);
+    if (s != STATUS_OK) return s;
+    return q->model->kind == APPEARANCE_SURFACE ? estimate_surface(q, pool, progress, out, err) : estimate_volume(q, pool, progress, out, err);
 }

@@ -14,6 +14,9 @@ struct appearance_scene {
     const struct volume_scene *volume; /* NULL: no volume model can be estimated */
 };
 
+/* STATUS_INVALID, field "model", when the cloth lacks the form that the model needs; what: "render", "check". */
+status appearance_scene_check(const struct appearance_scene *scene, const struct appearance *model, const char *what, struct error *err);
+
 struct appearance_request {
     struct appearance_scene scene;
     const struct appearance *model;
@@ -26,7 +29,7 @@ struct appearance_request {
     bool want_jacobian;
 };
 
-/* What estimate_run or volume_estimate_run give; STATUS_INVALID when the cloth lacks the form that the model needs. */
+/* What estimate_run or volume_estimate_run give; appearance_scene_check's errors. */
 status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
                                const struct progress *progress, struct estimate *out, struct error *err);
 

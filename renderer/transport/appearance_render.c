@@ -26,11 +26,9 @@ status appearance_render_run(const struct appearance_render_request *q, struct t
                              const struct progress *progress, struct image *im, struct error *err)
 {
     memset(im, 0, sizeof *im);
-    bool surface = q->model->kind == APPEARANCE_SURFACE;
-    if (surface ? q->scene.fibers == NULL : q->scene.volume == NULL)
-        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s': the cloth has no %s",
-                               q->model->id, surface ? "fibers" : "density volume");
-    if (!surface) return render_volume(q, pool, progress, im, err);
+    status s = appearance_scene_check(&q->scene, q->model, "render", err);
+    if (s != STATUS_OK) return s;
+    if (q->model->kind == APPEARANCE_VOLUME) return render_volume(q, pool, progress, im, err);
     const struct render_request request = {.scene = q->scene.fibers,
                                            .model = q->model->surface,
                                            .param = q->param,

@@ -277,10 +277,8 @@ status derivative_check_run(const struct derivative_check_request *q, const stru
     bool surface = q->model->kind == APPEARANCE_SURFACE;
     memset(out, 0, sizeof *out);
     out->n_param = q->model->n_param;
-    if (surface ? q->scene.fibers == NULL : q->scene.volume == NULL)
-        return error_set_field(err, STATUS_INVALID, "model", "cannot check model '%s': the cloth has no %s",
-                               q->model->id, surface ? "fibers" : "density volume");
-    status s = estimate_check_configurations(q->configuration, q->n_configuration, q->iteration, q->replica, err);
+    status s = appearance_scene_check(&q->scene, q->model, "check", err);
+    if (s == STATUS_OK) s = estimate_check_configurations(q->configuration, q->n_configuration, q->iteration, q->replica, err);
     if (s != STATUS_OK) return s;
     struct check *k = calloc(1, sizeof *k);
     size_t n = q->model->n_param, n_path = q->n_path / (q->n_configuration > 0 ? q->n_configuration : 1);

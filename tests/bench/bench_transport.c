@@ -10,7 +10,9 @@
  *       lamp only (two and two) share their paths
  *   transport.fleece.peak_bytes   largest resident memory of a process that makes the fibers (as many as the Fleece
  *       cloth has: 31,091 with 580,660 segments) into a scene and traces 16 x 256 paths with derivatives
- *   transport.published_iteration_s.gabardine   16 configurations x 2 replicas x 64 x 64 x 64 paths
+ *   transport.published_iteration_s.gabardine   processor seconds of 16 configurations x 2 replicas x 64 x 64 x 64 paths, traced
+ * bench_transport [PATHS] [NAME]: paths a configuration (16384; published_iteration has its own); only that set, "fleece" or
+ * "published".
  */
 #include "base/rng.h"
 #include "renderer/transport/estimate.h"
@@ -25,6 +27,8 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
+
+enum { N_CONFIGURATION = 16 };
 
 static const struct {
     const char *name;
@@ -136,8 +140,10 @@ static int trace_fleece(void)
     struct estimate_request q = {.scene = scene, .model = m, .param = param, .configuration = c, .n_configuration = 16,
                                  .n_path = n, .seed = 1, .want_jacobian = true};
     if (st == STATUS_OK) st = estimate_run(&q, NULL, NULL, e, &err);
-    if (st != STATUS_OK) fprintf(stderr, "%s\n", err.text);
-    fprintf(stderr, "fleece: %zu segments, %zu fibers\n", scene_n_segment(scene), f.n_fiber);
+    if (st == STATUS_OK)
+        fprintf(stderr, "fleece: %zu segments, %zu fibers\n", scene_n_segment(scene), f.n_fiber);
+    else
+        fprintf(stderr, "%s\n", err.text);
     scene_free(scene);
     fiber_set_release(&f);
     return st == STATUS_OK ? 0 : 1;
@@ -155,93 +161,116 @@ static int bench_fleece(void)
     return 0;
 }
 
+/* The bench cloth under the 16 configurations, one thread. */
+struct bench {
+    struct scene *scene;
+    struct thread_pool *pool;
+    struct configuration configuration[N_CONFIGURATION];
+    size_t n_path;
+};
+
+/* Estimates with all derivatives; gives the processor seconds. Ends the program when it fails. */
+static double trace(const struct bench *b, const double param[9], size_t n_path, uint32_t replica, bool share, struct estimate e[N_CONFIGURATION])
+{
+    struct error err = {0};
+    size_t n[N_CONFIGURATION];
+    for (int i = 0; i < N_CONFIGURATION; i++) n[i] = n_path;
+    const struct estimate_request q = {.scene = b->scene, .model = scattering_find("two_lobe.v1"), .param = param, .configuration = b->configuration,
+                                       .n_configuration = N_CONFIGURATION, .n_path = n, .seed = 1, .replica = replica, .want_jacobian = true,
+                                       .share_camera_paths = share};
+    double t0 = processor_s();
+    if (estimate_run(&q, b->pool, NULL, e, &err) != STATUS_OK) {
+        fprintf(stderr, "%s\n", err.text);
+        exit(1);
+    }
+    return processor_s() - t0;
+}
+
+/* Time to 1 % of the mean and 5 % of the derivative by C_TT, mean over the configurations. Channels are correlated: their
+ * standard errors are added. */
+static void print_times(const char *set, const struct estimate e[N_CONFIGURATION], double per_path)
+{
+    double s_mean = 0, s_derivative = 0, sd = 0, vertex = 0;
+    for (int i = 0; i < N_CONFIGURATION; i++) {
+        double n_path = (double)e[i].n_path, mean = 0, se = 0, jac = 0, jac_se = 0;
+        for (size_t ch = 0; ch < 3; ch++) {
+            mean += e[i].mean[ch];
+            se += sqrt(e[i].var[ch]);
+            jac += e[i].jac[ch * 9 + 3 + ch];
+            jac_se += sqrt(e[i].jac_var[ch * 9 + 3 + ch]);
+        }
+        double rel = se / mean * sqrt(n_path), rel_jac = jac_se / fabs(jac) * sqrt(n_path);
+        sd += rel / N_CONFIGURATION;
+        s_mean += rel * rel / 1e-4 * per_path / N_CONFIGURATION;
+        s_derivative += rel_jac * rel_jac / 25e-4 * per_path / N_CONFIGURATION;
+        vertex += (double)e[i].n_vertex / n_path / N_CONFIGURATION;
+    }
+    print(set, "paths_per_s_core", 1 / per_path, "1/s", "higher");
+    print(set, "s_to_1pct_mean", s_mean, "s", "lower");
+    print(set, "s_to_5pct_derivative", s_derivative, "s", "lower");
+    print(set, "relative_sd_per_path", sd, "", "lower");
+    print(set, "vertices_per_path", vertex, "", "lower");
+}
+
+static void bench_set(const struct bench *b, const char *set, const double param[9])
+{
+    static const struct {
+        const char *name;
+        size_t first;
+        bool colour;
+    } other[] = {{"C_R.s_to_5pct_derivative", 0, true},
+                 {"beta_R.s_to_5pct_derivative", 6, false},
+                 {"beta_TT.s_to_5pct_derivative", 7, false},
+                 {"gamma_TT.s_to_5pct_derivative", 8, false}};
+    static const char *const width[3] = {"beta_R.s_to_1pct_of_mean", "beta_TT.s_to_1pct_of_mean", "gamma_TT.s_to_1pct_of_mean"};
+    static struct estimate e[N_CONFIGURATION];
+    trace(b, param, 256, 1, false, e); /* warm up */
+    double alone_s = trace(b, param, b->n_path, 0, false, e), per_path = alone_s / (N_CONFIGURATION * (double)e[0].n_path);
+    print_times(set, e, per_path);
+    for (size_t p = 0; p < sizeof other / sizeof other[0]; p++)
+        print(set, other[p].name, s_to_derivative(e, other[p].first, other[p].colour, per_path), "s", "lower");
+    for (size_t p = 0; p < 3; p++) print(set, width[p], s_to_log_derivative(e, 6 + p, param[6 + p], per_path), "s", "lower");
+    print(set, "shared_camera_speedup", alone_s / trace(b, param, b->n_path, 0, true, e), "", "higher");
+}
+
+/* What one iteration of the published method traces. */
+static void bench_published(const struct bench *b, const char *set, const double param[9])
+{
+    static struct estimate e[N_CONFIGURATION];
+    double s = 0;
+    for (uint32_t replica = 0; replica < 2; replica++) s += trace(b, param, 64 * 64 * 64, replica, false, e);
+    print("published_iteration_s", set, s, "s", "lower");
+}
+
+static void make_bench(struct bench *b)
+{
+    struct fiber_set f;
+    struct error err = {0};
+    hand_weave_bench(&f);
+    orbit_configurations_16(b->configuration);
+    status s = scene_new(&f, &(struct scene_option){.black_sheet = true}, &b->scene, &err);
+    if (s == STATUS_OK) s = thread_pool_new(1, &b->pool, &err);
+    fiber_set_release(&f);
+    if (s == STATUS_OK) return;
+    fprintf(stderr, "%s\n", err.text);
+    exit(1);
+}
+
 int main(int argc, char **argv)
 {
-    if ((argc < 3 || strcmp(argv[2], "fleece") == 0) && bench_fleece() != 0) return 1; /* first: little is in memory */
-    size_t n_path = argc > 1 ? strtoul(argv[1], NULL, 10) : 16384;
+    struct bench b = {.n_path = argc > 1 ? strtoul(argv[1], NULL, 10) : 16384};
     const char *only = argc > 2 ? argv[2] : NULL;
-    struct fiber_set f;
-    struct scene *scene = NULL;
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    struct configuration c[16];
-    static struct estimate e[16];
-    size_t n[16], warm[16];
-    hand_weave_bench(&f);
-    orbit_configurations_16(c);
-    if (scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, &err) != STATUS_OK ||
-        thread_pool_new(1, &pool, &err) != STATUS_OK) {
-        fprintf(stderr, "%s\n", err.text);
-        return 1;
-    }
-    for (int i = 0; i < 16; i++) {
-        n[i] = n_path;
-        warm[i] = 256;
-    }
+    if ((only == NULL || strcmp(only, "fleece") == 0) && bench_fleece() != 0) return 1; /* first: little is in memory */
+    make_bench(&b);
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
     for (size_t k = 0; k < sizeof fabric / sizeof fabric[0]; k++) {
-        if (only != NULL && strcmp(only, fabric[k].name) != 0) continue;
-        const struct scattering_model *m = scattering_find("two_lobe.v1");
+        const char *set = fabric[k].name;
         double param[9];
         for (int p = 0; p < 9; p++) param[p] = param_from_file_unit(&m->param[p], fabric[k].param[p]);
-        struct estimate_request q = {.scene = scene, .model = m, .param = param, .configuration = c, .n_configuration = 16,
-                                     .n_path = warm, .seed = 1, .want_jacobian = true};
-        if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
-            fprintf(stderr, "%s\n", err.text);
-            return 1;
-        }
-        q.n_path = n;
-        double t0 = processor_s();
-        if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
-            fprintf(stderr, "%s\n", err.text);
-            return 1;
-        }
-        double spent = processor_s() - t0, per_path = spent / (16.0 * (double)n_path), s_mean = 0, s_derivative = 0,
-               sd = 0, vertex = 0;
-        for (int i = 0; i < 16; i++) {
-            double mean = 0, var = 0, jac = 0, jac_var = 0;
-            for (size_t ch = 0; ch < 3; ch++) { /* channels are correlated: add standard errors */
-                mean += e[i].mean[ch];
-                var += sqrt(e[i].var[ch]);
-                jac += e[i].jac[ch * 9 + 3 + ch];
-                jac_var += sqrt(e[i].jac_var[ch * 9 + 3 + ch]);
-            }
-            double rel = var / mean * sqrt((double)n_path), rel_j = jac_var / fabs(jac) * sqrt((double)n_path);
-            sd += rel / 16;
-            s_mean += rel * rel / 1e-4 * per_path / 16;
-            s_derivative += rel_j * rel_j / 25e-4 * per_path / 16;
-            vertex += (double)e[i].n_vertex / (double)e[i].n_path / 16;
-        }
-        print(fabric[k].name, "paths_per_s_core", 1 / per_path, "1/s", "higher");
-        print(fabric[k].name, "s_to_1pct_mean", s_mean, "s", "lower");
-        print(fabric[k].name, "s_to_5pct_derivative", s_derivative, "s", "lower");
-        static const struct {
-            const char *name;
-            size_t first;
-            bool colour;
-        } other[] = {{"C_R.s_to_5pct_derivative", 0, true},
-                     {"beta_R.s_to_5pct_derivative", 6, false},
-                     {"beta_TT.s_to_5pct_derivative", 7, false},
-                     {"gamma_TT.s_to_5pct_derivative", 8, false}};
-        for (size_t p = 0; p < sizeof other / sizeof other[0]; p++)
-            print(fabric[k].name, other[p].name, s_to_derivative(e, other[p].first, other[p].colour, per_path), "s", "lower");
-        static const char *const width[3] = {"beta_R.s_to_1pct_of_mean", "beta_TT.s_to_1pct_of_mean",
-                                             "gamma_TT.s_to_1pct_of_mean"};
-        for (size_t p = 0; p < 3; p++)
-            print(fabric[k].name, width[p], s_to_log_derivative(e, 6 + p, param[6 + p], per_path), "s", "lower");
-        q.share_camera_paths = true;
-        t0 = processor_s();
-        if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
-            fprintf(stderr, "%s\n", err.text);
-            return 1;
-        }
-        print(fabric[k].name, "shared_camera_speedup", spent / (processor_s() - t0), "", "higher");
-        print(fabric[k].name, "relative_sd_per_path", sd, "", "lower");
-        print(fabric[k].name, "vertices_per_path", vertex, "", "lower");
-        if (strcmp(fabric[k].name, "gabardine") == 0)
-            print("published_iteration_s.gabardine", "", per_path * 16 * 2 * 64 * 64 * 64, "s", "lower");
+        if (only == NULL || strcmp(only, set) == 0) bench_set(&b, set, param);
+        if (strcmp(set, "gabardine") == 0 && (only == NULL || strcmp(only, "published") == 0)) bench_published(&b, set, param);
     }
-    thread_pool_free(pool);
-    scene_free(scene);
-    fiber_set_release(&f);
+    thread_pool_free(b.pool);
+    scene_free(b.scene);
     return 0;
 }

@@ -5,6 +5,7 @@
 #include "renderer/transport/estimate.h"
 #include "tests/support/hand_weave.h"
 #include "tests/support/orbit_configurations.h"
+#include "tests/support/painted_environment.h"
 #include "tests/support/reference_two_lobe.h"
 #include "tests/support/statistics_test.h"
 
@@ -148,39 +149,6 @@ static void far_field_camera_is_a_distant_one(void **state)
     }
 }
 
-static struct environment *picture(size_t width, size_t height, void (*paint)(double theta, double phi, float rgb[3]))
-{
-    struct image im;
-    struct environment *e = NULL;
-    struct error err = {0};
-    assert_int_equal(image_init(&im, width, height, 3, NULL), STATUS_OK);
-    for (size_t i = 0; i < width * height; i++)
-        paint(M_PI * ((double)(i / width) + 0.5) / (double)height, 2 * M_PI * ((double)(i % width) + 0.5) / (double)width,
-              im.pixel + 3 * i);
-    if (environment_new(&im, 1, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
-    image_release(&im);
-    return e;
-}
-
-static void paint_constant(double theta, double phi, float rgb[3])
-{
-    (void)theta;
-    (void)phi;
-    rgb[0] = 0.7f;
-    rgb[1] = 1;
-    rgb[2] = 1.3f;
-}
-
-/* Two suns and a sky, nothing below the horizon but a dim floor. */
-static void paint_sky(double theta, double phi, float rgb[3])
-{
-    float up = theta < M_PI / 2 ? 0.3f : 0.05f;
-    bool sun = fabs(theta - 0.7) < 0.11 && fabs(phi - 1.1) < 0.15, moon = fabs(theta - 1.2) < 0.2 && fabs(phi - 3.9) < 0.3;
-    rgb[0] = up + (sun ? 40.0f : 0) + (moon ? 2.0f : 0);
-    rgb[1] = up + (sun ? 35.0f : 0) + (moon ? 3.0f : 0);
-    rgb[2] = 2 * up + (sun ? 20.0f : 0) + (moon ? 5.0f : 0);
-}
-
 static void constant_environment_is_a_furnace(void **state)
 {
     (void)state;
@@ -202,7 +170,7 @@ static void constant_picture_is_the_constant_environment(void **state)
 {
     (void)state;
     struct configuration c[16];
-    struct environment *e = picture(16, 8, paint_constant);
+    struct environment *e = painted_environment(16, 8, paint_constant);
     double param[9];
     orbit_configurations_16(c);
     coloured(param);
@@ -227,7 +195,7 @@ static void lights_add_up(void **state)
 {
     (void)state;
     struct configuration c[16];
-    struct environment *e = picture(64, 32, paint_sky);
+    struct environment *e = painted_environment(64, 32, paint_sky);
     double param[9];
     orbit_configurations_16(c);
     coloured(param);
@@ -255,7 +223,7 @@ static void picture_on_a_straight_fiber(void **state)
     static const double param[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
     const double tile_m = 0.4e-3, radius_m = 5e-6, y_z[1][2] = {{0.13e-3, 0}}, rotation[3] = {0, 0.4, 1.9};
     enum { FINE = 128 };
-    struct environment *e = picture(64, 32, paint_sky);
+    struct environment *e = painted_environment(64, 32, paint_sky);
     struct fiber_set f;
     struct scene *scene = NULL;
     hand_straight(&f, 1, y_z, tile_m, radius_m);
@@ -293,7 +261,7 @@ static void picture_samples_follow_their_density(void **state)
     enum { N = 400000, ROWS = 8, COLUMNS = 12, FINE = 16 };
     static double expected[ROWS * COLUMNS];
     static uint64_t observed[ROWS * COLUMNS];
-    struct environment *e = picture(48, 32, paint_sky);
+    struct environment *e = painted_environment(48, 32, paint_sky);
     for (int i = 0; i < ROWS * FINE; i++)
         for (int j = 0; j < COLUMNS * FINE; j++) {
             double theta = M_PI * (i + 0.5) / (ROWS * FINE), phi = 2 * M_PI * (j + 0.5) / (COLUMNS * FINE);

@@ -6,6 +6,7 @@
 #include "renderer/transport/volume_estimate.h"
 #include "tests/support/hand_volume.h"
 #include "tests/support/orbit_configurations.h"
+#include "tests/support/painted_environment.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -138,45 +139,18 @@ static void distant_lamps_and_cameras(void **state)
     }
 }
 
-static struct environment *picture(void (*paint)(double theta, double phi, float rgb[3]))
+/* The sky with a lamp below the horizon. */
+static void paint_sky_and_lamp(double theta, double phi, float rgb[3])
 {
-    enum { WIDTH = 64, HEIGHT = 32 };
-    struct image im;
-    struct environment *e = NULL;
-    struct error err = {0};
-    assert_int_equal(image_init(&im, WIDTH, HEIGHT, 3, NULL), STATUS_OK);
-    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
-        paint(M_PI * ((double)(i / WIDTH) + 0.5) / HEIGHT, 2 * M_PI * ((double)(i % WIDTH) + 0.5) / WIDTH, im.pixel + 3 * i);
-    if (environment_new(&im, 1, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
-    image_release(&im);
-    return e;
-}
-
-static void paint_constant(double theta, double phi, float rgb[3])
-{
-    (void)theta;
-    (void)phi;
-    rgb[0] = 0.7f;
-    rgb[1] = 1;
-    rgb[2] = 1.3f;
-}
-
-/* A sun, a moon and a sky; below the horizon a lamp on a dim floor. */
-static void paint_sky(double theta, double phi, float rgb[3])
-{
-    float up = theta < M_PI / 2 ? 0.3f : 0.05f;
-    bool sun = fabs(theta - 0.7) < 0.11 && fabs(phi - 1.1) < 0.15, moon = fabs(theta - 1.2) < 0.2 && fabs(phi - 3.9) < 0.3;
-    bool lamp = fabs(theta - 2.5) < 0.2 && fabs(phi - 2) < 0.4;
-    rgb[0] = up + (sun ? 40.0f : 0) + (moon ? 2.0f : 0);
-    rgb[1] = up + (sun ? 35.0f : 0) + (moon ? 3.0f : 0) + (lamp ? 15.0f : 0);
-    rgb[2] = 2 * up + (sun ? 20.0f : 0) + (moon ? 5.0f : 0);
+    paint_sky(theta, phi, rgb);
+    if (fabs(theta - 2.5) < 0.2 && fabs(phi - 2) < 0.4) rgb[1] += 15.0f;
 }
 
 static void constant_picture_is_the_constant_environment(void **state)
 {
     (void)state;
     struct configuration c[16];
-    struct environment *e = picture(paint_constant);
+    struct environment *e = painted_environment(64, 32, paint_constant);
     double param[12];
     orbit_configurations_16(c);
     coloured(param);
@@ -202,7 +176,7 @@ static void picture_on_the_slab(void **state)
     (void)state;
     enum { FINE = 128 };
     const double param[3] = {alpha, alpha, alpha}, tau = slab_m * d_per_m;
-    struct environment *e = picture(paint_sky);
+    struct environment *e = painted_environment(64, 32, paint_sky_and_lamp);
     for (int i = 0; i < 4; i++) {
         bool sheet = i % 2;
         const struct configuration c = {.cloth_rotation_rad = 0.9 * i, .crop_m = 0.01, .light = LIGHT_NO_LAMP,
@@ -240,7 +214,7 @@ static void lights_add_up(void **state)
 {
     (void)state;
     struct configuration c[16];
-    struct environment *e = picture(paint_sky);
+    struct environment *e = painted_environment(64, 32, paint_sky_and_lamp);
     double param[12];
     orbit_configurations_16(c);
     coloured(param);
