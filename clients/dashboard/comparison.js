@@ -25,7 +25,7 @@ export function gallery(list, pngExposure) {
       el("div", { class: "row" }, el("b", {}, c.name), c.held ? el("span", { class: "tag" }, "held out") : null),
       el("div", { class: "row" }, el("span", {}, "lamp"), el("span", {}, `θ ${degrees(c.angles.light_theta_deg)}  φ ${degrees(c.angles.light_phi_deg)}`)),
       el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(c.angles.camera_theta_deg)}  φ ${degrees(c.angles.camera_phi_deg)}`)),
-      el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, degrees(c.angles.cloth_rotation_deg))),
+      el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, c.angles.all_rotations ? "mean over all" : degrees(c.angles.cloth_rotation_deg))),
       el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percent(c.error))))));
   return [
     el("p", { class: "hint" }, "Left measured, right rendered with the fitted parameters; dashed frames were held out of the fit. Plain squares show mean colours; everything is at one exposure."),

@@ -124,6 +124,16 @@ static status cell_angle(const struct table *t, enum column c, double lower, dou
     return STATUS_OK;
 }
 
+/* "all" in place of the angle: the row is a mean over all rotations of the cloth. */
+static status cell_rotation(const struct table *t, double *out_deg, uint32_t *n_rotation, struct error *err)
+{
+    int place = t->place[COLUMN_ROTATION];
+    bool all = place >= 0 && strcmp(t->cell[place], "all") == 0;
+    *out_deg = 0.0;
+    *n_rotation = all ? CONFIGURATION_ALL_ROTATIONS : 0;
+    return all ? STATUS_OK : cell_angle(t, COLUMN_ROTATION, -360.0, 360.0, out_deg, err);
+}
+
 static status cell_polar(const struct table *t, enum column c, bool may_be_behind, double *out, struct error *err)
 {
     status s = cell_number(t, c, 0.0, out, err);
@@ -161,11 +171,12 @@ static status read_row(struct table *t, struct observation_set *o, struct error 
         return table_error(t, STATUS_INVALID, "column 'set' is '%.40s': allowed are fit, held-out", t->file, t->line,
                            set);
     double light_theta, light_phi, camera_theta, camera_phi, rotation;
+    uint32_t n_rotation;
     status s = cell_polar(t, COLUMN_LIGHT_THETA, !t->doc->black_sheet, &light_theta, err);
     if (s == STATUS_OK) s = cell_angle(t, COLUMN_LIGHT_PHI, -360.0, 360.0, &light_phi, err);
     if (s == STATUS_OK) s = cell_polar(t, COLUMN_CAMERA_THETA, false, &camera_theta, err);
     if (s == STATUS_OK) s = cell_angle(t, COLUMN_CAMERA_PHI, -360.0, 360.0, &camera_phi, err);
-    if (s == STATUS_OK) s = cell_angle(t, COLUMN_ROTATION, -360.0, 360.0, &rotation, err);
+    if (s == STATUS_OK) s = cell_rotation(t, &rotation, &n_rotation, err);
     for (unsigned c = 0; c < 3 && s == STATUS_OK; c++) {
         s = cell_not_negative(t, COLUMN_R + c, 0.0, 1e6, &item.mean_rgb[c], err);
         if (s == STATUS_OK) s = cell_not_negative(t, COLUMN_R_SE + c, 0.0, 1e6, &item.se_rgb[c], err);
@@ -173,6 +184,7 @@ static status read_row(struct table *t, struct observation_set *o, struct error 
     if (s == STATUS_OK) s = cell_not_negative(t, COLUMN_WEIGHT, 1.0, 1e6, &item.weight, err);
     if (s != STATUS_OK) return s;
     item.configuration = observation_configuration(t->doc, light_theta, light_phi, camera_theta, camera_phi, rotation);
+    item.configuration.n_rotation = n_rotation;
     const char *kind = item.set == JOB_SET_FIT ? "fit" : "held-out";
     snprintf(item.name, sizeof item.name, "%s-%02zu", kind, observation_set_count(o, item.set));
     if (t->place[COLUMN_NAME] >= 0 && job_file_name_valid(t->cell[t->place[COLUMN_NAME]]))

@@ -61,7 +61,7 @@ static bool same_configuration(const struct configuration *a, const struct confi
     return fabs(a->light_theta_rad - b->light_theta_rad) < close && fabs(a->light_phi_rad - b->light_phi_rad) < close &&
            fabs(a->camera_theta_rad - b->camera_theta_rad) < close &&
            fabs(a->camera_phi_rad - b->camera_phi_rad) < close &&
-           fabs(a->cloth_rotation_rad - b->cloth_rotation_rad) < close;
+           fabs(a->cloth_rotation_rad - b->cloth_rotation_rad) < close && a->n_rotation == b->n_rotation;
 }
 
 /* Largest difference of a channel relative to the brightness; 0 when noise explains it. */

@@ -160,6 +160,7 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
                             "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg", k->camera_theta_rad * deg,
                             "camera_phi_deg", k->camera_phi_rad * deg, "cloth_rotation_deg",
                             k->cloth_rotation_rad * deg, "weight", o->weight);
+    json_object_set_new(row, "all_rotations", json_boolean(k->n_rotation > 1));
     json_object_set_new(row, "measured", json_number_list(o->mean_rgb, 3, 1.0));
     json_object_set_new(row, "measured_se", json_number_list(o->se_rgb, 3, 1.0));
     json_object_set_new(row, "rendered", json_number_list(rendered, 3, 1.0));

@@ -8,7 +8,7 @@
  * (objective.h defines all three) "heldout_rel_rms":number|null, "misfit_rel_rms",  misfit: per residual, what no noise
  * explains "validation_worst_rel_se",                         largest standard error of a rendered mean, relative to
  * the row's brightness
- *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg",
+ *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg","all_rotations",
  *           "weight","measured":[r,g,b],"measured_se":[3],"rendered":[3],"rendered_se":[3],
  *           "rendering_png":"renderings/x.png","rendering_exr","photograph_png":"photographs/x.png"|null,"gain":null|number,"gain_se":null|number,
  *           "texture":null|{"block_mm","blocks_a_side","measured":[3],"measured_se":[3],"rendered":[3],"rendered_se":[3]}}],  contrasts

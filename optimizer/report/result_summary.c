@@ -33,6 +33,7 @@ static void print_rows(const struct pipeline_context *c, const struct pipeline_m
         const struct observation *o = &c->observation.item[i];
         const struct configuration *k = &o->configuration;
         double r[3], error = 0.0;
+        char turn[16];
         struct estimate a, b;
         nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
         nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
@@ -40,9 +41,10 @@ static void print_rows(const struct pipeline_context *c, const struct pipeline_m
             r[q] = 0.5 * (a.mean[q] + b.mean[q]);
             error += (r[q] - o->mean_rgb[q]) * (r[q] - o->mean_rgb[q]) / 3.0;
         }
-        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6.1f   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
+        snprintf(turn, sizeof turn, "%.1f", k->cloth_rotation_rad * deg);
+        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6s   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
                 o->name, o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg,
-                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->cloth_rotation_rad * deg, o->mean_rgb[0],
+                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->n_rotation > 1 ? "all" : turn, o->mean_rgb[0],
                 o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], 100.0 * sqrt(error * objective_relative_weight(o)));
     }
 }

@@ -21,7 +21,11 @@ enum configuration_light {
     LIGHT_NO_LAMP      /* only the environment, if any */
 };
 
-enum { CONFIGURATION_MAX_CELLS = 32 };
+enum {
+    CONFIGURATION_MAX_CELLS = 32,
+    CONFIGURATION_ALL_ROTATIONS = 9 /* n_rotation of a measurement that is a mean over all: odd, so that a weave, which looks nearly
+                                       the same after a quarter turn, is seen every 10 degrees */
+};
 
 enum configuration_camera {
     CAMERA_PERSPECTIVE = 0,
@@ -46,7 +50,8 @@ struct configuration {
     enum configuration_camera camera;
     uint32_t contrast_cells; /* 0: estimates are of the crop's mean radiance; 2 or more: of the contrast between so many
                                 equal parts of the crop a side (transport/contrast_blocks.h) */
-    uint32_t reserved;       /* 0 */
+    uint32_t n_rotation;     /* 0 or 1: the cloth lies at cloth_rotation_rad; more: estimates are of the mean over so many
+                                rotations, equally spaced from there on (appearance_estimate.h; pictures show the first) */
 };
 
 #endif

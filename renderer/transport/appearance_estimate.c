@@ -1,5 +1,6 @@
 #include "renderer/transport/appearance_estimate.h"
 
+#include "renderer/transport/rotation_mean.h"
 #include "renderer/transport/volume_estimate.h"
 
 static status estimate_surface(const struct appearance_request *q, struct thread_pool *pool,
@@ -43,10 +44,33 @@ status appearance_scene_check(const struct appearance_scene *scene, const struct
                            surface ? "fibers" : "density volume");
 }
 
+static status estimate_any(const struct appearance_request *q, struct thread_pool *pool, const struct progress *progress,
+                           struct estimate *out, struct error *err)
+{
+    return q->model->kind == APPEARANCE_SURFACE ? estimate_surface(q, pool, progress, out, err)
+                                                : estimate_volume(q, pool, progress, out, err);
+}
+
+static status estimate_rotations(const struct appearance_request *q, struct thread_pool *pool,
+                                 const struct progress *progress, struct estimate *out, struct error *err)
+{
+    struct rotation_mean mean;
+    struct appearance_request turned = *q;
+    status s = rotation_mean_init(&mean, q->configuration, q->n_path, q->n_configuration, err);
+    turned.configuration = mean.turned;
+    turned.n_configuration = mean.n_turned;
+    turned.n_path = mean.n_path;
+    if (s == STATUS_OK) s = estimate_any(&turned, pool, progress, mean.estimate, err);
+    if (s == STATUS_OK) rotation_mean_take(&mean, out);
+    rotation_mean_release(&mean);
+    return s;
+}
+
 status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
                                const struct progress *progress, struct estimate *out, struct error *err)
 {
     status s = appearance_scene_check(&q->scene, q->model, "render", err);
     if (s != STATUS_OK) return s;
-    return q->model->kind == APPEARANCE_SURFACE ? estimate_surface(q, pool, progress, out, err) : estimate_volume(q, pool, progress, out, err);
+    if (rotation_mean_wanted(q->configuration, q->n_configuration)) return estimate_rotations(q, pool, progress, out, err);
+    return estimate_any(q, pool, progress, out, err);
 }

@@ -29,7 +29,8 @@ struct appearance_request {
     bool want_jacobian;
 };
 
-/* What estimate_run or volume_estimate_run give; appearance_scene_check's errors. */
+/* What estimate_run or volume_estimate_run give, and means over rotations where a configuration asks for them (rotation_mean.h;
+ * every rotation counts as a configuration of its own); appearance_scene_check's errors. */
 status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
                                const struct progress *progress, struct estimate *out, struct error *err);
 

@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selved
 
 HEAD = "set,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n"
 ROWS = [f"fit,{i},{lt},0,{ct},180,{rot},0.{10 + i},0.{12 + i},0.{15 + i}" for i, (lt, ct, rot) in enumerate(
-    [(20, 20, 0), (45, 45, 0), (60, 0, 0), (20, 45, 90), (45, 20, 90), (60, 60, 90)])] + ["held-out,0,30,0,30,90,0,0.12,0.14,0.17"]
+    [(20, 20, 0), (45, 45, 0), (60, 0, 0), (20, 45, 90), (45, 20, 90), (60, 60, 90)])] + ["held-out,0,30,0,30,90,all,0.12,0.14,0.17"]
 TABLE = (HEAD + "\n".join(ROWS) + "\n").encode()
 
 
@@ -100,6 +100,7 @@ def test_from_scan_to_results(real, finished):
     assert archive.getnames() == names and "result.json" in names
     assert any(n.endswith(".hair") for n in names) and any(n.endswith(".vol") for n in names) and any(n.endswith(".png") for n in names)
     assert json.load(archive.extractfile("result.json")) == j["result"]
+    assert [r["all_rotations"] for r in j["result"]["rows"]] == [False] * 6 + [True]
 
 
 def steps(d, job):

@@ -7,6 +7,7 @@
 #include "tests/support/hand_weave.h"
 #include "tests/support/orbit_configurations.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -115,12 +116,66 @@ static void test_same_figures_as_the_tracers(void **unused)
     direction_volume_release(&v);
 }
 
+/* The mean over rotations against the cloth turned by hand, and a plain configuration beside it that stays as it is. */
+static void test_mean_over_rotations(void **unused)
+{
+    (void)unused;
+    enum { N_ROTATION = 5, N = N_ROTATION + 1 };
+    struct thread_pool *pool = NULL;
+    struct fiber_set f;
+    struct scene *scene = NULL;
+    struct configuration c[16], by_hand[N];
+    struct appearance a;
+    struct appearance_request q;
+    struct estimate mean[2], turned[N];
+    double param[SCATTERING_MAX_PARAM], sum = 0.0, var = 0.0;
+    const size_t n_path[2] = {N_ROTATION * 512, 256}, n_turned[N] = {512, 512, 512, 512, 512, 256};
+    orbit_configurations_16(c);
+    hand_weave_small(&f);
+    assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
+    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, NULL), STATUS_OK);
+    appearance_at(0, &a);
+    for (int k = 0; k < N; k++) by_hand[k] = c[k < N_ROTATION ? 1 : 0];
+    for (int k = 0; k < N_ROTATION; k++) by_hand[k].cloth_rotation_rad = c[1].cloth_rotation_rad + k * 2.0 * M_PI / N_ROTATION;
+    request_init(&q, &a, param, by_hand, n_turned);
+    q.scene.fibers = scene;
+    q.n_configuration = N;
+    assert_int_equal(appearance_estimate_run(&q, pool, NULL, turned, NULL), STATUS_OK);
+
+    struct configuration wanted[2] = {c[1], c[0]};
+    wanted[0].n_rotation = N_ROTATION;
+    q.configuration = wanted;
+    q.n_configuration = 2;
+    q.n_path = n_path;
+    assert_int_equal(appearance_estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
+    assert_memory_equal(&mean[1], &turned[N_ROTATION], sizeof mean[1]);
+    for (int k = 0; k < N_ROTATION; k++) {
+        sum += turned[k].mean[1] / N_ROTATION;
+        var += turned[k].var[1] / (N_ROTATION * N_ROTATION);
+    }
+    assert_true(fabs(turned[0].mean[1] - turned[1].mean[1]) > 0.05 * sum); /* rotations of this cloth differ */
+    assert_true(fabs(mean[0].mean[1] - sum) < 1e-12 && fabs(mean[0].var[1] - var) < 1e-12 * var);
+    size_t i_width = a.n_param + 6; /* green by beta_R */
+    sum = 0.0;
+    for (int k = 0; k < N_ROTATION; k++) sum += turned[k].jac[i_width] / N_ROTATION;
+    assert_true(fabs(mean[0].jac[i_width] - sum) < 1e-12 * fmax(1.0, fabs(sum)));
+    assert_int_equal(mean[0].n_path, N_ROTATION * 512);
+
+    struct error err;
+    wanted[0].contrast_cells = 4;
+    assert_int_equal(appearance_estimate_run(&q, pool, NULL, mean, &err), STATUS_INVALID);
+    scene_free(scene);
+    thread_pool_free(pool);
+    fiber_set_release(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ids_are_unique_and_found),
         cmocka_unit_test(test_volume_models_end_with_the_density_multiplier),
         cmocka_unit_test(test_same_figures_as_the_tracers),
+        cmocka_unit_test(test_mean_over_rotations),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -55,6 +55,23 @@ static void test_read(void **state)
     observation_set_release(&o);
 }
 
+static void test_rotations(void **state)
+{
+    (void)state;
+    const char *text = HEAD "fit,0,20,0,20,180,all,0.1,0.1,0.1\nfit,0,20,0,20,180,90,0.1,0.1,0.1\n";
+    struct observation_set o;
+    struct error err = {0};
+    observation_set_init(&o);
+    if (measurement_table_parse(text, strlen(text), "t.csv", &set_up, &o, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(o.item[0].configuration.n_rotation, CONFIGURATION_ALL_ROTATIONS);
+    assert_true(o.item[0].configuration.cloth_rotation_rad == 0.0);
+    assert_int_equal(o.item[1].configuration.n_rotation, 0);
+    assert_true(fabs(o.item[1].configuration.cloth_rotation_rad - M_PI / 2) < 1e-12);
+    observation_set_release(&o);
+    check_error(HEAD "fit,0,20,0,20,all,0,0.1,0.1,0.1\n", STATUS_FORMAT, "column 'camera_phi_deg'");
+    check_error(HEAD "fit,0,20,0,20,180,any,0.1,0.1,0.1\n", STATUS_FORMAT, "column 'cloth_rotation_deg': 'any'");
+}
+
 static void test_errors(void **state)
 {
     (void)state;
@@ -110,7 +127,7 @@ static void test_real_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_errors),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_rotations), cmocka_unit_test(test_errors),
                                        cmocka_unit_test(test_real_tables)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,27 @@
+/* Estimates of configurations whose radiance is the mean over cloth rotations (configuration.h, n_rotation): each such
+ * configuration is estimated at its rotations, with an equal share of its paths each, and the estimates are averaged.
+ * A stratified mean: unbiased for the rotations stated, and its variance is that of the paths alone.
+ */
+#ifndef SELVEDGE_RENDERER_ROTATION_MEAN_H
+#define SELVEDGE_RENDERER_ROTATION_MEAN_H
+
+#include "renderer/transport/estimate.h"
+
+struct rotation_mean {
+    size_t n, n_turned;              /* configurations wanted, and with their rotations taken apart */
+    struct configuration *turned;    /* in the order wanted; n_rotation 0 */
+    size_t *n_path;                  /* of turned */
+    size_t *first;                   /* n + 1: the turned ones of i are first[i] .. first[i + 1] - 1 */
+    struct estimate *estimate;       /* of turned: to be filled in */
+};
+
+/* True when any configuration asks for more than one rotation: then, and only then, is the rest needed. */
+bool rotation_mean_wanted(const struct configuration *c, size_t n);
+/* STATUS_INVALID (contrast of a mean over rotations), STATUS_NO_MEMORY. release it in any case. */
+status rotation_mean_init(struct rotation_mean *m, const struct configuration *c, const size_t *n_path, size_t n,
+                          struct error *err);
+/* out: n estimates from m->estimate. */
+void rotation_mean_take(const struct rotation_mean *m, struct estimate *out);
+void rotation_mean_release(struct rotation_mean *m);
+
+#endif
