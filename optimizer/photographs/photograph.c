@@ -32,17 +32,27 @@ static status crop_image(struct image *im, const size_t crop[4], const char *nam
     return STATUS_OK;
 }
 
+static double saturated_part(const struct image *im)
+{
+    size_t n = im->width * im->height, n_saturated = 0;
+    for (size_t i = 0; i < n; i++) {
+        const float *p = im->pixel + i * im->n_channel;
+        n_saturated += p[0] >= 1.0f || p[1] >= 1.0f || p[2] >= 1.0f;
+    }
+    return (double)n_saturated / (double)n;
+}
+
 status photograph_read(const char *path, const struct job_photograph *p, struct image *im, double *saturated_share,
                        struct error *err)
 {
     const char *dot = strrchr(path, '.');
-    double saturated = 0.0;
+    bool linear = dot != NULL && strcasecmp(dot, ".exr") == 0;
     status s;
     memset(im, 0, sizeof *im);
-    if (dot != NULL && strcasecmp(dot, ".exr") == 0)
+    if (linear)
         s = image_read_exr(im, path, LIMIT_PIXEL, err);
     else if (dot != NULL && strcasecmp(dot, ".png") == 0)
-        s = photograph_read_png(path, p->srgb, LIMIT_PIXEL, im, &saturated, err);
+        s = photograph_read_png(path, p->srgb, LIMIT_PIXEL, im, err);
     else
         return error_set(err, STATUS_UNSUPPORTED, "cannot read photograph '%s': its name must end in .exr or .png",
                          base_name(path));
@@ -52,8 +62,8 @@ status photograph_read(const char *path, const struct job_photograph *p, struct 
         image_release(im);
         return s;
     }
+    if (saturated_share != NULL) *saturated_share = linear ? 0.0 : saturated_part(im);
     for (size_t i = 0; i < im->width * im->height * im->n_channel; i++) im->pixel[i] *= (float)p->scale;
-    if (saturated_share != NULL) *saturated_share = saturated;
     return STATUS_OK;
 }
 

@@ -32,24 +32,19 @@ static float to_linear(unsigned value, unsigned largest, bool srgb)
     return (float)(v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4));
 }
 
-static double convert(png_structp png, png_infop info, bool srgb, struct image *im)
+static void convert(png_structp png, png_infop info, bool srgb, struct image *im)
 {
     png_bytepp row = png_get_rows(png, info);
     unsigned depth = png_get_bit_depth(png, info), largest = depth == 16 ? 65535 : 255;
-    size_t n_saturated = 0;
     for (size_t y = 0; y < im->height; y++) {
         for (size_t x = 0; x < im->width; x++) {
-            bool saturated = false;
             for (size_t c = 0; c < 3; c++) {
                 const png_byte *p = row[y] + (3 * x + c) * (depth / 8);
                 unsigned v = depth == 16 ? (unsigned)p[0] << 8 | p[1] : p[0];
-                saturated |= v == largest;
                 im->pixel[(y * im->width + x) * 3 + c] = to_linear(v, largest, srgb);
             }
-            n_saturated += saturated;
         }
     }
-    return (double)n_saturated / (double)(im->width * im->height);
 }
 
 /* The size stands at bytes 16..23; checked before libpng takes memory for it. */
@@ -74,8 +69,7 @@ static status check_size(FILE *f, const char *name, size_t limit_pixel, struct e
     return STATUS_OK;
 }
 
-status photograph_read_png(const char *path, bool srgb, size_t limit_pixel, struct image *im, double *saturated_share,
-                           struct error *err)
+status photograph_read_png(const char *path, bool srgb, size_t limit_pixel, struct image *im, struct error *err)
 {
     const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
     struct png_failure failure = {{0}};
@@ -99,7 +93,7 @@ status photograph_read_png(const char *path, bool srgb, size_t limit_pixel, stru
             png, info,
             PNG_TRANSFORM_EXPAND | PNG_TRANSFORM_STRIP_ALPHA | PNG_TRANSFORM_PACKING | PNG_TRANSFORM_GRAY_TO_RGB, NULL);
         s = image_init(im, png_get_image_width(png, info), png_get_image_height(png, info), 3, err);
-        if (s == STATUS_OK) *saturated_share = convert(png, info, srgb, im);
+        if (s == STATUS_OK) convert(png, info, srgb, im);
     }
     if (png != NULL) png_destroy_read_struct(&png, info != NULL ? &info : NULL, NULL);
     fclose(f);

@@ -123,6 +123,21 @@ static void test_png(void **state)
     p.srgb = false;
     assert_int_equal(photograph_measure(path, &p, &m, NULL), STATUS_OK);
     assert_true(fabs(m.mean_rgb[1] - 128.0 / 255.0) < 1e-6);
+    p.crop_px[1] = 0;
+    assert_int_equal(photograph_measure(path, &p, &m, NULL), STATUS_OK);
+    assert_true(m.saturated_share == 4.0 / 256.0);
+    /* what is saturated counts within the crop only: 4 of 16 pixels are too many, a lamp beside the crop is not */
+    p.crop_px[2] = p.crop_px[3] = 4;
+    assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_INVALID);
+    assert_true(m.saturated_share == 0.25);
+    memset(rgb + 8 * 16 * 3, 255, 8 * 16 * 3);
+    assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
+    memcpy(p.crop_px, (size_t[]){0, 1, 16, 8}, sizeof p.crop_px);
+    p.scale = 0.25; /* and before the scale */
+    assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_OK);
+    assert_true(m.saturated_share == 0.0);
+    memcpy(p.crop_px, (size_t[]){0, 1, 16, 16}, sizeof p.crop_px);
+    p.srgb = true;
     memset(rgb, 255, 16 * 3 * 8);
     assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
     assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_INVALID);
