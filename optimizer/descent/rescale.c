@@ -87,7 +87,7 @@ static double curve_step(const struct observation_set *o, const struct estimate 
     return sum;
 }
 
-/* One curve: all slots of the same symbol move together. */
+/* One curve: all slots of the same symbol move together, beyond bounds of their own where these are tighter. */
 static status measure_symbol(const struct fit_problem *problem, size_t first, size_t n_slot, const size_t *n_path,
                              struct rescale_curve *curve, struct estimate *buffer[2], uint64_t *n_path_used,
                              double *wall_s, struct error *err)
@@ -121,9 +121,16 @@ status rescale_measure(const struct fit_problem *problem, const struct coordinat
     for (size_t p = 0, n_slot; p < problem->n_param && s == STATUS_OK; p += n_slot) {
         for (n_slot = 1; p + n_slot < problem->n_param; n_slot++)
             if (strcmp(problem->info[p + n_slot].symbol, problem->info[p].symbol) != 0) break;
-        rescale_points(&problem->info[p], &k[p], &curve[p]);
-        s = measure_symbol(problem, p, n_slot, n_path, &curve[p], buffer, n_path_used, wall_s, err);
-        for (size_t i = 1; i < n_slot; i++) curve[p + i] = curve[p];
+        for (size_t i = p; i < p + n_slot && s == STATUS_OK; i++) {
+            size_t same = p;
+            while (same < i && (k[same].param_lower != k[i].param_lower || k[same].param_upper != k[i].param_upper)) same++;
+            if (same < i) {
+                curve[i] = curve[same];
+                continue;
+            }
+            rescale_points(&problem->info[i], &k[i], &curve[i]);
+            s = measure_symbol(problem, p, n_slot, n_path, &curve[i], buffer, n_path_used, wall_s, err);
+        }
     }
     free(buffer[0]);
     return s;

@@ -6,7 +6,7 @@
  *
  * Differs: the nine values of one curve are rendered with the same random numbers, which keeps noise out of their
  * differences; values below the bound of the fit (beta_TT: the published curve starts at 1 degree, the bound is 10) are
- * cut off, which shifts r by a constant only. Parameters that the published table does not list get nine values evenly
+ * cut off, which shifts r by a constant only; channels with bounds of their own get a curve each, a third of the colour's too. Parameters that the published table does not list get nine values evenly
  * spaced in their fit coordinate.
  */
 #ifndef SELVEDGE_OPTIMIZER_RESCALE_H
@@ -31,7 +31,7 @@ double rescale_forward(const struct rescale_curve *curve, double p);
 double rescale_backward(const struct rescale_curve *curve, double r);
 double rescale_slope(const struct rescale_curve *curve, double p);
 
-/* curve: n_param of them (channels of one colour share the values). n_path: per configuration of each evaluation. */
+/* curve: n_param of them (channels of one colour with the same bounds share the values). n_path: per configuration of each evaluation. */
 status rescale_measure(const struct fit_problem *problem, const struct coordinate *k, const size_t *n_path,
                        struct rescale_curve *curve, uint64_t *n_path_used, double *wall_s, struct error *err);
 

@@ -65,6 +65,40 @@ static void test_map(void **state)
         assert_true(fabs(rescale_backward(&curve, rescale_forward(&curve, p)) - p) < 1e-12);
 }
 
+/* Channels of one colour with bounds of their own are not held to those of the first. */
+static void test_bounds_of_one_channel(void **state)
+{
+    (void)state;
+    struct fake_cloth f;
+    struct observation_set o;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct coordinate k[FAKE_N_PARAM];
+    struct rescale_curve curve[FAKE_N_PARAM];
+    size_t n_path[FAKE_N_FIT];
+    double start[FAKE_N_PARAM], wall_s = 0.0;
+    uint64_t used = 0;
+    fake_cloth_init(&f, 1, FAKE_N_FIT);
+    struct estimator e = fake_estimator(&f);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+        double upper = p == 3 ? 0.86 : fake_param[p].upper;
+        start[p] = fake_param[p].start;
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, upper, start[p], false};
+        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, upper);
+    }
+    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(&f, start, 0.0, 1, &o), STATUS_OK);
+    struct fit_problem problem = {
+        .n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
+    assert_int_equal(rescale_measure(&problem, k, n_path, curve, &used, &wall_s, NULL), STATUS_OK);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+        assert_true(curve[p].c[curve[p].n - 1] == parameter[p].upper);
+        assert_true(rescale_backward(&curve[p], 1e9) == parameter[p].upper);
+    }
+    assert_true(curve[3].r[1] == curve[4].r[1] && curve[4].r[1] == curve[5].r[1]); /* a third of the colour's each */
+    observation_set_release(&o);
+}
+
 /* Without noise the measured curve is eq. 5.14 word for word, and colours get a third of it. */
 static void test_measured_curve(void **state)
 {
@@ -118,6 +152,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_published_table),
                                        cmocka_unit_test(test_points_within_bounds), cmocka_unit_test(test_map),
+                                       cmocka_unit_test(test_bounds_of_one_channel),
                                        cmocka_unit_test(test_measured_curve)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
