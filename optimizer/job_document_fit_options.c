@@ -330,6 +330,28 @@ static status group_bounds(const struct param_info *info, size_t n_param, const 
                            info[leader].name);
 }
 
+/* A prior is one of its leader's value: it must lie where the leader's coordinate is defined. */
+static status check_priors(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
+                           bool held, struct error *err)
+{
+    const struct job_fit_option *o = &given->option;
+    double lower = param_to_file_unit(&info[leader], info[leader].lower),
+           upper = param_to_file_unit(&info[leader], info[leader].upper);
+    const double slack = 1e-12 * (fabs(lower) + fabs(upper));
+    for (size_t p = 0; p < n_param; p++) {
+        if (o->leader[p] != leader || isnan(o->prior_mean[p])) continue;
+        if (held)
+            return error_set_field(err, STATUS_INVALID, "fit.priors",
+                                   "'fit.priors' has '%s', which 'fit.fixed' holds fixed", info[p].name);
+        double mean = o->prior_mean[p] / o->ratio[p];
+        if (mean < lower - slack || mean > upper + slack)
+            return error_set_field(err, STATUS_INVALID, "fit.priors",
+                                   "'fit.priors' has '%s' at %g, which 'fit.tied' makes '%s' at %g: allowed are %g and %g",
+                                   info[p].name, o->prior_mean[p], info[leader].name, mean, lower, upper);
+    }
+    return STATUS_OK;
+}
+
 static status resolve_group(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
                             struct job_fit_parameter *out, struct error *err)
 {
@@ -346,6 +368,8 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     if (clash != SIZE_MAX)
         return error_set_field(err, STATUS_INVALID, "fit.start",
                                "'fit.start' starts '%s' at a value that 'fit.tied' does not allow", info[clash].name);
+    s = check_priors(info, n_param, given, leader, !isnan(held), err);
+    if (s != STATUS_OK) return s;
     size_t ignored;
     double prior = group_value(o, n_param, o->prior_mean, leader, &ignored);
     const double slack = 1e-9 * (fabs(lower) + fabs(upper));
@@ -359,9 +383,6 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     value = fmin(fmax(value, lower), upper);
     for (size_t p = 0; p < n_param; p++) {
         if (o->leader[p] != leader) continue;
-        if (!isnan(held) && !isnan(o->prior_mean[p]))
-            return error_set_field(err, STATUS_INVALID, "fit.priors",
-                                   "'fit.priors' has '%s', which 'fit.fixed' holds fixed", info[p].name);
         out[p] = (struct job_fit_parameter){lower * o->ratio[p], upper * o->ratio[p], value * o->ratio[p],
                                             !isnan(held)};
     }

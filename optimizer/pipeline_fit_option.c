@@ -1,12 +1,16 @@
 #include "optimizer/pipeline_fit_option.h"
+#include "optimizer/descent/descent.h"
 
 #include <math.h>
+
+_Static_assert((int)JOB_MAX_PARAM == (int)SCATTERING_MAX_PARAM && (int)JOB_MAX_START == (int)FIT_MAX_START,
+               "a document's limits are those of the fit");
 
 void pipeline_fit_option(const struct job_fit_option *from, const struct param_info *info, size_t n_param,
                          struct fit_option *to)
 {
     fit_option_init(to);
-    for (size_t p = 0; p < n_param && p < JOB_MAX_PARAM; p++) {
+    for (size_t p = 0; p < n_param; p++) {
         to->leader[p] = from->leader[p];
         to->ratio[p] = from->ratio[p];
         if (isnan(from->prior_mean[p])) continue;

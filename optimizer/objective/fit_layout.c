@@ -5,6 +5,7 @@
 #include <string.h>
 
 enum { N = SCATTERING_MAX_PARAM };
+_Static_assert((int)SCATTERING_MAX_FLAT >= N, "estimates have room for derivatives by all unknowns");
 
 /* The range of a nuisance term, in standard deviations of its prior. */
 static const double gain_range = 5.0, stray_range = 8.0;
@@ -81,11 +82,12 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
     for (size_t p = 0; p < n_param; p++) {
         if (isnan(o->prior_mean[p]) || said_before(l, info, o, p)) continue;
         const struct param_info *owner = &l->info[l->owner[p]];
-        double mean = o->prior_mean[p] / o->ratio[p];
-        if (mean < owner->lower || mean > owner->upper || !(o->prior_se[p] > 0.0))
+        double mean = o->prior_mean[p] / o->ratio[p], slack = 1e-9 * (owner->upper - owner->lower); /* of rounding */
+        if (mean < owner->lower - slack || mean > owner->upper + slack || !(o->prior_se[p] > 0.0))
             return error_set_field(err, STATUS_INVALID, "fit.priors",
                                    "the prior of '%s' lies outside the range of '%s' or has no width", info[p].name,
                                    owner->name);
+        mean = fmin(fmax(mean, owner->lower), owner->upper);
         add_parameter_prior(l, l->owner[p], mean, o->prior_se[p] / o->ratio[p]);
     }
     if (o->global_gain_sd > 0.0) {

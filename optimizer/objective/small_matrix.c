@@ -1,7 +1,10 @@
 #include "optimizer/objective/small_matrix.h"
+#include "renderer/scattering/scattering.h"
 
 #include <math.h>
 #include <string.h>
+
+_Static_assert((int)SMALL_MATRIX_MAX >= (int)SCATTERING_MAX_PARAM, "matrices of a fit's unknowns fit");
 
 static void rotate(double *m, double *v, size_t n, size_t p, size_t q)
 {

@@ -292,6 +292,8 @@ static void test_fit_option_errors(void **state)
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"fixed\":{\"beta_R\":5}}"), "fit.priors", "fixed");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"method\":\"published_sgd.v1\"}"), "fit.priors",
                 METHOD_GAUSS_NEWTON);
+    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":0.2}],\"priors\":{\"gamma_TT\":{\"mean\":1,\"se\":1}}}"),
+                "fit.priors", "10 and 45");
     check_error(FIT_OF("{\"nuisance\":{\"stray_light\":true},\"method\":\"published_sgd.v1\"}"), "fit.nuisance",
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"nuisance\":{\"gain\":\"each\"}}"), "fit.nuisance.gain", "per_photograph");
