@@ -2,14 +2,21 @@
  *
  * Each iteration traces new paths (two replicas) at the present point, adds them to the history, and pools all of it
  * there (linear_model.h). The step minimises the pooled quadratic model in logit / log coordinates inside the bounds
- * and the step limits: rows        weighted by what noise and misfit leave of them (linear_model_weigh); gradient
- * mirrored product of the replicas, without bias; curvature   2 J'J of the averaged replicas: too large by the noise of
- * J, a damping that fades as paths add up; damping     plus 2 noise / limit^2: moving by the whole step limit must gain
- * more than one residual's Monte-Carlo variance. A step after which the objective is higher beyond doubt halves the
- * limits and is taken back. Paths: few at first; 1.3 times as many when the predicted gain is no longer clear of the
- * noise; spread over configurations by the standard deviation of a path (Neyman allocation). Ends when what several
- * undamped steps could gain is within the noise and the noise is small against what is left of the objective (where a
- * model does not fit, steps are short and each gains little: one step's gain would end such fits on their way).
+ * and the step limits:
+ *   rows       weighted by what noise and misfit leave of them (linear_model_weigh);
+ *   gradient   mirrored product of the replicas, without bias;
+ *   curvature  2 J'J of the averaged replicas: too large by the noise of J, a damping that fades as paths add up;
+ *   damping    plus 2 noise / limit^2: moving by the whole step limit must gain more than one residual's Monte-Carlo
+ *              variance.
+ * A step after which the objective is higher beyond doubt halves the limits and is taken back; one that gained clearly
+ * less than it promised halves them. Paths: few at first; 1.3 times as many when the predicted gain is no longer clear
+ * of the noise; spread over configurations by the standard deviation of a path (Neyman allocation).
+ *
+ * Arrived: what several undamped steps could gain (far_gain, by the curvature without the noise of J) is within the
+ * noise, or below arrived_share of the objective, which the model's curvature does not tell, or good enough. (Where a
+ * model does not fit, steps are short and each gains little: one step's gain would end such fits on their way.) The fit
+ * ends when it has arrived and the noise, too, is good enough: below target_share of the objective or target_rel_rms.
+ * Where the paths or iterations are used up before, it has converged if it had arrived.
  */
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/method_names.h"
@@ -232,6 +239,26 @@ static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_obse
     return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
 }
 
+/* Why a fit whose budget or iterations are used up has converged or not. */
+static void explain_early_end(const struct gauss_newton *g, const char *used, bool arrived, bool failed, double f, double se,
+                              struct fit_result *result)
+{
+    char *text = result->reason;
+    size_t n = sizeof result->reason;
+    if (result->converged)
+        snprintf(text, n,
+                 "%s ended when further steps promised %.2g of the objective, %.3g with a noise of %.1g; more paths "
+                 "would narrow the errors",
+                 used, g->far_gain, f, se);
+    else if (failed)
+        snprintf(text, n, "%s ended with a step that made the objective worse and was taken back", used);
+    else if (arrived)
+        snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used, g->history.n_step);
+    else
+        snprintf(text, n, "%s ended while further steps still promised to lower the objective by %.2g from %.3g", used,
+                 g->far_gain, f);
+}
+
 static status iterate(struct gauss_newton *g, struct fit_result *result, struct error *err)
 {
     const struct fit_problem *problem = g->run.problem;
@@ -262,15 +289,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         }
         bool paths_left = plan_paths(g, clear, problem->observation->n);
         if (g->run.n_step < max_iteration && paths_left) continue;
-        const char *used = paths_left ? "the iterations" : "the path budget";
-        if (result->converged)
-            snprintf(result->reason, sizeof result->reason,
-                     "%s ended when the objective (%.3g) could no longer be told from its noise (%.1g); more paths "
-                     "would narrow the errors",
-                     used, f, se);
-        else
-            snprintf(result->reason, sizeof result->reason,
-                     "%s ended while a step still promised to lower the objective by %.2g from %.3g", used, g->gain, f);
+        explain_early_end(g, paths_left ? "the iterations" : "the path budget", small, failed, f, se, result);
         return STATUS_OK;
     }
 }
