@@ -1,15 +1,16 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- *             [--sgd-budget N] [--curve-paths N] [--journal FILE]
+ *             [--sgd-budget N] [--curve-paths N] [--coverage-paths N] [--journal FILE]
  * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real"; nothing: all. "published": the published method
  * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
- * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 400,000 a held-out mean of the truth, 2 x 50,000
+ * Defaults are those of the figures: 1,000,000 paths a photograph (250,000 for coverage), 2 x 400,000 a held-out mean of the truth, 2 x 50,000
  * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ is.
  *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
  *   fit.<fabric>.published_paths         what the published method's own budget comes to
- *   fit.coverage_2sigma                  20 fits of gabardine and mid1 with new noise: share of determined parameters within 2 se
+ *   fit.coverage_2sigma                  20 fits of gabardine and mid1 to photographs traced anew, with new noise: share of
+ *                                        determined parameters within 2 se
  *   fit.seeds.worst_over_median          10 fits of gabardine with other seeds: held-out error
  *   fit.curve.<method>                   held-out error of gabardine against paths and seconds, one line a point; the
  *                                        published method with --sgd-budget paths (20 million) in all
@@ -33,12 +34,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const double NOISE = 0.005; /* of photographs, relative */
+
 enum { N_COVERAGE = 20, N_SEED = 10, N_CURVE = 14, MAX_STEP = 600 };
 
 struct bench {
     struct thread_pool *pool;
     const char *folder;
-    size_t photograph_paths, kept_paths, score_paths, curve_paths;
+    size_t photograph_paths, coverage_paths, kept_paths, score_paths, curve_paths;
     uint64_t path_budget, sgd_budget;
     const char *journal; /* of the published method; NULL: not kept */
     const char *sample; /* NULL: all measured tables */
@@ -125,14 +128,20 @@ static void tell_fit(const struct fit_phantom *f, const struct fit_result *r)
     }
 }
 
-static void open_fabric(const struct bench *b, const char *name, struct fit_phantom *f)
+/* Without photographs. */
+static void open_cloth(const struct bench *b, const char *name, struct fit_phantom *f)
 {
     const struct fit_fabric *fabric = fit_fabric_find(name);
     fprintf(stderr, "%s\n", name);
     fit_phantom_init(f, b->folder, b->pool, fabric->weave, fabric->model_id, fabric->truth);
     for (size_t p = 0; p < f->model.n_param; p++) /* tables are rounded: not beyond a bound */
         f->truth[p] = fmin(fmax(f->truth[p], f->model.param[p].lower), f->model.param[p].upper);
-    fit_phantom_photograph(f, b->photograph_paths, 0.005, 1);
+}
+
+static void open_fabric(const struct bench *b, const char *name, struct fit_phantom *f)
+{
+    open_cloth(b, name, f);
+    fit_phantom_photograph(f, &(struct fit_photography){.n_path = b->photograph_paths, .noise = NOISE, .noise_seed = 1});
 }
 
 static struct fit_score score(const struct bench *b, const struct fit_phantom *f, const double *param)
@@ -173,17 +182,19 @@ static void bench_coverage(const struct bench *b)
     size_t n_inside = 0, n_judged = 0;
     for (size_t k = 0; k < 2; k++) {
         struct fit_phantom f;
-        open_fabric(b, name[k], &f);
+        open_cloth(b, name[k], &f);
         for (uint64_t i = 0; i < N_COVERAGE / 2; i++) {
             struct fit_result r;
-            fit_phantom_photograph(&f, b->photograph_paths, 0.005, 100 + i);
+            fit_phantom_photograph(&f, &(struct fit_photography){b->coverage_paths, NOISE, 100 + i, 1 + i, true});
             run_fit(&f, METHOD_GAUSS_NEWTON, 100 + i, b->path_budget, NULL, &r, NULL);
             tell_fit(&f, &r);
+            size_t n_before = n_judged - n_inside;
             for (size_t p = 0; p < f.model.n_param; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
                 n_judged++;
                 n_inside += fabs(r.param[p] - f.truth[p]) < 2.0 * r.uncertainty.se_param[p];
             }
+            fprintf(stderr, "  %zu outside, %zu of %zu inside so far\n", n_judged - n_inside - n_before, n_inside, n_judged);
         }
         fit_phantom_release(&f);
     }
@@ -429,6 +440,8 @@ static bool take_option(struct bench *b, const char *name, const char *value)
         b->sample = value;
     else if (strcmp(name, "--photograph-paths") == 0)
         b->photograph_paths = strtoul(value, NULL, 10);
+    else if (strcmp(name, "--coverage-paths") == 0)
+        b->coverage_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--kept-paths") == 0)
         b->kept_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--score-paths") == 0)
@@ -450,7 +463,7 @@ int main(int argc, char **argv)
 {
     static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "real"};
     struct bench b = {
-        .folder = "build/bench-fit", .photograph_paths = 1000000, .kept_paths = 400000, .score_paths = 50000,
+        .folder = "build/bench-fit", .photograph_paths = 1000000, .coverage_paths = 250000, .kept_paths = 400000, .score_paths = 50000,
                       .curve_paths = 10000,
                       .sgd_budget = 20000000};
     struct error err = {0};

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { SEED_PHOTOGRAPH = 77001, SEED_KEPT = 77002, SEED_SCORE = 77003 };
+enum { SEED_PHOTOGRAPH = 77001, SEED_KEPT = 77002, SEED_SCORE = 77003, SEED_PHOTOGRAPH_ANEW = 78000 };
 
 void fit_check(status s, const struct error *err)
 {
@@ -212,7 +212,22 @@ static void kept_estimate(const struct fit_phantom *f, const struct kept_call *c
 
 /* ---- photographs ---- */
 
-void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, uint64_t noise_seed)
+/* The built-in views: all, or those to fit, which come first. */
+static size_t views(bool fitted_only, struct phantom_view_table *t, struct configuration *configuration)
+{
+    static const struct job_document set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
+    size_t n = 0;
+    phantom_view_table_builtin(t);
+    for (; n < FIT_N_VIEW && !(fitted_only && t->view[n].set != JOB_SET_FIT); n++) {
+        const struct job_photograph *v = &t->view[n];
+        configuration[n] = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
+                                                     v->camera_phi_deg, v->cloth_rotation_deg);
+    }
+    return n;
+}
+
+void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography *how)
 {
     struct phantom_view_table *t = calloc(1, sizeof *t);
     struct estimate *e = calloc(FIT_N_VIEW, sizeof *e);
@@ -222,26 +237,20 @@ void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, 
     struct rng rng;
     check_memory(t);
     check_memory(e);
-    phantom_view_table_builtin(t);
-    const struct job_document set_up = {
-        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
-    for (size_t i = 0; i < FIT_N_VIEW; i++) {
-        const struct job_photograph *v = &t->view[i];
-        configuration[i] = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
-                                                     v->camera_phi_deg, v->cloth_rotation_deg);
-    }
-    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, false};
-    kept_estimate(f, &call, n_path, e);
-    rng_start(&rng, &(struct rng_key){.seed = noise_seed, .iteration = 65533}, 0, 0);
+    const size_t n = views(how->fitted_only, t, configuration);
+    const uint64_t seed = how->trace_seed == 0 ? SEED_PHOTOGRAPH : SEED_PHOTOGRAPH_ANEW + how->trace_seed;
+    const struct kept_call call = {f->truth, configuration, n, seed, 0, false};
+    kept_estimate(f, &call, how->n_path, e);
+    rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);
-    for (size_t i = 0; i < FIT_N_VIEW; i++) {
+    for (size_t i = 0; i < n; i++) {
         struct observation item = {.set = t->view[i].set, .configuration = configuration[i], .weight = 1.0};
         memcpy(item.name, t->view[i].file, sizeof item.name);
         for (int c = 0; c < 3; c++) {
             double normal[2];
             rng_normal_pair(&rng, normal);
-            item.mean_rgb[c] = e[i].mean[c] * (1.0 + noise * normal[0]);
-            item.se_rgb[c] = sqrt(e[i].var[c] + noise * noise * e[i].mean[c] * e[i].mean[c]);
+            item.mean_rgb[c] = e[i].mean[c] * (1.0 + how->noise * normal[0]);
+            item.se_rgb[c] = sqrt(e[i].var[c] + how->noise * how->noise * e[i].mean[c] * e[i].mean[c]);
         }
         fit_check(observation_set_append(&o, &item, &err), &err);
     }

@@ -49,9 +49,16 @@ void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_p
                       const char *model_id, const double *truth_file_unit);
 void fit_phantom_release(struct fit_phantom *f);
 
-/* Photographs at the truth, n_path a configuration (cut into equal chunks); every number gets a relative error of `noise`
- * (0.005), drawn from noise_seed. Stated standard errors hold both kinds of noise. Replaces earlier ones. */
-void fit_phantom_photograph(struct fit_phantom *f, size_t n_path, double noise, uint64_t noise_seed);
+struct fit_photography {
+    size_t n_path; /* a configuration, cut into equal chunks */
+    double noise;  /* relative error that every number gets (0.005) */
+    uint64_t noise_seed;
+    uint64_t trace_seed; /* 0: the photographs of the figures; others: traced anew, with other paths */
+    bool fitted_only;    /* no held-out ones */
+};
+
+/* Photographs at the truth. Stated standard errors hold both kinds of noise. Replaces earlier ones. */
+void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography *how);
 /* Observations from elsewhere (kept: copied). */
 void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o);
 
