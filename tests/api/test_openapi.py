@@ -56,6 +56,77 @@ def test_problem_codes_are_documented():
         assert f"`{code}`" in table and status in table, code
 
 
+def key_lists():
+    """The lists of keys that the parser of job documents allows, as sets."""
+    source = ""
+    for name in sorted(os.listdir(os.path.join(ROOT, "optimizer"))):
+        if re.fullmatch(r"job_document\w*\.c", name):
+            with open(os.path.join(ROOT, "optimizer", name)) as f:
+                source += f.read()
+    return {frozenset(re.findall(r'"(\w+)"', body)) for body in
+            re.findall(r"static const char \*const (?:\w+_)?(?:key|allowed)\[\] = \{([^}]*)NULL\}", source)}
+
+
+def closed_objects(schema):
+    if isinstance(schema, dict):
+        if schema.get("additionalProperties") is False:
+            yield frozenset(schema["properties"])
+        for member in schema.values():
+            yield from closed_objects(member)
+    elif isinstance(schema, list):
+        for member in schema:
+            yield from closed_objects(member)
+
+
+def test_the_job_document_is_described_to_its_last_field():
+    parsed, described = key_lists(), set(closed_objects(API["components"]["schemas"]["JobDocument"]))
+    assert len(parsed) >= 14 and parsed == described
+    with open(os.path.join(ROOT, "docs", "sample-preparation.md")) as f:
+        words = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", f.read()))))
+    assert set().union(*parsed) <= words
+
+
+def test_examples_fit_the_description():
+    validator = OpenApiCheck().validator({"$ref": "#/components/schemas/JobDocument"})
+    folder = os.path.join(ROOT, "config", "examples")
+    documents = [name for name in os.listdir(folder) if name.endswith(".json")]
+    for name in documents:
+        with open(os.path.join(folder, name)) as f:
+            validator.validate(json.load(f))
+    assert len(documents) >= 5
+
+
+EVERYTHING = {
+    "sample": "everything", "lamp": {"side_cm": 5}, "camera": {"crop_cm": 2}, "black_sheet": False,
+    "volume": {"files": ["a.raw"], "raw": {"shape": [9, 9, 9], "type": "uint8"}, "filter": {"h": 5}, "voxel_size_um": [1, 1, 2], "matrix": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
+    "photographs": [{"file": "a.exr", "light_theta_deg": 120, "light_phi_deg": 0, "camera_theta_deg": 1, "camera_phi_deg": 0, "crop_px": [0, 0, 8, 8]}],
+    "fit": {"models": ["two_lobe.v1", "microflake.v1"], "fit_radius": {"lower_um": 3}, "tied": [["C_R"], {"beta_TT": 1, "gamma_TT": 2}], "bounds": {"beta_R": [2, 8]},
+            "priors": {"beta_R": {"mean": 5, "se": 1}}, "nuisance": {"gain": "global"}, "texture": {"block_mm": 1}, "fixed": {"C_TT": [0.1, 0.2, 0.3]}, "fit_density": True,
+            "start": {"C_R.g": 0.2}, "candidates": [{"light_theta_deg": 30, "light_phi_deg": 0, "camera_theta_deg": 1, "camera_phi_deg": 0}]}}
+
+
+def objects_within(value, path=""):
+    if isinstance(value, dict):
+        yield path, value
+        for key, member in value.items():
+            yield from objects_within(member, f"{path}.{key}" if path else key)
+    elif isinstance(value, list):
+        for i, member in enumerate(value):
+            yield from objects_within(member, f"{path}[{i}]")
+
+
+def test_unknown_fields_are_refused_wherever_they_stand(daemon):
+    assert daemon.post("/v1/jobs", json=EVERYTHING).status_code == 201
+    for path, _ in objects_within(EVERYTHING):
+        document = json.loads(json.dumps(EVERYTHING))
+        dict(objects_within(document))[path]["colour"] = 1
+        r = daemon.post("/v1/jobs", json=document)
+        assert r.status_code == 422 and r.json()["code"] == "invalid", (path, r.text)
+        # a name in a list of parameters that are tied stands for the list
+        assert r.json()["field"] in ((path + "." if path else "") + "colour", path), (path, r.json())
+        assert "colour" in r.json()["detail"], (path, r.json())
+
+
 def test_every_operation_answers_as_documented(daemon):
     """The happy path through all of them; the check in the fixture does the comparing."""
     job = daemon.start_job("series 20")
