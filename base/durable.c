@@ -9,6 +9,17 @@
 #include <unistd.h>
 #include <zlib.h>
 
+static status too_long(const char *path, struct error *err)
+{
+    return error_set(err, STATUS_INVALID, "path '%.100s...' is too long", path);
+}
+
+const char *path_file_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL && slash[1] != '\0' ? slash + 1 : path;
+}
+
 static status write_all(int fd, const char *data, size_t n_bytes)
 {
     while (n_bytes > 0) {
@@ -24,7 +35,8 @@ static status write_all(int fd, const char *data, size_t n_bytes)
 status durable_sync_folder_of(const char *path, struct error *err)
 {
     char folder[4096];
-    snprintf(folder, sizeof folder, "%s", path);
+    int n = snprintf(folder, sizeof folder, "%s", path);
+    if (n < 0 || (size_t)n >= sizeof folder) return too_long(path, err);
     char *slash = strrchr(folder, '/');
     if (slash == NULL) snprintf(folder, sizeof folder, ".");
     else if (slash == folder) folder[1] = '\0';
@@ -41,7 +53,7 @@ static status replace(const char *path, const void *data, size_t n_bytes, bool s
 {
     char temporary[4096];
     int n = snprintf(temporary, sizeof temporary, "%s.tmp-XXXXXX", path);
-    if (n < 0 || (size_t)n >= sizeof temporary) return error_set(err, STATUS_INVALID, "path '%.100s...' is too long", path);
+    if (n < 0 || (size_t)n >= sizeof temporary) return too_long(path, err);
     int fd = mkostemp(temporary, O_CLOEXEC);
     if (fd < 0) return error_set_errno(err, "cannot write '%s'", path);
     status s = STATUS_OK;
@@ -70,12 +82,16 @@ status durable_make_folder(const char *path, struct error *err)
 {
     char part[4096];
     int n = snprintf(part, sizeof part, "%s", path);
-    if (n < 0 || (size_t)n >= sizeof part) return error_set(err, STATUS_INVALID, "path '%.100s...' is too long", path);
+    if (n < 0 || (size_t)n >= sizeof part) return too_long(path, err);
+    if (n == 0) return error_set(err, STATUS_INVALID, "cannot make folder '': it has no name");
     for (char *c = part + 1;; c++) {
         if (*c != '/' && *c != '\0') continue;
         char end = *c;
         *c = '\0';
+        struct stat st;
         if (mkdir(part, 0700) != 0 && errno != EEXIST) return error_set_errno(err, "cannot make folder '%s'", part);
+        if (stat(part, &st) != 0 || !S_ISDIR(st.st_mode))
+            return error_set(err, STATUS_EXISTS, "cannot make folder '%s': a file of that name is in the way", part);
         *c = end;
         if (end == '\0') return STATUS_OK;
     }
@@ -85,7 +101,7 @@ status file_read_all(const char *path, size_t limit_bytes, char **data, size_t *
 {
     status s = STATUS_OK;
     char *buffer = NULL;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a pipe is refused below, not waited for */
     if (fd < 0) return error_set_errno(err, "cannot read '%s'", path);
     struct stat st;
     if (fstat(fd, &st) != 0) {
@@ -130,6 +146,7 @@ out:
 status record_append(const char *path, const char *json, bool sync, struct error *err)
 {
     size_t n_json = strlen(json);
+    if (n_json == 0 || strchr(json, '\n') != NULL) return error_set(err, STATUS_INVALID, "cannot append to '%s': a record is one line of text", path);
     char *line = malloc(n_json + 16);
     if (line == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot append to '%s': out of memory", path);
     unsigned long sum = crc32(0, (const unsigned char *)json, (unsigned)n_json);
@@ -145,6 +162,8 @@ status record_append(const char *path, const char *json, bool sync, struct error
     if (write_all(fd, line, (size_t)n) != STATUS_OK || (sync && fdatasync(fd) != 0)) {
         s = error_set_errno(err, "cannot append to '%s'", path);
         if (before >= 0 && ftruncate(fd, before) != 0) { /* the torn tail is found by its checksum */ }
+    } else if (sync && before == 0) {
+        s = durable_sync_folder_of(path, err);
     }
 out:
     if (fd >= 0) close(fd);

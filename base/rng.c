@@ -31,6 +31,7 @@ static uint64_t poisson_ptrs(struct rng *r, double mean)
     const double a = -0.059 + 0.02483 * b;
     const double inv_alpha = 1.1239 + 1.1328 / (b - 3.4);
     const double v_r = 0.9277 - 3.6224 / (b - 2.0);
+    int sign; /* lgamma_r, as lgamma writes its sign where all threads see it */
     for (;;) {
         double u = rng_double(r) - 0.5;
         double v = 1.0 - rng_double(r);
@@ -38,7 +39,7 @@ static uint64_t poisson_ptrs(struct rng *r, double mean)
         double k = floor((2.0 * a / us + b) * u + mean + 0.43);
         if (us >= 0.07 && v <= v_r) return (uint64_t)k;
         if (k < 0.0 || (us < 0.013 && v > us)) continue;
-        if (log(v) + log(inv_alpha) - log(a / (us * us) + b) <= -mean + k * log_mean - lgamma(k + 1.0))
+        if (log(v) + log(inv_alpha) - log(a / (us * us) + b) <= -mean + k * log_mean - lgamma_r(k + 1.0, &sign))
             return (uint64_t)k;
     }
 }

@@ -28,11 +28,6 @@ const char *status_name(status code)
     return (unsigned)code < STATUS_COUNT ? name[code] : "unknown";
 }
 
-void error_clear(struct error *err)
-{
-    if (err != NULL) memset(err, 0, sizeof *err);
-}
-
 static void fill(struct error *err, status code, int errno_value, const char *where, const char *field,
                  const char *format, va_list args)
 {
@@ -76,9 +71,9 @@ status error_set_errno_at(struct error *err, const char *where, const char *fiel
     return code;
 }
 
-status error_prefix(struct error *err, const char *format, ...)
+status error_prefix(struct error *err, status code, const char *format, ...)
 {
-    if (err == NULL) return STATUS_INTERNAL;
+    if (err == NULL) return code;
     char prefix[sizeof err->text];
     va_list args;
     va_start(args, format);
@@ -88,5 +83,5 @@ status error_prefix(struct error *err, const char *format, ...)
     memcpy(rest, err->text, sizeof rest);
     size_t used = (size_t)snprintf(err->text, sizeof err->text, "%s", prefix);
     if (used < sizeof err->text - 1) snprintf(err->text + used, sizeof err->text - used, ": %s", rest);
-    return err->code;
+    return code;
 }

@@ -48,9 +48,8 @@ status error_set_at(struct error *err, status code, const char *where, const cha
 /* The same with errno appended as text; ENOSPC and EDQUOT become STATUS_DISK_FULL. */
 status error_set_errno_at(struct error *err, const char *where, const char *field,
                           const char *format, ...) __attribute__((format(printf, 4, 5)));
-/* Put "prefix: " before the text of an error on its way up; returns err->code. */
-status error_prefix(struct error *err, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void error_clear(struct error *err);
+/* Put "prefix: " before the text of an error on its way up (err NULL: nothing to do); returns code, which is that of the error. */
+status error_prefix(struct error *err, status code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
 #define error_set(err, code, ...) error_set_at((err), (code), __func__, "", __VA_ARGS__)
 #define error_set_field(err, code, field, ...) error_set_at((err), (code), __func__, (field), __VA_ARGS__)

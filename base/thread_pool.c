@@ -91,16 +91,17 @@ status thread_pool_new(size_t n_thread, struct thread_pool **pool, struct error 
 {
     struct thread_pool *p = calloc(1, sizeof *p);
     if (p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make thread pool: out of memory");
-    p->n_thread = n_thread > 0 ? n_thread : available_processors();
+    if (n_thread == 0) n_thread = available_processors();
+    p->n_thread = n_thread;
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->work, NULL);
     pthread_cond_init(&p->done, NULL);
-    p->thread = calloc(p->n_thread, sizeof *p->thread);
+    p->thread = calloc(n_thread, sizeof *p->thread);
     if (p->thread == NULL) {
         thread_pool_free(p);
         return error_set(err, STATUS_NO_MEMORY, "cannot make thread pool: out of memory");
     }
-    for (size_t i = 1; i < p->n_thread; i++) {
+    for (size_t i = 1; i < n_thread; i++) {
         struct start_argument *a = malloc(sizeof *a);
         int failed = a == NULL;
         if (!failed) {

@@ -8,8 +8,8 @@
 
 struct thread_pool;
 
-/* n_thread = 0: one per available processor (affinity mask). Flush-to-zero and denormals-are-zero are set in every
- * thread (and in the caller while it helps), as Embree wants. */
+/* n_thread = 0: one per available processor (affinity mask). The caller of thread_pool_run is one of them. Flush-to-zero and
+ * denormals-are-zero are set in every thread, as Embree wants, and in the caller from its first thread_pool_run on. STATUS_NO_MEMORY. */
 status thread_pool_new(size_t n_thread, struct thread_pool **pool, struct error *err);
 void thread_pool_free(struct thread_pool *pool);
 size_t thread_pool_n_thread(const struct thread_pool *pool);
@@ -18,7 +18,7 @@ size_t thread_pool_n_thread(const struct thread_pool *pool);
 typedef void (*task_function)(void *context, size_t i_task, size_t i_thread);
 
 /* Run all tasks and wait. pool == NULL runs them in the caller. Not reentrant. Reports tasks done / n_task to
- * progress (NULL allowed). STATUS_CANCELLED when progress->cancel was set before all tasks had been started. */
+ * progress (NULL allowed). STATUS_CANCELLED when progress->cancel was set before all tasks had been started; nothing else fails. */
 status thread_pool_run(struct thread_pool *pool, size_t n_task, task_function run, void *context,
                        const struct progress *progress);
 

@@ -122,7 +122,7 @@ status settings_read_file(struct settings *s, const char *path, struct error *er
 {
     struct reading r = {s, err, STATUS_OK};
     int line = ini_parse(path, on_entry, &r);
-    if (r.result != STATUS_OK) return error_prefix(err, "cannot use '%s', line %d", path, line);
+    if (r.result != STATUS_OK) return error_prefix(err, r.result, "cannot use '%s', line %d", path, line);
     if (line == -1) return error_set_errno(err, "cannot read configuration '%s'", path);
     if (line != 0) return error_set(err, STATUS_INVALID, "cannot read configuration '%s': line %d is not 'name = value'", path, line);
     return STATUS_OK;

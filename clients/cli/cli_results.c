@@ -62,7 +62,7 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
     text_clean(path, t->name, sizeof t->name);
     if (!whole) {
         s = http_download(t->cli->http, url, target, got, t, err);
-        if (s != STATUS_OK) return error_prefix(err, "cannot download '%s'", path);
+        if (s != STATUS_OK) return error_prefix(err, s, "cannot download '%s'", path);
         /* the server's time of change, so that the next download knows the file whatever the clocks say */
         struct timespec times[2] = {{.tv_nsec = UTIME_OMIT}, {.tv_sec = (time_t)modified, .tv_nsec = (long)(1e9 * (modified - floor(modified)))}};
         (void)utimensat(AT_FDCWD, target, times, 0);

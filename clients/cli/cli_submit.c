@@ -124,7 +124,7 @@ static status create_job(struct submit *u, struct error *err)
     randombytes_buf(random, sizeof random);
     sodium_bin2hex(key, sizeof key, random, sizeof random);
     status s = http_json(u->cli->http, "POST", "/v1/jobs", key, u->document, &u->job, err);
-    if (s != STATUS_OK) return error_prefix(err, "the job document was refused");
+    if (s != STATUS_OK) return error_prefix(err, s, "the job document was refused");
     const char *id = json_string_value(json_object_get(u->job, "id"));
     if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's answer has no job id");
     snprintf(u->id, sizeof u->id, "%s", id);
@@ -152,7 +152,7 @@ static status open_job(struct submit *u, struct error *err)
     if (json_equal(theirs, u->document)) return STATUS_OK;
     snprintf(path + strlen(path), sizeof path - strlen(path), "/document");
     s = http_json(u->cli->http, "PUT", path, NULL, u->document, NULL, err);
-    return s == STATUS_OK ? s : error_prefix(err, "the changed job document was refused");
+    return s == STATUS_OK ? s : error_prefix(err, s, "the changed job document was refused");
 }
 
 static status declare(struct submit *u, const struct cli_file *file, json_t **answer, struct error *err)
@@ -172,7 +172,7 @@ static status declare(struct submit *u, const struct cli_file *file, json_t **an
         if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
     }
     json_decref(body);
-    return s == STATUS_OK ? s : error_prefix(err, "cannot declare '%s'", file->name);
+    return s == STATUS_OK ? s : error_prefix(err, s, "cannot declare '%s'", file->name);
 }
 
 static status send_files(struct submit *u, struct error *err)
@@ -216,7 +216,7 @@ static status start_job(struct submit *u, struct error *err)
     char path[256];
     status s = cli_job_path(u->id, "/start", path, sizeof path, err);
     if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, NULL, NULL, err);
-    return s == STATUS_OK ? s : error_prefix(err, "cannot start the job");
+    return s == STATUS_OK ? s : error_prefix(err, s, "cannot start the job");
 }
 
 status cli_submit(struct cli *cli, int *exit_code, struct error *err)

@@ -37,8 +37,8 @@ static status ask_offset(struct upload *u, struct http_reply *reply, struct erro
         u->offset = (uint64_t)reply->upload_offset;
         return STATUS_OK;
     }
-    http_problem(reply, err);
-    return error_prefix(err, "cannot continue the upload of '%s'", u->file->name);
+    s = http_problem(reply, err);
+    return error_prefix(err, s, "cannot continue the upload of '%s'", u->file->name);
 }
 
 static status send_piece(struct upload *u, struct http_reply *reply, struct error *err)
@@ -75,8 +75,8 @@ static status step(struct upload *u, bool *known, bool *again, struct error *err
         *again = true;
         s = http_problem(&reply, err);
     } else {
-        http_problem(&reply, err);
-        s = error_prefix(err, "cannot upload '%s'", u->file->name);
+        s = http_problem(&reply, err);
+        s = error_prefix(err, s, "cannot upload '%s'", u->file->name);
     }
     http_reply_release(&reply);
     return s;

@@ -321,11 +321,11 @@ status compare_fibers(const struct fiber_set *truth, const struct fiber_set *fou
     if (!(o->voxel_size_m > 0.0) || !(o->margin_m >= 0.0))
         return error_set(err, STATUS_INVALID, "the voxel size must be positive and the margin not negative");
     status st = fiber_set_validate(truth, err);
-    if (st != STATUS_OK) return error_prefix(err, "true fibers");
+    if (st != STATUS_OK) return error_prefix(err, st, "true fibers");
     struct fiber_set tiled = *found; /* shares the arrays */
     memcpy(tiled.tile_size_m, truth->tile_size_m, sizeof tiled.tile_size_m);
     st = fiber_set_validate(&tiled, err);
-    if (st != STATUS_OK) return error_prefix(err, "found fibers");
+    if (st != STATUS_OK) return error_prefix(err, st, "found fibers");
     st = walk_all(truth, found, truth, o, &of_truth, err);
     if (st == STATUS_OK) st = walk_all(found, truth, truth, o, &of_found, err);
     if (st != STATUS_OK) goto out;

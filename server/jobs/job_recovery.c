@@ -147,7 +147,7 @@ status job_service_open(const struct settings *settings, struct log *log, struct
     if (s == STATUS_OK) s = upload_recover(v->upload, err);
     if (s != STATUS_OK) {
         job_service_close(v);
-        return error_prefix(err, "cannot open data folder '%s'", settings->data);
+        return error_prefix(err, s, "cannot open data folder '%s'", settings->data);
     }
     *out = v;
     return STATUS_OK;

@@ -143,7 +143,7 @@ static status migrate(struct store *store, const char *path, struct error *err)
         char backup[4096 + 32];
         snprintf(backup, sizeof backup, "%s.v%d", path, version);
         s = store_run(store, NULL, err, "VACUUM INTO ?", "s", backup);
-        if (s != STATUS_OK) return error_prefix(err, "cannot back up the database before its migration");
+        if (s != STATUS_OK) return error_prefix(err, s, "cannot back up the database before its migration");
     }
     for (; version < N_MIGRATION; version++) {
         char done[64];

@@ -66,6 +66,15 @@ static void test_default_is_at_least_one_thread(void **state)
     thread_pool_free(pool);
 }
 
+static void test_too_many_threads_are_refused(void **state)
+{
+    (void)state;
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    assert_int_equal(thread_pool_new(SIZE_MAX / 2, &pool, &err), STATUS_NO_MEMORY);
+    assert_null(pool);
+}
+
 static void test_cancellation(void **state)
 {
     (void)state;
@@ -129,6 +138,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_task_once_for_any_number_of_threads),
         cmocka_unit_test(test_default_is_at_least_one_thread),
+        cmocka_unit_test(test_too_many_threads_are_refused),
         cmocka_unit_test(test_cancellation),
         cmocka_unit_test(test_progress_rises_to_one),
     };

@@ -261,6 +261,7 @@ static void test_margin_and_errors(void **state)
     check_near(r.missed, 0.0, 0);
     assert_int_equal(compare_fibers(&t, &empty, &o, &r, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "found fibers"));
+    assert_int_equal(compare_fibers(&t, &empty, &o, &r, NULL), STATUS_INVALID); /* the same when nobody wants the text */
     assert_int_equal(compare_fibers(&empty, &f, &o, &r, &err), STATUS_INVALID);
     o.voxel_size_m = 0.0;
     assert_int_equal(compare_fibers(&t, &f, &o, &r, &err), STATUS_INVALID);

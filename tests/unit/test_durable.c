@@ -2,15 +2,34 @@
 #include "base/durable.h"
 #include "tests/support/scratch_folder.h"
 
+#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <cmocka.h>
+
+/* The C library's own, watched: what is synced, and what happens when that fails. */
+static struct watched_syncs {
+    int n_data, n_folder, fail_with;
+} watch;
+
+static int watched_sync(int fd, long call)
+{
+    struct stat st;
+    assert_int_equal(fstat(fd, &st), 0);
+    S_ISDIR(st.st_mode) ? watch.n_folder++ : watch.n_data++;
+    errno = watch.fail_with;
+    return watch.fail_with != 0 ? -1 : (int)syscall(call, fd);
+}
+
+int fsync(int fd) { return watched_sync(fd, SYS_fsync); }
+int fdatasync(int fd) { return watched_sync(fd, SYS_fdatasync); }
 
 static void check_content(const char *path, const char *want)
 {
@@ -59,7 +78,13 @@ static void test_make_folder(void **state)
     assert_int_equal(durable_make_folder(path, NULL), STATUS_OK);
     assert_int_equal(durable_make_folder(scratch_path(state, "a/"), NULL), STATUS_OK);
     scratch_write(scratch_path(state, "a/file"), "x", 1);
+    struct error err = {0};
     assert_int_not_equal(durable_make_folder(scratch_path(state, "a/file/under"), NULL), STATUS_OK);
+    assert_int_equal(durable_make_folder(scratch_path(state, "a/file"), &err), STATUS_EXISTS); /* no folder, though the name is taken */
+    assert_non_null(strstr(err.text, "a/file': a file of that name"));
+    assert_int_equal(symlink("b", scratch_path(state, "a/link")), 0);
+    assert_int_equal(durable_make_folder(scratch_path(state, "a/link/d"), NULL), STATUS_OK);
+    assert_int_equal(durable_make_folder("", &err), STATUS_INVALID);
 }
 
 static void test_read_all(void **state)
@@ -80,6 +105,20 @@ static void test_read_all(void **state)
     free(data);
     assert_int_equal(file_read_all(scratch_path(state, "absent"), 9, &data, &n, &err), STATUS_NOT_FOUND);
     assert_int_equal(file_read_all(*state, 9, &data, &n, &err), STATUS_INVALID);
+    const char *fifo = scratch_path(state, "fifo");
+    assert_int_equal(mkfifo(fifo, 0600), 0);
+    alarm(20); /* a reader that waits for a writer is killed */
+    assert_int_equal(file_read_all(fifo, 9, &data, &n, &err), STATUS_INVALID);
+    alarm(0);
+    unlink(fifo);
+}
+
+static void test_name_without_folders(void **state)
+{
+    (void)state;
+    assert_string_equal(path_file_name("/var/lib/scan.tif"), "scan.tif");
+    assert_string_equal(path_file_name("scan.tif"), "scan.tif");
+    assert_string_equal(path_file_name("folder/"), "folder/"); /* nothing behind the slash: all of it */
 }
 
 struct seen {
@@ -173,6 +212,48 @@ static void test_every_flipped_bit_is_noticed(void **state)
     free(whole);
 }
 
+static void test_what_is_no_record_is_refused(void **state)
+{
+    const char *path = scratch_path(state, "lines.rec");
+    struct error err = {0};
+    assert_int_equal(record_append(path, "{}\n{}", false, &err), STATUS_INVALID); /* would be two lines, and torn */
+    assert_int_equal(record_append(path, "", false, &err), STATUS_INVALID);
+    assert_int_equal(access(path, F_OK), -1);
+}
+
+static void test_new_record_file_is_synced_with_its_folder(void **state)
+{
+    const char *path = scratch_path(state, "new.rec");
+    watch = (struct watched_syncs){0};
+    assert_int_equal(record_append(path, "{}", true, NULL), STATUS_OK);
+    assert_int_equal(watch.n_data, 1);
+    assert_int_equal(watch.n_folder, 1); /* or the file is gone after a power loss, synced or not */
+    assert_int_equal(record_append(path, "{}", true, NULL), STATUS_OK);
+    assert_int_equal(watch.n_data, 2);
+    assert_int_equal(watch.n_folder, 1);
+    assert_int_equal(record_append(scratch_path(state, "volatile.rec"), "{}", false, NULL), STATUS_OK);
+    assert_int_equal(watch.n_data + watch.n_folder, 3);
+}
+
+static void test_failed_sync_keeps_the_old_content(void **state)
+{
+    struct error err = {0};
+    assert_int_equal(durable_make_folder(scratch_path(state, "sync"), NULL), STATUS_OK);
+    const char *path = scratch_path(state, "sync/file"), *record = scratch_path(state, "sync/file.rec");
+    assert_int_equal(durable_replace(path, "old", 3, NULL), STATUS_OK);
+    assert_int_equal(record_append(record, "{}", false, NULL), STATUS_OK);
+    char *before = scratch_read(record, NULL);
+    watch = (struct watched_syncs){.fail_with = EIO};
+    assert_int_equal(durable_replace(path, "new", 3, &err), STATUS_IO);
+    assert_int_equal(err.errno_value, EIO);
+    assert_int_equal(record_append(record, "{\"lost\":1}", true, &err), STATUS_IO);
+    watch.fail_with = 0;
+    check_content(path, "old");
+    check_content(record, before);
+    assert_int_equal(scratch_count_entries(scratch_path(state, "sync")), 2);
+    free(before);
+}
+
 static void test_full_disk_is_told(void **state)
 {
     (void)state;
@@ -192,6 +273,10 @@ int main(void)
         cmocka_unit_test(test_records_come_back),
         cmocka_unit_test(test_every_torn_tail_is_noticed),
         cmocka_unit_test(test_every_flipped_bit_is_noticed),
+        cmocka_unit_test(test_what_is_no_record_is_refused),
+        cmocka_unit_test(test_new_record_file_is_synced_with_its_folder),
+        cmocka_unit_test(test_failed_sync_keeps_the_old_content),
+        cmocka_unit_test(test_name_without_folders),
         cmocka_unit_test(test_full_disk_is_told),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
