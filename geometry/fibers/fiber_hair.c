@@ -106,50 +106,50 @@ struct hair_header {
 };
 
 /* Counts of the header against the length of the file; *n_bytes is what the header promises (at most 2^37). */
-static status check_header(const struct hair_header *h, uint64_t file_bytes, const char *path, struct error *err)
+static status check_header(const struct hair_header *h, uint64_t file_bytes, const char *name, struct error *err)
 {
     if ((h->flags & HAIR_POINTS) == 0 || (h->flags & ~(uint32_t)HAIR_KNOWN) != 0)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': flags 0x%x, points are missing or flags unknown", path,
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': flags 0x%x, points are missing or flags unknown", name,
                          h->flags);
-    if (h->n_strand == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path);
+    if (h->n_strand == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", name);
     uint64_t want = HAIR_HEADER_BYTES + 12 * (uint64_t)h->n_point;
     if (h->flags & HAIR_SEGMENTS) want += 2 * (uint64_t)h->n_strand;
     if (h->flags & HAIR_THICKNESS) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_TRANSPARENCY) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_COLOUR) want += 12 * (uint64_t)h->n_point;
     if (want != file_bytes)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %llu bytes, its header promises %llu", path,
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %llu bytes, its header promises %llu", name,
                          (unsigned long long)file_bytes, (unsigned long long)want);
     if (2 * (uint64_t)h->n_strand > h->n_point)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers but only %u points", path, h->n_strand,
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers but only %u points", name, h->n_strand,
                          h->n_point);
     if ((h->flags & HAIR_SEGMENTS) == 0 &&
         (uint64_t)h->n_strand * ((uint64_t)h->default_segments + 1) != h->n_point)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers of %u segments do not make %u points", path,
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers of %u segments do not make %u points", name,
                          h->n_strand, h->default_segments, h->n_point);
     return STATUS_OK;
 }
 
 /* first_vertex from the segment counts. */
-static status get_strands(struct fiber_set *f, const struct hair_header *h, const uint8_t *segments, const char *path,
+static status get_strands(struct fiber_set *f, const struct hair_header *h, const uint8_t *segments, const char *name,
                           struct error *err)
 {
     uint64_t used = 0;
     for (size_t i = 0; i < h->n_strand; i++) {
         uint32_t n = segments == NULL ? h->default_segments : get_u16(segments + 2 * i);
-        if (n == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': fiber %zu has no segment", path, i);
+        if (n == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': fiber %zu has no segment", name, i);
         f->first_vertex[i] = used;
         used += (uint64_t)n + 1;
         if (used > h->n_point) break;
     }
     if (used != h->n_point)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the segments do not add up to %u points", path,
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the segments do not add up to %u points", name,
                          h->n_point);
     f->first_vertex[h->n_strand] = used;
     return STATUS_OK;
 }
 
-static status get_radii(struct fiber_set *f, const struct hair_header *h, const uint8_t *thickness, const char *path,
+static status get_radii(struct fiber_set *f, const struct hair_header *h, const uint8_t *thickness, const char *name,
                         struct error *err)
 {
     for (size_t i = 0; i < f->n_fiber; i++) {
@@ -160,7 +160,7 @@ static status get_radii(struct fiber_set *f, const struct hair_header *h, const 
         f->radius_m[i] = (float)(0.5e-3 * sum / (double)n);
         if (!(f->radius_m[i] > 0.0f) || !isfinite(f->radius_m[i]))
             return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': fiber %zu has no thickness, and neither does the header",
-                             path, i);
+                             name, i);
     }
     return STATUS_OK;
 }
@@ -183,12 +183,12 @@ static void get_tile(struct fiber_set *f, const uint8_t *header)
     f->tile_size_m[1] = 1e-3 * y;
 }
 
-static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes, const char *path, struct error *err)
+static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes, const char *name, struct error *err)
 {
     if (n_bytes < HAIR_HEADER_BYTES || memcmp(data, "HAIR", 4) != 0)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", path);
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", name);
     struct hair_header h = {get_u32(data + 4), get_u32(data + 8), get_u32(data + 12), get_u32(data + 16), get_f32(data + 20)};
-    status s = check_header(&h, n_bytes, path, err);
+    status s = check_header(&h, n_bytes, name, err);
     if (s == STATUS_OK) s = fiber_set_reserve(f, h.n_strand, h.n_point, err);
     if (s != STATUS_OK) return s;
     const uint8_t *segments = NULL, *at = data + HAIR_HEADER_BYTES;
@@ -197,13 +197,13 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
         at += 2 * (size_t)h.n_strand;
     }
     const uint8_t *points = at, *thickness = h.flags & HAIR_THICKNESS ? at + 12 * (size_t)h.n_point : NULL;
-    s = get_strands(f, &h, segments, path, err);
-    if (s == STATUS_OK) s = get_radii(f, &h, thickness, path, err);
+    s = get_strands(f, &h, segments, name, err);
+    if (s == STATUS_OK) s = get_radii(f, &h, thickness, name, err);
     if (s != STATUS_OK) return s;
     for (size_t k = 0; k < 3 * (size_t)h.n_point; k++) {
         f->position_m[k] = 1e-3f * get_f32(points + 4 * k);
         if (!isfinite(f->position_m[k]))
-            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", path, k / 3);
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", name, k / 3);
     }
     get_tile(f, data);
     fiber_set_classify(f);
@@ -213,19 +213,20 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
 /* The header is looked at before the rest is read, so that a wrong count costs nothing. */
 static status check_file(const char *path, struct error *err)
 {
+    const char *name = path_file_name(path);
     FILE *file = fopen(path, "re");
-    if (file == NULL) return error_set_errno(err, "cannot read fibers '%s'", path);
+    if (file == NULL) return error_set_errno(err, "cannot read fibers '%s'", name);
     uint8_t header[HAIR_HEADER_BYTES];
     status s = STATUS_OK;
     off_t n_bytes = -1;
     if (fread(header, 1, sizeof header, file) != sizeof header || memcmp(header, "HAIR", 4) != 0)
-        s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", path);
+        s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", name);
     else if (fseeko(file, 0, SEEK_END) != 0 || (n_bytes = ftello(file)) < 0)
-        s = error_set_errno(err, "cannot read fibers '%s'", path);
+        s = error_set_errno(err, "cannot read fibers '%s'", name);
     else {
         struct hair_header h = {get_u32(header + 4), get_u32(header + 8), get_u32(header + 12), get_u32(header + 16),
                                 get_f32(header + 20)};
-        s = check_header(&h, (uint64_t)n_bytes, path, err);
+        s = check_header(&h, (uint64_t)n_bytes, name, err);
     }
     fclose(file);
     return s;
@@ -239,7 +240,7 @@ status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *
     fiber_set_init(&read);
     status s = check_file(path, err);
     if (s == STATUS_OK) s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
-    if (s == STATUS_OK) s = decode(&read, (const uint8_t *)data, n_bytes, path, err);
+    if (s == STATUS_OK) s = decode(&read, (const uint8_t *)data, n_bytes, path_file_name(path), err);
     free(data);
     if (s != STATUS_OK) {
         fiber_set_release(&read);

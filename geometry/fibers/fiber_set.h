@@ -41,12 +41,13 @@ void fiber_set_classify(struct fiber_set *f);
  * found again from the directions. Reading checks the header against the file's length before it allocates.
  * A fiber's radius is half the mean thickness of its points; default segments and thickness of other programs' files are honoured.
  * Without that text the tile size is 0 and the caller must set it. Reading replaces f's content, or leaves it as it was.
- * Errors: STATUS_FORMAT (not a .hair file, counts that contradict each other or the length, no thickness, not finite),
- * STATUS_TOO_LARGE when a fiber to write has more than 65,536 vertices (the text names it). */
+ * Errors of reading name the file without its folder. STATUS_FORMAT (not a .hair file, counts that contradict each other or the length, no thickness, not finite),
+ * STATUS_TOO_LARGE when a fiber to write has more than 65,536 vertices (the text names it); STATUS_NOT_FOUND, STATUS_IO, STATUS_DISK_FULL,
+ * STATUS_NO_MEMORY. */
 status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err);
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err);
 /* Text: "x y z radius" per line, millimetres, blank line between fibers. The format has no place for the tile size: reading sets it
- * to 0 and the caller must set it. STATUS_FORMAT names the line. */
+ * to 0 and the caller must set it; a fiber's radius is the mean of its lines'. STATUS_FORMAT names the line; else as above. */
 status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err);
 status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *err);
 

@@ -1,4 +1,4 @@
-/* Fibers as text: "x y z radius" per line in millimetres, a blank line between fibers (docs/formats.md). */
+/* Fibers as text: "x y z radius" per line in millimetres, a blank line between fibers (docs/file-formats.md). */
 #include "base/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
@@ -86,19 +86,19 @@ static bool parse_point(const char *line, double value[4])
     return line[strspn(line, " \t\r")] == '\0' && value[3] > 0.0;
 }
 
-static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, double radius_sum, const char *path,
+static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, double radius_sum, const char *name,
                           size_t i_line, struct error *err)
 {
     size_t n = n_vertex - f->first_vertex[i_fiber];
     if (n < 2)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the fiber ending at line %zu has one point only", path,
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the fiber ending at line %zu has one point only", name,
                          i_line);
     f->radius_m[i_fiber] = (float)(1e-3 * radius_sum / (double)n);
     f->first_vertex[i_fiber + 1] = n_vertex;
     return STATUS_OK;
 }
 
-static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const char *path, struct error *err)
+static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const char *name, struct error *err)
 {
     struct line_reader r = {data, data + n_bytes, 0};
     char line[LINE_BYTES];
@@ -108,14 +108,14 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
         enum line_kind kind = next_line(&r, line);
         bool inside = n_vertex > f->first_vertex[i_fiber];
         if ((kind == LINE_BLANK || kind == LINE_END) && inside) {
-            status s = close_fiber(f, i_fiber++, n_vertex, radius_sum, path, r.i_line, err);
+            status s = close_fiber(f, i_fiber++, n_vertex, radius_sum, name, r.i_line, err);
             if (s != STATUS_OK) return s;
             radius_sum = 0.0;
         }
         if (kind == LINE_END) return STATUS_OK;
         if (kind == LINE_BLANK) continue;
         if (kind == LINE_TOO_LONG || !parse_point(line, value))
-            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu is not \"x y z radius\"", path, r.i_line);
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu is not \"x y z radius\"", name, r.i_line);
         for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * value[a]);
         radius_sum += value[3];
         n_vertex++;
@@ -131,9 +131,9 @@ status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *
     status s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
     if (s != STATUS_OK) return s;
     size_t n_vertex = count_points(data, n_bytes, &n_fiber);
-    if (n_fiber == 0) s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path);
+    if (n_fiber == 0) s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path_file_name(path));
     if (s == STATUS_OK) s = fiber_set_reserve(&read, n_fiber, n_vertex, err);
-    if (s == STATUS_OK) s = parse(&read, data, n_bytes, path, err);
+    if (s == STATUS_OK) s = parse(&read, data, n_bytes, path_file_name(path), err);
     free(data);
     if (s != STATUS_OK) {
         fiber_set_release(&read);

@@ -1,6 +1,7 @@
 /* MetaImage: a text header "Key = value" (.mhd) with the data in a file beside it, or header and data
  * in one file (.mha, ElementDataFile = LOCAL). Lengths are in millimetres. Compressed data is zlib's.
  * Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
+#include "base/durable.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
@@ -157,7 +158,7 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
 {
     struct metaimage *m = calloc(1, sizeof *m);
     status s = STATUS_OK;
-    if (m != NULL) m->name = strdup(volume_file_name(path[0]));
+    if (m != NULL) m->name = strdup(path_file_name(path[0]));
     if (m == NULL || m->name == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
         goto fail;
@@ -174,7 +175,7 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
     fclose(header);
     if (s == STATUS_OK && n_path > 1) /* uploads name the data file, too; nothing else makes sense */
         for (size_t i = 1; i < n_path && s == STATUS_OK; i++)
-            if (strcmp(path[i], m->data_path) != 0) s = bad(m, err, "its ElementDataFile is not", volume_file_name(path[i]));
+            if (strcmp(path[i], m->data_path) != 0) s = bad(m, err, "its ElementDataFile is not", path_file_name(path[i]));
     if (s == STATUS_OK) s = voxel_stream_open(m->name, m->data_path, &m->layout, &m->stream, err);
     if (s == STATUS_OK) s = voxel_stream_check_order(m->stream, err);
     if (s != STATUS_OK) goto fail;

@@ -2,6 +2,7 @@
  * Read: three dimensions of scalars, encodings raw and gzip, lengths from "spacings" or from the lengths of "space directions"
  * in the stated unit (millimetres when none is stated).
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
+#include "base/durable.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
@@ -250,7 +251,7 @@ static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path
 {
     const char *data = m->data_path != NULL ? m->data_path : path[0];
     for (size_t i = 1; i < n_path; i++) /* uploads name the data file, too; nothing else makes sense */
-        if (strcmp(path[i], data) != 0) return bad(m, err, "its data file is not", volume_file_name(path[i]));
+        if (strcmp(path[i], data) != 0) return bad(m, err, "its data file is not", path_file_name(path[i]));
     m->layout.swap = m->big_endian != (BYTE_ORDER == BIG_ENDIAN);
     status s = voxel_stream_open(m->name, data, &m->layout, &m->stream, err);
     return s == STATUS_OK ? voxel_stream_check_order(m->stream, err) : s;
@@ -259,7 +260,7 @@ static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path
 static status nrrd_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info, struct error *err)
 {
     struct nrrd *m = calloc(1, sizeof *m);
-    if (m != NULL) m->name = strdup(volume_file_name(path[0]));
+    if (m != NULL) m->name = strdup(path_file_name(path[0]));
     if (m == NULL || m->name == NULL) {
         nrrd_close(m);
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");

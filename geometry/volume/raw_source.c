@@ -1,5 +1,6 @@
 #include "geometry/volume/raw_source.h"
 
+#include "base/durable.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
@@ -25,10 +26,10 @@ status raw_source_open(const char *const *path, size_t n_path, const struct volu
         return error_set_field(err, STATUS_INVALID, "volume.raw", "cannot read the volume: 'raw' describes one file, %zu are given", n_path);
     if (!sample_type_of_name(d->type, &layout.sample))
         return error_set_field(err, STATUS_INVALID, "volume.raw.type", "cannot read volume '%s': unknown sample type '%s'",
-                               volume_file_name(path[0]), d->type);
+                               path_file_name(path[0]), d->type);
     memcpy(layout.n, d->n, sizeof layout.n);
     layout.swap = d->big_endian != (BYTE_ORDER == BIG_ENDIAN);
-    status s = voxel_stream_open(volume_file_name(path[0]), path[0], &layout, &stream, err);
+    status s = voxel_stream_open(path_file_name(path[0]), path[0], &layout, &stream, err);
     if (s == STATUS_OK) s = voxel_stream_check_order(stream, err);
     if (s != STATUS_OK) {
         voxel_stream_close(stream);

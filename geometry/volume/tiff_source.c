@@ -1,5 +1,6 @@
 /* TIFF volumes: one multi-page file, or several files in order. libtiff decodes, so any compression it knows is read.
  * Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our error text. */
+#include "base/durable.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>
@@ -66,7 +67,7 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     if (h->tiff != NULL) TIFFClose(h->tiff);
     h->tiff = NULL;
     h->message[0] = '\0';
-    const char *name = volume_file_name(h->path[i_path]);
+    const char *name = path_file_name(h->path[i_path]);
     struct stat st;
     if (stat(h->path[i_path], &st) != 0) {
         if (errno == ENOENT)
@@ -126,7 +127,7 @@ static bool page_fits_file(TIFF *tiff, uint64_t page_bytes, uint64_t file_bytes)
 /* Reads the header of the current page: all must be alike. i_page counts from 0. */
 static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_bytes, struct error *err)
 {
-    const char *name = volume_file_name(h->path[h->i_open]);
+    const char *name = path_file_name(h->path[h->i_open]);
     uint32_t width = 0, height = 0;
     uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK;
     TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
@@ -175,7 +176,7 @@ static status add_page(struct tiff_handle *h, size_t *capacity, struct error *er
 {
     if (h->n_page == MAX_PAGE)
         return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': over %d pages",
-                               volume_file_name(h->path[0]), MAX_PAGE);
+                               path_file_name(h->path[0]), MAX_PAGE);
     if (h->n_page == *capacity) {
         size_t n = *capacity == 0 ? 256 : *capacity * 2;
         struct page *bigger = realloc(h->page, n * sizeof *bigger);
@@ -193,7 +194,7 @@ static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, 
     if (s != STATUS_OK) return s;
     struct stat st;
     if (fstat(TIFFFileno(h->tiff), &st) != 0)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", volume_file_name(h->path[i_path]));
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(h->path[i_path]));
     for (;;) {
         s = check_page(h, h->n_page, (uint64_t)st.st_size, err);
         if (s == STATUS_OK) s = add_page(h, capacity, err);
@@ -202,7 +203,7 @@ static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, 
         h->message[0] = '\0';
         if (!TIFFReadDirectory(h->tiff))
             return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is unreadable: %s",
-                                   volume_file_name(h->path[i_path]), h->n_page + 1, cause(h));
+                                   path_file_name(h->path[i_path]), h->n_page + 1, cause(h));
     }
 }
 
@@ -260,7 +261,7 @@ static status reserve_block(struct tiff_handle *h, uint64_t n_byte, struct error
 static status block_error(struct tiff_handle *h, size_t i_page, struct error *err)
 {
     return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is damaged: %s",
-                           volume_file_name(h->path[h->i_open]), i_page + 1, cause(h));
+                           path_file_name(h->path[h->i_open]), i_page + 1, cause(h));
 }
 
 static status read_strips(struct tiff_handle *h, size_t i_page, float *value, struct error *err)

@@ -263,7 +263,7 @@ static status vol_source_open(const char *const *path, size_t n_path, void **han
 {
     struct vol_handle *h = calloc(1, sizeof *h);
     status s = STATUS_OK;
-    if (h != NULL) h->name = strdup(volume_file_name(path[0]));
+    if (h != NULL) h->name = strdup(path_file_name(path[0]));
     if (h == NULL || h->name == NULL) {
         vol_source_close(h);
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
@@ -326,7 +326,7 @@ status vol_read_density(const char *path, struct volume *v, struct error *err)
 
 status vol_read_direction(const char *path, struct vol_header *header, float **direction, struct error *err)
 {
-    const char *name = volume_file_name(path);
+    const char *name = path_file_name(path);
     uint8_t *raw = NULL;
     *direction = NULL;
     FILE *file = fopen(path, "rbe");

@@ -30,7 +30,5 @@ size_t sample_bytes(enum sample_type t);
 const char *sample_name(enum sample_type t);
 /* n samples of type t at data, byte order as the file's (swap: opposite to the machine's; data is changed), to floats. */
 void sample_to_float(enum sample_type t, bool swap, size_t n, void *data, float *value);
-/* Last component of a path: errors name files as the user knows them. */
-const char *volume_file_name(const char *path);
 
 #endif

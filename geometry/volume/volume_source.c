@@ -1,5 +1,6 @@
 #include "geometry/volume/volume_source.h"
 
+#include "base/durable.h"
 #include "geometry/volume/raw_source.h"
 #include "geometry/volume/volume_reader.h"
 
@@ -31,12 +32,6 @@ static const struct {
 
 size_t sample_bytes(enum sample_type t) { return sample[t].n_byte; }
 const char *sample_name(enum sample_type t) { return sample[t].name; }
-
-const char *volume_file_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL && slash[1] != '\0' ? slash + 1 : path;
-}
 
 static void swap_bytes(size_t n_byte, size_t n, uint8_t *data)
 {
@@ -79,16 +74,16 @@ static status read_first_bytes(const char *path, uint8_t first_byte[16], struct 
     if (file == NULL) {
         if (errno == ENOENT)
             return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file",
-                                   volume_file_name(path));
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", volume_file_name(path));
+                                   path_file_name(path));
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(path));
     }
     size_t n = fread(first_byte, 1, 16, file);
     int failed = ferror(file);
     fclose(file);
-    if (failed) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", volume_file_name(path));
+    if (failed) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(path));
     if (n == 0)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': the file is empty",
-                               volume_file_name(path));
+                               path_file_name(path));
     return STATUS_OK;
 }
 
@@ -107,10 +102,10 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
         return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
                                "cannot read volume '%s': neither TIFF nor MetaImage nor NRRD nor .vol (samples without a header are "
                                "described by 'volume.raw')",
-                               volume_file_name(path[0]));
+                               path_file_name(path[0]));
     struct volume_source *v = calloc(1, sizeof *v);
     if (v == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", volume_file_name(path[0]));
+        return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", path_file_name(path[0]));
     v->reader = found;
     s = found == &raw_reader ? raw_source_open(path, n_path, raw, &v->handle, &v->info, err)
                              : found->open(path, n_path, &v->handle, &v->info, err);

@@ -1,5 +1,7 @@
 #include "geometry/volume/voxel_stream.h"
 
+#include "base/durable.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -78,14 +80,14 @@ static status check_size(struct voxel_stream *v, uint64_t size, struct error *er
     if (have - want >= l->n[0] * sample_bytes(l->sample))
         return error_set_field(err, STATUS_FORMAT, "volume.files",
                                "cannot read volume '%s': %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s", v->name, l->n[0],
-                               l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want, volume_file_name(v->data_path),
+                               l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want, path_file_name(v->data_path),
                                (unsigned long long)have, types_that_fit(l, have, fits, sizeof fits));
     return STATUS_OK;
 too_short:
     return error_set_field(err, STATUS_FORMAT, "volume.files",
                            "cannot read volume '%s': the file is too short: %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s%s",
                            v->name, l->n[0], l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want,
-                           volume_file_name(v->data_path), (unsigned long long)have, l->compressed ? " (compressed)" : "",
+                           path_file_name(v->data_path), (unsigned long long)have, l->compressed ? " (compressed)" : "",
                            l->compressed ? "" : types_that_fit(l, have, fits, sizeof fits));
 }
 
@@ -103,12 +105,12 @@ static status open_data(struct voxel_stream *v, struct error *err)
     v->file = fopen(v->data_path, "rbe");
     if (v->file == NULL && errno == ENOENT)
         return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': its data file '%s' is missing",
-                               v->name, volume_file_name(v->data_path));
+                               v->name, path_file_name(v->data_path));
     if (v->file == NULL || fstat(fileno(v->file), &st) != 0)
         return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
     if (!S_ISREG(st.st_mode))
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': '%s' is not a regular file", v->name,
-                               volume_file_name(v->data_path));
+                               path_file_name(v->data_path));
     status s = check_size(v, (uint64_t)st.st_size, err);
     if (s != STATUS_OK) return s;
     v->slice = malloc(v->slice_bytes);
@@ -137,7 +139,7 @@ status voxel_stream_open(const char *name, const char *data_path, const struct v
 static status short_data(const struct voxel_stream *v, size_t i_slice, struct error *err)
 {
     return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': '%s' ends or is damaged in slice %zu",
-                           v->name, volume_file_name(v->data_path), i_slice + 1);
+                           v->name, path_file_name(v->data_path), i_slice + 1);
 }
 
 /* The next n_byte inflated bytes; gzip members that follow each other are one stream. */

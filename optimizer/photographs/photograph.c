@@ -1,5 +1,7 @@
 #include "optimizer/photographs/photograph.h"
 
+#include "base/durable.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -10,12 +12,6 @@ enum { LIMIT_PIXEL = 200 * 1000 * 1000, MAX_BLOCK = 8, MIN_BLOCK_PX = 4 };
 static const double saturated_limit = 0.02;
 /* Sub-block means of cloth at 1 cm scatter by a few per cent; a shadow edge or a wrong crop by much more. */
 static const double contrast_limit = 0.35;
-
-static const char *base_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
 
 static status crop_image(struct image *im, const size_t crop[4], const char *name, struct error *err)
 {
@@ -55,9 +51,9 @@ status photograph_read(const char *path, const struct job_photograph *p, struct 
         s = photograph_read_png(path, p->srgb, LIMIT_PIXEL, im, err);
     else
         return error_set(err, STATUS_UNSUPPORTED, "cannot read photograph '%s': its name must end in .exr or .png",
-                         base_name(path));
+                         path_file_name(path));
     if (s != STATUS_OK) return s;
-    s = crop_image(im, p->crop_px, base_name(path), err);
+    s = crop_image(im, p->crop_px, path_file_name(path), err);
     if (s != STATUS_OK) {
         image_release(im);
         return s;
@@ -103,7 +99,7 @@ static status check_pixels(const struct image *im, const char *name, struct erro
 status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
                           struct error *err)
 {
-    const char *name = base_name(path);
+    const char *name = path_file_name(path);
     struct image im;
     memset(mean, 0, sizeof *mean);
     status s = photograph_read(path, p, &im, &mean->saturated_share, err);

@@ -1,9 +1,10 @@
 #include "optimizer/photographs/photograph_contrast.h"
+
+#include "base/durable.h"
 #include "optimizer/photographs/photograph.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Share of pixel i that lies between from and to, in pixels. */
 static double overlap(double from, double to, size_t i)
@@ -50,7 +51,6 @@ status image_contrast(const struct image *im, size_t channel, size_t n_cell, dou
 status photograph_contrast(const char *path, const struct job_photograph *p, size_t n_cell, double contrast_rgb[3],
                            double se_rgb[3], struct error *err)
 {
-    const char *slash = strrchr(path, '/');
     struct image im;
     status s = photograph_read(path, p, &im, NULL, err);
     if (s != STATUS_OK) return s;
@@ -58,7 +58,7 @@ status photograph_contrast(const char *path, const struct job_photograph *p, siz
         s = error_set(err, STATUS_INVALID,
                       "cannot measure the contrast of photograph '%s': its %zu x %zu pixels leave fewer than 2 x 2 for "
                       "each of %zu x %zu parts",
-                      slash != NULL ? slash + 1 : path, im.width, im.height, n_cell, n_cell);
+                      path_file_name(path), im.width, im.height, n_cell, n_cell);
     for (size_t c = 0; c < 3 && s == STATUS_OK; c++)
         s = image_contrast(&im, c, n_cell, &contrast_rgb[c], &se_rgb[c], err);
     image_release(&im);

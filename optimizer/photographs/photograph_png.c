@@ -1,4 +1,5 @@
 /* 8/16-bit PNG through libpng. Its longjmp stays in this file. */
+#include "base/durable.h"
 #include "optimizer/photographs/photograph.h"
 
 #include <math.h>
@@ -71,7 +72,7 @@ static status check_size(FILE *f, const char *name, size_t limit_pixel, struct e
 
 status photograph_read_png(const char *path, bool srgb, size_t limit_pixel, struct image *im, struct error *err)
 {
-    const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
+    const char *name = path_file_name(path);
     struct png_failure failure = {{0}};
     memset(im, 0, sizeof *im);
     FILE *f = fopen(path, "rbe");
