@@ -42,7 +42,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-pictures fuzz fuzz-programs
+.PHONY: all deps test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -136,6 +136,12 @@ docs-fit-curve:    ## draw docs/images/fit-curve.svg anew: error against paths o
 	@mkdir -p $(BUILD)/bench-fit docs/images
 	@$(BUILD)/tests/bench/bench_fit analytic > $(BUILD)/bench-fit/analytic.json
 	@/usr/bin/python3 tests/bench/plot_fit_curve.py $(BUILD)/bench-fit/analytic.json docs/images/fit-curve.svg
+
+docs-grazing:      ## draw docs/images/microflake-grazing.svg anew: what each model makes of grazing highlights (minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@mkdir -p $(BUILD)/bench-fit docs/images
+	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --photograph-paths 100000 --score-paths 20000 --path-budget 2000000 grazing > $(BUILD)/bench-fit/grazing.json
+	@/usr/bin/python3 tests/bench/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
 
 docs-pictures:     ## render docs/images/{twill,derivatives}.png anew (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures

@@ -1,10 +1,12 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- *             [--sgd-budget N] [--curve-paths N] [--coverage-paths N] [--journal FILE]
- * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real"; nothing: all. "published": the published method
+ *             [--sgd-budget N] [--curve-paths N] [--coverage-paths N] [--journal FILE] [--model M] [--yarn FILE|none] [--as-stated]
+ * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "grazing"; nothing: all. "published": the published method
  * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph (250,000 for coverage), 2 x 400,000 a held-out mean of the truth, 2 x 50,000
- * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ is.
+ * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ and yarns/ are.
+ * "grazing" takes --model (of the four); "real" --sample (a table), --model, --yarn (file of the weave's yarn; none: smooth
+ * yarns) and --as-stated: cloth lies as the tables state; rows otherwise are means over all rotations, as isotropic data are.
  *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
@@ -17,7 +19,9 @@
  *   fit.analytic.<method>                error of the fitted means against the exact ones, Gabardine's parameters on the
  *                                        analytic cloth of the tests, both methods with their own budgets, 10 seeds
  *   fit.published.{wall_s,paths,heldout_rel_rms}   gabardine by the published method
- *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave, felts on felt
+ *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave of plied yarns, felts on felt
+ *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
+ *                                        from the normal, as fitted by each model to the 16 photographs
  */
 #include "base/durable.h"
 #include "optimizer/descent/descent.h"
@@ -45,6 +49,9 @@ struct bench {
     uint64_t path_budget, sgd_budget;
     const char *journal; /* of the published method; NULL: not kept */
     const char *sample; /* NULL: all measured tables */
+    const char *model;  /* NULL: all four on measured tables */
+    const char *yarn;   /* file of the measured tables' yarn; NULL: yarns/cotton1.txt of SELVEDGE_DATA; "none": smooth yarns */
+    bool as_stated;     /* measured tables at the rotations that they state, not as means over all */
     bool prepare;
 };
 
@@ -128,20 +135,30 @@ static void tell_fit(const struct fit_phantom *f, const struct fit_result *r)
     }
 }
 
+static void keep_truth_inside(struct fit_phantom *f)
+{
+    for (size_t p = 0; p < f->model.n_param; p++) /* tables are rounded: not beyond a bound */
+        f->truth[p] = fmin(fmax(f->truth[p], f->model.param[p].lower), f->model.param[p].upper);
+}
+
 /* Without photographs. */
 static void open_cloth(const struct bench *b, const char *name, struct fit_phantom *f)
 {
     const struct fit_fabric *fabric = fit_fabric_find(name);
     fprintf(stderr, "%s\n", name);
     fit_phantom_init(f, b->folder, b->pool, fabric->weave, fabric->model_id, fabric->truth);
-    for (size_t p = 0; p < f->model.n_param; p++) /* tables are rounded: not beyond a bound */
-        f->truth[p] = fmin(fmax(f->truth[p], f->model.param[p].lower), f->model.param[p].upper);
+    keep_truth_inside(f);
+}
+
+static void photograph(const struct bench *b, struct fit_phantom *f)
+{
+    fit_phantom_photograph(f, &(struct fit_photography){.n_path = b->photograph_paths, .noise = NOISE, .noise_seed = 1});
 }
 
 static void open_fabric(const struct bench *b, const char *name, struct fit_phantom *f)
 {
     open_cloth(b, name, f);
-    fit_phantom_photograph(f, &(struct fit_photography){.n_path = b->photograph_paths, .noise = NOISE, .noise_seed = 1});
+    photograph(b, f);
 }
 
 static struct fit_score score(const struct bench *b, const struct fit_phantom *f, const double *param)
@@ -341,9 +358,37 @@ struct real_row {
     double error[N_REAL_MODEL][2]; /* fitted, held out */
 };
 
-static void fit_table(const struct bench *b, const char *path, struct real_row *row)
+static void tell_rows(const struct fit_phantom *f, const double *param, size_t n_path)
 {
-    const bool felt = strstr(row->sample, "felt") != NULL;
+    struct estimate e[FIT_MAX_OBSERVATION];
+    const double deg = 180.0 / M_PI;
+    fit_phantom_render(f, param, n_path, e);
+    fprintf(stderr, "  %-12s %5s %5s %5s %5s %5s  %-24s  %s\n", "row", "lamp", "phi", "cam", "phi", "turn", "measured", "rendered / measured");
+    for (size_t i = 0; i < f->observation.n; i++) {
+        const struct observation *o = &f->observation.item[i];
+        const struct configuration *k = &o->configuration;
+        fprintf(stderr, "  %-12s %5.0f %5.0f %5.0f %5.0f %5.0f ", o->name, k->light_theta_rad * deg, k->light_phi_rad * deg,
+                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->cloth_rotation_rad * deg);
+        for (int c = 0; c < 3; c++) fprintf(stderr, " %7.4f", o->mean_rgb[c]);
+        for (int c = 0; c < 3; c++) fprintf(stderr, "  %5.2f +- %.2f", e[i].mean[c] / o->mean_rgb[c], sqrt(e[i].var[c]) / o->mean_rgb[c]);
+        fputc('\n', stderr);
+    }
+}
+
+/* The tables hold each row twice, with the cloth turned by 0 and by 90 degrees, and equal values: one mean over rotations is enough. */
+static void take_as_isotropic(struct observation_set *o)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < o->n; i++) {
+        if (o->item[i].configuration.cloth_rotation_rad != 0.0) continue;
+        o->item[n] = o->item[i];
+        o->item[n++].configuration.n_rotation = CONFIGURATION_ALL_ROTATIONS;
+    }
+    o->n = n;
+}
+
+static void fit_table(const struct bench *b, const struct fit_cloth *cloth, const char *path, struct real_row *row)
+{
     struct observation_set o;
     struct error err = {0};
     char *text = NULL;
@@ -353,18 +398,23 @@ static void fit_table(const struct bench *b, const char *path, struct real_row *
     observation_set_init(&o);
     fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
     fit_check(measurement_table_parse(text, n, row->sample, &set_up, &o, &err), &err);
+    if (!b->as_stated) take_as_isotropic(&o);
     for (size_t k = 0; k < N_REAL_MODEL; k++) {
         struct fit_phantom f;
+        if (b->model != NULL && strcmp(b->model, real_model[k].name) != 0) continue;
         struct fit_result r;
         char what[160];
         fprintf(stderr, "%s, %s\n", row->sample, real_model[k].name);
-        fit_phantom_init(&f, b->folder, b->pool, felt ? PHANTOM_FELT : PHANTOM_PLAIN, real_model[k].id, NULL);
+        fit_phantom_init_on(&f, b->folder, b->pool, cloth, real_model[k].id, NULL);
         fit_phantom_observe(&f, &o);
         run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
         tell_fit(&f, &r);
+        tell_rows(&f, r.param, b->score_paths / 4);
         for (int held_out = 0; held_out < 2; held_out++) {
             const enum job_set set = held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT;
-            row->error[k][held_out] = fit_phantom_score(&f, set, NULL, 0, r.param, b->score_paths / 2).rel_rms;
+            const struct fit_score s = fit_phantom_score(&f, set, NULL, 0, r.param, b->score_paths / 2);
+            row->error[k][held_out] = s.rel_rms;
+            fprintf(stderr, "  %s %.3f +- %.3f\n", held_out ? "held out" : "fitted", s.rel_rms, s.se);
             snprintf(what, sizeof what, "%s.%s.%s", row->sample, real_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");
             print("real", what, row->error[k][held_out], "1", "lower");
         }
@@ -386,14 +436,28 @@ static void print_table(const struct real_row *row, size_t n)
     fputc('\n', stderr);
 }
 
+/* The cloth that a sample is fitted on, made when the first one asks for it. */
+static const struct fit_cloth *real_cloth(const struct bench *b, const char *data, const char *sample, struct fit_cloth cloth[2])
+{
+    const bool felt = strstr(sample, "felt") != NULL;
+    char yarn[1024];
+    if (cloth[felt].scene != NULL) return &cloth[felt];
+    snprintf(yarn, sizeof yarn, "%s/yarns/cotton1.txt", data);
+    const char *file = b->yarn == NULL ? yarn : b->yarn;
+    fit_cloth_init(&cloth[felt], felt ? PHANTOM_FELT : PHANTOM_PLAIN, felt || strcmp(file, "none") == 0 ? NULL : file, true, b->pool);
+    return &cloth[felt];
+}
+
 static void bench_real(const struct bench *b)
 {
-    const char *data = getenv("SELVEDGE_DATA");
+    const char *set = getenv("SELVEDGE_DATA"), *data = set != NULL ? set : "../shared/data";
     char pattern[1024];
     glob_t found;
     struct real_row row[MAX_REAL] = {0};
+    struct fit_cloth cloth[2];
     size_t n = 0;
-    snprintf(pattern, sizeof pattern, "%s/measured-reflectance/*.csv", data != NULL ? data : "../shared/data");
+    memset(cloth, 0, sizeof cloth);
+    snprintf(pattern, sizeof pattern, "%s/measured-reflectance/*.csv", data);
     if (glob(pattern, 0, NULL, &found) != 0) {
         fprintf(stderr, "skipped: no '%s' (set SELVEDGE_DATA)\n", pattern);
         return;
@@ -403,11 +467,86 @@ static void bench_real(const struct bench *b)
         snprintf(row[n].sample, sizeof row[n].sample, "%s", slash != NULL ? slash + 1 : found.gl_pathv[i]);
         row[n].sample[strcspn(row[n].sample, ".")] = '\0';
         if (b->sample != NULL && strcmp(b->sample, row[n].sample) != 0) continue;
-        fit_table(b, found.gl_pathv[i], &row[n]);
+        fit_table(b, real_cloth(b, data, row[n].sample, cloth), found.gl_pathv[i], &row[n]);
         n++;
     }
     print_table(row, n);
+    for (size_t k = 0; k < 2; k++)
+        if (cloth[k].scene != NULL) fit_cloth_release(&cloth[k]);
     globfree(&found);
+}
+
+/* ---- lamp and camera in mirrored directions, from the normal to grazing ---- */
+
+enum { N_MIRROR = 18, MIRROR_STEP_DEG = 5 };
+
+static void print_mirror(const char *of, double angle_deg, const double rgb[3], double se)
+{
+    printf("{\"name\":\"fit.grazing.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"higher\",\"angle_deg\":%g,\"se\":%.2g}\n", of,
+           (rgb[0] + rgb[1] + rgb[2]) / 3.0, angle_deg, se);
+}
+
+/* The photographs of the fit that were taken in such directions. */
+static void print_mirror_photographs(const struct observation_set *o)
+{
+    const double deg = 180.0 / M_PI;
+    for (size_t i = 0; i < o->n; i++) {
+        const struct configuration *k = &o->item[i].configuration;
+        if (fabs(k->light_theta_rad - k->camera_theta_rad) > 1e-6 || k->cloth_rotation_rad != 0.0 ||
+            fabs(fabs(k->light_phi_rad - k->camera_phi_rad) - M_PI) > 1e-6)
+            continue;
+        print_mirror("photograph", k->light_theta_rad * deg, o->item[i].mean_rgb, 0.0);
+    }
+}
+
+/* Replaces f's observations. */
+static void print_mirror_curve(const struct bench *b, struct fit_phantom *f, const char *name, const double *param)
+{
+    const struct job_document set_up = {.lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
+    struct observation_set o;
+    struct error err = {0};
+    struct estimate e[N_MIRROR];
+    observation_set_init(&o);
+    for (size_t i = 0; i < N_MIRROR; i++) {
+        double theta_deg = MIRROR_STEP_DEG * (double)i;
+        const struct observation item = {.set = JOB_SET_HELD_OUT, .weight = 1.0,
+                                         .configuration = observation_configuration(&set_up, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
+        fit_check(observation_set_append(&o, &item, &err), &err);
+    }
+    fit_phantom_observe(f, &o);
+    fit_phantom_render(f, param, b->score_paths, e);
+    for (size_t i = 0; i < N_MIRROR; i++)
+        print_mirror(name, MIRROR_STEP_DEG * (double)i, e[i].mean, sqrt(e[i].var[0] + e[i].var[1] + e[i].var[2]) / 3.0);
+    fflush(stdout);
+    observation_set_release(&o);
+}
+
+/* Gabardine's fibers are known to be two_lobe.v1: what the other models make of photographs of them. */
+static void bench_grazing(const struct bench *b)
+{
+    const struct fit_fabric *fabric = fit_fabric_find("gabardine");
+    struct fit_cloth cloth;
+    struct fit_phantom truth;
+    fit_cloth_init(&cloth, fabric->weave, NULL, true, b->pool);
+    fit_phantom_init_on(&truth, b->folder, b->pool, &cloth, fabric->model_id, fabric->truth);
+    keep_truth_inside(&truth);
+    photograph(b, &truth);
+    print_mirror_photographs(&truth.fitted);
+    for (size_t k = 0; k < N_REAL_MODEL; k++) {
+        struct fit_phantom f;
+        struct fit_result r;
+        if (b->model != NULL && strcmp(b->model, real_model[k].name) != 0) continue;
+        fprintf(stderr, "grazing, %s\n", real_model[k].name);
+        fit_phantom_init_on(&f, b->folder, b->pool, &cloth, real_model[k].id, NULL);
+        fit_phantom_observe(&f, &truth.observation);
+        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
+        tell_fit(&f, &r);
+        print_mirror_curve(b, &f, real_model[k].name, r.param);
+        fit_phantom_release(&f);
+    }
+    print_mirror_curve(b, &truth, "truth", truth.truth);
+    fit_phantom_release(&truth);
+    fit_cloth_release(&cloth);
 }
 
 static void run_one(const struct bench *b, const char *what)
@@ -424,6 +563,8 @@ static void run_one(const struct bench *b, const char *what)
         bench_published(b);
     else if (strcmp(what, "real") == 0)
         bench_real(b);
+    else if (strcmp(what, "grazing") == 0)
+        bench_grazing(b);
     else if (fit_fabric_find(what) != NULL)
         bench_fabric(b, what);
     else {
@@ -438,6 +579,10 @@ static bool take_option(struct bench *b, const char *name, const char *value)
         b->folder = value;
     else if (strcmp(name, "--sample") == 0)
         b->sample = value;
+    else if (strcmp(name, "--model") == 0)
+        b->model = value;
+    else if (strcmp(name, "--yarn") == 0)
+        b->yarn = value;
     else if (strcmp(name, "--photograph-paths") == 0)
         b->photograph_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--coverage-paths") == 0)
@@ -461,7 +606,7 @@ static bool take_option(struct bench *b, const char *name, const char *value)
 
 int main(int argc, char **argv)
 {
-    static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "real"};
+    static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "real", "grazing"};
     struct bench b = {
         .folder = "build/bench-fit", .photograph_paths = 1000000, .coverage_paths = 250000, .kept_paths = 400000, .score_paths = 50000,
                       .curve_paths = 10000,
@@ -471,6 +616,8 @@ int main(int argc, char **argv)
     for (; i < argc && argv[i][0] == '-'; i++) {
         if (strcmp(argv[i], "--prepare") == 0) {
             b.prepare = true;
+        } else if (strcmp(argv[i], "--as-stated") == 0) {
+            b.as_stated = true;
         } else if (i + 1 == argc || !take_option(&b, argv[i], argv[i + 1])) {
             fprintf(stderr, "unknown option '%s', or its value is missing\n", argv[i]);
             return 1;

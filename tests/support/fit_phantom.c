@@ -31,18 +31,26 @@ static void check_memory(const void *p)
 
 /* ---- cloth ---- */
 
-static void make_volume(struct fit_cloth *c, struct thread_pool *pool)
+static void make_volume(struct fit_cloth *c, double voxel_m, struct thread_pool *pool)
 {
     struct error err = {0};
-    double voxel_m;
-    fit_check(fibers_voxelise(&c->fiber, &(struct voxelise_option){2e-6, 1u << 30}, pool, NULL, &c->volume, &voxel_m, &err),
-              &err);
+    const struct voxelise_option o = {voxel_m, 1u << 30};
+    fit_check(fibers_voxelise(&c->fiber, &o, pool, NULL, &c->volume, &voxel_m, &err), &err);
     fit_check(volume_scene_init(&c->volume_scene, &c->volume, &(struct volume_scene_option){.black_sheet = true}, &err),
               &err);
     c->has_volume = true;
 }
 
-void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, bool with_volume, struct thread_pool *pool)
+/* As `selvedge-phantom cloth --yarn FILE --flatness 1.8 --cover 1.1`: looser than smooth yarns, as flat, and closed all the same. */
+static void take_yarn(struct phantom_option *o, const char *file)
+{
+    struct error err = {0};
+    fit_check(phantom_yarn_read(file, &o->yarn, &err), &err);
+    o->packing = 0.5;
+    o->cover = 1.1;
+}
+
+void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, const char *yarn_file, bool with_volume, struct thread_pool *pool)
 {
     struct error err = {0};
     struct phantom_option o;
@@ -54,11 +62,12 @@ void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, bool with_vol
     o.felt_tile_m = 6e-4;
     o.felt_thickness_m = 2.5e-4;
     o.vertex_spacing_m = 8e-6;
+    if (yarn_file != NULL) take_yarn(&o, yarn_file);
     fit_check(phantom_generate(&o, pool, NULL, &c->fiber, &report, &err), &err);
-    fprintf(stderr, "phantom %s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n",
+    fprintf(stderr, "phantom %s%s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n", yarn_file != NULL ? "plied " : "",
             phantom_weave_name(weave), c->fiber.n_fiber, c->fiber.n_vertex, report.cover, report.volume_fraction);
     fit_check(scene_new(&c->fiber, &(struct scene_option){.black_sheet = true}, &c->scene, &err), &err);
-    if (with_volume) make_volume(c, pool);
+    if (with_volume) make_volume(c, yarn_file != NULL ? 0.5 * o.fiber_radius_m[0] : 2e-6, pool);
 }
 
 void fit_cloth_release(struct fit_cloth *c)
@@ -73,8 +82,7 @@ void fit_cloth_release(struct fit_cloth *c)
 
 /* ---- phantom ---- */
 
-void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_pool *pool, enum phantom_weave weave,
-                      const char *model_id, const double *truth_file_unit)
+static void start(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const char *model_id, const double *truth_file_unit)
 {
     struct error err = {0};
     *f = (struct fit_phantom){.pool = pool, .folder = folder};
@@ -83,12 +91,26 @@ void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_p
         fprintf(stderr, "no model '%s'\n", model_id);
         exit(1);
     }
-    fit_cloth_init(&f->cloth, weave, f->model.kind == APPEARANCE_VOLUME, pool);
     for (size_t p = 0; p < f->model.n_param; p++)
         f->truth[p] = truth_file_unit != NULL ? param_from_file_unit(&f->model.param[p], truth_file_unit[p])
                                               : f->model.param[p].start;
     observation_set_init(&f->observation);
     observation_set_init(&f->fitted);
+}
+
+void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_pool *pool, enum phantom_weave weave,
+                      const char *model_id, const double *truth_file_unit)
+{
+    start(f, folder, pool, model_id, truth_file_unit);
+    fit_cloth_init(&f->cloth, weave, NULL, f->model.kind == APPEARANCE_VOLUME, pool);
+}
+
+void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const struct fit_cloth *cloth,
+                         const char *model_id, const double *truth_file_unit)
+{
+    start(f, folder, pool, model_id, truth_file_unit);
+    f->cloth = *cloth;
+    f->shares_cloth = true;
 }
 
 static void forget_observations(struct fit_phantom *f)
@@ -102,7 +124,7 @@ static void forget_observations(struct fit_phantom *f)
 void fit_phantom_release(struct fit_phantom *f)
 {
     forget_observations(f);
-    fit_cloth_release(&f->cloth);
+    if (!f->shares_cloth) fit_cloth_release(&f->cloth);
 }
 
 void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o)
@@ -150,6 +172,12 @@ static void run_estimate(const struct fit_phantom *f, const struct kept_call *c,
     fit_check(appearance_estimate_run(&q, f->pool, NULL, out, &err), &err);
 }
 
+void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out)
+{
+    const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false};
+    run_estimate(f, &call, 1, n_path, out);
+}
+
 static uint32_t call_sum(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path)
 {
     const struct fiber_set *s = &f->cloth.fiber;
@@ -162,6 +190,7 @@ static uint32_t call_sum(const struct fit_phantom *f, const struct kept_call *c,
         const double angle[] = {k->light_theta_rad, k->light_phi_rad, k->camera_theta_rad, k->camera_phi_rad,
                                 k->cloth_rotation_rad};
         sum = (uint32_t)crc32_z(sum, (const void *)angle, sizeof angle);
+        if (k->n_rotation > 1) sum = (uint32_t)crc32_z(sum, (const void *)&k->n_rotation, sizeof k->n_rotation);
     }
     return (uint32_t)crc32_z(sum, (const void *)number, sizeof number);
 }

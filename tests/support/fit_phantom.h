@@ -30,6 +30,7 @@ struct fit_phantom {
     struct thread_pool *pool;
     const char *folder; /* of kept estimates */
     struct fit_cloth cloth;
+    bool shares_cloth; /* with its maker, who releases it */
     struct appearance model;
     double truth[SCATTERING_MAX_PARAM];         /* internal units */
     struct observation_set observation, fitted; /* all; those of the set fit */
@@ -39,14 +40,18 @@ struct fit_phantom {
 /* Status and error to standard error, then exit(1), unless s is STATUS_OK. */
 void fit_check(status s, const struct error *err);
 
-/* One tile of a phantom: fibers of 14 um in yarns of 37 (felt: 0.6 x 0.6 x 0.25 mm), black sheet below. with_volume:
- * also as densities and directions on a grid of 2 um. */
-void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, bool with_volume, struct thread_pool *pool);
+/* One tile of a phantom: fibers of 14 um, black sheet below. yarn_file NULL: smooth yarns of 37 parallel fibers (felt: 0.6 x 0.6 x
+ * 0.25 mm); else a file of a real yarn's parameters (phantom_yarn_read): plied yarns with hairs. with_volume: also as
+ * densities and directions, on a grid of 2 um (plied: of half a radius). */
+void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, const char *yarn_file, bool with_volume, struct thread_pool *pool);
 void fit_cloth_release(struct fit_cloth *c);
 
 /* Cloth and model; no observations yet. truth_file_unit: NULL leaves the truth at the model's start. */
 void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_pool *pool, enum phantom_weave weave,
                       const char *model_id, const double *truth_file_unit);
+/* The same on a cloth that was made before, and outlives f. */
+void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const struct fit_cloth *cloth,
+                         const char *model_id, const double *truth_file_unit);
 void fit_phantom_release(struct fit_phantom *f);
 
 struct fit_photography {
@@ -61,6 +66,9 @@ struct fit_photography {
 void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography *how);
 /* Observations from elsewhere (kept: copied). */
 void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o);
+
+/* Estimates of all observations' configurations at param with n_path paths each, without derivatives. */
+void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out);
 
 /* Of cloth, model and fitted means: what a checkpoint of a fit depends on. */
 uint64_t fit_phantom_fingerprint(const struct fit_phantom *f);
