@@ -1,12 +1,13 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- *             [--sgd-budget N] [--curve-paths N] [--coverage-paths N] [--journal FILE] [--model M] [--yarn FILE|none] [--as-stated]
+ *             [--sgd-budget N] [--curve-paths N] [--coverage-paths N] [--journal FILE] [--model M] [--yarn FILE|none] [--as-stated] [--row-paths N]
  * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "grazing"; nothing: all. "published": the published method
  * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph (250,000 for coverage), 2 x 400,000 a held-out mean of the truth, 2 x 50,000
  * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ and yarns/ are.
  * "grazing" takes --model (of the four); "real" --sample (a table), --model, --yarn (file of the weave's yarn; none: smooth
- * yarns) and --as-stated: cloth lies as the tables state; rows otherwise are means over all rotations, as isotropic data are.
+ * yarns), --as-stated (cloth lies as the tables state; rows otherwise are means over all rotations, as isotropic data are)
+ * and --row-paths (tells rendered / measured of every row).
  *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
@@ -21,7 +22,7 @@
  *   fit.published.{wall_s,paths,heldout_rel_rms}   gabardine by the published method
  *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave of plied yarns, felts on felt
  *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
- *                                        from the normal, as fitted by each model to the 16 photographs
+ *                                        from the normal, as fitted by each model to the 16 photographs; _brightest: at 80 degrees, of any microflakes
  */
 #include "base/durable.h"
 #include "optimizer/descent/descent.h"
@@ -45,6 +46,7 @@ enum { N_COVERAGE = 20, N_SEED = 10, N_CURVE = 14, MAX_STEP = 600 };
 struct bench {
     struct thread_pool *pool;
     const char *folder;
+    size_t row_paths; /* for each row of a measured table told by itself; 0: none is */
     size_t photograph_paths, coverage_paths, kept_paths, score_paths, curve_paths;
     uint64_t path_budget, sgd_budget;
     const char *journal; /* of the published method; NULL: not kept */
@@ -349,12 +351,15 @@ enum { N_REAL_MODEL = 4, MAX_REAL = 32 };
 static const struct {
     const char *name, *id;
 } real_model[N_REAL_MODEL] = {{"two_lobe", "two_lobe.v1"},
-                              {"two_lobe_balanced", "two_lobe_balanced.v1"},
+                              {"microflake", "microflake.v1"},
                               {"two_lobe_volume", "phase_two_lobe.v1"},
-                              {"microflake", "microflake.v1"}};
+                              {"two_lobe_balanced", "two_lobe_balanced.v1"}};
+
+static bool takes_model(const struct bench *b, size_t k) { return b->model == NULL || strcmp(b->model, real_model[k].name) == 0; }
 
 struct real_row {
     char sample[64];
+    struct observation_set observation;
     double error[N_REAL_MODEL][2]; /* fitted, held out */
 };
 
@@ -387,41 +392,41 @@ static void take_as_isotropic(struct observation_set *o)
     o->n = n;
 }
 
-static void fit_table(const struct bench *b, const struct fit_cloth *cloth, const char *path, struct real_row *row)
+static void read_table(const struct bench *b, const char *path, struct real_row *row)
 {
-    struct observation_set o;
     struct error err = {0};
     char *text = NULL;
     size_t n = 0;
     const struct job_document set_up = {
         .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0, .black_sheet = true};
-    observation_set_init(&o);
+    observation_set_init(&row->observation);
     fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
-    fit_check(measurement_table_parse(text, n, row->sample, &set_up, &o, &err), &err);
-    if (!b->as_stated) take_as_isotropic(&o);
-    for (size_t k = 0; k < N_REAL_MODEL; k++) {
-        struct fit_phantom f;
-        if (b->model != NULL && strcmp(b->model, real_model[k].name) != 0) continue;
-        struct fit_result r;
-        char what[160];
-        fprintf(stderr, "%s, %s\n", row->sample, real_model[k].name);
-        fit_phantom_init_on(&f, b->folder, b->pool, cloth, real_model[k].id, NULL);
-        fit_phantom_observe(&f, &o);
-        run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
-        tell_fit(&f, &r);
-        tell_rows(&f, r.param, b->score_paths / 4);
-        for (int held_out = 0; held_out < 2; held_out++) {
-            const enum job_set set = held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT;
-            const struct fit_score s = fit_phantom_score(&f, set, NULL, 0, r.param, b->score_paths / 2);
-            row->error[k][held_out] = s.rel_rms;
-            fprintf(stderr, "  %s %.3f +- %.3f\n", held_out ? "held out" : "fitted", s.rel_rms, s.se);
-            snprintf(what, sizeof what, "%s.%s.%s", row->sample, real_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");
-            print("real", what, row->error[k][held_out], "1", "lower");
-        }
-        fit_phantom_release(&f);
-    }
-    observation_set_release(&o);
+    fit_check(measurement_table_parse(text, n, row->sample, &set_up, &row->observation, &err), &err);
+    if (!b->as_stated) take_as_isotropic(&row->observation);
     free(text);
+}
+
+/* The fitted error is the fit's own objective (all its paths, pooled), the held-out one takes new paths. */
+static void fit_table(const struct bench *b, const struct fit_cloth *cloth, size_t k, struct real_row *row)
+{
+    struct fit_phantom f;
+    struct fit_result r;
+    fprintf(stderr, "%s, %s\n", row->sample, real_model[k].name);
+    fit_phantom_init_on(&f, b->folder, b->pool, cloth, real_model[k].id, NULL);
+    fit_phantom_observe(&f, &row->observation);
+    run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
+    tell_fit(&f, &r);
+    if (b->row_paths > 0) tell_rows(&f, r.param, b->row_paths);
+    const struct fit_score held_out = fit_phantom_score(&f, JOB_SET_HELD_OUT, NULL, 0, r.param, b->score_paths / 2);
+    row->error[k][0] = sqrt(fmax(r.objective.value, 0.0) / (3.0 * (double)f.fitted.n));
+    row->error[k][1] = held_out.rel_rms;
+    fprintf(stderr, "  fitted %.3f, held out %.3f +- %.3f\n", row->error[k][0], held_out.rel_rms, held_out.se);
+    for (int set = 0; set < 2; set++) {
+        char what[160];
+        snprintf(what, sizeof what, "%s.%s.%s", row->sample, real_model[k].name, set == 1 ? "heldout_rel_rms" : "fit_rel_rms");
+        print("real", what, row->error[k][set], "1", "lower");
+    }
+    fit_phantom_release(&f);
 }
 
 static void print_table(const struct real_row *row, size_t n)
@@ -467,10 +472,12 @@ static void bench_real(const struct bench *b)
         snprintf(row[n].sample, sizeof row[n].sample, "%s", slash != NULL ? slash + 1 : found.gl_pathv[i]);
         row[n].sample[strcspn(row[n].sample, ".")] = '\0';
         if (b->sample != NULL && strcmp(b->sample, row[n].sample) != 0) continue;
-        fit_table(b, real_cloth(b, data, row[n].sample, cloth), found.gl_pathv[i], &row[n]);
-        n++;
+        read_table(b, found.gl_pathv[i], &row[n++]);
     }
+    for (size_t k = 0; k < N_REAL_MODEL; k++)
+        for (size_t i = 0; i < n && takes_model(b, k); i++) fit_table(b, real_cloth(b, data, row[i].sample, cloth), k, &row[i]);
     print_table(row, n);
+    for (size_t i = 0; i < n; i++) observation_set_release(&row[i].observation);
     for (size_t k = 0; k < 2; k++)
         if (cloth[k].scene != NULL) fit_cloth_release(&cloth[k]);
     globfree(&found);
@@ -499,26 +506,57 @@ static void print_mirror_photographs(const struct observation_set *o)
     }
 }
 
-/* Replaces f's observations. */
-static void print_mirror_curve(const struct bench *b, struct fit_phantom *f, const char *name, const double *param)
+/* Replaces f's observations by mirrored directions: n of them from first_deg on. */
+static void observe_mirror(struct fit_phantom *f, double first_deg, size_t n)
 {
     const struct job_document set_up = {.lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
     struct observation_set o;
     struct error err = {0};
-    struct estimate e[N_MIRROR];
     observation_set_init(&o);
-    for (size_t i = 0; i < N_MIRROR; i++) {
-        double theta_deg = MIRROR_STEP_DEG * (double)i;
+    for (size_t i = 0; i < n; i++) {
+        double theta_deg = first_deg + MIRROR_STEP_DEG * (double)i;
         const struct observation item = {.set = JOB_SET_HELD_OUT, .weight = 1.0,
                                          .configuration = observation_configuration(&set_up, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
         fit_check(observation_set_append(&o, &item, &err), &err);
     }
     fit_phantom_observe(f, &o);
-    fit_phantom_render(f, param, b->score_paths, e);
-    for (size_t i = 0; i < N_MIRROR; i++)
-        print_mirror(name, MIRROR_STEP_DEG * (double)i, e[i].mean, sqrt(e[i].var[0] + e[i].var[1] + e[i].var[2]) / 3.0);
-    fflush(stdout);
     observation_set_release(&o);
+}
+
+static double mean_se(const struct estimate *e) { return sqrt(e->var[0] + e->var[1] + e->var[2]) / 3.0; }
+
+static void print_mirror_curve(const struct bench *b, struct fit_phantom *f, const char *name, const double *param)
+{
+    struct estimate e[N_MIRROR];
+    observe_mirror(f, 0.0, N_MIRROR);
+    fit_phantom_render(f, param, b->score_paths, e);
+    for (size_t i = 0; i < N_MIRROR; i++) print_mirror(name, MIRROR_STEP_DEG * (double)i, e[i].mean, mean_se(&e[i]));
+    fflush(stdout);
+}
+
+/* The brightest that microflakes get at 80 degrees (thesis, figure 5.15): albedo at its upper bound, gamma over its range, several d. */
+static void print_brightest_microflake(const struct bench *b, const struct fit_cloth *cloth)
+{
+    enum { N_GAMMA = 7, N_DENSITY = 3 };
+    const double at_deg = 80.0;
+    struct fit_phantom f;
+    struct estimate e, brightest = {0};
+    double param[SCATTERING_MAX_PARAM];
+    fit_phantom_init_on(&f, b->folder, b->pool, cloth, "microflake.v1", NULL);
+    observe_mirror(&f, at_deg, 1);
+    size_t i_gamma = f.model.n_param - 2, i_d = f.model.n_param - 1;
+    const struct param_info *gamma = &f.model.param[i_gamma];
+    for (size_t p = 0; p < i_gamma; p++) param[p] = f.model.param[p].upper;
+    for (size_t g = 0; g < N_GAMMA; g++)
+        for (size_t d = 0; d < N_DENSITY; d++) {
+            param[i_gamma] = gamma->lower * pow(gamma->upper / gamma->lower, (double)g / (N_GAMMA - 1));
+            param[i_d] = f.model.param[i_d].start * pow(4.0, (double)d - 1.0);
+            fit_phantom_render(&f, param, b->score_paths, &e);
+            fprintf(stderr, "  microflake, albedo %.3f, gamma %.3f, d %.0f /cm: %.3f\n", param[0], param[i_gamma], 1e-2 * param[i_d], e.mean[0]);
+            if (e.mean[0] > brightest.mean[0]) brightest = e;
+        }
+    print_mirror("microflake_brightest", at_deg, brightest.mean, mean_se(&brightest));
+    fit_phantom_release(&f);
 }
 
 /* Gabardine's fibers are known to be two_lobe.v1: what the other models make of photographs of them. */
@@ -535,7 +573,7 @@ static void bench_grazing(const struct bench *b)
     for (size_t k = 0; k < N_REAL_MODEL; k++) {
         struct fit_phantom f;
         struct fit_result r;
-        if (b->model != NULL && strcmp(b->model, real_model[k].name) != 0) continue;
+        if (!takes_model(b, k)) continue;
         fprintf(stderr, "grazing, %s\n", real_model[k].name);
         fit_phantom_init_on(&f, b->folder, b->pool, &cloth, real_model[k].id, NULL);
         fit_phantom_observe(&f, &truth.observation);
@@ -545,6 +583,7 @@ static void bench_grazing(const struct bench *b)
         fit_phantom_release(&f);
     }
     print_mirror_curve(b, &truth, "truth", truth.truth);
+    print_brightest_microflake(b, &cloth);
     fit_phantom_release(&truth);
     fit_cloth_release(&cloth);
 }
@@ -581,6 +620,8 @@ static bool take_option(struct bench *b, const char *name, const char *value)
         b->sample = value;
     else if (strcmp(name, "--model") == 0)
         b->model = value;
+    else if (strcmp(name, "--row-paths") == 0)
+        b->row_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--yarn") == 0)
         b->yarn = value;
     else if (strcmp(name, "--photograph-paths") == 0)

@@ -8,9 +8,11 @@ import math
 import sys
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 720, 440, 72, 24, 24, 60
-COLOUR = {"truth": "#222", "two_lobe": "#1f5fa8", "two_lobe_balanced": "#4a9c8e", "two_lobe_volume": "#7a4fa3", "microflake": "#c0501f"}
+COLOUR = {"two_lobe": "#1f5fa8", "two_lobe_balanced": "#4a9c8e", "two_lobe_volume": "#7a4fa3", "microflake": "#c0501f", "truth": "#222"}
 TITLE = {"truth": "true cloth (two_lobe fibers)", "two_lobe": "two_lobe, fitted", "two_lobe_balanced": "two_lobe_balanced, fitted",
-         "two_lobe_volume": "two_lobe_volume, fitted", "microflake": "microflake, fitted", "photograph": "photographs of the fit"}
+         "two_lobe_volume": "two_lobe_volume, fitted", "microflake": "microflake, fitted", "photograph": "photographs of the fit",
+         "microflake_brightest": "brightest white microflakes of any gamma and density"}
+SIGN = {"photograph": "○ ", "microflake_brightest": "+ "}
 
 
 def read(path):
@@ -49,10 +51,14 @@ def picture(curve):
         dash = ' stroke-dasharray="6 4"' if name == "truth" else ""
         out.append(f'<polyline points="{line}" fill="none" stroke="{COLOUR[name]}" stroke-width="1.6"{dash}/>')
         out += [f'<path d="M{x(a):.1f} {y(v - e):.1f}V{y(v + e):.1f}" stroke="{COLOUR[name]}"/>' for a, v, e in curve[name]]
-    out += [f'<circle cx="{x(a):.1f}" cy="{y(v):.1f}" r="5" fill="none" stroke="#222"/>' for a, v, _ in curve.get("photograph", [])]
-    for i, name in enumerate(names + ["photograph"]):
-        ring = "○ " if name == "photograph" else ""
-        out.append(f'<text x="{LEFT + 12}" y="{TOP + 20 + 18 * i}" fill="{COLOUR.get(name, "#222")}">{ring}{TITLE[name]}</text>')
+    for a, v, _ in curve.get("photograph", []):
+        out.append(f'<circle cx="{x(a):.1f}" cy="{y(v):.1f}" r="5" fill="none" stroke="#222"/>')
+    for a, v, _ in curve.get("microflake_brightest", []):
+        out.append(f'<path d="M{x(a) - 6:.1f} {y(v):.1f}h12m-6 -6v12" stroke="{COLOUR["microflake"]}" stroke-width="2"/>')
+    for i, name in enumerate(names + [n for n in SIGN if n in curve]):
+        colour = COLOUR[name.split("_brightest")[0]] if name != "photograph" else "#222"
+        text = SIGN.get(name, "") + TITLE[name]
+        out.append(f'<text x="{LEFT + 12}" y="{TOP + 20 + 18 * i}" fill="{colour}">{text}</text>')
     out.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 14}" text-anchor="middle">angle of lamp and camera from the normal, on opposite sides</text>'
                f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" text-anchor="middle">radiance (white facing the lamp: 1)</text>')
     return "\n".join(out + ["</svg>", ""])
