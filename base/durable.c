@@ -207,6 +207,42 @@ out:
     return s;
 }
 
+enum { SEEK_SPAN_BYTES = 64 * 1024 };
+
+/* The first record that begins behind `at`: its offset, and whether it is a good one that `before` holds for. */
+static bool record_behind(FILE *f, uint64_t at, char **line, size_t *capacity, record_visitor before, void *context, uint64_t *begin)
+{
+    if (fseeko(f, (off_t)at, SEEK_SET) != 0) return false;
+    ssize_t rest = getline(line, capacity, f), n = rest > 0 ? getline(line, capacity, f) : -1;
+    *begin = at + (rest > 0 ? (uint64_t)rest : 0);
+    if (n <= 0 || (*line)[n - 1] != '\n' || !record_valid(*line, (size_t)n - 1)) return false;
+    (*line)[n - 1] = '\0';
+    return before(context, *line + 9, (size_t)n - 10);
+}
+
+status record_seek(const char *path, record_visitor before, void *context, uint64_t *from, struct error *err)
+{
+    *from = 0;
+    FILE *f = fopen(path, "re");
+    if (f == NULL) return error_set_errno(err, "cannot read '%s'", path);
+    status s = STATUS_OK;
+    char *line = NULL;
+    size_t capacity = 0;
+    off_t size = fseeko(f, 0, SEEK_END) == 0 ? ftello(f) : -1;
+    if (size < 0) s = error_set_errno(err, "cannot seek in '%s'", path);
+    for (uint64_t end = size > 0 ? (uint64_t)size : 0; s == STATUS_OK && end - *from > SEEK_SPAN_BYTES;) {
+        uint64_t middle = *from + (end - *from) / 2, begin = 0;
+        if (record_behind(f, middle, &line, &capacity, before, context, &begin) && begin < end)
+            *from = begin;
+        else
+            end = middle;
+        if (ferror(f)) s = error_set_errno(err, "cannot read '%s'", path);
+    }
+    free(line);
+    fclose(f);
+    return s;
+}
+
 status record_truncate(const char *path, uint64_t keep_bytes, struct error *err)
 {
     struct stat st;

@@ -37,6 +37,10 @@ status record_append(const char *path, const char *json, bool sync, struct error
 typedef bool (*record_visitor)(void *context, const char *json, size_t n_json);
 status record_read(const char *path, uint64_t from, record_visitor visit, void *context, uint64_t *next,
                    struct error *err);
+/* Finds a place to begin reading in a file whose records are in order (`before` holds for those up to a place, and for
+ * none behind it) without reading it all: *from is the offset of a record for which it holds, or 0, and not much more
+ * than 64 KiB of further such records follow. */
+status record_seek(const char *path, record_visitor before, void *context, uint64_t *from, struct error *err);
 /* Cut a torn tail: everything behind offset keep_bytes, if keep_bytes < file size. A file that does not exist is fine. STATUS_IO. */
 status record_truncate(const char *path, uint64_t keep_bytes, struct error *err);
 

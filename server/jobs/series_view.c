@@ -1,121 +1,254 @@
+/* Records of a series are in the order of their steps, and of their models, a search for the radius first: what is asked
+ * for is found by bisection (record_seek), counted, and merged while it is read. So an incremental request costs what it
+ * answers, not what the file holds, and memory is that of the points. */
 #include "server/jobs/series_view.h"
 #include "base/durable.h"
+#include "optimizer/job_document.h"
 #include "optimizer/job_folder.h"
 #include "server/jobs/job_paths.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-enum { SERIES_MAX_RECORD = 1000000 };
+/* Of a reply with the renderings of all points: fewer points beyond. */
+enum { ALL_RENDERED_BYTES = 8 << 20, KEY_RADIUS = -1 };
 
-struct reading {
+/* The worker writes "step" first; false for a record without a whole step. */
+static bool read_step(const char *json, size_t n, json_int_t *step)
+{
+    static const char begin[] = "{\"step\":";
+    char *end = NULL;
+    if (n > sizeof begin && memcmp(json, begin, sizeof begin - 1) == 0) {
+        *step = strtoll(json + sizeof begin - 1, &end, 10);
+        if (end != json + sizeof begin - 1 && (*end == ',' || *end == '}')) return true;
+    }
+    json_t *j = json_loadb(json, n, 0, NULL), *value = json_object_get(j, "step");
+    bool found = json_is_integer(value);
+    *step = json_integer_value(value);
+    json_decref(j);
+    return found;
+}
+
+static json_int_t model_of(const json_t *record) { return json_integer_value(json_object_get(record, "i_model")); }
+
+/* Rises along the file: the search for the radius, whatever model it used, then the models. */
+static json_int_t key_of(const json_t *record)
+{
+    const char *phase = json_string_value(json_object_get(record, "phase"));
+    return phase != NULL && strcmp(phase, "radius") == 0 ? KEY_RADIUS : model_of(record);
+}
+
+/* ---- which records ---- */
+
+struct counting {
     long long after_step;
-    json_t *record;
-    json_t *model; /* [{"id", "parameters"}]: what the numbers of each model's points are */
     json_int_t last_step;
-    size_t n;
+    size_t n, n_bytes; /* of those behind after_step */
 };
 
-/* The first record of a model describes its parameters: to the list of models, and out of the record. */
-static void take_description(struct reading *r, json_t *record)
+static bool is_seen(void *context, const char *json, size_t n)
 {
-    json_t *parameters = json_object_get(record, "parameters");
-    if (parameters == NULL) return;
-    json_int_t i_model = json_integer_value(json_object_get(record, "i_model"));
-    if (i_model == (json_int_t)json_array_size(r->model)) /* a search before the fit describes the model as well */
-        json_array_append_new(r->model, json_pack("{s:O?,s:O}", "id", json_object_get(record, "model"), "parameters", parameters));
-    json_object_del(record, "parameters");
+    const struct counting *c = context;
+    json_int_t step;
+    return read_step(json, n, &step) && step <= c->after_step;
 }
 
-static bool on_record(void *context, const char *json, size_t n)
+static bool count(void *context, const char *json, size_t n)
 {
-    struct reading *r = context;
+    struct counting *c = context;
+    json_int_t step;
+    if (!read_step(json, n, &step)) return true;
+    if (step > c->last_step) c->last_step = step;
+    if (step <= c->after_step) return true;
+    c->n++;
+    c->n_bytes += n;
+    return true;
+}
+
+/* ---- what the numbers are ---- */
+
+struct description {
+    json_int_t i_model;
+    json_t *model; /* [{"id", "parameters"}], of the models before */
+};
+
+static bool is_of_earlier_model(void *context, const char *json, size_t n)
+{
+    const struct description *d = context;
     json_t *j = json_loadb(json, n, 0, NULL);
-    json_int_t step = json_integer_value(json_object_get(j, "step"));
-    if (json_is_integer(json_object_get(j, "step"))) {
-        r->n++;
-        if (step > r->last_step) r->last_step = step;
-        take_description(r, j);
-        if (step > r->after_step) json_array_append(r->record, j);
-    }
+    bool earlier = j != NULL && key_of(j) < d->i_model;
     json_decref(j);
-    return r->n < SERIES_MAX_RECORD;
+    return earlier;
 }
 
-/* Element-wise minimum and maximum of "parameter" over a group; members of other lengths are left out. */
-static void merge_parameters(json_t *point, const json_t *record, size_t from, size_t to)
+/* The first record of a model describes its parameters; so does the first of a search before the fit, of its model. */
+static bool take_description(void *context, const char *json, size_t n)
 {
-    const json_t *shape = json_object_get(point, "parameter");
-    size_t n = json_array_size(shape);
-    if (n == 0) return;
-    json_t *low = json_array(), *high = json_array();
-    for (size_t p = 0; p < n; p++) {
-        double least = json_number_value(json_array_get(shape, p)), most = least;
-        for (size_t i = from; i < to; i++) {
-            const json_t *a = json_object_get(json_array_get(record, i), "parameter");
-            if (json_array_size(a) != n) continue;
-            double x = json_number_value(json_array_get(a, p));
-            if (x < least) least = x;
-            if (x > most) most = x;
+    struct description *d = context;
+    json_t *j = json_loadb(json, n, 0, NULL), *parameters = json_object_get(j, "parameters");
+    bool found = parameters != NULL && model_of(j) == d->i_model;
+    bool go_on = !found && (j == NULL || key_of(j) < d->i_model);
+    if (found) json_array_append_new(d->model, json_pack("{s:O?,s:O}", "id", json_object_get(j, "model"), "parameters", parameters));
+    json_decref(j);
+    return go_on;
+}
+
+static bool keep_last_model(void *context, const char *json, size_t n)
+{
+    json_t *j = json_loadb(json, n, 0, NULL);
+    if (j != NULL) *(json_int_t *)context = key_of(j) > 0 ? key_of(j) : 0;
+    json_decref(j);
+    return true;
+}
+
+static bool always(void *context, const char *json, size_t n)
+{
+    (void)context, (void)json, (void)n;
+    return true;
+}
+
+/* Of all models that the fit has begun. */
+static status describe_models(const char *path, json_t *model, struct error *err)
+{
+    uint64_t from = 0;
+    json_int_t last = 0;
+    status s = record_seek(path, always, NULL, &from, err);
+    if (s == STATUS_OK) s = record_read(path, from, keep_last_model, &last, NULL, err);
+    for (json_int_t i = 0; s == STATUS_OK && i <= last && json_array_size(model) == (size_t)i; i++) {
+        struct description d = {i, model};
+        s = record_seek(path, is_of_earlier_model, &d, &from, err);
+        if (s == STATUS_OK && i == 0) from = 0; /* where the search describes it */
+        if (s == STATUS_OK) s = record_read(path, from, take_description, &d, NULL, err);
+    }
+    return s;
+}
+
+/* ---- points ---- */
+
+/* Records that become one point: the last one with the extremes of all. */
+struct group {
+    json_t *last;
+    size_t n, n_parameter;
+    double least, most, low[JOB_MAX_PARAM], high[JOB_MAX_PARAM];
+};
+
+struct merging {
+    long long after_step;
+    size_t n, n_point, i;
+    bool all_rendered;
+    json_t *point;
+    struct group group;
+};
+
+static void widen(const json_t *value, double *low, double *high)
+{
+    if (!json_is_number(value)) return;
+    *low = fmin(*low, json_number_value(value));
+    *high = fmax(*high, json_number_value(value));
+}
+
+static void restart_group(struct group *g, size_t n_parameter)
+{
+    json_decref(g->last);
+    *g = (struct group){.n_parameter = n_parameter, .least = INFINITY, .most = -INFINITY};
+    for (size_t p = 0; p < JOB_MAX_PARAM; p++) {
+        g->low[p] = INFINITY;
+        g->high[p] = -INFINITY;
+    }
+}
+
+/* Takes over the record. Those of an earlier model, or of other parameters, are not merged with it: they are left out. */
+static void add_to_group(struct group *g, json_t *record)
+{
+    const json_t *parameter = json_object_get(record, "parameter");
+    size_t n = json_array_size(parameter);
+    if (g->n == 0 || n != g->n_parameter || model_of(g->last) != model_of(record)) restart_group(g, n);
+    widen(json_object_get(record, "objective"), &g->least, &g->most);
+    for (size_t p = 0; p < n && p < JOB_MAX_PARAM; p++) widen(json_array_get(parameter, p), &g->low[p], &g->high[p]);
+    json_decref(g->last);
+    g->last = record;
+    g->n++;
+}
+
+static json_t *number_or_null(double v) { return isfinite(v) ? json_real(v) : json_null(); }
+
+static void close_group(struct merging *m)
+{
+    struct group *g = &m->group;
+    bool whole = m->all_rendered || json_array_size(m->point) + 1 == m->n_point;
+    if (g->n > 1) {
+        json_object_set_new(g->last, "n_merged", json_integer((json_int_t)g->n));
+        json_object_set_new(g->last, "objective_min", number_or_null(g->least));
+        json_object_set_new(g->last, "objective_max", number_or_null(g->most));
+        json_t *low = json_array(), *high = json_array();
+        for (size_t p = 0; p < g->n_parameter && p < JOB_MAX_PARAM; p++) {
+            json_array_append_new(low, number_or_null(g->low[p]));
+            json_array_append_new(high, number_or_null(g->high[p]));
         }
-        json_array_append_new(low, json_real(least));
-        json_array_append_new(high, json_real(most));
+        json_object_set_new(g->last, "parameter_min", low);
+        json_object_set_new(g->last, "parameter_max", high);
     }
-    json_object_set_new(point, "parameter_min", low);
-    json_object_set_new(point, "parameter_max", high);
+    if (!whole) json_object_del(g->last, "rendered");
+    if (!whole) json_object_del(g->last, "n_path_row");
+    json_array_append(m->point, g->last);
+    restart_group(g, 0);
 }
 
-static json_int_t model_of(const json_t *record, size_t i)
+static bool merge(void *context, const char *json, size_t n)
 {
-    return json_integer_value(json_object_get(json_array_get(record, i), "i_model"));
+    struct merging *m = context;
+    json_int_t step;
+    if (m->i == m->n) return false;
+    if (!read_step(json, n, &step) || step <= m->after_step) return true;
+    json_t *j = json_loadb(json, n, 0, NULL);
+    m->i++;
+    if (j != NULL) {
+        json_object_del(j, "parameters");
+        add_to_group(&m->group, j);
+    }
+    if (m->group.n > 0 && m->i == (json_array_size(m->point) + 1) * m->n / m->n_point) close_group(m);
+    return true;
 }
 
-/* Records from .. to - 1 as one point; a group that begins in an earlier model is left to the last one's. */
-static json_t *merge(const json_t *record, size_t from, size_t to)
+static status read_series(const char *path, struct counting *c, struct merging *m, json_t *model, size_t max_points, struct error *err)
 {
-    while (from + 1 < to && model_of(record, from) != model_of(record, to - 1)) from++;
-    json_t *point = json_copy(json_array_get(record, to - 1));
-    if (to - from == 1) return point;
-    double least = 0, most = 0;
-    bool any = false;
-    for (size_t i = from; i < to; i++) {
-        const json_t *f = json_object_get(json_array_get(record, i), "objective");
-        if (!json_is_number(f)) continue;
-        double x = json_number_value(f);
-        if (!any || x < least) least = x;
-        if (!any || x > most) most = x;
-        any = true;
+    uint64_t from = 0;
+    status s = record_seek(path, is_seen, c, &from, err);
+    if (s == STATUS_OK) s = record_read(path, from, count, c, NULL, err);
+    if (s == STATUS_OK) s = describe_models(path, model, err);
+    if (s != STATUS_OK || c->n == 0) return s;
+    if (m->all_rendered) {
+        size_t most = ALL_RENDERED_BYTES / (c->n_bytes / c->n + 1);
+        max_points = most < 2 ? 2 : most < max_points ? most : max_points;
     }
-    json_object_set_new(point, "n_merged", json_integer((json_int_t)(to - from)));
-    json_object_set_new(point, "objective_min", any ? json_real(least) : json_null());
-    json_object_set_new(point, "objective_max", any ? json_real(most) : json_null());
-    merge_parameters(point, record, from, to);
-    return point;
+    m->n = c->n;
+    m->n_point = c->n < max_points ? c->n : max_points;
+    s = record_read(path, from, merge, m, NULL, err);
+    if (m->group.n > 0) close_group(m); /* the series was cut meanwhile */
+    return s;
 }
 
 status series_view(struct job_service *v, const struct job_row *row, long long after_step, size_t max_points, bool all_rendered, json_t **view,
                    struct error *err)
 {
     char path[PATH_BYTES];
-    status s = STATUS_OK;
-    struct reading r = {.after_step = after_step, .record = json_array(), .model = json_array(), .last_step = -1};
+    struct counting c = {.after_step = after_step, .last_step = -1};
+    struct merging m = {.after_step = after_step, .all_rendered = all_rendered, .point = json_array()};
+    json_t *model = json_array();
     path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_SERIES, NULL);
-    uint64_t next = 0;
-    if (row->attempt > 0 && !row->dirty && access(path, F_OK) == 0) s = record_read(path, 0, on_record, &r, &next, err);
+    status s = STATUS_OK;
+    if (row->attempt > 0 && !row->dirty && access(path, F_OK) == 0) s = read_series(path, &c, &m, model, max_points, err);
+    if (s == STATUS_NOT_FOUND) s = STATUS_OK; /* removed meanwhile */
+    json_decref(m.group.last);
     if (s != STATUS_OK) {
-        json_decref(r.record);
-        json_decref(r.model);
+        json_decref(m.point);
+        json_decref(model);
         return s;
     }
-    size_t n = json_array_size(r.record), n_point = n < max_points ? n : max_points;
-    json_t *point = json_array();
-    for (size_t i = 0; i < n_point; i++) {
-        json_t *p = merge(r.record, i * n / n_point, (i + 1) * n / n_point);
-        if (!all_rendered && i + 1 < n_point) json_object_del(p, "rendered");
-        json_array_append_new(point, p);
-    }
-    json_decref(r.record);
-    json_int_t last = n > 0 ? r.last_step : (json_int_t)after_step;
-    *view = json_pack("{s:o,s:o,s:I,s:I,s:I}", "points", point, "models", r.model, "next_after_step", last, "n_step", (json_int_t)r.n, "generation", (json_int_t)row->generation);
+    json_int_t next = c.n > 0 ? c.last_step : (json_int_t)after_step;
+    *view = json_pack("{s:o,s:o,s:I,s:I,s:I}", "points", m.point, "models", model, "next_after_step", next, "n_step", c.last_step + 1, "generation",
+                      (json_int_t)row->generation);
     return STATUS_OK;
 }

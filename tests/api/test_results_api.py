@@ -65,6 +65,70 @@ def test_series_with_a_torn_tail_and_bad_queries(daemon, done):
         problem(daemon.get(f"/v1/jobs/{done}/series?{bad}"), 422, "invalid", bad.split("=")[0])
 
 
+N_ROW, SEARCH, STEPS = 300, 8, [500, 400]
+
+
+def write_long_series(path):
+    """A search for the radius with the second model, then the fits of two models, 300 rows a record: 12 MB."""
+    rows = ",".join(["[0.123456789,0.234567891,0.345678912]"] * N_ROW)
+    with open(path, "w") as f:
+        for step in range(SEARCH + sum(STEPS)):
+            fit = step - SEARCH
+            model = 1 if fit < 0 or fit >= STEPS[0] else 0
+            begins = fit in (0, STEPS[0]) or step == 0
+            described = f',"parameters":[{{"name":"p","unit":"","lower":{model},"upper":9,"fixed":false}}]' if begins else ""
+            parameter = ",".join(["0.5"] * (3 + model))
+            text = (f'{{"step":{step},"model":"m{model}","i_model":{model},"phase":"{"radius" if fit < 0 else "gauss_newton"}","objective":{step % 97}.5,'
+                    f'"parameter":[{parameter}],"rendered":[{rows}],"n_path_row":[{",".join(["4096"] * N_ROW)}]{described}}}')
+            f.write(f"{zlib.crc32(text.encode()):08x} {text}\n")
+
+
+def process_number(pid, file, name):
+    with open(f"/proc/{pid}/{file}") as f:
+        return next(int(line.split()[1]) for line in f if line.startswith(name + ":"))
+
+
+def test_long_series_costs_what_it_answers(daemon_maker):
+    d = daemon_maker()
+    job = d.start_job("series 3")
+    d.wait_state(job, "succeeded")
+    path = os.path.join(d.data, "jobs", job, "series.rec")
+    write_long_series(path)
+    n = SEARCH + sum(STEPS)
+    pid = d.process.pid
+
+    def ask(query):
+        before = process_number(pid, "io", "rchar")
+        r = d.get(f"/v1/jobs/{job}/series?{query}")
+        assert r.status_code == 200, r.text
+        return r.json(), process_number(pid, "io", "rchar") - before
+
+    peak = process_number(pid, "status", "VmHWM")
+    whole, _ = ask("max_points=5000")
+    assert [p["step"] for p in whole["points"]] == list(range(n)) and whole["n_step"] == n
+    assert [m["id"] for m in whole["models"]] == ["m0", "m1"] and [m["parameters"][0]["lower"] for m in whole["models"]] == [0, 1]
+    assert ["rendered" in p or "n_path_row" in p for p in whole["points"]] == [False] * (n - 1) + [True]
+    few, _ = ask("max_points=11")
+    assert len(few["points"]) == 11 and few["models"] == whole["models"]
+    assert process_number(pid, "status", "VmHWM") - peak < 8 << 10  # kB; the file alone has 12 MB, its records ten times as much
+    for after in [0, 7, 8, 450, 507, 508, 850]:
+        some, _ = ask(f"after_step={after}&max_points=5000")
+        assert some["points"] == whole["points"][after + 1:] and some["models"] == whole["models"], after
+        assert some["n_step"] == n and some["next_after_step"] == n - 1
+    for after in [n - 2, n - 1, n + 50]:
+        some, cost = ask(f"after_step={after}")
+        assert len(some["points"]) == max(0, n - 1 - after) and some["n_step"] == n and some["models"] == whole["models"]
+        assert cost < 1.5e6, (after, cost)
+    every, _ = ask("max_points=5000&rendered=all&after_step=100")
+    assert all("rendered" in p for p in every["points"]) and 500 < len(every["points"]) < n - 101 == sum(p.get("n_merged", 1) for p in every["points"])
+    with open(path, "r+") as f:
+        f.truncate(9_000_000)  # as a resumed worker does, but in the middle of a record
+    cut = ask("max_points=5000")[0]
+    assert 0 < cut["n_step"] < n and cut["points"][:-1] == whole["points"][:cut["n_step"] - 1]
+    os.truncate(path, 60_000)
+    assert [m["id"] for m in ask("")[0]["models"]] == []  # the search's second model does not stand in the first one's place
+
+
 def test_a_job_without_output_has_empty_answers(daemon):
     job = daemon.create()
     assert daemon.get(f"/v1/jobs/{job}/series").json()["points"] == []

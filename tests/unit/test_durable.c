@@ -263,6 +263,71 @@ static void test_full_disk_is_told(void **state)
     assert_int_equal(record_truncate(scratch_path(state, "absent.rec"), 0, NULL), STATUS_OK);
 }
 
+/* ---- record_seek ---- */
+
+enum { N_ORDERED = 400 };
+
+struct looking {
+    size_t wanted, n_asked, n_bytes;
+};
+
+static bool is_before(void *context, const char *json, size_t n_json)
+{
+    struct looking *l = context;
+    size_t number;
+    l->n_asked++;
+    l->n_bytes += n_json;
+    assert_int_equal(sscanf(json, "{\"n\":%zu", &number), 1);
+    return number < l->wanted;
+}
+
+struct reading_on {
+    size_t first, n, n_bytes;
+    size_t stop;
+};
+
+static bool read_on(void *context, const char *json, size_t n_json)
+{
+    struct reading_on *r = context;
+    size_t number;
+    assert_int_equal(sscanf(json, "{\"n\":%zu", &number), 1);
+    if (r->n++ == 0) r->first = number;
+    if (number < r->stop) r->n_bytes += n_json;
+    return number < r->stop;
+}
+
+/* Records from 20 bytes to 200 kB; every one is found, by few looks, with little to read before it; a torn tail is no
+ * record. */
+static void test_seek(void **state)
+{
+    const char *path = scratch_path(state, "ordered.rec");
+    char *text = malloc(200100);
+    uint64_t from, next;
+    for (size_t i = 0; i < N_ORDERED; i++) {
+        size_t n = (size_t)snprintf(text, 100, "{\"n\":%zu,\"fill\":\"", i), fill = i % 7 == 3 ? 200000 : i % 5 * 900;
+        memset(text + n, 'x', fill);
+        memcpy(text + n + fill, "\"}", 3);
+        assert_int_equal(record_append(path, text, false, NULL), STATUS_OK);
+    }
+    free(text);
+    FILE *torn = fopen(path, "ab");
+    assert_non_null(torn);
+    fputs("0123abcd {\"n\":999", torn);
+    fclose(torn);
+    for (size_t wanted = 0; wanted <= N_ORDERED + 1; wanted++) {
+        struct looking l = {.wanted = wanted};
+        assert_int_equal(record_seek(path, is_before, &l, &from, NULL), STATUS_OK);
+        struct reading_on r = {.stop = wanted};
+        assert_int_equal(record_read(path, from, read_on, &r, &next, NULL), STATUS_OK);
+        assert_true(r.n > 0 && (from == 0 ? r.first == 0 : r.first < wanted));
+        assert_true(l.n_asked < 40 && r.n_bytes < 64 * 1024 + 2 * 200100);
+    }
+    assert_int_equal(record_seek(scratch_path(state, "absent.rec"), is_before, NULL, &from, NULL), STATUS_NOT_FOUND);
+    scratch_write(scratch_path(state, "empty.rec"), "", 0);
+    assert_int_equal(record_seek(scratch_path(state, "empty.rec"), is_before, NULL, &from, NULL), STATUS_OK);
+    assert_int_equal(from, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -278,6 +343,7 @@ int main(void)
         cmocka_unit_test(test_failed_sync_keeps_the_old_content),
         cmocka_unit_test(test_name_without_folders),
         cmocka_unit_test(test_full_disk_is_told),
+        cmocka_unit_test(test_seek),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
