@@ -1,6 +1,7 @@
 #include "optimizer/worker_series.h"
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
+#include "optimizer/report/json_number.h"
 
 #include <errno.h>
 #include <jansson.h>
@@ -74,8 +75,6 @@ void worker_series_close(struct worker_series *s)
     free(s);
 }
 
-static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(); }
-
 /* What the numbers in "parameter" are: with the first step of each model. */
 static json_t *parameters_json(const struct worker_series_model *model)
 {
@@ -96,24 +95,24 @@ static char *record_text(const struct fit_step *step, const struct worker_series
     json_t *parameter = json_array(), *parameter_se = step->param_se != NULL ? json_array() : json_null(),
            *rendered = json_array();
     for (size_t p = 0; p < step->n_param; p++) {
-        json_array_append_new(parameter, number(param_to_file_unit(&info[p], step->param[p])));
+        json_array_append_new(parameter, json_number(param_to_file_unit(&info[p], step->param[p])));
         if (step->param_se != NULL)
-            json_array_append_new(parameter_se, number(param_to_file_unit(&info[p], step->param_se[p])));
+            json_array_append_new(parameter_se, json_number(param_to_file_unit(&info[p], step->param_se[p])));
     }
     for (size_t i = 0; i < step->n_configuration; i++) {
         json_t *rgb = json_array();
         for (int c = 0; c < 3; c++)
-            json_array_append_new(rgb, number(0.5 * (step->replica[0][i].mean[c] + step->replica[1][i].mean[c])));
+            json_array_append_new(rgb, json_number(0.5 * (step->replica[0][i].mean[c] + step->replica[1][i].mean[c])));
         json_array_append_new(rendered, rgb);
     }
     json_t *json = json_pack("{s:I, s:s, s:I, s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}",
                              "step", (json_int_t)(model->step_base + step->step), "model", model->appearance->id,
                              "i_model", (json_int_t)model->i_model, "model_step", (json_int_t)step->step, "phase",
                              step->phase, "wall_s", step->wall_s, "n_path", (json_int_t)step->n_path, "n_path_total",
-                             (json_int_t)step->n_path_total, "objective", number(step->objective.value),
-                             "objective_se", number(step->objective.se), "parameter", parameter, "parameter_se",
-                             parameter_se, "rel_rms", number(step->objective.rel_rms), "rendered", rendered, "damping",
-                             number(step->damping), "noise", number(step->noise), "note",
+                             (json_int_t)step->n_path_total, "objective", json_number(step->objective.value),
+                             "objective_se", json_number(step->objective.se), "parameter", parameter, "parameter_se",
+                             parameter_se, "rel_rms", json_number(step->objective.rel_rms), "rendered", rendered, "damping",
+                             json_number(step->damping), "noise", json_number(step->noise), "note",
                              step->note != NULL ? step->note : "");
     if (json != NULL && step->step == 0) json_object_set_new(json, "parameters", parameters_json(model));
     if (json != NULL) {
@@ -121,15 +120,15 @@ static char *record_text(const struct fit_step *step, const struct worker_series
         for (size_t i = 0; i < step->n_configuration; i++)
             json_array_append_new(paths, json_integer((json_int_t)(step->replica[0][i].n_path + step->replica[1][i].n_path)));
         json_object_set_new(json, "n_path_row", paths);
-        json_object_set_new(json, "step_length", number(step->step_length));
-        json_object_set_new(json, "step_limit", number(step->step_limit));
-        json_object_set_new(json, "gain", number(step->gain));
+        json_object_set_new(json, "step_length", json_number(step->step_length));
+        json_object_set_new(json, "step_limit", json_number(step->step_limit));
+        json_object_set_new(json, "gain", json_number(step->gain));
     }
     if (json != NULL && step->nuisance != NULL) {
         json_t *nuisance = json_object();
         for (size_t i = 0; i < step->nuisance->n; i++)
             json_object_set_new(nuisance, step->nuisance->name[i],
-                                json_pack("[o, o]", number(step->nuisance->value[i]), number(step->nuisance->se[i])));
+                                json_pack("[o, o]", json_number(step->nuisance->value[i]), json_number(step->nuisance->se[i])));
         json_object_set_new(json, "nuisance", nuisance);
     }
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(9) | JSON_COMPACT) : NULL;

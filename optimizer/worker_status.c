@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
+#include "optimizer/report/json_number.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -32,8 +33,6 @@ struct worker_status {
     char warning[MAX_WARNING][WARNING_BYTES];
 };
 
-static json_t *number_or_null(double v) { return isfinite(v) ? json_real(v) : json_null(); }
-
 /* Remaining time by the speed so far; unknown before one per cent is done. */
 static double eta_s(const struct worker_status *st, double fraction)
 {
@@ -61,10 +60,10 @@ static char *status_text(const struct worker_status *st, const char *state, cons
         json_pack("{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state",
                   state, "attempt", (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage",
                   (json_int_t)st->i_stage, "n_stage", (json_int_t)st->n_stage, "stage_fraction", st->stage_fraction,
-                  "fraction", fraction, "eta_s", over ? json_null() : number_or_null(eta_s(st, fraction)),
+                  "fraction", fraction, "eta_s", over ? json_null() : json_number(eta_s(st, fraction)),
                   "heartbeat_unix_s", clock_wall_s(), "started_unix_s", st->started_unix_s, "message", st->message,
-                  "objective", st->has_objective ? number_or_null(st->objective) : json_null(), "objective_se",
-                  st->has_objective ? number_or_null(st->objective_se) : json_null(), "step",
+                  "objective", st->has_objective ? json_number(st->objective) : json_null(), "objective_se",
+                  st->has_objective ? json_number(st->objective_se) : json_null(), "step",
                   st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
                   error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(12)) : NULL;

@@ -1,11 +1,10 @@
 #include "optimizer/report/result_options_json.h"
+#include "optimizer/report/json_number.h"
 
 #include "optimizer/pipeline_contrast.h"
 
 #include <math.h>
 #include <stdio.h>
-
-static json_t *number(double v) { return isfinite(v) ? json_real(v) : json_null(); }
 
 void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *parameter)
 {
@@ -28,7 +27,7 @@ static void row_gain(const struct pipeline_context *c, const struct pipeline_mod
                              m->fit.uncertainty.misfit_var, gain, se);
 }
 
-static json_t *rgb_json(const double v[3]) { return json_pack("[o, o, o]", number(v[0]), number(v[1]), number(v[2])); }
+static json_t *rgb_json(const double v[3]) { return json_pack("[o, o, o]", json_number(v[0]), json_number(v[1]), json_number(v[2])); }
 
 static json_t *texture_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i)
 {
@@ -44,8 +43,8 @@ void result_row_options(const struct pipeline_context *c, const struct pipeline_
 {
     double gain = NAN, se = NAN;
     if (m->option->gain == JOB_GAIN_PER_PHOTOGRAPH) row_gain(c, m, i, &gain, &se);
-    json_object_set_new(row, "gain", number(gain));
-    json_object_set_new(row, "gain_se", number(se));
+    json_object_set_new(row, "gain", json_number(gain));
+    json_object_set_new(row, "gain_se", json_number(se));
     json_object_set_new(row, "texture", c->contrast.n > 0 ? texture_json(c, m, i) : json_null());
 }
 
@@ -75,8 +74,8 @@ static json_t *nuisance_json(const struct fit_nuisance *n)
 {
     json_t *list = json_array();
     for (size_t i = 0; i < n->n; i++)
-        json_array_append_new(list, json_pack("{s:s, s:o, s:o, s:b}", "name", n->name[i], "value", number(n->value[i]),
-                                              "standard_error", number(n->se[i]), "at_bound", (int)n->at_bound[i]));
+        json_array_append_new(list, json_pack("{s:s, s:o, s:o, s:b}", "name", n->name[i], "value", json_number(n->value[i]),
+                                              "standard_error", json_number(n->se[i]), "at_bound", (int)n->at_bound[i]));
     return list;
 }
 
@@ -84,7 +83,7 @@ static json_t *values_json(const struct pipeline_model *m, const double *param)
 {
     json_t *list = json_array();
     for (size_t p = 0; p < m->appearance.n_param; p++)
-        json_array_append_new(list, number(param_to_file_unit(&m->appearance.param[p], param[p])));
+        json_array_append_new(list, json_number(param_to_file_unit(&m->appearance.param[p], param[p])));
     return list;
 }
 
@@ -95,8 +94,8 @@ static json_t *starts_json(const struct pipeline_model *m)
         const struct fit_start *s = &m->fit.start[k];
         json_array_append_new(
             list, json_pack("{s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:b, s:I}", "start", values_json(m, s->from), "value",
-                            values_json(m, s->param), "objective", number(s->objective), "objective_se",
-                            number(s->objective_se), "prior_penalty", number(s->prior_penalty), "converged",
+                            values_json(m, s->param), "objective", json_number(s->objective), "objective_se",
+                            json_number(s->objective_se), "prior_penalty", json_number(s->prior_penalty), "converged",
                             (int)s->converged, "kept", (int)s->kept, "elsewhere", (int)s->elsewhere, "n_path",
                             (json_int_t)s->n_path));
     }
@@ -110,9 +109,9 @@ static json_t *certificate_json(const struct pipeline_model *m)
     for (size_t p = 0; p < m->appearance.n_param; p++)
         if (k->checked[p])
             json_array_append_new(list, json_pack("{s:s, s:o, s:o}", "name", m->appearance.param[p].name, "rel_error",
-                                                  number(k->error[p]), "rel_error_se", number(k->error_se[p])));
-    return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", number(k->error[k->worst]), "worst_rel_error_se",
-                     number(k->error_se[k->worst]), "worst_parameter", m->appearance.param[k->worst].name, "n_path",
+                                                  json_number(k->error[p]), "rel_error_se", json_number(k->error_se[p])));
+    return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", json_number(k->error[k->worst]), "worst_rel_error_se",
+                     json_number(k->error_se[k->worst]), "worst_parameter", m->appearance.param[k->worst].name, "n_path",
                      (json_int_t)k->n_path, "parameters", list);
 }
 
@@ -126,7 +125,7 @@ static json_t *candidate_json(const struct pipeline_context *c, const struct pip
     return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:o, s:o, s:o}", "candidate", (json_int_t)k->i_candidate,
                      "light_theta_deg", g->light_theta_deg, "light_phi_deg", g->light_phi_deg, "camera_theta_deg",
                      g->camera_theta_deg, "camera_phi_deg", g->camera_phi_deg, "cloth_rotation_deg",
-                     g->cloth_rotation_deg, "information_nats", number(k->score.information), "standard_error_after",
+                     g->cloth_rotation_deg, "information_nats", json_number(k->score.information), "standard_error_after",
                      values_json(m, k->score.se_after), "determines", determines);
 }
 
@@ -141,12 +140,12 @@ static json_t *candidates_json(const struct pipeline_context *c, const struct pi
 
 void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result)
 {
-    json_object_set_new(result, "prior_penalty", number(m->fit.prior_penalty));
+    json_object_set_new(result, "prior_penalty", json_number(m->fit.prior_penalty));
     json_object_set_new(result, "nuisance", nuisance_json(&m->fit.nuisance));
     json_object_set_new(result, "starts", starts_json(m));
     json_object_set_new(result, "next_photograph", candidates_json(c, m));
     json_object_set_new(result, "certificate", certificate_json(m));
-    json_object_set_new(result, "fit_rel_rms_with_gains", number(rel_rms_with_gains(c, m)));
+    json_object_set_new(result, "fit_rel_rms_with_gains", json_number(rel_rms_with_gains(c, m)));
 }
 
 /* Scatter of blocks about their mean, in per cent of it, mean over channels. */
