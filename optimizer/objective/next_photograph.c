@@ -119,14 +119,17 @@ void next_photograph_score(const struct param_info *info, const struct fit_param
     (void)small_invert(s, 3, inverse); /* eigenvalues are at least v > 0 */
     for (size_t k = 0; k < d.n; k++) {
         double fall = 0.0;
-        for (size_t c = 0; c < 3; c++)
-            for (size_t e = 0; e < 3; e++) fall += jc[0][c * d.n + k] * inverse[c * 3 + e] * jc[1][e * d.n + k];
+        for (size_t i = 0; i < 3; i++)
+            for (size_t e = 0; e < 3; e++) fall += jc[0][i * d.n + k] * inverse[i * 3 + e] * jc[1][e * d.n + k];
         double before = d.cov[k * d.n + k], share = before > 0.0 ? sqrt(fmin(fmax(0.0, 1.0 - fall / before), 1.0)) : 1.0;
+        size_t own = d.index[k];
+        struct coordinate c;
+        coordinate_init(&c, &info[own], parameter[own].lower, parameter[own].upper);
+        bool known = uncertainty_determined(&c, sqrt(before) * share, u->se_param[own] * share);
         for (size_t p = 0; p < d.n_param; p++) {
-            if (leader[p] != d.index[k]) continue;
-            double uniform = (parameter[p].upper - parameter[p].lower) / sqrt(12.0);
+            if (leader[p] != own) continue;
             score->se_after[p] = u->se_param[p] * share;
-            score->determines[p] = !u->determined[p] && score->se_after[p] < 0.5 * uniform;
+            score->determines[p] = !u->determined[p] && known;
         }
     }
 }

@@ -112,6 +112,14 @@ static void scatter(const double *cov, const size_t *index, size_t n, size_t n_p
         for (size_t q = 0; q < n; q++) full[index[p] * n_param + index[q]] = cov[p * n + q];
 }
 
+/* Near the low end of a log range the range alone is a small error of the parameter: judged in the coordinate, too. */
+bool uncertainty_determined(const struct coordinate *k, double sd, double se_param)
+{
+    bool in_proportion = k->kind != COORDINATE_LOG || sd < log_determined;
+    return in_proportion && sd < 0.5 * (k->upper - k->lower) / sqrt(12.0) &&
+           se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
+}
+
 void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
                          const bool *fixed, struct uncertainty *u)
 {
@@ -140,8 +148,7 @@ void uncertainty_compute(const struct linear_model *m, const struct observation_
         double slope = coordinate_slope(&k[p], coordinate_to_param(&k[p], m->x_ref[p]));
         double most = m->prior != NULL && m->prior[p].precision > 0.0 ? slope / sqrt(m->prior[p].precision) : uniform;
         u->se_param[p] = fixed[p] ? 0.0 : fmin(slope * sqrt(u->cov[p * n + p]), fmin(uniform, most));
-        bool in_proportion = k[p].kind != COORDINATE_LOG || sqrt(u->cov[p * n + p]) < log_determined;
-        u->determined[p] = fixed[p] || (u->se_param[p] < 0.5 * uniform && in_proportion);
+        u->determined[p] = fixed[p] || uncertainty_determined(&k[p], sqrt(u->cov[p * n + p]), u->se_param[p]);
         u->correlation[p * n + p] = 1.0;
     }
     for (size_t a = 0; a < n_inner; a++) {

@@ -25,13 +25,16 @@ struct uncertainty {
                        SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed or at a bound */
     double se_param[SCATTERING_MAX_PARAM];    /* internal unit; 0 for fixed parameters */
     bool at_bound[SCATTERING_MAX_PARAM];
-    /* The standard error is below half of that of a uniform distribution over the allowed range, and for parameters
-     * that move in the logarithm below a factor of 2. */
-    bool determined[SCATTERING_MAX_PARAM];
+    bool determined[SCATTERING_MAX_PARAM]; /* uncertainty_determined; true for fixed ones */
     double misfit_var; /* per residual, in units of the objective: about the squared relative error that the model
                           leaves */
     double noise_var;  /* mean Monte-Carlo variance per residual of the pooled mean */
 };
+
+/* The standard error is below half of that of a uniform distribution over the allowed range (that of k), in the
+ * parameter (se_param) and in its fit coordinate (sd), and for parameters that move in the logarithm below a factor of
+ * 2. */
+bool uncertainty_determined(const struct coordinate *k, double sd, double se_param);
 
 /* m: pooled at the result. fixed: n_param flags. */
 void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,

@@ -134,6 +134,24 @@ static void test_one_dark_row(void **state)
     observation_set_release(&x.observation);
 }
 
+/* Nothing counts: nothing is determined, and nothing is learned. */
+static void test_no_row_has_weight(void **state)
+{
+    (void)state;
+    for (const char *const *method = method_name_list(); *method != NULL; method++) {
+        struct fixture x;
+        struct fit_result r;
+        setup(&x, FAKE_N_FIT);
+        for (size_t i = 0; i < x.observation.n; i++) x.observation.item[i].weight = 0.0;
+        fit(&x, *method, &r);
+        for (size_t p = 0; p < N; p++) {
+            if (r.uncertainty.determined[p]) fail_msg("%s: %s counts as determined", *method, fake_param[p].name);
+            assert_true(fabs(r.param[p] - x.parameter[p].start) < 1e-9);
+        }
+        observation_set_release(&x.observation);
+    }
+}
+
 static status fail_numeric(void *context, const struct estimator_call *call, const struct progress *progress,
                            struct estimate *out, double *wall_s, struct error *err)
 {
@@ -211,6 +229,7 @@ int main(void)
         cmocka_unit_test(test_contradictory),
         cmocka_unit_test(test_all_zero),
         cmocka_unit_test(test_one_dark_row),
+        cmocka_unit_test(test_no_row_has_weight),
         cmocka_unit_test(test_failing_model),
         cmocka_unit_test(test_warnings),
     };
