@@ -80,25 +80,32 @@ void handle_create_job(struct http_request *r)
 
 void handle_get_job(struct http_request *r) { reply_job(r, r->param[0], 0, false, false); }
 
+struct precondition {
+    struct http_request *request;
+    const char *wanted; /* If-Match */
+    bool failed;
+};
+
+static status check_tag(void *context, const struct job_row *row, struct error *err)
+{
+    struct precondition *p = context;
+    json_t *view = NULL;
+    char tag[40];
+    status s = job_view(p->request->service, row, true, &view, err);
+    if (s != STATUS_OK) return s;
+    json_tag(view, tag);
+    json_decref(view);
+    p->failed = !tag_matches(p->wanted, tag);
+    return p->failed ? error_set_field(err, STATUS_CONFLICT, "If-Match", "the job has changed since: get it again") : STATUS_OK;
+}
+
 void handle_put_document(struct http_request *r)
 {
     struct error err = {0};
-    struct job_row row;
-    json_t *view = NULL;
-    char tag[40];
-    const char *wanted = request_header(r, "If-Match");
+    struct precondition p = {.request = r, .wanted = request_header(r, "If-Match")};
     if (!body_is_json(r)) return;
-    status s = job_get(r->service, r->param[0], &row, &err);
-    if (s == STATUS_OK) s = job_view(r->service, &row, true, &view, &err);
-    if (s == STATUS_OK) json_tag(view, tag);
-    json_decref(view);
-    job_row_release(&row);
-    if (s == STATUS_OK && wanted != NULL && !tag_matches(wanted, tag)) {
-        reply_code(r, "precondition", "If-Match", "the job has changed since: get it again");
-        return;
-    }
-    if (s == STATUS_OK) s = job_replace_document(r->service, r->param[0], r->body, r->n_body, &err);
-    if (s != STATUS_OK) reply_problem(r, NULL, &err, NULL);
+    status s = job_replace_document(r->service, r->param[0], r->body, r->n_body, p.wanted != NULL ? check_tag : NULL, &p, &err);
+    if (s != STATUS_OK) reply_problem(r, p.failed ? "precondition" : NULL, &err, NULL);
     else reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
 }
 

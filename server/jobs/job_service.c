@@ -158,13 +158,14 @@ static status edit(struct job_service *v, struct job_row *row, struct error *err
     return job_update_surely(v, row, err);
 }
 
-status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes, struct error *err)
+status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
+                            status (*may_edit)(void *context, const struct job_row *row, struct error *err), void *context, struct error *err)
 {
     struct job_row row;
     pthread_mutex_lock(&v->change);
     status s = job_get(v, id, &row, err);
-    if (s != STATUS_OK) goto out;
-    s = check_document(document, n_bytes, row.sample, err);
+    if (s == STATUS_OK && may_edit != NULL) s = may_edit(context, &row, err);
+    if (s == STATUS_OK) s = check_document(document, n_bytes, row.sample, err);
     if (s != STATUS_OK) goto out;
     char *text = strndup(document, n_bytes);
     if (text == NULL) {

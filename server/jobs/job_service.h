@@ -39,7 +39,10 @@ void job_service_close(struct job_service *service);
 /* idempotency_key may be NULL. *replayed: the job existed already. */
 status job_create(struct job_service *v, const char *document, size_t n_bytes, const char *idempotency_key, char id[STORE_ID_BYTES],
                   bool *replayed, struct job_refusal *refusal, struct error *err);
-status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes, struct error *err);
+/* may_edit (NULL: always) sees the job as it is and is not changed by anyone until the document is replaced; what it returns
+ * ends the call. */
+status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
+                            status (*may_edit)(void *context, const struct job_row *row, struct error *err), void *context, struct error *err);
 /* *changed: false when the job was in the wanted state already. */
 status job_start(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);
 status job_retry(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);

@@ -1,5 +1,6 @@
 """Jobs: creating, editing, listing, starting, cancelling, deleting."""
 import json
+import socket
 
 import pytest
 from daemon_under_test import DOCUMENT, FILES, document, problem, wait_until
@@ -83,6 +84,27 @@ def test_replace_document(daemon):
     problem(daemon.put(f"/v1/jobs/{job}/document", json=document("again"), headers={"If-Match": tag}), 412, "precondition")
     problem(daemon.put(f"/v1/jobs/{job}/document", json={**DOCUMENT, "extra": 1}), 422, "invalid", "extra")
     assert daemon.job(job)["sample"] == "fake: edited"
+
+
+def test_one_of_two_editors_with_the_same_tag_wins(daemon):
+    """What If-Match is for: nobody's edit is lost unseen, however close the two come."""
+    job, n = daemon.create(), 8
+    host = daemon.url.split("//")[1]
+    address = (host.split(":")[0], int(host.split(":")[1]))
+    for k in range(150):
+        tag, sockets = daemon.get(f"/v1/jobs/{job}").headers["ETag"], []
+        for i in range(n):
+            body = json.dumps(document(f"{k}-{i}"))
+            s = socket.create_connection(address, timeout=60)
+            s.sendall((f"PUT /v1/jobs/{job}/document HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nIf-Match: {tag}\r\n"
+                       f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n{body[:-1]}").encode())
+            sockets.append(s)
+        for s in sockets:  # the last byte of all at once
+            s.sendall(b"}")
+        codes = [s.recv(4096).split()[1] for s in sockets]
+        for s in sockets:
+            s.close()
+        assert sorted(codes) == [b"200"] + [b"412"] * (n - 1), (k, codes)
 
 
 def test_listing_pages_and_filters(daemon_maker):
