@@ -207,11 +207,12 @@ static json_t *describe(const struct cloth *c)
                              "poisson_count", c->scan.poisson_count, "ring_amplitude", c->scan.ring_amplitude, "gradient",
                              c->scan.gradient, "bits", c->file.bits, "void_value", c->file.void_value, "fiber_value",
                              c->file.fiber_value);
-    json_t *size = json_pack("{s:[i,i,i],s:[f,f],s:[f,f],s:i,s:i,s:f,s:f,s:f,s:f,s:f}", "n_voxel", (int)r->n_voxel[0], (int)r->n_voxel[1],
+    json_t *size = json_pack("{s:[i,i,i],s:[f,f],s:[f,f],s:i,s:i,s:f,s:f,s:f,s:f,s:f,s:f}", "n_voxel", (int)r->n_voxel[0], (int)r->n_voxel[1],
                              (int)r->n_voxel[2], "tile_mm", 1e3 * c->fibers.tile_size_m[0], 1e3 * c->fibers.tile_size_m[1],
                              "yarn_spacing_um", um * r->yarn_spacing_m[0], um * r->yarn_spacing_m[1], "n_fiber", (int)c->fibers.n_fiber,
                              "n_vertex", (int)c->fibers.n_vertex, "length_mm", 1e3 * fiber_set_length_m(&c->fibers), "cover", r->cover,
-                             "volume_fraction", r->volume_fraction, "overlap_mean", r->overlap_mean, "overlap_max", r->overlap_max);
+                             "volume_fraction", r->volume_fraction, "overlap_mean", r->overlap_mean, "overlap_max", r->overlap_max,
+                             "strain_p95", r->strain_p95);
     const struct phantom_plied *p = &r->plied;
     if (o->yarn.n_ply > 0 && cloth != NULL) {
         json_object_del(cloth, "migration"); /* of the lattice yarn */

@@ -31,7 +31,7 @@ void phantom_option_default(struct phantom_option *o, enum phantom_weave weave)
     *o = (struct phantom_option){.weave = weave, .seed = 1, .voxel_size_m = 2e-6,
                                  .fiber_radius_m = {7e-6, 7e-6, 7e-6}, .n_fiber_per_yarn = 19, .packing = 0.7,
                                  .flatness = 1.8, .cover = 1.05, .twist_turns = 1.0 / 3.0, .migration = 0.05,
-                                 .pile_height_m = 2e-4, .felt_tile_m = 3.2e-4, .felt_thickness_m = 1.2e-4, .n_relax = 150};
+                                 .pile_height_m = 2e-4, .felt_tile_m = 3.2e-4, .felt_thickness_m = 1.2e-4, .n_relax = 300};
     if (weave == PHANTOM_VELVET) o->n_fiber_per_yarn = 7;
     if (weave == PHANTOM_FELT) o->n_fiber_per_yarn = 60;
     if (weave == PHANTOM_KNIT) {
@@ -130,7 +130,7 @@ status phantom_generate(const struct phantom_option *option, struct thread_pool 
     status st = check(&o, err);
     if (st == STATUS_OK) st = make(&s, &o, report, err);
     report->plied = s.plied;
-    if (st == STATUS_OK) st = strand_relax(&s, o.n_relax, pool, progress, &report->overlap_mean, &report->overlap_max, err);
+    if (st == STATUS_OK) st = strand_relax(&s, o.n_relax, pool, progress, report, err);
     if (st == STATUS_OK) st = strand_emit(&s, o.vertex_spacing_m, o.margin_m, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK) st = report_fill(&o, f, report, err);

@@ -3,7 +3,7 @@
  * Fibers form one tile that repeats in x and y without a seam: a fiber that leaves through a face goes on as a fiber (the same or
  * another) at the opposite face. Weaves and knits are made of yarns: fibers on a hexagonal lattice in a flattened section, turned about
  * the yarn's path by a whole number of sixths of a turn per tile (the lattice maps to itself, so the tile closes). All fibers are then
- * pushed apart until they hardly interpenetrate. Yarn model after Zhao et al. 2016, "Fitting procedural yarn models for realistic cloth
+ * pushed apart until they hardly interpenetrate, without bending them more than fibers bear. Yarn model after Zhao et al. 2016, "Fitting procedural yarn models for realistic cloth
  * rendering" (section 3: packing, twist, migration, fly-aways), without plies; with the parameters of a real yarn (phantom_yarn_read)
  * the yarns are plied by the laws of that paper instead; the loop of the knit after Peirce's jersey.
  * Everything follows from the options and the seed: the same numbers for any number of threads.
@@ -86,6 +86,7 @@ struct phantom_report {
         size_t n_hair, n_loop;
     } plied;
     double overlap_mean, overlap_max; /* depth of interpenetration over the diameter: mean over all fiber points, and the largest */
+    double strain_p95;            /* of the fibers' surface where they bend (radius / radius of curvature): 95 % of the points stay below */
     double cover;                 /* share of the tile's area under at least one fiber, looking along z */
     double volume_fraction;       /* fiber volume over tile area x thickness */
 };

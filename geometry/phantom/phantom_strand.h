@@ -34,9 +34,10 @@ void strand_set_release(struct strand_set *s);
 /* Append a strand with n nodes at zero; *node is where to write them (valid until the next call). */
 status strand_add(struct strand_set *s, const struct strand *like, size_t n, double (**node)[3], struct error *err);
 
-/* Push nodes of different fibers apart until they are at least the sum of their radii away, keeping displacements smooth along fibers. */
+/* Push nodes of different fibers apart until they are at least the sum of their radii away, keeping displacements smooth along fibers and
+ * bends no sharper than fibers bear. Fills the report's overlaps and strain. */
 status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *pool, const struct progress *progress,
-                    double *overlap_mean, double *overlap_max, struct error *err);
+                    struct phantom_report *report, struct error *err);
 
 /* Cut, subdivide to the given spacing (Catmull-Rom through the nodes) and move to z_min = margin. */
 status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f, struct error *err);
