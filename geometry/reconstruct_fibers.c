@@ -118,8 +118,25 @@ static status smooth_and_drop(struct fiber_job *job, const struct polyline_set *
     return s;
 }
 
-/* Fibers that end within half a slice of a face reach it: the last segment is prolonged. Ends are first or last vertices. */
-static void reach_face(struct polyline_set *p, size_t line, bool last, const size_t n[3])
+/* Mean density on the way from x along n_step times t. */
+static double density_on_way(const struct volume *v, const float x[3], const float t[3], double n_step)
+{
+    double sum = 0.0;
+    int n = 1 + (int)n_step;
+    for (int k = 0; k < n; k++) {
+        size_t i[3];
+        for (int a = 0; a < 3; a++) {
+            double c = floor((double)x[a] + n_step * (k + 0.5) / n * (double)t[a]);
+            i[a] = c <= 0.0 ? 0 : c >= (double)v->n[a] - 1.0 ? v->n[a] - 1 : (size_t)c;
+        }
+        sum += (double)v->density[volume_index(v->n, i[0], i[1], i[2])];
+    }
+    return sum / n;
+}
+
+/* Fibers that end shortly before a face, with material on the rest of the way, reach it: the last segment is prolonged. Ends are first or last
+ * vertices. */
+static void reach_face(const struct fiber_job *job, struct polyline_set *p, size_t line, bool last)
 {
     size_t m = polyline_length(p, line), back = m < 5 ? m - 1 : 4;
     float *x = p->vertex[last ? p->first[line + 1] - 1 : p->first[line]];
@@ -127,11 +144,12 @@ static void reach_face(struct polyline_set *p, size_t line, bool last, const siz
     float t[3], nearest = INFINITY;
     for (int a = 0; a < 3; a++) t[a] = (x[a] - y[a]) / (float)back;
     for (int a = 0; a < 3; a++) { /* steps of t until a face is met */
-        float room = t[a] > 0.0f ? (float)n[a] - x[a] : x[a], speed = fabsf(t[a]);
+        float room = t[a] > 0.0f ? (float)job->v->n[a] - x[a] : x[a], speed = fabsf(t[a]);
         if (speed > 0.2f && room / speed < nearest) nearest = room / speed;
     }
-    if (nearest > 0.0f && nearest <= 1.5f)
-        for (int a = 0; a < 3; a++) x[a] += nearest * t[a];
+    if (!(nearest > 0.0f && (double)nearest <= fmax(1.5, END_DIAMETERS * job->diameter))) return;
+    if (nearest > 1.5f && density_on_way(job->v, x, t, (double)nearest) < job->o->eps_d) return;
+    for (int a = 0; a < 3; a++) x[a] += nearest * t[a];
 }
 
 /* One pass over the pieces: cut duplicates, let the ends grow, join what meets. in is emptied. */
@@ -234,8 +252,8 @@ static void finish_lines(struct fiber_job *job, struct polyline_set *lines)
 {
     classify(lines);
     for (size_t l = 0; l < lines->n_line; l++) {
-        reach_face(lines, l, false, job->v->n);
-        reach_face(lines, l, true, job->v->n);
+        reach_face(job, lines, l, false);
+        reach_face(job, lines, l, true);
     }
 }
 
