@@ -203,25 +203,37 @@ static float descend(const struct orientation_job *o, const struct line_filter_s
     return value;
 }
 
-static void ridge_band(void *context, size_t i_task, size_t i_thread)
+/* J, as a share of that in solid material, at ridge voxel x: downhill from the node nearest to `start`; the direction in d. */
+static double descend_at(const struct orientation_job *o, const size_t x[3], const float start[3], float *scratch, float d[3])
 {
-    struct orientation_job *o = context;
-    const size_t *n = o->v->n;
+    struct line_filter_site site = line_filter_at(o->filter, &o->blurred, x[0], x[1], x[2], scratch);
+    return (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, start), d) / o->j_full;
+}
+
+typedef void (*ridge_visitor)(struct orientation_job *o, const size_t x[3], size_t at, float *scratch);
+
+/* All ridge voxels of a band; scratch is the thread's. */
+static void each_ridge(struct orientation_job *o, size_t i_task, size_t i_thread, ridge_visitor visit)
+{
     const struct band b = band_of(o, i_task);
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
     scratch_keep_within(o->v->space);
     for (size_t j = b.j0; j < b.j1; j++)
-        for (size_t i = 0; i < n[0]; i++) {
-            size_t at = volume_index(n, i, j, b.k);
-            if (get_j(o, at) == 0) continue;
-            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, b.k, scratch);
-            float d[3], least, d0[3];
-            structure_tensor_direction(&o->blurred, &o->window, i, j, b.k, d0);
-            least = descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, d0), d);
-            set_j(o, at, (double)least / o->j_full);
-            direction_volume_set(o->d, at, d);
+        for (size_t i = 0; i < o->v->n[0]; i++) {
+            size_t at = volume_index(o->v->n, i, j, b.k);
+            if (get_j(o, at) != 0) visit(o, (const size_t[3]){i, j, b.k}, at, scratch);
         }
 }
+
+static void find_direction(struct orientation_job *o, const size_t x[3], size_t at, float *scratch)
+{
+    float d[3], start[3];
+    structure_tensor_direction(&o->blurred, &o->window, x[0], x[1], x[2], start);
+    set_j(o, at, descend_at(o, x, start, scratch, d));
+    direction_volume_set(o->d, at, d);
+}
+
+static void ridge_band(void *context, size_t i_task, size_t i_thread) { each_ridge(context, i_task, i_thread, find_direction); }
 
 /* One layer of cells of the consensus. */
 static void collect_layer(void *context, size_t layer, size_t i_thread)
@@ -243,28 +255,19 @@ static void collect_layer(void *context, size_t layer, size_t i_thread)
 }
 
 /* The direction that the neighbourhood agrees on, where J has a minimum near it that is almost as deep. */
-static void agree_band(void *context, size_t i_task, size_t i_thread)
+static void agree(struct orientation_job *o, const size_t x[3], size_t at, float *scratch)
 {
-    struct orientation_job *o = context;
-    const size_t *n = o->v->n;
-    const struct band b = band_of(o, i_task);
-    float *scratch = o->scratch + i_thread * o->scratch_per_thread;
-    scratch_keep_within(o->v->space);
-    for (size_t j = b.j0; j < b.j1; j++)
-        for (size_t i = 0; i < n[0]; i++) {
-            size_t at = volume_index(n, i, j, b.k);
-            float own[3], common[3], d[3];
-            if (get_j(o, at) == 0) continue;
-            if (!consensus_direction(&o->consensus, i, j, b.k, common)) continue;
-            direction_volume_get(o->d, at, own);
-            if (fabsf(own[0] * common[0] + own[1] * common[1] + own[2] * common[2]) > AGREEMENT_COSINE) continue;
-            struct line_filter_site site = line_filter_at(o->filter, &o->blurred, i, j, b.k, scratch);
-            double share = (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, common), d) / o->j_full;
-            if (share < (1.0 - J_TOLERANCE) * get_j(o, at) * J_UNIT) continue;
-            set_j(o, at, share);
-            direction_volume_set(o->d, at, d);
-        }
+    float own[3], common[3], d[3];
+    if (!consensus_direction(&o->consensus, x[0], x[1], x[2], common)) return;
+    direction_volume_get(o->d, at, own);
+    if (fabsf(own[0] * common[0] + own[1] * common[1] + own[2] * common[2]) > AGREEMENT_COSINE) return;
+    double share = descend_at(o, x, common, scratch, d);
+    if (share < (1.0 - J_TOLERANCE) * get_j(o, at) * J_UNIT) return;
+    set_j(o, at, share);
+    direction_volume_set(o->d, at, d);
 }
+
+static void agree_band(void *context, size_t i_task, size_t i_thread) { each_ridge(context, i_task, i_thread, agree); }
 
 static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
@@ -364,15 +367,31 @@ static void release(struct orientation_job *o)
     free(o->n_kept);
 }
 
-struct part_progress {
-    const struct progress *outer;
-    double from, share;
-};
-
-static void report_part(void *context, double fraction)
+/* All passes over the volume; their progress goes on from that of the blur. */
+static status search(struct orientation_job *o, struct thread_pool *pool, const struct progress *inner, struct progress_part *part, struct error *err)
 {
-    const struct part_progress *p = context;
-    progress_report(p->outer, p->from + p->share * fraction);
+    size_t n_slice = o->v->n[2];
+    *part = (struct progress_part){part->outer, 0.3, 0.2};
+    status s = thread_pool_run(pool, n_band(o) * n_slice, climb_band, o, inner);
+    *part = (struct progress_part){part->outer, 0.5, 0.4};
+    if (s == STATUS_OK) s = thread_pool_run(pool, n_band(o) * n_slice, ridge_band, o, inner);
+    *part = (struct progress_part){part->outer, 0.9, 0.1};
+    if (s == STATUS_OK) s = seek_agreement(o, pool, inner, err);
+    if (s == STATUS_OK) s = thread_pool_run(pool, n_slice, assign_slice, o, NULL);
+    return s == STATUS_CANCELLED ? error_set(err, s, "finding fiber directions was cancelled") : s;
+}
+
+static status count_voxels(const struct orientation_job *o, const struct reconstruct_option *option, struct reconstruct_report *report,
+                           struct error *err)
+{
+    size_t n_slice = o->v->n[2];
+    report->n_material_voxel = report->n_kept_voxel = 0;
+    for (size_t t = 0; t < n_slice * n_band(o); t++) report->n_material_voxel += o->n_material[t];
+    for (size_t k = 0; k < n_slice; k++) report->n_kept_voxel += o->n_kept[k];
+    if (report->n_kept_voxel > 0) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "volume.eps_d",
+                           "cannot find fibers: %zu voxels reach the density eps_d %g, none of them J <= eps_j %g",
+                           report->n_material_voxel, option->eps_d, option->eps_j);
 }
 
 status reconstruct_orientation(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
@@ -380,8 +399,8 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
                                struct reconstruct_report *report, struct error *err)
 {
     struct orientation_job o = {.v = v, .d = d};
-    struct part_progress part = {progress, 0.0, 0.1};
-    struct progress inner = {report_part, &part, progress != NULL ? progress->cancel : NULL};
+    struct progress_part part = {progress, 0.0, 0.1};
+    const struct progress inner = progress_of_part(&part);
     *d = (struct direction_volume){0};
     status s = fiber_diameter_measure(v, pool, &inner, &report->fiber_diameter_voxel, err);
     if (s != STATUS_OK) return s;
@@ -389,29 +408,13 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     s = prepare(&o, option, report->fiber_diameter_voxel, thread_pool_n_thread(pool), err);
     if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
     if (s != STATUS_OK) goto out;
-    part = (struct part_progress){progress, 0.1, 0.2};
+    part = (struct progress_part){progress, 0.1, 0.2};
     s = line_filter_blur(v, option->s, option->t, pool, &inner, &o.blurred, err);
     if (s == STATUS_OK) /* the climb, half a line, and the taps of its interpolation */
         s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2, -option->eps_j / (double)option->h, pool, err);
     if (s != STATUS_OK) goto out;
-    part = (struct part_progress){progress, 0.3, 0.2};
-    s = thread_pool_run(pool, n_band(&o) * v->n[2], climb_band, &o, &inner);
-    part = (struct part_progress){progress, 0.5, 0.4};
-    if (s == STATUS_OK) s = thread_pool_run(pool, n_band(&o) * v->n[2], ridge_band, &o, &inner);
-    part = (struct part_progress){progress, 0.9, 0.1};
-    if (s == STATUS_OK) s = seek_agreement(&o, pool, &inner, err);
-    if (s == STATUS_OK) s = thread_pool_run(pool, v->n[2], assign_slice, &o, NULL);
-    if (s != STATUS_OK) {
-        s = error_set(err, s, "finding fiber directions was cancelled");
-        goto out;
-    }
-    report->n_material_voxel = report->n_kept_voxel = 0;
-    for (size_t t = 0; t < v->n[2] * n_band(&o); t++) report->n_material_voxel += o.n_material[t];
-    for (size_t k = 0; k < v->n[2]; k++) report->n_kept_voxel += o.n_kept[k];
-    if (report->n_kept_voxel == 0)
-        s = error_set_field(err, STATUS_INVALID, "volume.eps_d",
-                            "cannot find fibers: %zu voxels reach the density eps_d %g, none of them J <= eps_j %g",
-                            report->n_material_voxel, option->eps_d, option->eps_j);
+    s = search(&o, pool, &inner, &part, err);
+    if (s == STATUS_OK) s = count_voxels(&o, option, report, err);
 out:
     release(&o);
     if (s != STATUS_OK) direction_volume_release(d);

@@ -186,7 +186,7 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
     else st = phantom_view_table_read(t, o->table_file, err);
     if (st == STATUS_OK) st = durable_make_folder(o->folder, err);
     if (st == STATUS_OK) st = load_scene(o, &scene, truth, err);
-    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    const struct progress quiet = progress_silent(progress);
     for (size_t i = 0; i < t->n && st == STATUS_OK; i++) {
         st = make_photograph(o, scene, &t->view[i], i, pool, &quiet, photographs, rows, err);
         progress_report(progress, (double)(i + 1) / (double)t->n);

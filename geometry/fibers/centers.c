@@ -280,7 +280,7 @@ static status detect_slabs(struct detect_job *job, const struct slice_source *so
                            const struct progress *progress, struct error *err)
 {
     size_t n = job->frame->n_slice;
-    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    const struct progress quiet = progress_silent(progress);
     status s = STATUS_OK;
     for (job->first = 0; job->first < n && s == STATUS_OK; job->first += n_slab) {
         size_t n_here = job->first + n_slab < n ? n_slab : n - job->first;

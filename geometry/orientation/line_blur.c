@@ -92,7 +92,7 @@ static void blur_along_z(void *context, size_t i_task, size_t i_thread)
 static status blur_slabs(struct blur_job *job, size_t n_slab, struct thread_pool *pool, const struct progress *progress)
 {
     size_t n = job->v->n[2], reach = (size_t)job->kernel.reach, ready = 0;
-    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    const struct progress quiet = progress_silent(progress);
     status s = STATUS_OK;
     for (size_t k = 0; k < n && s == STATUS_OK; k += n_slab) {
         size_t end = k + n_slab < n ? k + n_slab : n, wanted = end + reach < n ? end + reach : n;

@@ -279,7 +279,7 @@ status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struc
     st = volume_init_in(v, n, size_m, space, err);
     if (st != STATUS_OK) return st;
     struct scan s = {.f = f, .o = o, .v = v};
-    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    const struct progress quiet = progress_silent(progress);
     size_t ready = 0;
     st = scan_init(&s, err);
     if (st != STATUS_OK) goto out;

@@ -277,7 +277,7 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
     st = relax_init(&r, s, err);
     if (st != STATUS_OK) goto out;
     size_t n_task = (s->n_node + NODES_PER_TASK - 1) / NODES_PER_TASK;
-    const struct progress quiet = {NULL, NULL, progress != NULL ? progress->cancel : NULL};
+    const struct progress quiet = progress_silent(progress);
     for (size_t i_round = 0; i_round <= n_round; i_round++) {
         sort_into_cells(&r);
         if (st == STATUS_OK) st = thread_pool_run(pool, n_task, look, &r, &quiet);

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <tiffio.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -281,9 +282,36 @@ static void test_cancel(void **state)
     release(&x);
 }
 
+/* As if the disk went away: no more arrays in files once the search has come so far. */
+static void remove_folder(void *context, double fraction)
+{
+    if (fraction > 0.85) rmdir(context);
+}
+
+static void test_first_error_is_the_one_told(void **state)
+{
+    (void)state;
+    char folder[64];
+    struct scratch_space *space;
+    struct result x;
+    struct error err = {0};
+    void *most_of_memory;
+    const struct progress progress = {.report = remove_folder, .context = folder};
+    test_make_folder(folder);
+    assert_int_equal(scratch_space_new(folder, 1 << 20, &space, NULL), STATUS_OK);
+    run_in(space, path, "xyz", 2, &x);
+    direction_volume_release(&x.d);
+    assert_int_equal(scratch_new(space, 500000, "the rest", &most_of_memory, NULL), STATUS_OK);
+    assert_int_equal(reconstruct_orientation(&x.v, &x.o, NULL, &progress, &x.d, &x.r, &err), STATUS_NOT_FOUND);
+    if (strstr(err.text, "cannot keep the directions of neighbourhoods in") == NULL) fail_msg("'%s'", err.text);
+    assert_null(x.d.density);
+    release(&x);
+    scratch_space_free(space);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_choices_are_reported_and_overridable), cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
-                                       cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit)};
+                                       cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_first_error_is_the_one_told)};
     return cmocka_run_group_tests(tests, make_scan, NULL);
 }
