@@ -152,6 +152,8 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
             if (progress_cancelled(progress)) s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
             else s = volume_source_read(source, k + i, 1, block + i * n_page, err);
         }
+        for (size_t i = 0; i < n * n_page && s == STATUS_OK; i++) /* a value of the file's own is not VOLUME_OUTSIDE: refused later as any infinite one */
+            if (block[i] == VOLUME_OUTSIDE) block[i] = INFINITY;
         if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
         progress_report(progress, 0.8 * (double)(k + n) / (double)p->n_file[2]);
     }

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <tiffio.h>
 
-enum { MAX_PAGE = 1 << 20, MAX_EXPANSION = 4096 }; /* deflate cannot expand more than 1032-fold; others less or so */
+enum { MAX_PAGE = 1 << 20, MAX_EDGE = 1 << 20, MAX_EXPANSION = 4096 }; /* deflate cannot expand more than 1032-fold; others less or so */
 
 struct page {
     size_t i_path;
@@ -139,6 +139,9 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
     if (width == 0 || height == 0)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu has no pixels", name,
                                i_page + 1);
+    if (width > MAX_EDGE || height > MAX_EDGE)
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': page %zu has %u x %u pixels, the limit is %d an edge",
+                               name, i_page + 1, width, height, MAX_EDGE);
     if (per_pixel != 1 || photometric == PHOTOMETRIC_PALETTE)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is a color image", name,
                                i_page + 1);
