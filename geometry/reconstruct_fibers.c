@@ -34,21 +34,14 @@ struct fiber_job {
     struct thread_pool *pool;
     struct reconstruct_report *report;
     struct progress inner;
-    const struct progress *outer;
-    double from, share;
+    struct progress_part part; /* what inner reports to */
     double diameter; /* voxels */
 };
 
-static void report_part(void *context, double fraction)
-{
-    const struct fiber_job *job = context;
-    progress_report(job->outer, job->from + job->share * fraction);
-}
-
 static void enter_part(struct fiber_job *job, double from, double to)
 {
-    job->from = from;
-    job->share = to - from;
+    job->part.from = from;
+    job->part.share = to - from;
 }
 
 /* Axis that a frame's centers are counted under: a diagonal between two axes counts under the first. */
@@ -111,8 +104,7 @@ static status smooth_and_drop(struct fiber_job *job, const struct polyline_set *
             continue;
         }
         polyline_smooth(in->vertex + in->first[l], n, job->o->smooth_alpha, work);
-        s = polyline_begin(out, in->axis[l], err);
-        for (size_t i = in->first[l]; i < in->first[l + 1] && s == STATUS_OK; i++) s = polyline_add(out, in->vertex[i], err);
+        s = polyline_add_part(out, in, l, in->first[l], in->first[l + 1], err);
     }
     free(work);
     return s;
@@ -199,8 +191,7 @@ static status keep_inside(const struct fiber_job *job, const struct polyline_set
             job->report->n_short_dropped[in->axis[l]]++;
             continue;
         }
-        s = polyline_begin(out, in->axis[l], err);
-        for (size_t i = from; i < to && s == STATUS_OK; i++) s = polyline_add(out, in->vertex[i], err);
+        s = polyline_add_part(out, in, l, from, to, err);
     }
     return s;
 }
@@ -297,7 +288,7 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
 
 static status find_radius(struct fiber_job *job, const struct polyline_set *lines, struct error *err)
 {
-    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *all = part + RADIUS_PARTS;
+    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *all; /* the last is their sum */
     struct reconstruct_report *report = job->report;
     struct radius_measure m;
     double voxel_m = job->v->voxel_size_m[0];
@@ -307,6 +298,7 @@ static status find_radius(struct fiber_job *job, const struct polyline_set *line
                                           part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);
     if (s == STATUS_OK) {
+        all = part + RADIUS_PARTS;
         distance_histogram_sum(part, RADIUS_PARTS, all);
         report->radius_per_axis = m.per_axis;
         for (unsigned a = 0; a < 3; a++) {
@@ -346,8 +338,8 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
                           struct thread_pool *pool, const struct progress *progress, struct fiber_set *f,
                           struct reconstruct_report *report, struct error *err)
 {
-    struct fiber_job job = {.v = v, .d = d, .o = o, .pool = pool, .report = report, .outer = progress};
-    job.inner = (struct progress){report_part, &job, progress != NULL ? progress->cancel : NULL};
+    struct fiber_job job = {.v = v, .d = d, .o = o, .pool = pool, .report = report, .part = {.outer = progress}};
+    job.inner = progress_of_part(&job.part);
     job.diameter = report->fiber_diameter_voxel;
     struct polyline_set lines;
     polyline_set_init(&lines);

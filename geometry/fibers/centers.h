@@ -23,7 +23,7 @@ struct center {
 struct center_list {
     size_t n_slice;
     size_t *first; /* n_slice + 1 */
-    struct center *center;
+    struct center *center; /* of slice k: first[k] .. first[k + 1] - 1, sorted by v, then u */
 };
 
 void center_list_release(struct center_list *l);

@@ -49,11 +49,7 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
         for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
             if (i < n && !disagrees(value, n, i, limit)) continue;
-            if (i - run >= min_vertex) {
-                s = polyline_begin(result, lines->axis[l], err);
-                for (size_t k = run; k < i && s == STATUS_OK; k++)
-                    s = polyline_add(result, lines->vertex[lines->first[l] + k], err);
-            }
+            if (i - run >= min_vertex) s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
             *n_cut += i < n;
             run = i + 1;
         }
@@ -79,8 +75,7 @@ status polylines_trim_disagreeing(const struct polyline_set *lines, const struct
         }
         *n_cut += to > from ? n - (to - from) : n;
         if (to < from + min_vertex) continue;
-        s = polyline_begin(result, lines->axis[l], err);
-        for (size_t k = from; k < to && s == STATUS_OK; k++) s = polyline_add(result, lines->vertex[lines->first[l] + k], err);
+        s = polyline_add_part(result, lines, l, lines->first[l] + from, lines->first[l] + to, err);
     }
     free(value);
     return s;

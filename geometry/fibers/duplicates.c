@@ -24,13 +24,12 @@ static bool wins(const struct polyline_set *p, size_t a, size_t b)
     return na != nb ? na > nb : a < b;
 }
 
-/* Does a winning line of another subvolume pass vertex i of `line` within `near`, side by side? */
+/* Does a winning line pass vertex i of `line` within `near`? */
 static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i, float near)
 {
     const float *x = p->vertex[i];
-    float reach = sqrtf(near * near + 1.0f), t[3]; /* vertices are at most about 1.5 apart */
+    float reach = sqrtf(near * near + 1.0f); /* vertices are at most about 1.5 apart */
     size_t from[3], to[3], c[3];
-    tangent_at(p, line, i, t);
     vertex_grid_range(g, x, reach, from, to);
     for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
         for (c[1] = from[1]; c[1] <= to[1]; c[1]++)
@@ -39,13 +38,12 @@ static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid 
                 for (size_t e = g->first[cell]; e < g->first[cell + 1]; e++) {
                     size_t other = g->vertex[e], other_line = g->line_of[other];
                     if (other_line == line || !wins(p, other_line, line)) continue;
-                    float d[3], s[3], along = 0.0f, square = 0.0f, cosine = 0.0f;
+                    float d[3], s[3], along = 0.0f, square = 0.0f;
                     tangent_at(p, other_line, other, s);
                     for (int a = 0; a < 3; a++) {
                         d[a] = x[a] - p->vertex[other][a];
                         along += d[a] * s[a];
                         square += d[a] * d[a];
-                        cosine += s[a] * t[a];
                     }
                     if (square <= reach * reach && square - along * along <= near * near) return true;
                 }
@@ -66,10 +64,7 @@ status polylines_remove_duplicates(const struct polyline_set *lines, const size_
         for (size_t i = lines->first[l]; i <= lines->first[l + 1] && s == STATUS_OK; i++) {
             bool cut = i == lines->first[l + 1] || is_duplicate(lines, &g, l, i, near);
             if (!cut) continue;
-            if (i - run >= min_vertex) {
-                s = polyline_begin(result, lines->axis[l], err);
-                for (size_t k = run; k < i && s == STATUS_OK; k++) s = polyline_add(result, lines->vertex[k], err);
-            }
+            if (i - run >= min_vertex) s = polyline_add_part(result, lines, l, run, i, err);
             counts->n_duplicate += i < lines->first[l + 1];
             run = i + 1;
         }

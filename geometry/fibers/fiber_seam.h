@@ -16,10 +16,11 @@ struct fiber_seam {
     double offset_m[2];    /* mean distance of these partners in the plane of the face; NaN without any */
 };
 
+/* STATUS_NO_MEMORY. f must satisfy fiber_set_validate. */
 status fiber_seam_measure(const struct fiber_set *f, struct fiber_seam *seam, struct error *err);
 
 /* Partners within two radii are brought together halfway and onto the faces; the shift fades out over the next 8 radii of arc length.
- * n_joined: pairs of ends. */
+ * n_joined: pairs of ends. STATUS_NO_MEMORY. */
 status fiber_seam_join(struct fiber_set *f, size_t *n_joined, struct error *err);
 
 #endif

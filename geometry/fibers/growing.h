@@ -2,7 +2,7 @@
  *
  * A step is one voxel along the tangent, followed by a move to the centroid of the material around, perpendicular to the tangent, that
  * is nearer to this line than to any other. The walk ends where the material does, at another line, at a face of the volume, or
- * after max_step_voxel. It closes what slices miss: fibers at 45 degrees to two axes, sharp bends, ends near faces.
+ * after max_step steps. It closes what slices miss: fibers at 45 degrees to two axes, sharp bends, ends near faces.
  */
 #ifndef SELVEDGE_GEOMETRY_GROWING_H
 #define SELVEDGE_GEOMETRY_GROWING_H

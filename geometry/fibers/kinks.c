@@ -50,13 +50,6 @@ status polylines_kink_limit(const struct polyline_set *lines, double diameter_vo
     return STATUS_OK;
 }
 
-static status add_piece(const struct polyline_set *lines, size_t line, size_t from, size_t to, struct polyline_set *result, struct error *err)
-{
-    status s = polyline_begin(result, lines->axis[line], err);
-    for (size_t i = from; i < to && s == STATUS_OK; i++) s = polyline_add(result, lines->vertex[i], err);
-    return s;
-}
-
 status polylines_cut_kinks(const struct polyline_set *lines, double diameter_voxel, double over_usual, size_t min_vertex,
                            struct polyline_set *result, size_t *n_cut, struct error *err)
 {
@@ -73,7 +66,7 @@ status polylines_cut_kinks(const struct polyline_set *lines, double diameter_vox
                 for (size_t k = i - reach; k <= i + reach; k++) kink[k] = true;
         for (size_t i = begin; i <= end && s == STATUS_OK; i++) {
             if (i < end && !kink[i]) continue;
-            if (i - piece >= min_vertex) s = add_piece(lines, l, piece, i, result, err);
+            if (i - piece >= min_vertex) s = polyline_add_part(result, lines, l, piece, i, err);
             *n_cut += i < end;
             piece = i + 1;
         }

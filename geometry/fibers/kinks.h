@@ -6,7 +6,7 @@
 #include "geometry/fibers/polyline.h"
 
 /* Turn per voxel of arc length that only kinks exceed: over_usual times what 95 % of the vertices stay below, and at least 1.2 radians a
- * diameter. */
+ * diameter. STATUS_NO_MEMORY. */
 status polylines_kink_limit(const struct polyline_set *lines, double diameter_voxel, double over_usual, double *limit_per_voxel, struct error *err);
 
 /* Vertices (about one a voxel) within half a diameter of a kink are removed; near the ends of a line 0.7 of the limit is enough. What remains

@@ -49,6 +49,13 @@ status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
     return STATUS_OK;
 }
 
+status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end, struct error *err)
+{
+    status s = polyline_begin(p, from->axis[line], err);
+    for (; i < end && s == STATUS_OK; i++) s = polyline_add(p, from->vertex[i], err);
+    return s;
+}
+
 static size_t cell_index(const struct vertex_grid *g, const float x[3])
 {
     size_t c[3];

@@ -16,20 +16,23 @@ struct polyline_set {
 
 void polyline_set_init(struct polyline_set *p);
 void polyline_set_release(struct polyline_set *p);
-/* Start a line; vertices added from now on are its. STATUS_NO_MEMORY. */
+/* Start a line; vertices added from now on are its. STATUS_NO_MEMORY; STATUS_TOO_LARGE at 2^32 vertices. */
 status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err);
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
+/* A line of `from` over again: its vertices i .. end - 1 (indices in from->vertex). */
+status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end, struct error *err);
 static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
 
 /* Every vertex filed by cell of a grid, for neighbour searches. */
 struct vertex_grid {
     float cell;        /* edge, voxels */
     size_t n[3];
-    size_t *first;     /* n cells + 1 */
+    size_t *first;     /* per cell (x fastest), and one more: where its vertices begin in `vertex` */
     uint32_t *vertex;  /* index into polyline_set.vertex */
     uint32_t *line_of; /* of each vertex */
 };
 
+/* Over a volume of n_voxel; vertices outside of it are filed in the cells at its faces. STATUS_NO_MEMORY. */
 status vertex_grid_init(struct vertex_grid *g, const struct polyline_set *p, const size_t n_voxel[3], float cell,
                         struct error *err);
 void vertex_grid_release(struct vertex_grid *g);

@@ -28,7 +28,9 @@ struct distance_histogram {
 
 /* part: RADIUS_PARTS histograms, of disjoint sets of bricks scattered over the volume (their sum is that of the volume); they tell how
  * sure a radius is.
- * eps_d: density that counts as material (the density is interpolated, so V has smooth surfaces). */
+ * eps_d: density that counts as material (the density is interpolated, so V has smooth surfaces). farthest_voxel: end of the last bin. Of more than
+ * 1500 bricks with fibers near them some 1500 are measured. Whole numbers are summed: nothing depends on threads. STATUS_CANCELLED,
+ * STATUS_NO_MEMORY. */
 status distance_histogram_measure(const struct volume *v, const struct polyline_set *lines, double eps_d,
                                   double farthest_voxel, struct thread_pool *pool, const struct progress *progress,
                                   struct distance_histogram part[RADIUS_PARTS], struct error *err);

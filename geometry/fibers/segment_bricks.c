@@ -64,9 +64,9 @@ static status start(struct segment_bricks *s, size_t n_segment, const size_t n_v
     *s = (struct segment_bricks){.edge = edge, .reach = reach};
     memcpy(s->n_voxel, n_voxel, sizeof s->n_voxel);
     for (int a = 0; a < 3; a++) s->n_brick[a] = (n_voxel[a] + edge - 1) / edge;
+    if (n_segment >= UINT32_MAX) return error_set(err, STATUS_TOO_LARGE, "cannot file fiber segments: over 2^32");
     s->segment = malloc((n_segment + 1) * sizeof *s->segment);
-    if (s->segment == NULL || n_segment >= UINT32_MAX)
-        return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+    if (s->segment == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
     return STATUS_OK;
 }
 

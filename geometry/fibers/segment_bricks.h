@@ -25,7 +25,7 @@ struct segment_bricks {
     uint32_t *index;
 };
 
-/* From polylines in voxels, or from a fiber set in metres. STATUS_NO_MEMORY. */
+/* From polylines in voxels, or from a fiber set in metres. Nothing to release after STATUS_NO_MEMORY, STATUS_TOO_LARGE (2^32 segments). */
 status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3], size_t edge,
                            float reach, struct error *err);
 status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],

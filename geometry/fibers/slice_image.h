@@ -25,7 +25,8 @@ struct pixel_range {
 };
 
 /* Slices first .. first + n_slice - 1 into image[n_slice][height][width]: density where the voxel shows in the frame, 0 elsewhere; between
- * voxels bilinear in the plane of the two diagonal axes. own[n_slice]: the pixels that kept voxels of the class reach. */
+ * voxels bilinear in the plane of the two diagonal axes. own[n_slice]: the pixels that kept voxels of the class reach.
+ * STATUS_NO_MEMORY. */
 status slice_images_fill(const struct slice_source *source, size_t first, size_t n_slice, struct thread_pool *pool, float *image,
                          struct pixel_range *own, struct error *err);
 

@@ -88,16 +88,3 @@ status vision_blob_response(const float *image, size_t width, size_t height, dou
     }
     CATCH
 }
-
-status vision_gaussian(const float *image, size_t width, size_t height, double sigma, float *result, struct error *err)
-{
-    if (!size_ok(width, height, sigma)) return bad_size(width, height, sigma, err);
-    try {
-        std::vector<float> smooth, second;
-        gaussian_kernels(sigma, smooth, second);
-        cv::Mat in = as_matrix(image, width, height), out = as_matrix(result, width, height);
-        cv::sepFilter2D(in, out, CV_32F, smooth, smooth, cv::Point(-1, -1), 0.0, cv::BORDER_REFLECT);
-        return STATUS_OK;
-    }
-    CATCH
-}
