@@ -72,15 +72,15 @@ struct reconstruct_report {
     double direction_change_mean_deg;      /* between filtered and transferred directions */
 };
 
-/* Step "volume": read the file(s), honour axes/matrix/crop, map densities to [0, 1]. paths: one multi-page TIFF, one MetaImage
- * header (data file beside it), or TIFF slices in order. Errors name the file, and the field of the job document as
+/* Step "volume": read the file(s), honour axes/matrix/crop, map densities to [0, 1]. path: as for volume_source_open_declared. Errors name
+ * the file, and the field of the job document as
  * "volume.<field>": STATUS_FORMAT (truncated, pages of different size or depth), STATUS_INVALID (NaN voxels, empty: nothing
- * above the threshold, constant), STATUS_DISK_FULL (scratch space). space NULL: memory, without a limit. */
+ * above the threshold, constant), STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; the same for all steps). space NULL: memory, without a limit. */
 status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, struct scratch_space *space,
                         struct thread_pool *pool, const struct progress *progress, struct volume *v,
                         struct reconstruct_report *report, struct error *err);
 
-/* Step "orientation": the filter of section 2 of the notes (structure tensor start, local refinement of J), v -> d.
+/* Step "orientation": the line filter (orientation/line_filter.h; structure tensor start, local refinement of J), v -> d.
  * STATUS_INVALID, field "volume.eps_d", when no voxel is kept. */
 status reconstruct_orientation(const struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                                const struct progress *progress, struct direction_volume *d,
@@ -96,7 +96,7 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
                             const struct progress *progress, struct reconstruct_report *report, struct error *err);
 
 /* What a user should know about the geometry though it stops nothing; each text begins with the subject. Says the same again for a report
- * that was read back. f: the fibers in use, NULL before there are any. */
+ * that was read back. f: the fibers in use. */
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
                              void (*warn)(void *context, const char *text), void *context);
 void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,

@@ -16,6 +16,7 @@ struct consensus {
     struct scratch_space *space; /* not owned; NULL: memory */
 };
 
+/* Cells of zeros over a volume of n_voxel. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
 status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space, struct error *err);
 void consensus_release(struct consensus *c);
 /* Adds to the cell of a voxel; threads keep to different layers of cells (k / cell). */

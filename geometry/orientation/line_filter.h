@@ -26,7 +26,8 @@ status line_filter_blur(const struct volume *v, double s, double t, struct threa
 
 struct line_filter;
 
-/* Lines of length h voxels in volumes of n voxels. STATUS_NO_MEMORY; STATUS_INVALID for h < 3 or > 63. */
+/* Lines of length h voxels in volumes of n voxels. STATUS_NO_MEMORY; STATUS_INVALID for h < 3 or > 63; STATUS_TOO_LARGE for slices of 2^25
+ * voxels and more. */
 status line_filter_new(const struct direction_set *set, size_t h, const size_t n[3], struct line_filter **filter,
                        struct error *err);
 void line_filter_free(struct line_filter *filter);

@@ -37,7 +37,7 @@ struct finder {
     size_t n_brick, *first;  /* corner voxels of bricks; x runs fastest, then y */
     size_t n_column;         /* bricks side by side in x and y */
     struct sample *sample;   /* PER_BRICK a brick; weight 0: none */
-    float *scratch;          /* per thread: three buffers */
+    float *scratch;          /* per thread: two buffers */
 };
 
 static const size_t EDGE = BUFFER, CUBE = (size_t)BUFFER * BUFFER * BUFFER;

@@ -27,7 +27,7 @@ struct main_directions {
 };
 
 /* material: scanner value from which on a blurred voxel counts as fiber. Cells at VOLUME_OUTSIDE count as void.
- * A volume without any material gives n = 0. */
+ * A volume without any material gives n = 0. STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status main_directions_find(const struct volume *v, double material, struct thread_pool *pool, const struct progress *progress,
                             struct main_directions *m, struct error *err);
 

@@ -1,4 +1,4 @@
-/* How well reconstructed fibers agree with true ones (the figures of the geometry notes, section 10).
+/* How well reconstructed fibers agree with true ones.
  *
  * Both sets are walked in steps of one voxel of arc length; a sample stands for one voxel of fiber. Distances are taken to the nearest
  * point of the other set's polylines, periodic in x and y with the truth's tile. A sample is matched when that point lies within one

@@ -21,7 +21,7 @@ static status check(const struct phantom_file_option *o, const char *path, struc
     return STATUS_OK;
 }
 
-/* n voxels as little-endian bytes (libtiff and .mhd are told so). */
+/* n voxels in the machine's byte order, which libtiff knows and is little-endian, as the .mhd says, on all that this is built for. */
 static void encode(const float *from, size_t n, const struct phantom_file_option *o, uint8_t *to)
 {
     double top = o->bits == 8 ? 255.0 : 65535.0;
@@ -33,13 +33,19 @@ static void encode(const float *from, size_t n, const struct phantom_file_option
     }
 }
 
-/* Keeps libtiff from printing; the text goes into the error. */
+/* Keeps libtiff from printing; its first words are the cause, what follows from it is not. */
 static int keep_message(TIFF *t, void *context, const char *module, const char *format, va_list args)
 {
     struct error *err = context;
     (void)t;
     (void)module;
-    if (err != NULL) vsnprintf(err->text, sizeof err->text, format, args);
+    if (err->text[0] == '\0') vsnprintf(err->text, sizeof err->text, format, args);
+    return 1;
+}
+
+static int drop_message(TIFF *t, void *context, const char *module, const char *format, va_list args)
+{
+    (void)t, (void)context, (void)module, (void)format, (void)args;
     return 1;
 }
 
@@ -74,7 +80,7 @@ status phantom_write_tiff(const struct volume *v, const struct phantom_file_opti
         goto out;
     }
     TIFFOpenOptionsSetErrorHandlerExtR(options, keep_message, &cause);
-    TIFFOpenOptionsSetWarningHandlerExtR(options, keep_message, &cause);
+    TIFFOpenOptionsSetWarningHandlerExtR(options, drop_message, NULL);
     uint64_t n_bytes = (uint64_t)volume_n_voxel(v->n) * (o->bits == 8 ? 1 : 2);
     t = TIFFOpenExt(path, n_bytes > 0xf0000000u ? "w8" : "w", options);
     if (t == NULL) {
@@ -84,7 +90,7 @@ status phantom_write_tiff(const struct volume *v, const struct phantom_file_opti
     for (size_t k = 0; k < v->n[2] && st == STATUS_OK; k++) {
         errno = 0;
         if (!write_page(t, v, k, o, row))
-            st = error_set(err, errno == ENOSPC ? STATUS_DISK_FULL : STATUS_IO, "cannot write volume '%s': page %zu: %s", path, k,
+            st = error_set(err, errno == ENOSPC ? STATUS_DISK_FULL : STATUS_IO, "cannot write volume '%s': page %zu: %s", path, k + 1,
                            cause.text);
     }
     TIFFClose(t);

@@ -11,7 +11,8 @@
 
 enum { MAX_TRY = 400, CANDIDATES = 60 };
 
-double plied_scale(const struct phantom_option *o, double fiber_radius_m)
+/* Of the yarn's own lengths. */
+static double plied_scale(const struct phantom_option *o, double fiber_radius_m)
 {
     const struct phantom_yarn_law *y = &o->yarn;
     if (o->yarn_true_size) return 1.0;
@@ -35,8 +36,6 @@ struct plied {
     double scale, distance_m, ellipse_m[2], ply_turns, fiber_turns; /* a tile */
     size_t n_period;                                                 /* tiles until a ply meets itself */
 };
-
-static size_t greatest_divisor(size_t a, size_t b) { return b == 0 ? a : greatest_divisor(b, a % b); }
 
 static void lay_out(struct plied *p, const struct phantom_option *o, const struct yarn *path)
 {

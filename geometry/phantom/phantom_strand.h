@@ -59,12 +59,14 @@ struct yarn_section {
     double twist_turns, length_m;
 };
 
+/* Of whole numbers, 0 allowed: after a / gcd(a, k) steps of k a ring of a is closed. */
+static inline size_t greatest_divisor(size_t a, size_t b) { return b == 0 ? a : greatest_divisor(b, a % b); }
+
 double yarn_length_m(const struct yarn *y);
 /* The point (u, v) of the section before flattening, s tiles along the yarn: u in the cloth's plane, v upwards. */
 void yarn_point(const struct yarn *y, const struct yarn_section *c, double s, double u_m, double v_m, double out[3]);
 
-/* The same as the two below for yarns with plies; scale of the yarn's lengths. */
-double plied_scale(const struct phantom_option *o, double fiber_radius_m);
+/* The same as the two below for yarns with plies. */
 double plied_section_radius_m(const struct phantom_option *o, double fiber_radius_m);
 status plied_yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, struct error *err);
 

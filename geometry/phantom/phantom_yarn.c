@@ -115,8 +115,6 @@ static void section_point(const struct yarn *y, const struct yarn_section *c, do
     yarn_point(y, c, s, rho_m * cos(turned), rho_m * sin(turned), out);
 }
 
-static size_t greatest_divisor(size_t a, size_t b) { return b == 0 ? a : greatest_divisor(b, a % b); }
-
 /* The strands that one orbit of lattice points makes: turning by k sixths a tile, a fiber meets itself after 6 / gcd(k, 6) tiles. */
 static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, const struct yarn_section *c,
                         double rho_m, double angle, struct rng *rng, struct error *err)

@@ -231,10 +231,11 @@ static status find_data(struct nrrd *m, FILE *header, struct error *err)
         if (c == EOF) break;
     }
     m->layout.offset_bytes = ftello(file);
+    status s = m->layout.offset_bytes >= 0 ? STATUS_OK : error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
     if (file != header) fclose(file);
     m->layout.skip_bytes = m->byte_skip > 0 ? m->byte_skip : 0;
     if (m->byte_skip == -1) m->layout.offset_bytes = -1;
-    return m->layout.offset_bytes >= -1 ? STATUS_OK : error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+    return s;
 }
 
 static void nrrd_close(void *handle)

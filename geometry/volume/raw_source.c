@@ -4,10 +4,11 @@
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
-bool sample_type_of_name(const char *name, enum sample_type *type)
+static bool sample_type_of_name(const char *name, enum sample_type *type)
 {
     for (enum sample_type t = 0; t < SAMPLE_COUNT; t++)
         if (strcmp(name, sample_name(t)) == 0) {
@@ -27,6 +28,13 @@ status raw_source_open(const char *const *path, size_t n_path, const struct volu
     if (!sample_type_of_name(d->type, &layout.sample))
         return error_set_field(err, STATUS_INVALID, "volume.raw.type", "cannot read volume '%s': unknown sample type '%s'",
                                path_file_name(path[0]), d->type);
+    for (int a = 0; a < 3; a++)
+        if (d->n[a] == 0 || d->n[a] > VOXEL_STREAM_MAX_EDGE)
+            return error_set_field(err, STATUS_INVALID, "volume.raw.shape", "cannot read volume '%s': a shape of %zu x %zu x %zu voxels makes no sense",
+                                   path_file_name(path[0]), d->n[0], d->n[1], d->n[2]);
+    if (d->header_bytes > LLONG_MAX) /* a negative offset would mean something else */
+        return error_set_field(err, STATUS_INVALID, "volume.raw.header_bytes", "cannot read volume '%s': a header of %zu bytes makes no sense",
+                               path_file_name(path[0]), d->header_bytes);
     memcpy(layout.n, d->n, sizeof layout.n);
     layout.swap = d->big_endian != (BYTE_ORDER == BIG_ENDIAN);
     status s = voxel_stream_open(path_file_name(path[0]), path[0], &layout, &stream, err);

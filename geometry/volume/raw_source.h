@@ -4,11 +4,9 @@
 
 #include "geometry/volume/volume_reader.h"
 
-/* type: a name of sample_name ("uint8" ... "float64"). False for others. */
-bool sample_type_of_name(const char *name, enum sample_type *type);
-
-/* One file that holds declaration's voxels and nothing else after declaration->header_bytes. STATUS_INVALID, field "volume.raw",
- * for a type or shape that makes no sense or more than one file; STATUS_FORMAT for a length that does not fit. */
+/* One file that holds declaration's voxels and nothing else after declaration->header_bytes. STATUS_INVALID for more than one file (field
+ * "volume.raw"), an unknown type ("volume.raw.type"), edges that are not 1 .. VOXEL_STREAM_MAX_EDGE ("volume.raw.shape") and a header of
+ * over 2^63 bytes ("volume.raw.header_bytes"); else as voxel_stream_open. */
 status raw_source_open(const char *const *path, size_t n_path, const struct volume_raw_declaration *declaration,
                        void **handle, struct volume_source_info *info, struct error *err);
 status raw_source_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);

@@ -57,7 +57,6 @@ static void add_block(void *context, size_t bz, size_t i_thread)
     for (size_t k = bz * p->block[2]; k < to; k++) {
         scratch_keep_within(p->v->space);
         bool inner = k >= p->z_low && k < p->z_high;
-        scratch_keep_within(p->v->space);
         for (size_t j = 0; j < n[1]; j++) {
             const float *row = p->v->density + volume_index(n, 0, j, k);
             float *of_x = p->mean[0] + (j / p->block[1]) * nb[2] + bz, *of_y = p->mean[1] + j * nb[0] * nb[2] + bz;

@@ -113,8 +113,8 @@ static status writer_close(struct vol_writer *w, status s, struct error *err)
     return s;
 }
 
-/* Row j of slice k, encoded. */
-typedef void (*encode_row)(const void *volume, size_t first_voxel, size_t n_voxel, uint8_t *out);
+/* Voxels of a slice as bytes of the file. */
+typedef void (*encode_slice)(const void *volume, size_t first_voxel, size_t n_voxel, uint8_t *out);
 
 static void encode_density_f32(const void *volume, size_t first, size_t n, uint8_t *out)
 {
@@ -148,21 +148,21 @@ static void encode_direction_quantised(const void *volume, size_t first, size_t 
     }
 }
 
-static status write_rows(const char *path, const uint8_t header[HEADER_BYTES], const void *volume, const size_t n[3],
-                         struct scratch_space *space, size_t bytes_per_voxel, encode_row encode, struct error *err)
+static status write_slices(const char *path, const uint8_t header[HEADER_BYTES], const void *volume, const size_t n[3],
+                         struct scratch_space *space, size_t bytes_per_voxel, encode_slice encode, struct error *err)
 {
     struct vol_writer w = {0};
-    uint8_t *row = malloc(n[0] * n[1] * bytes_per_voxel);
-    if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    uint8_t *slice = malloc(n[0] * n[1] * bytes_per_voxel);
+    if (slice == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     status s = writer_open(&w, path, err);
     if (s == STATUS_OK) s = writer_put(&w, header, HEADER_BYTES, err);
     for (size_t k = 0; k < n[2] && s == STATUS_OK; k++) {
         scratch_keep_within(space);
-        encode(volume, volume_index(n, 0, 0, k), n[0] * n[1], row);
-        s = writer_put(&w, row, n[0] * n[1] * bytes_per_voxel, err);
+        encode(volume, volume_index(n, 0, 0, k), n[0] * n[1], slice);
+        s = writer_put(&w, slice, n[0] * n[1] * bytes_per_voxel, err);
     }
     s = writer_close(&w, s, err);
-    free(row);
+    free(slice);
     return s;
 }
 
@@ -172,8 +172,8 @@ status vol_write_density(const char *path, const struct volume *v, enum vol_enco
         return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for densities", path, (int)encoding);
     uint8_t header[HEADER_BYTES];
     fill_header(header, encoding, v->n, 1, v->voxel_size_m);
-    return encoding == VOL_FLOAT32 ? write_rows(path, header, v, v->n, v->space, 4, encode_density_f32, err)
-                                   : write_rows(path, header, v, v->n, v->space, 1, encode_density_u8, err);
+    return encoding == VOL_FLOAT32 ? write_slices(path, header, v, v->n, v->space, 4, encode_density_f32, err)
+                                   : write_slices(path, header, v, v->n, v->space, 1, encode_density_u8, err);
 }
 
 status vol_write_direction(const char *path, const struct direction_volume *d, enum vol_encoding encoding,
@@ -183,8 +183,8 @@ status vol_write_direction(const char *path, const struct direction_volume *d, e
         return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for directions", path, (int)encoding);
     uint8_t header[HEADER_BYTES];
     fill_header(header, encoding, d->n, 3, d->voxel_size_m);
-    return encoding == VOL_FLOAT32 ? write_rows(path, header, d, d->n, d->space, 12, encode_direction_f32, err)
-                                   : write_rows(path, header, d, d->n, d->space, 2, encode_direction_quantised, err);
+    return encoding == VOL_FLOAT32 ? write_slices(path, header, d, d->n, d->space, 12, encode_direction_f32, err)
+                                   : write_slices(path, header, d, d->n, d->space, 2, encode_direction_quantised, err);
 }
 
 static void copy_density(const void *volume, size_t first, size_t n, uint8_t *out)
@@ -197,7 +197,7 @@ status vol_write_kept_density(const char *path, const struct direction_volume *d
 {
     uint8_t header[HEADER_BYTES];
     fill_header(header, VOL_UINT8, d->n, 1, d->voxel_size_m);
-    return write_rows(path, header, d, d->n, d->space, 1, copy_density, err);
+    return write_slices(path, header, d, d->n, d->space, 1, copy_density, err);
 }
 
 static status bad_header(const char *name, struct error *err, const char *what)

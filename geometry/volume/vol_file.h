@@ -20,16 +20,18 @@ struct vol_header {
     size_t bytes_per_voxel;
 };
 
-/* Files appear as a whole or not at all. STATUS_IO, STATUS_DISK_FULL; STATUS_INVALID for an encoding that does not fit. */
+/* Files appear as a whole or not at all, written a slice at a time. STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY; STATUS_INVALID for an
+ * encoding that does not fit. */
 status vol_write_density(const char *path, const struct volume *v, enum vol_encoding encoding, struct error *err);
 status vol_write_direction(const char *path, const struct direction_volume *d, enum vol_encoding encoding,
                            struct error *err);
 /* The densities of a direction volume (0 where emptied) as VOL_UINT8. */
 status vol_write_kept_density(const char *path, const struct direction_volume *d, struct error *err);
 
-/* Header at the start of file, checked against the file's length. name is used in errors. STATUS_FORMAT. */
+/* Header at the start of file, checked against the file's length. name is used in errors. STATUS_FORMAT, STATUS_UNSUPPORTED (other encodings
+ * and channels), STATUS_IO; the field of all errors of reading is "volume.files". */
 status vol_read_header(FILE *file, const char *name, struct vol_header *header, struct error *err);
-/* Density in one channel; the voxel size is taken from the box in millimetres. */
+/* Density in one channel; the voxel size is taken from the box in millimetres (NaN for a box without extent). v: volume_release it. */
 status vol_read_density(const char *path, struct volume *v, struct error *err);
 /* Directions, 3 floats a voxel into direction[n_voxel*3] (malloc'ed), zero where there is no fiber. */
 status vol_read_direction(const char *path, struct vol_header *header, float **direction, struct error *err);

@@ -17,7 +17,7 @@
 struct volume {
     size_t n[3];
     double voxel_size_m[3];
-    float *density; /* n[0]*n[1]*n[2]; mapped to [0, 1] after volume_map_density, raw scanner values before */
+    float *density; /* n[0]*n[1]*n[2]; mapped to [0, 1] after density_map_apply, raw scanner values before */
     struct scratch_space *space; /* not owned */
 };
 
@@ -44,7 +44,7 @@ status direction_volume_init(struct direction_volume *v, const size_t n[3], cons
 status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                                 struct scratch_space *space, struct error *err);
 void direction_volume_release(struct direction_volume *v);
-/* Unit direction of a voxel; only meaningful where density > 0. Decoding error below 0.005 degrees. */
+/* Unit direction of a voxel; only meaningful where density > 0. Decoding error below 0.005 degrees. What is set may have any length but 0. */
 void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3]);
 void direction_volume_set(struct direction_volume *v, size_t i_voxel, const float d[3]);
 

@@ -9,12 +9,13 @@
 #include <stdio.h>
 
 typedef struct volume_reader {
-    const char *id;
-    /* Does this reader take the files? Decided by the first bytes of the first file (at least 16, zero-padded). */
+    const char *id; /* "tiff.v1" */
+    /* Does this reader take the files? Decided by the first 16 bytes of the first file (zero-padded) and its name. */
     bool (*recognise)(const uint8_t first_byte[16], const char *path);
-    /* On success *handle is closed by close; info is complete but for reader_id. */
+    /* On success *handle is closed by close; info is complete but for reader_id. Errors as volume_source_open says. */
     status (*open)(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
                    struct error *err);
+    /* Slices i_slice .. i_slice + n_slice - 1, which exist, into value[n_slice][rows][columns]. */
     status (*read)(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);
     void (*close)(void *handle);
 } volume_reader;

@@ -50,7 +50,7 @@ void voxel_stream_close(struct voxel_stream *v)
     free(v);
 }
 
-/* ", which fits uint8, int8" when exactly that type would explain the file's length, else "". */
+/* ", which fits uint8, int8" for the types that would explain the file's length exactly, else "". */
 static const char *types_that_fit(const struct voxel_layout *l, uint64_t have, char *text, size_t n_text)
 {
     uint64_t n_voxel = (uint64_t)l->n[0] * l->n[1] * l->n[2];
@@ -138,6 +138,7 @@ status voxel_stream_open(const char *name, const char *data_path, const struct v
 
 static status short_data(const struct voxel_stream *v, size_t i_slice, struct error *err)
 {
+    if (ferror(v->file)) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
     return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': '%s' ends or is damaged in slice %zu",
                            v->name, path_file_name(v->data_path), i_slice + 1);
 }
@@ -165,8 +166,8 @@ static status start_inflating(struct voxel_stream *v, struct error *err)
     if (v->inflating) inflateEnd(&v->inflate);
     v->inflating = false;
     v->inflate = (z_stream){0};
-    if (fseeko(v->file, v->layout.offset_bytes, SEEK_SET) != 0 || inflateInit2(&v->inflate, 32 + MAX_WBITS) != Z_OK)
-        return short_data(v, 0, err);
+    if (fseeko(v->file, v->layout.offset_bytes, SEEK_SET) != 0) return short_data(v, 0, err);
+    if (inflateInit2(&v->inflate, 32 + MAX_WBITS) != Z_OK) return no_memory(v->name, err);
     v->inflating = true;
     v->next_slice = 0;
     long long left = v->layout.skip_bytes;

@@ -203,6 +203,35 @@ static void test_raw(void **state)
     raw.header_bytes = (size_t)1 << 62;
     snprintf(raw.type, sizeof raw.type, "uint8");
     check_refused(path, &raw, STATUS_FORMAT, "volume.files", "too short");
+    raw.header_bytes = SIZE_MAX; /* as an offset it would mean 'at the end of the file' */
+    check_refused(path, &raw, STATUS_INVALID, "volume.raw.header_bytes", "makes no sense");
+    raw.header_bytes = 2;
+    raw.n[1] = 0;
+    check_refused(path, &raw, STATUS_INVALID, "volume.raw.shape", "2 x 0 x 2");
+    raw.n[1] = (1u << 20) + 1;
+    check_refused(path, &raw, STATUS_INVALID, "volume.raw.shape", "2 x 1048577 x 2");
+}
+
+/* Every reader of the registry has an id of its own with a version, takes its own kind of file only, and refuses that cut short. */
+static void test_registry(void **state)
+{
+    static const char begin[][16] = {"II*", "NDims = 3\n", "NRRD0004\n", "VOL\3", "hello, there"}; /* one for each reader, and none */
+    assert_int_equal(volume_reader_count(), sizeof begin / sizeof begin[0] - 1);
+    for (size_t i = 0; i < volume_reader_count(); i++) {
+        const volume_reader *r = volume_reader_at(i);
+        const char *version = strrchr(r->id, '.'), *path = scratch_path(state, "cut.short");
+        assert_true(version != NULL && version[1] == 'v' && version[2] >= '1' && version[2] <= '9');
+        for (size_t k = 0; k < i; k++) assert_string_not_equal(r->id, volume_reader_at(k)->id);
+        for (size_t k = 0; k < sizeof begin / sizeof begin[0]; k++)
+            if (r->recognise((const uint8_t *)begin[k], "scan") != (k == i)) fail_msg("%s and '%s'", r->id, begin[k]);
+        scratch_write(path, begin[i], 4);
+        void *handle = NULL;
+        struct volume_source_info info;
+        struct error err = {0};
+        assert_int_equal(r->open(&path, 1, &handle, &info, &err), STATUS_FORMAT);
+        if (strstr(err.text, "'cut.short'") == NULL || strcmp(err.field, "volume.files") != 0) fail_msg("%s: %s", r->id, err.text);
+        assert_null(handle);
+    }
 }
 
 /* A picture is noise when its bytes are swapped; noise and coarse values (multiples of 256) are no reason to refuse. */
@@ -322,7 +351,7 @@ int main(void)
         cmocka_unit_test(test_nrrd_types_and_orders), cmocka_unit_test(test_nrrd_gzip_and_skips), cmocka_unit_test(test_nrrd_detached),
         cmocka_unit_test(test_nrrd_refused),          cmocka_unit_test(test_raw),                 cmocka_unit_test(test_wrong_byte_order),
         cmocka_unit_test(test_metaimage),             cmocka_unit_test(test_vol),
-        cmocka_unit_test(test_raw_in_a_job),
+        cmocka_unit_test(test_raw_in_a_job),          cmocka_unit_test(test_registry),
     };
     return cmocka_run_group_tests(test, scratch_folder_setup, scratch_folder_teardown);
 }
