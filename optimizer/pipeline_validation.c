@@ -45,8 +45,9 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
     }
 }
 
-static void evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
-                         struct objective_value *value)
+/* NaN when the set has no rows. */
+static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
+                           struct objective_value *value, struct error *err)
 {
     const struct validation *v = &m->validation;
     struct observation_set part;
@@ -54,28 +55,30 @@ static void evaluate_set(const struct pipeline_context *c, const struct pipeline
     struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
     observation_set_init(&part);
     *value = (struct objective_value){NAN, NAN, NAN};
-    if (a != NULL && observation_set_select(&c->observation, set, &part, NULL) == STATUS_OK && part.n > 0) {
-        for (size_t i = 0; i < n; i++) {
-            if (c->observation.item[i].set != set) continue;
-            nuisance_show(&m->fit.nuisance, &v->replica[0][i], &a[n_part]);
-            nuisance_show(&m->fit.nuisance, &v->replica[1][i], &b[n_part++]);
-        }
-        objective_evaluate(&part, a, b, value);
+    status s = a != NULL ? observation_set_select(&c->observation, set, &part, err)
+                         : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        if (c->observation.item[i].set != set) continue;
+        nuisance_show(&m->fit.nuisance, &v->replica[0][i], &a[n_part]);
+        nuisance_show(&m->fit.nuisance, &v->replica[1][i], &b[n_part++]);
     }
+    if (s == STATUS_OK && part.n > 0) objective_evaluate(&part, a, b, value);
     observation_set_release(&part);
     free(a);
+    return s;
 }
 
-static void score_validation(const struct pipeline_context *c, struct pipeline_model *m)
+static status score_validation(const struct pipeline_context *c, struct pipeline_model *m, struct error *err)
 {
     struct validation *v = &m->validation;
-    evaluate_set(c, m, JOB_SET_FIT, &v->fit);
-    evaluate_set(c, m, JOB_SET_HELD_OUT, &v->held_out);
+    status s = evaluate_set(c, m, JOB_SET_FIT, &v->fit, err);
+    if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, &v->held_out, err);
     v->worst_rel_se = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         for (int k = 0; k < 3; k++)
             v->worst_rel_se = fmax(v->worst_rel_se, 0.5 * sqrt(v->replica[0][i].var[k] + v->replica[1][i].var[k]) /
                                                         brightness(&c->observation.item[i]));
+    return s;
 }
 
 static status allocate_validations(struct pipeline_context *c, struct error *err)
@@ -128,8 +131,8 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     estimator = estimate_journal_estimator(trace.journal);
     s = estimate_validation(c, m, &estimator, &of_means, n_path, err);
     if (s == STATUS_OK) s = pipeline_validate_contrast(c, i_model, n_path, &of_contrasts, err);
+    if (s == STATUS_OK) s = score_validation(c, m, err);
     if (s != STATUS_OK) goto out;
-    score_validation(c, m);
     log_info(c->log,
              "validation of %s: relative RMS error %.4f over the fitted rows, %.4f over the held-out rows; rendered "
              "means have a standard error below %.2f %%",
@@ -168,7 +171,7 @@ status stage_validation_load(struct pipeline_context *c, struct error *err)
     if (s != STATUS_OK) return s;
     estimate_sections(c, section);
     s = work_file_read(path, "validation.2", section, 4 * c->n_model, err);
-    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) score_validation(c, &c->model[i]);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = score_validation(c, &c->model[i], err);
     return s;
 }
 

@@ -25,6 +25,7 @@ struct estimate_journal {
     off_t end;      /* behind the last record that is in use */
     size_t n_bytes; /* of a payload: the same for every call of one fit */
     uint8_t *payload, *record;
+    uint8_t *asked; /* the call part of a payload, to compare with */
 };
 
 struct call_header {
@@ -32,11 +33,15 @@ struct call_header {
     double wall_s;
 };
 
+static size_t call_bytes(const struct estimator *e)
+{
+    return sizeof(struct call_header) + e->n_param * sizeof(double) + e->n_configuration * sizeof(uint64_t);
+}
+
 static size_t payload_bytes(const struct estimator *e)
 {
     size_t per_estimate = (6 + 6 * e->n_param) * sizeof(double) + 2 * sizeof(uint64_t);
-    return sizeof(struct call_header) + e->n_param * sizeof(double) +
-           e->n_configuration * (sizeof(uint64_t) + per_estimate);
+    return call_bytes(e) + e->n_configuration * per_estimate;
 }
 
 static void put(uint8_t **p, const void *data, size_t n)
@@ -150,10 +155,15 @@ status estimate_journal_open(const char *path, uint64_t fingerprint, const struc
     j->n_bytes = payload_bytes(live);
     j->record = malloc(RECORD_HEADER_BYTES + j->n_bytes);
     j->payload = j->record != NULL ? j->record + RECORD_HEADER_BYTES : NULL;
+    j->asked = malloc(call_bytes(live));
     size_t n_path = strlen(path);
     j->fd = -1;
-    if (j->record == NULL || n_path >= sizeof j->path) {
+    if (j->record == NULL || j->asked == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot open checkpoint '%s': out of memory", path);
+        goto out;
+    }
+    if (n_path >= sizeof j->path) {
+        s = error_set(err, STATUS_INVALID, "cannot open checkpoint '%.200s...': its path is too long", path);
         goto out;
     }
     memcpy(j->path, path, n_path + 1);
@@ -176,6 +186,7 @@ void estimate_journal_close(struct estimate_journal *j)
     if (j == NULL) return;
     if (j->fd >= 0) close(j->fd);
     free(j->record);
+    free(j->asked);
     free(j);
 }
 
@@ -188,13 +199,9 @@ static bool replay(struct estimate_journal *j, const struct estimator_call *call
     memcpy(head, j->record, sizeof head);
     if (head[0] != j->n_bytes || head[1] != crc32(0, j->payload, (unsigned)j->n_bytes)) return false;
     memcpy(&h, j->payload, sizeof h);
-    size_t n_call = sizeof h + j->live->n_param * sizeof(double) + j->live->n_configuration * sizeof(uint64_t);
-    uint8_t *asked = malloc(n_call);
-    if (asked == NULL) return false;
-    put_call(j, call, h.wall_s, asked);
-    bool same = memcmp(asked, j->payload, n_call) == 0;
-    free(asked);
-    if (!same) return false;
+    size_t n_call = call_bytes(j->live);
+    put_call(j, call, h.wall_s, j->asked);
+    if (memcmp(j->asked, j->payload, n_call) != 0) return false;
     get_estimates(j, j->payload + n_call, out);
     *wall_s = h.wall_s;
     j->end += (off_t)(RECORD_HEADER_BYTES + j->n_bytes);

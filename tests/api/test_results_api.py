@@ -129,6 +129,20 @@ def test_long_series_costs_what_it_answers(daemon_maker):
     assert [m["id"] for m in ask("")[0]["models"]] == []  # the search's second model does not stand in the first one's place
 
 
+def test_the_result_of_a_large_job_is_in_its_view(daemon):
+    """A table of thousands of rows in several models makes some 14 MB."""
+    job = daemon.start_job("succeed")
+    daemon.wait_state(job, "succeeded")
+    path = os.path.join(daemon.data, "jobs", job, "results", "result.json")
+    with open(path) as f:
+        result = json.load(f)
+    result["rows"] = ["x" * 100] * 140_000
+    with open(path, "w") as f:
+        json.dump(result, f)
+    view = daemon.job(job)
+    assert view["result"] == result and view["parameters"] == result["parameters"]
+
+
 def test_a_job_without_output_has_empty_answers(daemon):
     job = daemon.create()
     assert daemon.get(f"/v1/jobs/{job}/series").json()["points"] == []
