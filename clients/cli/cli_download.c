@@ -72,7 +72,9 @@ static status take_piece(struct http *http, const char *url_path, struct downloa
         header[1] = if_range;
     }
     status s = http_call(http, "GET", url_path, header, NULL, 0, &reply, err);
-    if (s != STATUS_OK) {
+    if (s != STATUS_OK && reply.code == 200 && d->n_done > 0) {
+        s = restart(d, err); /* the file has changed, and is too large for one answer: its first piece comes next */
+    } else if (s != STATUS_OK) {
         *broke = reply.cut_off;
     } else if (reply.code == 416) { /* the piece begins behind the end: we have it all, be it nothing */
         *done = true;

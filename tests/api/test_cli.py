@@ -22,6 +22,7 @@ import selvedge  # noqa: E402
 
 class Daemon:
     def __init__(self, folder):
+        self.folder = str(folder)
         self.process = subprocess.Popen([os.path.join(BUILD, "bin", "selvedged"), "--data", str(folder), "--port", "0", "--worker", STUB,
                                          "--set", "disk.floor_bytes=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         line = self.process.stdout.readline()
@@ -258,6 +259,24 @@ def test_live_line_in_a_terminal(daemon, sample):
     assert b"\r\x1b[K[#" in screen and b"ETA" in screen
     drawn = [part for line in screen.replace(b"\r\n", b"\n").split(b"\n") for part in line.split(b"\r\x1b[K") if b" ETA " in part]
     assert len(drawn) > 2 and all(len(part) < 80 for part in drawn)  # a line that wraps cannot be redrawn
+
+
+def test_a_large_result_that_changed_since_its_download_broke_off(daemon, sample, tmp_path):
+    """Its first piece is of the old file: all of it comes anew, in pieces."""
+    job_id = run(daemon.url, "submit", sample / "job.json", "--watch").stdout.split()[0]
+    large = os.path.join(daemon.folder, "jobs", job_id, "results", "large.bin")
+    with open(large, "wb") as f:
+        f.truncate(70 << 20)
+        f.write(b"new")
+    out = tmp_path / "results"
+    os.makedirs(out)
+    (out / "large.bin.part").write_bytes(b"old" * 1000)
+    (out / "large.bin.part.etag").write_text('"of-the-old-file"')
+    run(daemon.url, "results", job_id, "--out", out)
+    assert os.path.getsize(out / "large.bin") == 70 << 20
+    with open(out / "large.bin", "rb") as f:
+        assert f.read(3) == b"new" and not any(f.read())
+    assert not [name for name in os.listdir(out) if ".part" in name]
 
 
 def test_python_client(daemon, sample, tmp_path):
