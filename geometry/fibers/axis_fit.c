@@ -63,7 +63,7 @@ static bool foot_of(const struct segment *g, const float p[3], float *t, float o
     }
     *t = length2 > 0.0f ? along / length2 : 0.0f;
     if ((g->is_first && *t < 0.0f) || (g->is_last && *t > 1.0f)) return false;
-    *t = fminf(1.0f, fmaxf(0.0f, *t));
+    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t; /* comparisons, here and below: fminf is a call */
     *d2 = 0.0f;
     for (int a = 0; a < 3; a++) {
         offset[a] = p[a] - *t * u[a];
@@ -137,7 +137,7 @@ static void add_to_model(const struct fit_job *job, struct brick_scratch *s, siz
 static float residual(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3], uint32_t at, float *weight)
 {
     size_t i = from[0] + at % BRICK, j = from[1] + at / BRICK % BRICK, k = from[2] + at / (BRICK * BRICK);
-    float low = (float)job->profile.low, high = (float)job->profile.high, share = fminf(1.0f, s->model[at]);
+    float low = (float)job->profile.low, high = (float)job->profile.high, share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
     float e = job->v->density[volume_index(job->v->n, i, j, k)] - low - (high - low) * share;
     float q = 1.0f / (1.0f + e * e / (OUTLIER * OUTLIER));
     *weight = q * q;

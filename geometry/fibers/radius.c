@@ -18,22 +18,35 @@ struct radius_job {
     uint8_t *part;                        /* of each segment */
 };
 
-/* Density between voxel centres, trilinear, edge values repeated. */
-static float density_between_centres(const struct volume *v, const float x[3])
+/* Where a point lies between voxel centres along one axis, edge values repeated: (1 - f) * value[i] + f * value[j]. */
+struct between {
+    size_t i, j;
+    float f;
+};
+
+static struct between between_centres(float x, size_t n)
 {
-    size_t i[3], j[3];
-    float f[3];
-    for (int a = 0; a < 3; a++) {
-        float c = fminf(fmaxf(x[a] - 0.5f, 0.0f), (float)(v->n[a] - 1));
-        i[a] = (size_t)c;
-        j[a] = i[a] + 1 < v->n[a] ? i[a] + 1 : i[a];
-        f[a] = c - (float)i[a];
+    float c = x - 0.5f, last = (float)(n - 1);
+    c = c < 0.0f ? 0.0f : c > last ? last : c;
+    size_t i = (size_t)c;
+    return (struct between){i, i + 1 < n ? i + 1 : i, c - (float)i};
+}
+
+/* Densities at the points of a row along x, trilinear between voxel centres. */
+static void row_densities(const struct volume *v, const struct between *x, size_t n_point, struct between y, struct between z, float *density)
+{
+    const float *r00 = v->density + volume_index(v->n, 0, y.i, z.i), *r10 = v->density + volume_index(v->n, 0, y.j, z.i);
+    const float *r01 = v->density + volume_index(v->n, 0, y.i, z.j), *r11 = v->density + volume_index(v->n, 0, y.j, z.j);
+    float a[BRICK + 2], b[BRICK + 2]; /* a row's points lie within a brick: its voxels and one on either side */
+    size_t from = x[0].i;
+    for (size_t i = from; i <= x[n_point - 1].j; i++) {
+        a[i - from] = (1.0f - y.f) * r00[i] + y.f * r10[i];
+        b[i - from] = (1.0f - y.f) * r01[i] + y.f * r11[i];
     }
-    const float *r00 = v->density + volume_index(v->n, 0, i[1], i[2]), *r10 = v->density + volume_index(v->n, 0, j[1], i[2]);
-    const float *r01 = v->density + volume_index(v->n, 0, i[1], j[2]), *r11 = v->density + volume_index(v->n, 0, j[1], j[2]);
-    float a0 = (1.0f - f[1]) * r00[i[0]] + f[1] * r10[i[0]], a1 = (1.0f - f[1]) * r00[j[0]] + f[1] * r10[j[0]];
-    float b0 = (1.0f - f[1]) * r01[i[0]] + f[1] * r11[i[0]], b1 = (1.0f - f[1]) * r01[j[0]] + f[1] * r11[j[0]];
-    return (1.0f - f[2]) * ((1.0f - f[0]) * a0 + f[0] * a1) + f[2] * ((1.0f - f[0]) * b0 + f[0] * b1);
+    for (size_t k = 0; k < n_point; k++) {
+        size_t i = x[k].i - from, j = x[k].j - from;
+        density[k] = (1.0f - z.f) * ((1.0f - x[k].f) * a[i] + x[k].f * a[j]) + z.f * ((1.0f - x[k].f) * b[i] + x[k].f * b[j]);
+    }
 }
 
 static size_t part_of(size_t i_brick) { return (uint32_t)(i_brick * 2246822519u) >> 29; }
@@ -61,14 +74,16 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
     uint32_t *nearest = job->nearest + i_thread * FINE * FINE * FINE;
     struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, RADIUS_UPSAMPLING);
     segment_distances(job->bricks, i_brick, &l, distance2, nearest);
-    float inverse_bin = (float)(1.0 / own->bin_voxel);
+    float inverse_bin = (float)(1.0 / own->bin_voxel), row[FINE];
+    struct between x[FINE];
     size_t at = 0;
+    for (size_t i = 0; i < l.n[0]; i++) x[i] = between_centres(l.origin[0] + ((float)i + 0.5f) * l.spacing, job->v->n[0]);
     for (size_t k = 0; k < l.n[2]; k++)
-        for (size_t j = 0; j < l.n[1]; j++)
+        for (size_t j = 0; j < l.n[1]; j++) {
+            row_densities(job->v, x, l.n[0], between_centres(l.origin[1] + ((float)j + 0.5f) * l.spacing, job->v->n[1]),
+                          between_centres(l.origin[2] + ((float)k + 0.5f) * l.spacing, job->v->n[2]), row);
             for (size_t i = 0; i < l.n[0]; i++, at++) {
-                const float x[3] = {l.origin[0] + ((float)i + 0.5f) * l.spacing, l.origin[1] + ((float)j + 0.5f) * l.spacing,
-                                    l.origin[2] + ((float)k + 0.5f) * l.spacing};
-                float density = density_between_centres(job->v, x);
+                float density = row[i];
                 size_t bin = (size_t)(sqrtf(distance2[at]) * inverse_bin);
                 if (nearest[at] == UINT32_MAX || bin >= RADIUS_BINS) {
                     far->far_inside += density >= job->eps_d;
@@ -82,6 +97,7 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
                 (density >= job->eps_d ? h->inside : h->outside)[axis][bin]++;
                 h->density_sum[axis][bin] += (uint64_t)(255.0f * density + 0.5f);
             }
+        }
 }
 
 static void add_histogram(struct distance_histogram *to, const struct distance_histogram *from)
