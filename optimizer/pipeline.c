@@ -195,7 +195,7 @@ static status claim_inputs(struct pipeline_context *c, struct error *err)
     bool changed;
     job_document_visit_files(c->doc, add_input, &input);
     status s = worker_folder_claim_inputs(c->folder, c->fingerprint << 32 | input.sum, &changed, err);
-    if (s == STATUS_OK && changed) log_info(c->log, "the inputs have changed since the last run: starting anew");
+    if (s == STATUS_OK && changed) log_info(c->log, "the inputs, or the program, have changed since the last run: starting anew");
     return s;
 }
 
@@ -212,6 +212,20 @@ static status select_rows(struct pipeline_context *c, struct error *err)
                : s;
 }
 
+enum { PROGRAM_MAX_BYTES = 256 << 20 };
+
+/* Of the running program: another build may trace other numbers, which must not be mixed with those of the run before. 0
+ * where the system does not show it. */
+static uint32_t program_sum(void)
+{
+    char *text = NULL;
+    size_t n = 0;
+    if (file_read_all("/proc/self/exe", PROGRAM_MAX_BYTES, &text, &n, NULL) != STATUS_OK) return 0;
+    uint32_t sum = (uint32_t)crc32_z(0, (const void *)text, n);
+    free(text);
+    return sum;
+}
+
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -220,7 +234,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
     s = job_document_parse(text, n, &c->doc, err);
-    c->fingerprint = crc32(0, (const unsigned char *)text, (unsigned)n);
+    c->fingerprint = crc32_z(program_sum(), (const void *)text, n);
     free(text);
     if (s == STATUS_OK) s = set_models(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);

@@ -70,7 +70,7 @@ struct pipeline_context {
     struct progress progress; /* of the running stage */
 
     struct job_document *doc;
-    uint64_t fingerprint;               /* of the job document's text */
+    uint64_t fingerprint;               /* of the job document's text and this build of the program */
     struct observation_set observation; /* all */
     struct observation_set fitted;      /* those of the set "fit" */
     struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */

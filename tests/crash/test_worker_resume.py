@@ -27,8 +27,8 @@ def make_job(folder, **fit):
     return folder
 
 
-def start(folder, threads=1):
-    return subprocess.Popen([WORKER, "--quiet", "--threads", str(threads), folder], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+def start(folder, threads=1, program=WORKER):
+    return subprocess.Popen([program, "--quiet", "--threads", str(threads), folder], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
 
 def finish(folder, threads=1):
@@ -153,6 +153,23 @@ def test_edited_document_starts_anew(reference, tmp_path):
     with open(os.path.join(folder, "series.rec")) as f:
         steps = [json.loads(line[9:])["step"] for line in f]
     assert steps == list(range(len(steps)))
+
+
+def test_another_build_starts_anew(tmp_path):
+    """Estimates of another build of the program are not mixed with this one's."""
+    folder = make_job(str(tmp_path / "job"))
+    other = str(tmp_path / "other-build")
+    shutil.copy(WORKER, other)
+    with open(other, "ab") as f:
+        f.write(b"another build")
+    assert kill_when(folder, 1, lambda: journal_bytes(folder, "fit") > 20)
+    journal = os.path.join(folder, "work", "fit", "estimates.journal")
+    with open(journal, "rb") as before:  # held open, so that its inode is not given to the new one
+        worker = start(folder, program=other)
+        worker.communicate(timeout=120)
+        assert worker.returncode == 0
+        assert os.fstat(before.fileno()).st_nlink == 0, "the old journal was continued"
+    assert [r["step"] for r in outcome(folder)[1]] == list(range(len(outcome(folder)[1])))
 
 
 def test_stage_that_runs_again_outdates_later_ones(reference, tmp_path):
