@@ -26,11 +26,15 @@ def missing_data(name):
     return [f for f in JOBS[name][1] if not os.path.exists(os.path.join(DATA, f))]
 
 
-def run_job(name, folder, timeout_s=900):
-    """Run a job in `folder`; returns (result.json, the series' records, wall seconds)."""
+def run_job(name, folder, timeout_s=900, **fit):
+    """Run a job in `folder`; returns (result.json, the series' records, wall seconds). fit: options in place of the example's."""
     document, files = JOBS[name]
     os.makedirs(os.path.join(folder, "input"))
-    shutil.copy(os.path.join(ROOT, "config", "examples", document), os.path.join(folder, "job.json"))
+    with open(os.path.join(ROOT, "config", "examples", document)) as f:
+        job = json.load(f)
+    job["fit"].update(fit)
+    with open(os.path.join(folder, "job.json"), "w") as f:
+        json.dump(job, f)
     for f in files:
         shutil.copy(os.path.join(DATA, f), os.path.join(folder, "input"))
     start = time.monotonic()
