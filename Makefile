@@ -88,7 +88,9 @@ TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	@echo "  LINK $@"
-	@$(CC) $(LDFLAGS) -o $@ $^ -lcmocka $(LINK_SERVER) $(LINK_OPTIMIZER)
+	@$(CC) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lcmocka $(LINK_SERVER) $(LINK_OPTIMIZER)
+# bench_fit is more than one file
+$(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
 .SECONDARY:
 
 deps:              ## install what is missing (Debian packages, as root or through sudo)

@@ -280,11 +280,8 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
     const struct progress quiet = progress_silent(progress);
     for (size_t i_round = 0; i_round <= n_round; i_round++) {
         sort_into_cells(&r);
-        if (st == STATUS_OK) st = thread_pool_run(pool, n_task, look, &r, &quiet);
-        if (st != STATUS_OK) {
-            error_set(err, st, "cancelled while making the phantom");
-            goto out;
-        }
+        st = thread_pool_run(pool, n_task, look, &r, &quiet);
+        if (st != STATUS_OK) goto out;
         if (i_round == n_round) break; /* the last look only measures */
         for (size_t k = 0; k < s->n_node; k++)
             for (int a = 0; a < 3; a++) {
@@ -298,6 +295,7 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
             for (size_t i = 0; i < s->n_node && st == STATUS_OK; i++)
                 for (int a = 0; a < 3; a++) s->p[i][a] += r.move[i][a];
         }
+        if (st != STATUS_OK) goto out;
         progress_report(progress, (double)(i_round + 1) / (double)n_round);
     }
     report->overlap_mean = report->overlap_max = 0.0;
@@ -308,5 +306,5 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
     report->strain_p95 = strain_p95(&r);
 out:
     relax_release(&r);
-    return st;
+    return st == STATUS_CANCELLED ? error_set(err, st, "cancelled while making the phantom") : st;
 }

@@ -27,6 +27,13 @@ def make_job(folder, **fit):
     return folder
 
 
+def edit_seed(folder, seed):
+    document = read_json(folder, "job.json")
+    document["fit"]["seed"] = seed
+    with open(os.path.join(folder, "job.json"), "w") as f:
+        json.dump(document, f)
+
+
 def start(folder, threads=1, program=WORKER):
     return subprocess.Popen([program, "--quiet", "--threads", str(threads), folder], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
@@ -143,10 +150,7 @@ def test_edited_document_starts_anew(reference, tmp_path):
     fit, source, want = reference
     folder = str(tmp_path / "job")
     shutil.copytree(source, folder)
-    document = read_json(folder, "job.json")
-    document["fit"]["seed"] = 8
-    with open(os.path.join(folder, "job.json"), "w") as f:
-        json.dump(document, f)
+    edit_seed(folder, 8)
     finish(folder, 2)
     assert outcome(folder)[0]["seed"] == 8
     assert outcome(folder)[0]["parameters"] != want[0]["parameters"]
@@ -196,10 +200,7 @@ def test_killed_while_removing_what_is_outdated(reference, tmp_path):
     fit, source, _ = reference
     folder = str(tmp_path / "job")
     shutil.copytree(source, folder)
-    document = read_json(folder, "job.json")
-    document["fit"]["seed"] = 8
-    with open(os.path.join(folder, "job.json"), "w") as f:
-        json.dump(document, f)
+    edit_seed(folder, 8)
     os.remove(os.path.join(folder, "work", "inputs.fingerprint"))
     finish(folder, 2)
     whole = make_job(str(tmp_path / "whole"), **{**fit, "seed": 8})

@@ -1,0 +1,143 @@
+/* Measured tables: figures fit.real.* of bench_fit. */
+#include "base/durable.h"
+#include "optimizer/descent/method_names.h"
+#include "optimizer/photographs/measurement_table.h"
+#include "tests/bench/fit_bench.h"
+
+#include <glob.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_REAL = 32 };
+
+struct real_row {
+    char sample[64];
+    struct observation_set observation;
+    double error[BENCH_N_MODEL][2]; /* fitted, held out */
+};
+
+static void tell_rows(const struct fit_phantom *f, const double *param, size_t n_path)
+{
+    struct estimate e[FIT_MAX_OBSERVATION];
+    const double deg = 180.0 / M_PI;
+    fit_phantom_render(f, param, n_path, e);
+    fprintf(stderr, "  %-12s %5s %5s %5s %5s %5s  %-24s  %s\n", "row", "lamp", "phi", "cam", "phi", "turn", "measured", "rendered / measured");
+    for (size_t i = 0; i < f->observation.n; i++) {
+        const struct observation *o = &f->observation.item[i];
+        const struct configuration *k = &o->configuration;
+        fprintf(stderr, "  %-12s %5.0f %5.0f %5.0f %5.0f %5.0f ", o->name, k->light_theta_rad * deg, k->light_phi_rad * deg,
+                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->cloth_rotation_rad * deg);
+        for (int c = 0; c < 3; c++) fprintf(stderr, " %7.4f", o->mean_rgb[c]);
+        for (int c = 0; c < 3; c++) fprintf(stderr, "  %5.2f +- %.2f", e[i].mean[c] / o->mean_rgb[c], sqrt(e[i].var[c]) / o->mean_rgb[c]);
+        fputc('\n', stderr);
+    }
+}
+
+/* The tables hold each row twice, with the cloth turned by 0 and by 90 degrees, and equal values: one mean over rotations is enough. */
+static void take_as_isotropic(struct observation_set *o)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < o->n; i++) {
+        if (o->item[i].configuration.cloth_rotation_rad != 0.0) continue;
+        o->item[n] = o->item[i];
+        o->item[n++].configuration.n_rotation = CONFIGURATION_ALL_ROTATIONS;
+    }
+    o->n = n;
+}
+
+static void read_table(const struct bench *b, const char *path, struct real_row *row)
+{
+    struct error err = {0};
+    char *text = NULL;
+    size_t n = 0;
+    const struct job_document set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0, .black_sheet = true};
+    observation_set_init(&row->observation);
+    fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
+    fit_check(measurement_table_parse(text, n, row->sample, &set_up, &row->observation, &err), &err);
+    if (!b->as_stated) take_as_isotropic(&row->observation);
+    free(text);
+}
+
+/* Both errors by fresh paths: the fit's own objective is at its lowest partly by the luck of the paths that it was fitted to. */
+static void score_table(const struct bench *b, const struct fit_phantom *f, const double *param, size_t k, struct real_row *row)
+{
+    for (int held_out = 0; held_out < 2; held_out++) {
+        char what[160];
+        const struct fit_score s = fit_phantom_score(f, held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT, NULL, 0, param, b->score_paths / 2);
+        row->error[k][held_out] = s.rel_rms;
+        fprintf(stderr, "  %s %.3f +- %.3f\n", held_out ? "held out" : "fitted", s.rel_rms, s.se);
+        snprintf(what, sizeof what, "%s.%s.%s", row->sample, bench_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");
+        bench_print("real", what, s.rel_rms, "1", "lower");
+    }
+}
+
+static void fit_table(const struct bench *b, const struct fit_cloth *cloth, size_t k, struct real_row *row)
+{
+    struct fit_phantom f;
+    struct fit_result r;
+    fprintf(stderr, "%s, %s\n", row->sample, bench_model[k].name);
+    fit_phantom_init_on(&f, b->folder, b->pool, cloth, bench_model[k].id, NULL);
+    fit_phantom_observe(&f, &row->observation);
+    bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
+    bench_tell_fit(&f, &r);
+    if (b->row_paths > 0) tell_rows(&f, r.param, b->row_paths);
+    score_table(b, &f, r.param, k, row);
+    fit_phantom_release(&f);
+}
+
+static void print_table(const struct real_row *row, size_t n)
+{
+    fprintf(stderr, "%-32s", "relative RMS, fitted / held out");
+    for (size_t k = 0; k < BENCH_N_MODEL; k++) fprintf(stderr, "%20s", bench_model[k].name);
+    for (size_t i = 0; i < n; i++) {
+        fprintf(stderr, "\n%-32s", row[i].sample);
+        for (size_t k = 0; k < BENCH_N_MODEL; k++)
+            fprintf(stderr, "%12.3f / %.3f", row[i].error[k][0], row[i].error[k][1]);
+    }
+    fputc('\n', stderr);
+}
+
+/* The cloth that a sample is fitted on, made when the first one asks for it. */
+static const struct fit_cloth *real_cloth(const struct bench *b, const char *data, const char *sample, struct fit_cloth cloth[2])
+{
+    const bool felt = strstr(sample, "felt") != NULL;
+    char yarn[1024];
+    if (cloth[felt].scene != NULL) return &cloth[felt];
+    snprintf(yarn, sizeof yarn, "%s/yarns/cotton1.txt", data);
+    const char *file = b->yarn == NULL ? yarn : b->yarn;
+    fit_cloth_init(&cloth[felt], felt ? PHANTOM_FELT : PHANTOM_PLAIN, felt || strcmp(file, "none") == 0 ? NULL : file, true, b->pool);
+    return &cloth[felt];
+}
+
+void bench_real(const struct bench *b)
+{
+    const char *set = getenv("SELVEDGE_DATA"), *data = set != NULL ? set : "../shared/data";
+    char pattern[1024];
+    glob_t found;
+    struct real_row row[MAX_REAL] = {0};
+    struct fit_cloth cloth[2];
+    size_t n = 0;
+    memset(cloth, 0, sizeof cloth);
+    snprintf(pattern, sizeof pattern, "%s/measured-reflectance/*.csv", data);
+    if (glob(pattern, 0, NULL, &found) != 0) {
+        fprintf(stderr, "skipped: no '%s' (set SELVEDGE_DATA)\n", pattern);
+        return;
+    }
+    for (size_t i = 0; i < found.gl_pathc && n < MAX_REAL; i++) {
+        const char *slash = strrchr(found.gl_pathv[i], '/');
+        snprintf(row[n].sample, sizeof row[n].sample, "%s", slash != NULL ? slash + 1 : found.gl_pathv[i]);
+        row[n].sample[strcspn(row[n].sample, ".")] = '\0';
+        if (b->sample != NULL && strcmp(b->sample, row[n].sample) != 0) continue;
+        read_table(b, found.gl_pathv[i], &row[n++]);
+    }
+    for (size_t k = 0; k < BENCH_N_MODEL; k++)
+        for (size_t i = 0; i < n && bench_takes_model(b, k); i++) fit_table(b, real_cloth(b, data, row[i].sample, cloth), k, &row[i]);
+    print_table(row, n);
+    for (size_t i = 0; i < n; i++) observation_set_release(&row[i].observation);
+    for (size_t k = 0; k < 2; k++)
+        if (cloth[k].scene != NULL) fit_cloth_release(&cloth[k]);
+    globfree(&found);
+}
