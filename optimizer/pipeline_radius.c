@@ -133,15 +133,6 @@ out:
     return s;
 }
 
-/* Variance of a residual that the photographs' own errors explain. */
-static double photograph_variance(const struct observation_set *o)
-{
-    double sum = 0.0;
-    for (size_t i = 0; i < o->n; i++)
-        for (int k = 0; k < 3; k++) sum += objective_weight(&o->item[i]) * o->item[i].se_rgb[k] * o->item[i].se_rgb[k];
-    return sum / (3.0 * (double)o->n);
-}
-
 /* From the place on the curve to the radius and its error. */
 static void conclude(struct pipeline_context *c)
 {
@@ -149,7 +140,7 @@ static void conclude(struct pipeline_context *c)
     const struct pipeline_model *m = &c->model[r->i_model];
     double n_free = 1.0, n_row = 3.0 * (double)c->fitted.n;
     for (size_t p = 0; p < m->appearance.n_param; p++) n_free += m->parameter[p].fixed ? 0.0 : 1.0;
-    double s2 = fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), photograph_variance(&c->fitted));
+    double s2 = fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), objective_mean_photograph_variance(&c->fitted));
     double var = r->curve.u_se * r->curve.u_se + (r->curve.curvature > 0.0 ? 2.0 * s2 / r->curve.curvature : INFINITY);
     double range = log(r->upper_m / r->lower_m);
     r->curve.determined = r->curve.determined && sqrt(var) < 0.5 * range / sqrt(12.0);

@@ -180,7 +180,7 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
         result->wall_s = g->run.wall_s;
         result->objective.value = linear_model_objective(&model, &result->objective.se);
         result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)model.n_row);
-        uncertainty_compute(&model, problem->observation, g->run.coordinate, g->run.fixed, &result->uncertainty);
+        uncertainty_compute(&model, g->run.coordinate, g->run.fixed, &result->uncertainty);
         result->converged = best->turn <= 0.3 && best->i_run > 0 && best->i_run < N_RUN - 1;
         snprintf(result->reason, sizeof result->reason,
                  "run %d of %d had the lowest objective%s; successive steps have a mean cosine of %.2f (below 0.3 "

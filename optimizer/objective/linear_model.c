@@ -68,7 +68,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
 {
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
-    double *block = calloc(2 * per_replica + n_row, sizeof *block);
+    double *block = calloc(2 * per_replica + 3 * n_row, sizeof *block);
     if (block == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot hold a model of %zu residuals: out of memory", n_row);
     for (size_t q = 0; q < 2; q++) {
@@ -79,7 +79,9 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
     }
     m->row_var = 1.0;
     m->weight = block + 2 * per_replica;
-    for (size_t row = 0; row < n_row; row++) m->weight[row] = 1.0;
+    m->photograph_var = m->weight + n_row;
+    m->extra = m->photograph_var + n_row;
+    for (size_t row = 0; row < n_row; row++) m->weight[row] = m->extra[row] = 1.0;
     return STATUS_OK;
 }
 
@@ -354,6 +356,10 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     m->n_effective = 0.0;
     for (size_t i = 0; i < h->observation->n; i++)
         pool_configuration(m, h, mean, i, change, weight);
+    for (size_t row = 0; row < m->n_row; row++) {
+        m->photograph_var[row] = objective_photograph_variance(&h->observation->item[row / 3], row % 3);
+        m->extra[row] = h->observation->item[row / 3].weight;
+    }
     m->n_effective /= (double)h->observation->n;
     if (m->gain_sd > 0.0) absorb_gains(m, h->observation);
 out:
@@ -381,11 +387,36 @@ double linear_model_objective(const struct linear_model *m, double *se)
     return value;
 }
 
-void linear_model_weigh(struct linear_model *m)
+/* Variance by tracing and photograph, without the extra weight; NaN for a row of weight 0, which says nothing. */
+static double row_noise(const struct linear_model *m, size_t row)
 {
-    double misfit = fmax(linear_model_objective(m, NULL) / (double)m->n_row, 1e-6), mean = 0.0;
+    return (0.25 * (m->r_var[0][row] + m->r_var[1][row]) + m->photograph_var[row]) / m->extra[row];
+}
+
+double linear_model_misfit(const struct linear_model *m, size_t n_free)
+{
+    enum { ROUND = 8 };
+    double n = (double)m->n_row, freedom = fmax(1.0, n - (double)n_free) / n;
+    double misfit = fmax(linear_model_objective(m, NULL), 0.0) / n;
+    for (int round = 0; round < ROUND; round++) {
+        double sum = 0.0, square = 0.0, photograph = 0.0;
+        for (size_t row = 0; row < m->n_row; row++) {
+            if (!(m->extra[row] > 0.0)) continue;
+            double var = misfit + row_noise(m, row) + 1e-12, weight = 1.0 / (var * var);
+            square += weight * m->r[0][row] * m->r[1][row] / m->extra[row];
+            photograph += weight * m->photograph_var[row] / m->extra[row];
+            sum += weight;
+        }
+        misfit = sum > 0.0 ? fmax(0.0, (square / freedom - photograph) / sum) : 0.0;
+    }
+    return misfit;
+}
+
+void linear_model_weigh(struct linear_model *m, size_t n_free)
+{
+    double misfit = linear_model_misfit(m, n_free), mean = 0.0;
     for (size_t row = 0; row < m->n_row; row++) {
-        m->weight[row] = 1.0 / (misfit + 0.25 * (m->r_var[0][row] + m->r_var[1][row]));
+        m->weight[row] = 1.0 / fmax(misfit + (m->extra[row] > 0.0 ? row_noise(m, row) : 0.0), 1e-6);
         mean += m->weight[row] / (double)m->n_row;
     }
     for (size_t row = 0; row < m->n_row; row++) m->weight[row] /= mean;

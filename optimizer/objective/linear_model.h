@@ -41,6 +41,8 @@ struct linear_model {
     double x_ref[SCATTERING_MAX_PARAM];
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
+    double *photograph_var; /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
+    double *extra;      /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
     double *weight;     /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
     double row_var;     /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
     const struct gaussian_prior *prior; /* n_param, NULL: none; the caller's */
@@ -69,11 +71,16 @@ void linear_model_release(struct linear_model *m);
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref,
                          struct error *err);
 
-/* Row weights v0 / (v_misfit + v_row): what is left of f per row, against the row's Monte-Carlo variance. While noise
- * rules, rows that are known well count more (bright channels have the longest paths and the most noise); as paths add
- * up, or where the model does not fit, all weights go to 1 and the minimum is that of f. Weights are kept until the
- * next call and by linear_model_pool. */
-void linear_model_weigh(struct linear_model *m);
+/* Variance of a residual (of extra weight 1) that neither tracing nor the photographs' stated errors explain, per degree of
+ * freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their variance)^2, found by iterating: rows that are
+ * known to 0.5 % say more about a misfit of 1 % than those known to 5 %. */
+double linear_model_misfit(const struct linear_model *m, size_t n_free);
+/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, without extra weights,
+ * which act as they are. While noise rules, rows
+ * that are known well count more (bright channels have the longest paths and the most noise); where the model does not
+ * fit, or photographs state no errors and paths add up, all weights go to 1 and the minimum is that of f. Weights are kept
+ * until the next call and by linear_model_pool. */
+void linear_model_weigh(struct linear_model *m, size_t n_free);
 
 /* s2 sum ((x - mean) / sd)^2 with s2 = row_var: what the priors add to f at x. */
 double linear_model_penalty(const struct linear_model *m, const double *x);

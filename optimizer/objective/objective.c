@@ -12,6 +12,18 @@ double objective_relative_weight(const struct observation *o)
 
 double objective_weight(const struct observation *o) { return o->weight * objective_relative_weight(o); }
 
+double objective_photograph_variance(const struct observation *o, size_t channel)
+{
+    return objective_weight(o) * o->se_rgb[channel] * o->se_rgb[channel];
+}
+
+double objective_mean_photograph_variance(const struct observation_set *o)
+{
+    double sum = 0.0;
+    for (size_t row = 0; row < 3 * o->n; row++) sum += objective_photograph_variance(&o->item[row / 3], row % 3);
+    return o->n > 0 ? sum / (3.0 * (double)o->n) : 0.0;
+}
+
 double objective_image_difference(const double x_rgb[3], const double y_rgb[3])
 {
     double sum = 0.0;

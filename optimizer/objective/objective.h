@@ -37,6 +37,10 @@ double objective_relative_weight(const struct observation *o);
 /* w_i */
 double objective_weight(const struct observation *o);
 
+/* w_i se_ic^2: variance of a residual by the photograph's stated error; and its mean over all rows. */
+double objective_photograph_variance(const struct observation *o, size_t channel);
+double objective_mean_photograph_variance(const struct observation_set *o);
+
 /* a, b: one estimate per observation, from independent replicas. */
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out);

@@ -1,5 +1,4 @@
 #include "optimizer/objective/uncertainty.h"
-#include "optimizer/objective/objective.h"
 #include "optimizer/objective/small_matrix.h"
 
 #include <math.h>
@@ -10,24 +9,10 @@ enum { N = SCATTERING_MAX_PARAM };
 /* A quantity that is positive and spans decades is not known when it may be half or twice as large (one standard error). */
 static const double log_determined = 0.69;
 
-/* Squared residuals (without Monte-Carlo bias) beyond what the photographs' own noise explains, per degree of freedom.
- */
-static double misfit_variance(const struct linear_model *m, const struct observation_set *o, size_t n_free)
-{
-    double f = linear_model_objective(m, NULL), photograph = 0.0;
-    for (size_t i = 0; i < o->n; i++)
-        for (int c = 0; c < 3; c++)
-            photograph += objective_weight(&o->item[i]) * o->item[i].se_rgb[c] * o->item[i].se_rgb[c];
-    double n = (double)m->n_row, freedom = fmax(1.0, n - (double)n_free);
-    return fmax(0.0, f / freedom - photograph / n);
-}
-
 /* V of one row, without Monte-Carlo noise. */
-static double row_variance(const struct observation_set *o, size_t row, double misfit)
+static double row_variance(const struct linear_model *m, size_t row, double misfit)
 {
-    const struct observation *item = &o->item[row / 3];
-    double se = item->se_rgb[row % 3];
-    return objective_weight(item) * se * se + misfit * item->weight;
+    return m->photograph_var[row] + misfit * m->extra[row];
 }
 
 static double row_noise(const struct linear_model *m, size_t row)
@@ -51,7 +36,7 @@ static void add_path_noise(const struct linear_model *m, size_t i, const size_t 
 }
 
 /* H and B of the parameters index[0..n-1]. */
-static void normal_matrices(const struct linear_model *m, const struct observation_set *o, const size_t *index,
+static void normal_matrices(const struct linear_model *m, const size_t *index,
                             size_t n, double misfit, double *h, double *b, double *mean_variance)
 {
     memset(h, 0, n * n * sizeof *h);
@@ -60,7 +45,7 @@ static void normal_matrices(const struct linear_model *m, const struct observati
     for (size_t row = 0; row < m->n_row; row++) {
         const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
         const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
-        double u = m->weight[row], v = row_variance(o, row, misfit),
+        double u = m->weight[row], v = row_variance(m, row, misfit),
                r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * row_noise(m, row);
         *mean_variance += u * (v + row_noise(m, row)) / (double)m->n_row;
         for (size_t p = 0; p < n; p++) {
@@ -76,11 +61,11 @@ static void normal_matrices(const struct linear_model *m, const struct observati
 }
 
 /* Covariance of the parameters index[0..n-1], all others held. */
-static void covariance(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+static void covariance(const struct linear_model *m, const struct coordinate *k,
                        const size_t *index, size_t n, double misfit, double *cov)
 {
     double h[N * N], b[N * N], inverse[N * N], half[N * N], s2, scale[N];
-    normal_matrices(m, o, index, n, misfit, h, b, &s2);
+    normal_matrices(m, index, n, misfit, h, b, &s2);
     s2 = fmax(s2, 1e-12);
     for (size_t p = 0; p < n; p++) scale[p] = (k[index[p]].upper - k[index[p]].lower) / sqrt(12.0);
     for (size_t p = 0; p < n; p++) {
@@ -120,7 +105,7 @@ bool uncertainty_determined(const struct coordinate *k, double sd, double se_par
            se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
 }
 
-void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
                          const bool *fixed, struct uncertainty *u)
 {
     size_t n = m->n_param, moving[N], inner[N], n_moving = 0, n_inner = 0;
@@ -133,14 +118,14 @@ void uncertainty_compute(const struct linear_model *m, const struct observation_
         if (!fixed[p]) moving[n_moving++] = p;
         if (!fixed[p] && !u->at_bound[p]) inner[n_inner++] = p;
     }
-    u->misfit_var = misfit_variance(m, o, n_inner);
+    u->misfit_var = linear_model_misfit(m, n_inner);
     u->noise_var = linear_model_noise(m);
     if (n_moving > 0) {
-        covariance(m, o, k, moving, n_moving, u->misfit_var, cov);
+        covariance(m, k, moving, n_moving, u->misfit_var, cov);
         scatter(cov, moving, n_moving, n, u->cov);
     }
     if (n_inner > 0 && n_inner < n_moving) {
-        covariance(m, o, k, inner, n_inner, u->misfit_var, cov);
+        covariance(m, k, inner, n_inner, u->misfit_var, cov);
         scatter(cov, inner, n_inner, n, u->cov);
     }
     for (size_t p = 0; p < n; p++) {

@@ -37,7 +37,7 @@ struct uncertainty {
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param);
 
 /* m: pooled at the result. fixed: n_param flags. */
-void uncertainty_compute(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
                          const bool *fixed, struct uncertainty *u);
 
 #endif

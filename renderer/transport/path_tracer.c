@@ -6,7 +6,7 @@
 #include <string.h>
 
 #ifndef ROULETTE_BELOW
-#define ROULETTE_BELOW 0.3f
+#define ROULETTE_BELOW 0.6f
 #endif
 #ifndef SHADOW_BELOW
 #define SHADOW_BELOW 0.01f

@@ -13,7 +13,7 @@ struct bench {
     struct thread_pool *pool;
     const char *folder;
     size_t row_paths; /* for each row of a measured table told by itself; 0: none is */
-    size_t photograph_paths, coverage_paths, kept_paths, score_paths, curve_paths;
+    size_t photograph_paths, kept_paths, score_paths, curve_paths;
     uint64_t path_budget, sgd_budget;
     const char *journal; /* of the published method; NULL: not kept */
     const char *sample; /* NULL: all measured tables */

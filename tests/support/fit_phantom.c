@@ -13,7 +13,7 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { SEED_PHOTOGRAPH = 77001, SEED_KEPT = 77002, SEED_SCORE = 77003, SEED_PHOTOGRAPH_ANEW = 78000 };
+enum { SEED_PHOTOGRAPH = 77001, SEED_KEPT = 77002, SEED_SCORE = 77003 };
 
 void fit_check(status s, const struct error *err)
 {
@@ -226,14 +226,17 @@ static void merge(struct estimate *sum, const struct estimate *part, double shar
     sum->n_vertex += part->n_vertex;
 }
 
-static void kept_estimate(const struct fit_phantom *f, const struct kept_call *c, size_t n_path, struct estimate *out)
+static size_t n_chunks(size_t n_path) { return (n_path + FIT_CHUNK - 1) / FIT_CHUNK; }
+
+static void kept_estimate(const struct fit_phantom *f, const struct kept_call *c, size_t first_chunk, size_t n_path,
+                          struct estimate *out)
 {
-    size_t n_chunk = (n_path + FIT_CHUNK - 1) / FIT_CHUNK;
+    size_t n_chunk = n_chunks(n_path);
     struct estimate *part = calloc(c->n_configuration, sizeof *part);
     check_memory(part);
     memset(out, 0, c->n_configuration * sizeof *out);
     for (size_t k = 0; k < n_chunk; k++) {
-        chunk_estimate(f, c, (uint32_t)k, n_path / n_chunk, part);
+        chunk_estimate(f, c, (uint32_t)(first_chunk + k), n_path / n_chunk, part);
         for (size_t i = 0; i < c->n_configuration; i++) merge(&out[i], &part[i], 1.0 / (double)n_chunk);
     }
     free(part);
@@ -241,19 +244,16 @@ static void kept_estimate(const struct fit_phantom *f, const struct kept_call *c
 
 /* ---- photographs ---- */
 
-/* The built-in views: all, or those to fit, which come first. */
-static size_t views(bool fitted_only, struct phantom_view_table *t, struct configuration *configuration)
+static void views(struct phantom_view_table *t, struct configuration *configuration)
 {
     static const struct job_document set_up = {
         .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
-    size_t n = 0;
     phantom_view_table_builtin(t);
-    for (; n < FIT_N_VIEW && !(fitted_only && t->view[n].set != JOB_SET_FIT); n++) {
+    for (size_t n = 0; n < FIT_N_VIEW; n++) {
         const struct job_photograph *v = &t->view[n];
         configuration[n] = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
                                                      v->camera_phi_deg, v->cloth_rotation_deg);
     }
-    return n;
 }
 
 void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography *how)
@@ -266,13 +266,12 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
     struct rng rng;
     check_memory(t);
     check_memory(e);
-    const size_t n = views(how->fitted_only, t, configuration);
-    const uint64_t seed = how->trace_seed == 0 ? SEED_PHOTOGRAPH : SEED_PHOTOGRAPH_ANEW + how->trace_seed;
-    const struct kept_call call = {f->truth, configuration, n, seed, 0, false};
-    kept_estimate(f, &call, how->n_path, e);
+    views(t, configuration);
+    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, false};
+    kept_estimate(f, &call, how->part * n_chunks(how->n_path), how->n_path, e);
     rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < FIT_N_VIEW; i++) {
         struct observation item = {.set = t->view[i].set, .configuration = configuration[i], .weight = 1.0};
         memcpy(item.name, t->view[i].file, sizeof item.name);
         for (int c = 0; c < 3; c++) {
@@ -337,7 +336,7 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
     for (int q = 0; q < 2; q++) check_memory(s.replica[q] = calloc(s.part.n, sizeof(struct estimate)));
     if (at != NULL) {
         for (uint32_t q = 0; q < 2; q++)
-            kept_estimate(f, &(struct kept_call){at, s.configuration, s.part.n, SEED_KEPT, q, true}, n_kept,
+            kept_estimate(f, &(struct kept_call){at, s.configuration, s.part.n, SEED_KEPT, q, true}, 0, n_kept,
                           s.replica[q]);
         append_here(&s, f, at);
     }

@@ -58,8 +58,7 @@ struct fit_photography {
     size_t n_path; /* a configuration, cut into equal chunks */
     double noise;  /* relative error that every number gets (0.005) */
     uint64_t noise_seed;
-    uint64_t trace_seed; /* 0: the photographs of the figures; others: traced anew, with other paths */
-    bool fitted_only;    /* no held-out ones */
+    size_t part; /* photographs of the same n_path and another part have other paths, so their errors are independent */
 };
 
 /* Photographs at the truth. Stated standard errors hold both kinds of noise. Replaces earlier ones. */

@@ -231,8 +231,6 @@ static void test_uncertainty(void **state)
 {
     (void)state;
     enum { ROWS = 3 * FAKE_N_FIT };
-    struct observation item[FAKE_N_FIT];
-    struct observation_set o = {.n = FAKE_N_FIT, .item = item};
     struct coordinate k[2];
     struct linear_model m;
     struct uncertainty u;
@@ -241,12 +239,12 @@ static void test_uncertainty(void **state)
     for (size_t p = 0; p < 2; p++) coordinate_init(&k[p], &fake_param[6], fake_param[6].lower, fake_param[6].upper);
     double jj = 0.0;
     for (size_t row = 0; row < ROWS; row++) {
-        item[row / 3] = (struct observation){.mean_rgb = {1.0, 1.0, 1.0}, .se_rgb = {0.01, 0.01, 0.01}, .weight = 1.0};
+        m.photograph_var[row] = 0.01 * 0.01;
         for (int q = 0; q < 2; q++) m.j[q][2 * row] = 0.5 + 0.01 * (double)row;
         jj += m.j[0][2 * row] * m.j[0][2 * row];
     }
     m.x_ref[0] = m.x_ref[1] = log(fake_param[6].start);
-    uncertainty_compute(&m, &o, k, fixed, &u);
+    uncertainty_compute(&m, k, fixed, &u);
     double want = 0.01 / sqrt(jj);
     assert_true(fabs(sqrt(u.cov[0]) / want - 1.0) < 1e-2);
     assert_true(fabs(u.se_param[0] / (want * fake_param[6].start) - 1.0) < 1e-2);
@@ -254,8 +252,41 @@ static void test_uncertainty(void **state)
     assert_true(isfinite(u.se_param[1]) && u.se_param[1] > u.se_param[0]);
     m.x_ref[0] = k[0].upper;
     fixed[1] = true;
-    uncertainty_compute(&m, &o, k, fixed, &u);
+    uncertainty_compute(&m, k, fixed, &u);
     assert_true(u.at_bound[0] && u.se_param[0] > 0.0 && u.se_param[1] == 0.0 && u.determined[1]);
+    linear_model_release(&m);
+}
+
+/* Residuals of 1 % that nothing explains in rows known to 0.2 %, among rows known to 5 %: the misfit is found in spite of
+ * those, none is where the stated errors explain it, and weights follow; an extra weight changes neither. */
+static void test_misfit_and_weights(void **state)
+{
+    (void)state;
+    enum { ROWS = 600 };
+    struct linear_model m;
+    struct rng rng;
+    rng_start(&rng, &(struct rng_key){.seed = 5}, 0, 0);
+    assert_int_equal(linear_model_init(&m, ROWS, 1, NULL), STATUS_OK);
+    for (int explained = 0; explained < 2; explained++) {
+        for (size_t row = 0; row < ROWS; row++) {
+            double normal[4], se = row % 2 ? 0.05 : 0.002, left = explained ? 0.0 : 0.01;
+            rng_normal_pair(&rng, normal);
+            rng_normal_pair(&rng, normal + 2);
+            m.extra[row] = row < ROWS / 2 ? 1.0 : 9.0;
+            m.photograph_var[row] = se * se * m.extra[row];
+            for (int q = 0; q < 2; q++) {
+                m.r[q][row] = sqrt(m.extra[row]) * (hypot(left, se) * normal[0] + 0.002 * normal[1 + q]);
+                m.r_var[q][row] = 0.002 * 0.002 * m.extra[row];
+            }
+        }
+        double misfit = linear_model_misfit(&m, 0), noise = 0.5 * 0.002 * 0.002;
+        /* 300 squared normals: 1e-4 to 8 %; below 2 % of the well-known rows' variance otherwise */
+        assert_true(explained ? misfit < 0.25 * 0.002 * 0.002 : fabs(misfit / 1e-4 - 1.0) < 0.3);
+        linear_model_weigh(&m, 0);
+        double ratio = (misfit + noise + 0.05 * 0.05) / (misfit + noise + 0.002 * 0.002);
+        assert_true(fabs(m.weight[0] / m.weight[1] / ratio - 1.0) < 1e-9);
+        assert_true(fabs(m.weight[ROWS - 2] / m.weight[0] - 1.0) < 1e-9);
+    }
     linear_model_release(&m);
 }
 
@@ -264,7 +295,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_by_hand),     cmocka_unit_test(test_unbiased), cmocka_unit_test(test_gradient),
         cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices), cmocka_unit_test(test_pool),
-        cmocka_unit_test(test_uncertainty),
+        cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
