@@ -180,9 +180,13 @@ static double good_enough(const struct gauss_newton *g, double f)
     return fmax(target_share * f, target_rel_rms * target_rel_rms * (double)g->model.n_row);
 }
 
+/* By the noise of all rows alike, as f counts them: that of the rows that the fit leans on is smaller. */
 static bool precise_enough(const struct gauss_newton *g, double f, double se)
 {
-    return noise_gain(g) <= good_enough(g, f - 2.0 * se);
+    const struct linear_model *m = &g->model;
+    double noise = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) noise += 0.25 * (m->r_var[0][row] + m->r_var[1][row]) / (double)m->n_row;
+    return 2.0 * (double)g->n_free * noise <= good_enough(g, f - 2.0 * se);
 }
 
 /* Tracing noise against the photographs' own; infinite where they state none. */

@@ -76,6 +76,7 @@ static void test_recovery_and_errors(void **state)
             mean += error[seed - 1] / SEEDS;
             worst = fmax(worst, error[seed - 1]);
             assert_true(r.n_path <= 6600000);
+            assert_non_null(strstr(r.reason, "path budget")); /* the noise never is 0.07 % of all rows by then */
             for (size_t p = 0; p < FAKE_N_PARAM; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
                 n_judged++;
