@@ -98,6 +98,7 @@ static void expand_uncertainty(const struct fit_layout *l, const struct param_in
     full->n_param = n;
     full->misfit_var = u->misfit_var;
     full->noise_var = u->noise_var;
+    full->photograph_var = u->photograph_var;
     for (size_t p = 0; p < n; p++) {
         size_t k = l->owner[p];
         double stretch = fit_layout_stretch(l, info, unknown, p);

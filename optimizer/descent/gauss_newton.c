@@ -183,10 +183,7 @@ static double good_enough(const struct gauss_newton *g, double f)
 /* By the noise of all rows alike, as f counts them: that of the rows that the fit leans on is smaller. */
 static bool precise_enough(const struct gauss_newton *g, double f, double se)
 {
-    const struct linear_model *m = &g->model;
-    double noise = 0.0;
-    for (size_t row = 0; row < m->n_row; row++) noise += 0.25 * (m->r_var[0][row] + m->r_var[1][row]) / (double)m->n_row;
-    return 2.0 * (double)g->n_free * noise <= good_enough(g, f - 2.0 * se);
+    return 2.0 * (double)g->n_free * linear_model_mean_noise(&g->model) <= good_enough(g, f - 2.0 * se);
 }
 
 /* Tracing noise against the photographs' own; infinite where they state none. */
@@ -273,8 +270,8 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
         snprintf(text, n, "further steps promise %.2g, the objective is %.3g with a noise of %.1g", g->far_gain, f, se);
     else
         snprintf(text, n,
-                 "further steps promise %.2g, and tracing adds %.1f times the photographs' own variance; more paths would narrow the "
-                 "errors by %.0f %% at most",
+                 "further steps promise %.2g, and tracing adds %.1f times the photographs' own variance; exact renderings would "
+                 "narrow the errors by some %.0f %%",
                  g->far_gain, noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
 
@@ -321,8 +318,9 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
         bool small = g->far_gain <= fmax(noise_gain(g), fmax(arrived_share * f, good_enough(g, f)));
         result->converged = small && !failed && g->history.n_step > 2;
-        if (result->converged && (precise_enough(g, f, se) || as_good_as_photographs(g))) {
-            explain_end(g, precise_enough(g, f, se), f, se, result);
+        bool precise = precise_enough(g, f, se);
+        if (result->converged && (precise || as_good_as_photographs(g))) {
+            explain_end(g, precise, f, se, result);
             return STATUS_OK;
         }
         bool paths_left = plan_paths(g, clear, problem->observation->n);

@@ -280,7 +280,7 @@ static double gain_share(const struct linear_model *m, const struct observation 
     double noise = 0.0, root_w = sqrt(objective_weight(o)), length2;
     for (size_t c = 0; c < 3; c++) {
         unit[c] = root_w * o->mean_rgb[c];
-        noise += 0.25 * (m->r_var[0][3 * i + c] + m->r_var[1][3 * i + c]) / 3.0;
+        noise += linear_model_row_noise(m, 3 * i + c) / 3.0;
     }
     length2 = dot3(unit, unit);
     if (!(length2 > 0.0) || observation_is_contrast(o)) return 0.0; /* a gain leaves a contrast as it is */
@@ -387,22 +387,28 @@ double linear_model_objective(const struct linear_model *m, double *se)
     return value;
 }
 
-/* Variance by tracing and photograph, without the extra weight; NaN for a row of weight 0, which says nothing. */
-static double row_noise(const struct linear_model *m, size_t row)
+double linear_model_row_noise(const struct linear_model *m, size_t row)
 {
-    return (0.25 * (m->r_var[0][row] + m->r_var[1][row]) + m->photograph_var[row]) / m->extra[row];
+    return 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
+}
+
+/* Variance by tracing and photograph, without the extra weight, which is not 0. */
+static double known_variance(const struct linear_model *m, size_t row)
+{
+    return (linear_model_row_noise(m, row) + m->photograph_var[row]) / m->extra[row];
 }
 
 double linear_model_misfit(const struct linear_model *m, size_t n_free)
 {
     enum { ROUND = 8 };
-    double n = (double)m->n_row, freedom = fmax(1.0, n - (double)n_free) / n;
-    double misfit = fmax(linear_model_objective(m, NULL), 0.0) / n;
+    double n = 0.0, misfit = fmax(linear_model_objective(m, NULL), 0.0) / (double)m->n_row;
+    for (size_t row = 0; row < m->n_row; row++) n += m->extra[row] > 0.0;
+    double freedom = fmax(1.0, n - (double)n_free) / fmax(1.0, n);
     for (int round = 0; round < ROUND; round++) {
         double sum = 0.0, square = 0.0, photograph = 0.0;
         for (size_t row = 0; row < m->n_row; row++) {
             if (!(m->extra[row] > 0.0)) continue;
-            double var = misfit + row_noise(m, row) + 1e-12, weight = 1.0 / (var * var);
+            double var = misfit + known_variance(m, row) + 1e-12, weight = 1.0 / (var * var);
             square += weight * m->r[0][row] * m->r[1][row] / m->extra[row];
             photograph += weight * m->photograph_var[row] / m->extra[row];
             sum += weight;
@@ -414,11 +420,13 @@ double linear_model_misfit(const struct linear_model *m, size_t n_free)
 
 void linear_model_weigh(struct linear_model *m, size_t n_free)
 {
-    double misfit = linear_model_misfit(m, n_free), mean = 0.0;
+    double misfit = linear_model_misfit(m, n_free), sum = 0.0, n = 0.0;
     for (size_t row = 0; row < m->n_row; row++) {
-        m->weight[row] = 1.0 / fmax(misfit + (m->extra[row] > 0.0 ? row_noise(m, row) : 0.0), 1e-6);
-        mean += m->weight[row] / (double)m->n_row;
+        m->weight[row] = m->extra[row] > 0.0 ? 1.0 / fmax(misfit + known_variance(m, row), 1e-6) : 0.0;
+        sum += m->weight[row];
+        n += m->extra[row] > 0.0;
     }
+    double mean = sum > 0.0 ? sum / n : 1.0; /* no row says anything: all weights 0 */
     for (size_t row = 0; row < m->n_row; row++) m->weight[row] /= mean;
     m->row_var = 1.0 / mean; /* weight x variance, the same for all rows */
 }
@@ -459,6 +467,13 @@ void linear_model_hessian(const struct linear_model *m, bool cross, double *hess
 double linear_model_noise(const struct linear_model *m)
 {
     double sum = 0.0;
-    for (size_t row = 0; row < m->n_row; row++) sum += m->weight[row] * 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
+    for (size_t row = 0; row < m->n_row; row++) sum += m->weight[row] * linear_model_row_noise(m, row);
+    return sum / (double)m->n_row;
+}
+
+double linear_model_mean_noise(const struct linear_model *m)
+{
+    double sum = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) sum += linear_model_row_noise(m, row);
     return sum / (double)m->n_row;
 }

@@ -71,15 +71,16 @@ void linear_model_release(struct linear_model *m);
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref,
                          struct error *err);
 
+/* Monte-Carlo variance of (r_A + r_B) / 2 of one row. */
+double linear_model_row_noise(const struct linear_model *m, size_t row);
 /* Variance of a residual (of extra weight 1) that neither tracing nor the photographs' stated errors explain, per degree of
- * freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their variance)^2, found by iterating: rows that are
- * known to 0.5 % say more about a misfit of 1 % than those known to 5 %. */
+ * freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their variance)^2, found by
+ * iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows of weight 0 are left out. */
 double linear_model_misfit(const struct linear_model *m, size_t n_free);
-/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, without extra weights,
- * which act as they are. While noise rules, rows
- * that are known well count more (bright channels have the longest paths and the most noise); where the model does not
- * fit, or photographs state no errors and paths add up, all weights go to 1 and the minimum is that of f. Weights are kept
- * until the next call and by linear_model_pool. */
+/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without extra
+ * weights, which act as they are. While noise rules, rows that are known well count more (bright channels have the longest
+ * paths and the most noise); where the model does not fit, or photographs state no errors and paths add up, all weights go
+ * to 1 and the minimum is that of f. Weights are kept until the next call and by linear_model_pool. */
 void linear_model_weigh(struct linear_model *m, size_t n_free);
 
 /* s2 sum ((x - mean) / sd)^2 with s2 = row_var: what the priors add to f at x. */
@@ -91,7 +92,8 @@ void linear_model_gradient(const struct linear_model *m, double *g);
 /* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged
  * J, positive semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian);
-/* Weighted mean over rows of the variance of (r_A + r_B) / 2. */
+/* Mean over rows of the variance of (r_A + r_B) / 2: as the fit weighs rows, and all alike, as f counts them. */
 double linear_model_noise(const struct linear_model *m);
+double linear_model_mean_noise(const struct linear_model *m);
 
 #endif

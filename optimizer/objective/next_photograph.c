@@ -108,7 +108,7 @@ void next_photograph_score(const struct param_info *info, const struct fit_param
 {
     struct design d = {.n_param = u->n_param};
     const struct estimate *const replica[2] = {a, b};
-    double jc[2][3 * N], s[9], inverse[9] = {0}, v = fmax(u->misfit_var + u->noise_var, least_var);
+    double jc[2][3 * N], s[9], inverse[9] = {0}, v = fmax(u->misfit_var + u->noise_var + u->photograph_var, least_var);
     memset(score, 0, sizeof *score);
     take_covariance(&d, info, parameter, u, leader);
     take_derivatives(&d, info, param, leader, ratio, replica);

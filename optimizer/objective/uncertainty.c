@@ -15,17 +15,12 @@ static double row_variance(const struct linear_model *m, size_t row, double misf
     return m->photograph_var[row] + misfit * m->extra[row];
 }
 
-static double row_noise(const struct linear_model *m, size_t row)
-{
-    return 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
-}
-
 /* The three channels of a configuration come from the same paths: their Monte-Carlo noise moves together. */
 static void add_path_noise(const struct linear_model *m, size_t i, const size_t *index, size_t n, double *b)
 {
     double va[N] = {0}, vb[N] = {0};
     for (size_t row = 3 * i; row < 3 * i + 3; row++) {
-        double sd = m->weight[row] * sqrt(row_noise(m, row));
+        double sd = m->weight[row] * sqrt(linear_model_row_noise(m, row));
         for (size_t p = 0; p < n; p++) {
             va[p] += sd * m->j[0][row * m->n_param + index[p]];
             vb[p] += sd * m->j[1][row * m->n_param + index[p]];
@@ -46,8 +41,8 @@ static void normal_matrices(const struct linear_model *m, const size_t *index,
         const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
         const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
         double u = m->weight[row], v = row_variance(m, row, misfit),
-               r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * row_noise(m, row);
-        *mean_variance += u * (v + row_noise(m, row)) / (double)m->n_row;
+               r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * linear_model_row_noise(m, row);
+        *mean_variance += u * (v + linear_model_row_noise(m, row)) / (double)m->n_row;
         for (size_t p = 0; p < n; p++) {
             for (size_t q = 0; q < n; q++) {
                 double jj = 0.5 * (ja[index[p]] * jb[index[q]] + jb[index[p]] * ja[index[q]]);
@@ -119,7 +114,9 @@ void uncertainty_compute(const struct linear_model *m, const struct coordinate *
         if (!fixed[p] && !u->at_bound[p]) inner[n_inner++] = p;
     }
     u->misfit_var = linear_model_misfit(m, n_inner);
-    u->noise_var = linear_model_noise(m);
+    u->noise_var = linear_model_mean_noise(m);
+    u->photograph_var = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) u->photograph_var += m->photograph_var[row] / (double)m->n_row;
     if (n_moving > 0) {
         covariance(m, k, moving, n_moving, u->misfit_var, cov);
         scatter(cov, moving, n_moving, n, u->cov);

@@ -29,6 +29,7 @@ struct uncertainty {
     double misfit_var; /* per residual, in units of the objective: about the squared relative error that the model
                           leaves */
     double noise_var;  /* mean Monte-Carlo variance per residual of the pooled mean */
+    double photograph_var; /* mean variance per residual by the photographs' stated errors */
 };
 
 /* The standard error is below half of that of a uniform distribution over the allowed range (that of k), in the

@@ -29,7 +29,7 @@ static void test_against_the_whole_matrix(void **state)
     (void)state;
     struct fit_option o;
     struct fit_parameter parameter[N];
-    struct uncertainty u = {.n_param = N, .misfit_var = 4e-4, .noise_var = 1e-4};
+    struct uncertainty u = {.n_param = N, .misfit_var = 1e-4, .noise_var = 1e-4, .photograph_var = 3e-4};
     struct candidate_score score;
     struct estimate e = {.n_path = 1};
     double param[N], before[N * N], information[N * N], after[N * N], slope[N];

@@ -287,6 +287,17 @@ static void test_misfit_and_weights(void **state)
         assert_true(fabs(m.weight[0] / m.weight[1] / ratio - 1.0) < 1e-9);
         assert_true(fabs(m.weight[ROWS - 2] / m.weight[0] - 1.0) < 1e-9);
     }
+    double misfit = linear_model_misfit(&m, 3), weight = m.weight[0];
+    for (size_t row = ROWS - 300; row < ROWS; row++) /* half of the rows again, as of photographs that are left out */
+        m.extra[row] = m.photograph_var[row] = m.r[0][row] = m.r[1][row] = m.r_var[0][row] = m.r_var[1][row] = 0.0;
+    linear_model_weigh(&m, 3);
+    assert_true(isfinite(linear_model_misfit(&m, 3)) && m.weight[ROWS - 1] == 0.0 && isfinite(m.row_var));
+    double mean = 0.0;
+    for (size_t row = 0; row < ROWS - 300; row++) mean += m.weight[row] / (ROWS - 300);
+    assert_true(fabs(mean - 1.0) < 1e-9 && fabs(m.weight[0] / weight - 1.0) < 0.1 && misfit < 1e-5);
+    for (size_t row = 0; row < ROWS; row++) m.extra[row] = 0.0;
+    linear_model_weigh(&m, 3);
+    assert_true(linear_model_misfit(&m, 3) == 0.0 && m.weight[0] == 0.0 && isfinite(m.row_var));
     linear_model_release(&m);
 }
 
