@@ -85,7 +85,9 @@ static void bench_fabric(const struct bench *b, const char *name)
         bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
         bench_tell_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
-        fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
+        double photographs = expected_score(&f), added = fit_phantom_expected(&f, JOB_SET_HELD_OUT, b->kept_paths, r.uncertainty.cov);
+        fprintf(stderr, "  held out %.4f +- %.4f, %.4f expected of the stated errors of photographs and parameters\n", s.rel_rms, s.se,
+                sqrt(fmax(photographs * photographs + added, 0.0)));
         bench_print(name, "wall_s", r.wall_s, "s", "lower");
         bench_print(name, "paths", (double)r.n_path, "path", "lower");
         bench_print(name, "heldout_rel_rms", s.rel_rms, "1", "lower");

@@ -316,45 +316,81 @@ static void append_here(struct scorer *s, const struct fit_phantom *f, const dou
     fit_check(linear_history_append(&s->history, x, s->replica[0], s->replica[1], &err), &err);
 }
 
+static void scorer_start(struct scorer *s, const struct fit_phantom *f, enum job_set set)
+{
+    struct error err = {0};
+    *s = (struct scorer){0};
+    observation_set_init(&s->part);
+    fit_check(observation_set_select(&f->observation, set, &s->part, &err), &err);
+    s->configuration = trace_configurations(&s->part);
+    check_memory(s->configuration);
+    for (size_t p = 0; p < f->model.n_param; p++) {
+        const struct param_info *info = &f->model.param[p];
+        coordinate_init(&s->coordinate[p], info, info->lower, info->upper);
+    }
+    linear_history_init(&s->history, &s->part, s->coordinate, f->model.n_param);
+    fit_check(linear_model_init(&s->model, 3 * s->part.n, f->model.n_param, &err), &err);
+    for (int q = 0; q < 2; q++) check_memory(s->replica[q] = calloc(s->part.n, sizeof(struct estimate)));
+}
+
+static void scorer_release(struct scorer *s)
+{
+    linear_model_release(&s->model);
+    linear_history_release(&s->history);
+    observation_set_release(&s->part);
+    free(s->configuration);
+    free(s->replica[0]);
+    free(s->replica[1]);
+}
+
+static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
+{
+    for (uint32_t q = 0; q < 2; q++)
+        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept, s->replica[q]);
+    append_here(s, f, at);
+}
+
+static void pool_at(struct scorer *s, const struct fit_phantom *f, const double *param)
+{
+    struct error err = {0};
+    double x[SCATTERING_MAX_PARAM];
+    for (size_t p = 0; p < f->model.n_param; p++) x[p] = coordinate_from_param(&s->coordinate[p], param[p]);
+    fit_check(linear_model_pool(&s->model, &s->history, x, &err), &err);
+}
+
 struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
                                    const double *param, size_t n_path)
 {
-    struct scorer s = {0};
-    struct error err = {0};
-    double x[SCATTERING_MAX_PARAM], se;
-    observation_set_init(&s.part);
-    fit_check(observation_set_select(&f->observation, set, &s.part, &err), &err);
-    s.configuration = trace_configurations(&s.part);
-    check_memory(s.configuration);
-    for (size_t p = 0; p < f->model.n_param; p++) {
-        const struct param_info *info = &f->model.param[p];
-        coordinate_init(&s.coordinate[p], info, info->lower, info->upper);
-        x[p] = coordinate_from_param(&s.coordinate[p], param[p]);
-    }
-    linear_history_init(&s.history, &s.part, s.coordinate, f->model.n_param);
-    fit_check(linear_model_init(&s.model, 3 * s.part.n, f->model.n_param, &err), &err);
-    for (int q = 0; q < 2; q++) check_memory(s.replica[q] = calloc(s.part.n, sizeof(struct estimate)));
-    if (at != NULL) {
-        for (uint32_t q = 0; q < 2; q++)
-            kept_estimate(f, &(struct kept_call){at, s.configuration, s.part.n, SEED_KEPT, q, true}, 0, n_kept,
-                          s.replica[q]);
-        append_here(&s, f, at);
-    }
+    struct scorer s;
+    double se;
+    scorer_start(&s, f, set);
+    if (at != NULL) append_kept(&s, f, at, n_kept);
     if (n_path > 0) {
         for (uint32_t q = 0; q < 2; q++)
             run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true}, 0, n_path,
                          s.replica[q]);
         append_here(&s, f, param);
     }
-    fit_check(linear_model_pool(&s.model, &s.history, x, &err), &err);
+    pool_at(&s, f, param);
     double value = fmax(linear_model_objective(&s.model, &se), 0.0), n_row = (double)s.model.n_row;
     struct fit_score score = {.rel_rms = sqrt(value / n_row)};
     score.se = score.rel_rms > 0.0 ? 0.5 * se / (n_row * score.rel_rms) : 0.0;
-    linear_model_release(&s.model);
-    linear_history_release(&s.history);
-    observation_set_release(&s.part);
-    free(s.configuration);
-    free(s.replica[0]);
-    free(s.replica[1]);
+    scorer_release(&s);
     return score;
+}
+
+double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov)
+{
+    struct scorer s;
+    size_t n = f->model.n_param;
+    double sum = 0.0;
+    scorer_start(&s, f, set);
+    append_kept(&s, f, f->truth, n_kept);
+    pool_at(&s, f, f->truth);
+    for (size_t row = 0; row < s.model.n_row; row++)
+        for (size_t p = 0; p < n; p++)
+            for (size_t q = 0; q < n; q++) sum += s.model.j[0][row * n + p] * cov[p * n + q] * s.model.j[1][row * n + q];
+    sum /= (double)s.model.n_row;
+    scorer_release(&s);
+    return sum;
 }

@@ -81,4 +81,8 @@ struct fit_score {
 struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
                                    const double *param, size_t n_path);
 
+/* What errors of the fit with covariance cov (n_param x n_param, fit coordinates) add to the squared relative RMS error of one set,
+ * to first order and from the kept estimates at the truth alone: mean over rows of J cov J', J's own noise left out. */
+double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov);
+
 #endif
