@@ -379,7 +379,8 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
     return score;
 }
 
-double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov)
+/* trace(M J'J) / n_row on one set, J from the kept estimates at the truth. */
+static double quadratic(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *m)
 {
     struct scorer s;
     size_t n = f->model.n_param;
@@ -389,8 +390,27 @@ double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_
     pool_at(&s, f, f->truth);
     for (size_t row = 0; row < s.model.n_row; row++)
         for (size_t p = 0; p < n; p++)
-            for (size_t q = 0; q < n; q++) sum += s.model.j[0][row * n + p] * cov[p * n + q] * s.model.j[1][row * n + q];
+            for (size_t q = 0; q < n; q++) sum += s.model.j[0][row * n + p] * m[p * n + q] * s.model.j[1][row * n + q];
     sum /= (double)s.model.n_row;
     scorer_release(&s);
     return sum;
+}
+
+double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov)
+{
+    return quadratic(f, set, n_kept, cov);
+}
+
+double fit_phantom_first_order(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *param)
+{
+    size_t n = f->model.n_param;
+    double dx[SCATTERING_MAX_PARAM], m[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM];
+    for (size_t p = 0; p < n; p++) {
+        struct coordinate k;
+        coordinate_init(&k, &f->model.param[p], f->model.param[p].lower, f->model.param[p].upper);
+        dx[p] = coordinate_from_param(&k, param[p]) - coordinate_from_param(&k, f->truth[p]);
+    }
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) m[p * n + q] = dx[p] * dx[q];
+    return quadratic(f, set, n_kept, m);
 }

@@ -84,5 +84,7 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
 /* What errors of the fit with covariance cov (n_param x n_param, fit coordinates) add to the squared relative RMS error of one set,
  * to first order and from the kept estimates at the truth alone: mean over rows of J cov J', J's own noise left out. */
 double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov);
+/* The same of one fit: mean over rows of (J (x - x_truth))^2. Score paths would have to be many to tell it as well. */
+double fit_phantom_first_order(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *param);
 
 #endif
