@@ -7,7 +7,9 @@
  *   gradient   mirrored product of the replicas, without bias;
  *   curvature  2 J'J of the averaged replicas: too large by the noise of J, a damping that fades as paths add up;
  *   damping    plus 2 c noise / limit^2: moving by the whole step limit must gain more than c times one residual's
- *              Monte-Carlo variance; c falls from early_caution to 1 as paths add up.
+ *              Monte-Carlo variance; c falls from early_caution to 1 as paths add up;
+ *   pull       while paths are few, towards the start and wide lobes, like a prior of pull_sd step limits; gone well
+ *              before the end.
  * A step after which the objective is higher beyond doubt halves the limits and is taken back; one that gained clearly
  * less than it promised halves them. Paths: few at first; 1.3 times as many when the predicted gain is no longer clear
  * of the noise; spread over configurations by the standard deviation of a path (Neyman allocation).
@@ -43,15 +45,17 @@ static const double target_rel_rms = 0.0007, target_share = 0.002;
 /* Variance of a residual by tracing, in units of that by the photographs' stated errors, that ends a fit whose budget is
  * the default one: its errors are then sqrt(1 + photograph_share) times what exact renderings would leave. Not before
  * the pooled means have least_effective paths each: their derivatives are several times noisier than they are. */
-static const double photograph_share = 1.25, least_effective = 80000.0;
+static const double photograph_share = 1.0, least_effective = 80000.0;
 /* Share of the objective below which a promised gain is not told from the model's curvature any more. */
 static const double arrived_share = 0.02;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
 static const double largest_share = 0.1;
-/* Early noise would drive weakly determined parameters along a valley, to where fits did not come back from (a width at its
- * bound: 3 % held out instead of 1). Chosen by trial on analytic cloth: 16 halves the worst error of 20 seeds; 64 is too
- * slow, and 16 to the end slows the way along a valley. */
-static const double early_caution = 16.0, cautious_until = 40000.0; /* effective paths */
+/* Early noise would drive weakly determined parameters along a valley, to where fits did not come back from (narrow lobes,
+ * whose noise is four times as large). A strong damping prevents that and makes the way along a valley long; a pull as of
+ * a prior does not, and lets go while most paths are still to come. Numbers chosen by trial on analytic cloth. */
+static const double early_caution = 4.0, cautious_until = 10000.0; /* effective paths */
+static const double pull_sd = 1.0, pull_until = 40000.0;           /* step limits; effective paths */
+static const double wide_share = 0.8; /* of the way from the narrowest lobe to the widest, in the logarithm */
 static const double least_limit = 1.0 / 32.0; /* of the step limits */
 static const double far_reach = 6.0;          /* step limits within which far_gain looks */
 
@@ -66,6 +70,7 @@ struct gauss_newton {
     double n_path_mean;     /* a configuration and replica, of the next iteration */
     double promised;        /* fall of f by the last step, as the model saw it */
     double gain, far_gain, noise, damping, largest_step;
+    bool pulls; /* towards pull_target */
     size_t n_free;
 };
 
@@ -105,6 +110,43 @@ struct scaled_model {
     double h[N * N], g[N], trace;
 };
 
+/* Where parameter p is pulled to: the start, but lobe widths that start where the model says towards wide lobes. There
+ * radiance is smooth and known from few paths; a fit that comes from narrow lobes finds its noise in its way. Other
+ * positive quantities (density, the flakes' gamma) may be decades off: no pull, false. */
+static bool pull_target(const struct gauss_newton *g, size_t p, double *x)
+{
+    const struct coordinate *k = &g->run.coordinate[p];
+    const struct param_info *info = &g->run.problem->info[p];
+    double start = g->run.problem->param[p].start;
+    bool width = strcmp(info->unit, "deg") == 0;
+    *x = coordinate_from_param(k, start);
+    if (width && start == info->start) *x = fmax(*x, k->lower + wide_share * (k->upper - k->lower));
+    return !g->run.fixed[p] && (width || k->kind != COORDINATE_LOG);
+}
+
+/* As strong as a prior of pull_sd step limits. */
+static void add_pull(const struct gauss_newton *g, struct scaled_model *m)
+{
+    double curvature = 2.0 * g->model.row_var / (pull_sd * pull_sd), x;
+    for (size_t a = 0; a < m->n; a++) {
+        size_t p = m->index[a];
+        if (!pull_target(g, p, &x)) continue;
+        m->h[a * m->n + a] += curvature;
+        m->g[a] += curvature * (g->model.x_ref[p] - x) / g->run.coordinate[p].step_limit;
+    }
+}
+
+static double pull_penalty(const struct gauss_newton *g, const double *x)
+{
+    double sum = 0.0, target;
+    for (size_t p = 0; p < g->model.n_param && g->pulls; p++) {
+        if (!pull_target(g, p, &target)) continue;
+        double off = (x[p] - target) / (pull_sd * g->run.coordinate[p].step_limit);
+        sum += off * off;
+    }
+    return g->model.row_var * sum;
+}
+
 /* cross: curvature without the noise of J, which would hide what a parameter with a noisy derivative has to gain. */
 static void scale_model(const struct gauss_newton *g, bool cross, struct scaled_model *m)
 {
@@ -122,6 +164,7 @@ static void scale_model(const struct gauss_newton *g, bool cross, struct scaled_
         m->trace += m->h[a * m->n + a];
     }
     if (cross) small_clip_eigenvalues(m->h, m->n, 2.0 * linear_model_noise(&g->model));
+    if (g->pulls) add_pull(g, m);
 }
 
 /* Its minimum inside the bounds and reach times the step limits, with `damping` on the diagonal: where it is, and by how
@@ -229,8 +272,9 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
 static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
 {
     double se, f = linear_model_objective(&g->model, &se), doubt = se + g->best_se;
-    /* priors count in today's unit on both sides */
-    double penalty = linear_model_penalty(&g->model, g->x), best = g->best_f + linear_model_penalty(&g->model, g->best_x);
+    /* priors and the pull count in today's unit on both sides */
+    double penalty = linear_model_penalty(&g->model, g->x) + pull_penalty(g, g->x);
+    double best = g->best_f + linear_model_penalty(&g->model, g->best_x) + pull_penalty(g, g->best_x);
     bool first = g->history.n_step == 1;
     *failed = !first && f + penalty - best > 3.0 * doubt && f + penalty > 1.1 * best && g->limit_scale > least_limit;
     bool short_of_promise = !first && best - f - penalty < 0.25 * g->promised && g->promised > 2.0 * doubt;
@@ -295,6 +339,14 @@ static void explain_early_end(const struct gauss_newton *g, const char *used, bo
                  g->far_gain, f);
 }
 
+/* The pull ends with enough paths, or with half of what may be spent; where no row says anything there is none. */
+static void let_go(struct gauss_newton *g, size_t max_iteration)
+{
+    bool half = 2 * g->run.n_path_total >= g->run.path_budget || 2 * g->run.n_step >= max_iteration, silent = true;
+    for (size_t row = 0; row < g->model.n_row; row++) silent = silent && !(g->model.weight[row] > 0.0);
+    if (g->model.n_effective >= pull_until || half || silent) g->pulls = false;
+}
+
 static status iterate(struct gauss_newton *g, struct fit_result *result, struct error *err)
 {
     const struct fit_problem *problem = g->run.problem;
@@ -306,6 +358,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         s = linear_model_pool(&g->model, &g->history, g->x, err);
         if (s != STATUS_OK) return s;
         linear_model_weigh(&g->model, g->n_free);
+        let_go(g, max_iteration);
         double se, f = linear_model_objective(&g->model, &se);
         s = report_here(g, NULL, err);
         if (s != STATUS_OK) return s;
@@ -316,13 +369,15 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         g->promised = g->gain;
         for (size_t p = 0; p < g->model.n_param; p++) g->x[p] += dx[p];
         bool clear = g->gain > 2.0 * noise_gain(g) && g->gain > 0.005 * fabs(f) && !failed;
-        bool small = g->far_gain <= fmax(noise_gain(g), fmax(arrived_share * f, good_enough(g, f)));
+        double weighted = linear_model_weighted_objective(&g->model); /* as the gains are */
+        bool small = g->far_gain <= fmax(noise_gain(g), fmax(arrived_share * weighted, good_enough(g, weighted)));
         result->converged = small && !failed && g->history.n_step > 2;
         bool precise = precise_enough(g, f, se);
-        if (result->converged && (precise || as_good_as_photographs(g))) {
+        if (result->converged && (precise || as_good_as_photographs(g)) && !g->pulls) {
             explain_end(g, precise, f, se, result);
             return STATUS_OK;
         }
+        if (result->converged && precise) g->pulls = false; /* arrived with it: on without */
         bool paths_left = plan_paths(g, clear, problem->observation->n);
         if (g->run.n_step < max_iteration && paths_left) continue;
         explain_early_end(g, paths_left ? "the iterations" : "the path budget", small, failed, f, se, result);
@@ -347,7 +402,7 @@ static status finish(struct gauss_newton *g, struct fit_result *result, struct e
 
 static status run_gauss_newton(const struct fit_problem *problem, struct fit_result *result, struct error *err)
 {
-    struct gauss_newton g = {.limit_scale = 1.0};
+    struct gauss_newton g = {.limit_scale = 1.0, .pulls = true};
     memset(result, 0, sizeof *result);
     status s = descent_run_init(&g.run, problem, &descent_gauss_newton, err);
     if (s != STATUS_OK) goto out;

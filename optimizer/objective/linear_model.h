@@ -1,11 +1,12 @@
 /* What all estimates of a fit so far say about the residuals near one point: R(x) ~ R + J (x - x_ref), for two
  * independent replicas.
  *
- * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by its own
- * derivatives, and they are averaged with weights 1 / (noise^2 + curvature^2): noise from the path count and the
- * configuration's pooled variance per path (not from the estimate's own variance, which is correlated with its value),
- * curvature from the predicted squared change of the residuals between the two points and from the changes by single
- * parameters, which cancel along a valley while their curvatures do not. So early, cheap iterations fade
+ * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by the
+ * derivatives half way (averages of all steps, those near the middle counting most: exact to second order), and they
+ * are averaged with weights 1 / (noise^2 + bend^2): noise from the path count and the configuration's pooled variance
+ * per path (not from the estimate's own variance, which is correlated with its value), bend from the cube of the
+ * predicted change of the residuals between the two points and from the changes by single parameters, which cancel
+ * along a valley while their bends do not. So early, cheap iterations fade
  * out and the last ones add up: this is the averaging over the last steps.
  *
  * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic), row 3 i + c; columns are the fit coordinates of
@@ -25,6 +26,7 @@ struct gaussian_prior {
 
 struct history_step {
     double x[SCATTERING_MAX_PARAM];
+    double slope[SCATTERING_MAX_PARAM]; /* d param / d x there */
     struct estimate *replica[2]; /* one per observation, owned */
 };
 
@@ -92,6 +94,8 @@ void linear_model_gradient(const struct linear_model *m, double *g);
 /* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged
  * J, positive semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian);
+/* The objective as the fit weighs rows: what gradient and Hessian are of. */
+double linear_model_weighted_objective(const struct linear_model *m);
 /* Mean over rows of the variance of (r_A + r_B) / 2: as the fit weighs rows, and all alike, as f counts them. */
 double linear_model_noise(const struct linear_model *m);
 double linear_model_mean_noise(const struct linear_model *m);
