@@ -15,9 +15,10 @@
  * of the noise; spread over configurations by the standard deviation of a path (Neyman allocation).
  *
  * Arrived: what several undamped steps could gain (far_gain, by the curvature without the noise of J) is within the
- * noise, or below arrived_share of the objective, which the model's curvature does not tell, or good enough. (Where a
- * model does not fit, steps are short and each gains little: one step's gain would end such fits on their way.) The fit
- * ends when it has arrived and the noise, too, is good enough: below target_share of the objective or target_rel_rms, or,
+ * noise, or below arrived_share of the weighted objective, which the model's curvature does not tell, or good enough: below
+ * target_share of that or target_rel_rms. (Where a model does not fit, steps are short and each gains little: one step's
+ * gain would end such fits on their way.) The fit ends when it has arrived, the pull is gone and the noise, too, is good
+ * enough: below target_share of the plain objective or target_rel_rms, or,
  * where no budget was asked for, photograph_share of what the photographs' own errors make of a residual.
  * Where the paths or iterations are used up before, it has converged if it had arrived.
  */

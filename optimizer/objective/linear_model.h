@@ -6,8 +6,8 @@
  * are averaged with weights 1 / (noise^2 + bend^2): noise from the path count and the configuration's pooled variance
  * per path (not from the estimate's own variance, which is correlated with its value), bend from the cube of the
  * predicted change of the residuals between the two points and from the changes by single parameters, which cancel
- * along a valley while their bends do not. So early, cheap iterations fade
- * out and the last ones add up: this is the averaging over the last steps.
+ * along a valley while their bends do not. So early, cheap iterations fade out and the last ones add up: this is the
+ * averaging over the last steps.
  *
  * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic), row 3 i + c; columns are the fit coordinates of
  * all parameters. Ownership: init/release. Not thread-safe.

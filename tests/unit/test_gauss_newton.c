@@ -155,11 +155,105 @@ static void test_says_when_it_has_not_converged(void **state)
     assert_non_null(strstr(r.reason, "path budget ended"));
 }
 
+/* A cloth that looks the same whatever parameter 8 is, and where its value first settled and last was. */
+struct blind {
+    struct estimator inner;
+    double same, first, last;
+};
+
+static status blind_run(void *context, const struct estimator_call *call, const struct progress *progress,
+                        struct estimate *out, double *wall_s, struct error *err)
+{
+    struct blind *b = context;
+    double param[FAKE_N_PARAM];
+    memcpy(param, call->param, sizeof param);
+    param[8] = b->same;
+    struct estimator_call same = *call;
+    same.param = param;
+    status s = b->inner.run(b->inner.context, &same, progress, out, wall_s, err);
+    for (size_t i = 0; i < b->inner.n_configuration; i++)
+        for (size_t c = 0; c < 3; c++) out[i].jac[c * FAKE_N_PARAM + 8] = out[i].jac_var[c * FAKE_N_PARAM + 8] = 0.0;
+    return s;
+}
+
+static status blind_report(void *context, const struct fit_step *step, struct error *err)
+{
+    struct blind *b = context;
+    (void)err;
+    if (step->step == 0) b->first = step->param[8];
+    b->last = step->param[8];
+    return STATUS_OK;
+}
+
+/* A fit of that, with parameter 8 as info says and from `start`. */
+static struct blind fit_blind(const struct param_info *eighth, double start, struct fit_result *r)
+{
+    struct fake_cloth f;
+    struct observation_set o;
+    struct param_info info[FAKE_N_PARAM];
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct error err = {0};
+    double truth[FAKE_N_PARAM];
+    fake_cloth_init(&f, 1, FAKE_N_FIT);
+    struct blind b = {.inner = fake_estimator(&f)};
+    struct estimator e = {&b, b.inner.n_configuration, b.inner.n_param, blind_run};
+    fake_param_set(cloth[0], truth);
+    b.same = truth[8];
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(&f, truth, 0.005, 1, &o), STATUS_OK);
+    memcpy(info, fake_param, sizeof info);
+    info[8] = *eighth;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        parameter[p] = (struct fit_parameter){info[p].lower, info[p].upper, info[p].start, false};
+    parameter[8].start = start;
+    struct fit_problem problem = {.n_param = FAKE_N_PARAM,
+                                  .info = info,
+                                  .param = parameter,
+                                  .observation = &o,
+                                  .estimator = &e,
+                                  .report = blind_report,
+                                  .report_context = &b};
+    if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    observation_set_release(&o);
+    return b;
+}
+
+/* What the photographs do not tell shows where the pull leads: a width from the model's start to wide lobes, from a stated
+ * start back to that; another positive quantity nowhere. What they do tell is as if there had been no pull. */
+static void test_pull(void **state)
+{
+    (void)state;
+    struct fit_result r[3];
+    struct fake_cloth f;
+    const struct param_info width = fake_param[8];
+    struct param_info density = width;
+    density.unit = "1/cm";
+    double stated = 1.5 * width.start, range = log(width.upper / width.lower);
+    struct blind b = fit_blind(&width, width.start, &r[0]);
+    assert_true(b.first == width.start);
+    assert_true(fabs(log(b.last / width.lower) / range - 0.8) < 0.03);
+    b = fit_blind(&width, stated, &r[1]);
+    assert_true(fabs(log(b.last / stated)) < 1e-6);
+    b = fit_blind(&density, width.start, &r[2]);
+    assert_true(fabs(log(b.last / width.start)) < 1e-6);
+    double truth[FAKE_N_PARAM];
+    fake_param_set(cloth[0], truth);
+    fake_cloth_init(&f, 1, FAKE_N_FIT);
+    for (size_t k = 0; k < 3; k++) {
+        assert_true(r[k].converged && !r[k].uncertainty.determined[8]);
+        r[k].param[8] = truth[8];
+        for (size_t p = 0; p < 8; p++)
+            assert_true(r[k].uncertainty.at_bound[p] || fabs(r[k].param[p] - truth[p]) < 4.0 * r[k].uncertainty.se_param[p]);
+        assert_true(fake_rel_rms(&f, 0, FAKE_N_FIT, r[k].param, truth) < 0.01);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact), cmocka_unit_test(test_recovery_and_errors),
                                        cmocka_unit_test(test_ends_at_the_noise_of_the_photographs),
                                        cmocka_unit_test(test_exact_renderings_of_noisy_photographs),
-                                       cmocka_unit_test(test_says_when_it_has_not_converged)};
+                                       cmocka_unit_test(test_says_when_it_has_not_converged),
+                                       cmocka_unit_test(test_pull)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

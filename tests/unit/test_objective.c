@@ -1,4 +1,4 @@
-/* Objective, coordinates, small matrices, pooled linear model, uncertainty. */
+/* Objective, coordinates, small matrices, what follows from a linear model, uncertainty. */
 #include "base/rng.h"
 #include "optimizer/objective/linear_model.h"
 #include "optimizer/objective/objective.h"
@@ -172,59 +172,6 @@ static void test_matrices(void **state)
     for (size_t k = 0; k < N; k++) assert_true(value[k] > 0.9e-3);
 }
 
-/* A history with exact estimates at several points: pooling returns exactly what holds at the reference point, to
- * second order. */
-static void test_pool(void **state)
-{
-    (void)state;
-    struct fake_cloth f;
-    struct observation_set o;
-    struct coordinate k[FAKE_N_PARAM];
-    struct linear_history h;
-    struct linear_model m;
-    double truth[FAKE_N_PARAM], x[FAKE_N_PARAM], param[FAKE_N_PARAM];
-    struct estimate a[FAKE_N_FIT], exact[FAKE_N_FIT];
-    size_t n_path[FAKE_N_FIT];
-    fake_cloth_init(&f, 3, FAKE_N_FIT);
-    f.noise = 0.0;
-    struct estimator e = fake_estimator(&f);
-    fake_param_set(mid_range, truth);
-    observation_set_init(&o);
-    assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
-    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 4096;
-    for (size_t p = 0; p < FAKE_N_PARAM; p++)
-        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, fake_param[p].upper);
-    linear_history_init(&h, &o, k, FAKE_N_PARAM);
-    assert_int_equal(linear_model_init(&m, 3 * FAKE_N_FIT, FAKE_N_PARAM, NULL), STATUS_OK);
-    double wall_s;
-    for (int step = -1; step <= 1; step++) {
-        for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-            x[p] = coordinate_from_param(&k[p], truth[p]) + 0.02 * step;
-            param[p] = coordinate_to_param(&k[p], x[p]);
-        }
-        struct estimator_call call = {param, n_path, 0, 0, true};
-        assert_int_equal(e.run(e.context, &call, NULL, a, &wall_s, NULL), STATUS_OK);
-        for (size_t i = 0; i < FAKE_N_FIT; i++)
-            for (int c = 0; c < 3; c++) a[i].var[c] = a[i].mean[c] * a[i].mean[c] * 25.0 / 4096.0;
-        if (step == 0) memcpy(exact, a, sizeof a);
-        assert_int_equal(linear_history_append(&h, x, a, a, NULL), STATUS_OK);
-    }
-    for (size_t p = 0; p < FAKE_N_PARAM; p++) x[p] = coordinate_from_param(&k[p], truth[p]);
-    assert_int_equal(linear_model_pool(&m, &h, x, NULL), STATUS_OK);
-    assert_true(m.n_effective > 1.5 * 4096 && m.n_effective <= 3.0 * 4096.5);
-    for (size_t row = 0; row < m.n_row; row++) {
-        assert_true(fabs(m.r[0][row]) < 2e-3);
-        for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-            double want = sqrt(objective_weight(&o.item[row / 3])) * exact[row / 3].jac[(row % 3) * FAKE_N_PARAM + p] *
-                          coordinate_slope(&k[p], truth[p]);
-            assert_true(fabs(m.j[0][row * FAKE_N_PARAM + p] - want) < 0.03 * fabs(want) + 0.002);
-        }
-    }
-    linear_model_release(&m);
-    linear_history_release(&h);
-    observation_set_release(&o);
-}
-
 /* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called
  * undetermined. */
 static void test_uncertainty(void **state)
@@ -301,12 +248,46 @@ static void test_misfit_and_weights(void **state)
     linear_model_release(&m);
 }
 
+/* Its derivative along the model is the gradient, so what a step promises and what has been reached are of one function. */
+static void test_weighted_objective(void **state)
+{
+    (void)state;
+    enum { ROWS = 12, PARAMS = 2 };
+    struct linear_model m;
+    struct rng rng;
+    double g[PARAMS], value[2], plain = 0.0;
+    rng_start(&rng, &(struct rng_key){.seed = 9}, 0, 0);
+    assert_int_equal(linear_model_init(&m, ROWS, PARAMS, NULL), STATUS_OK);
+    for (size_t row = 0; row < ROWS; row++) {
+        m.weight[row] = 0.1 + rng_double(&rng);
+        for (int q = 0; q < 2; q++) {
+            m.r[q][row] = rng_double(&rng) - 0.5;
+            for (size_t p = 0; p < PARAMS; p++) m.j[q][row * PARAMS + p] = rng_double(&rng) - 0.5;
+        }
+        plain += m.weight[row] * m.r[0][row] * m.r[1][row];
+    }
+    assert_true(fabs(linear_model_weighted_objective(&m) - plain) < 1e-12);
+    linear_model_gradient(&m, g);
+    for (size_t p = 0; p < PARAMS; p++) {
+        for (int side = 0; side < 2; side++) {
+            double dx = side ? 2e-4 : -1e-4; /* to 1e-4 below, from there to 1e-4 above, and back */
+            for (size_t row = 0; row < ROWS; row++)
+                for (int q = 0; q < 2; q++) m.r[q][row] += dx * m.j[q][row * PARAMS + p];
+            value[side] = linear_model_weighted_objective(&m);
+        }
+        assert_true(fabs((value[1] - value[0]) / 2e-4 - g[p]) < 1e-6);
+        for (size_t row = 0; row < ROWS; row++)
+            for (int q = 0; q < 2; q++) m.r[q][row] -= 1e-4 * m.j[q][row * PARAMS + p];
+    }
+    linear_model_release(&m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_by_hand),     cmocka_unit_test(test_unbiased), cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices), cmocka_unit_test(test_pool),
-        cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights),
+        cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices),
+        cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights), cmocka_unit_test(test_weighted_objective),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
