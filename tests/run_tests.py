@@ -1,13 +1,16 @@
 """Run every test and end with "N passed, N failed[, N skipped]"; exit status 1 when one failed or none ran.
 
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
-hangs or writes no results counts as one failed test. --quick runs the unit tests, the layer rules and the quick API tests.
+hangs or writes no results counts as one failed test. --quick runs the unit tests, the layer rules and the quick API tests,
+C beside Python: one computes while the other waits for daemons.
 """
 import argparse
+import concurrent.futures
 import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import xml.etree.ElementTree as ElementTree
 
@@ -48,6 +51,13 @@ def run(command, timeout_s, environment):
 class Totals:
     def __init__(self):
         self.passed = self.failed = self.skipped = 0
+        self.lock = threading.Lock()
+
+    def add_one(self, name, code, output, seconds):
+        with self.lock:
+            self.passed += code == 0
+            self.failed += code != 0
+            print(f"{'ok' if code == 0 else 'FAILED':7s}{name} ({seconds:.1f} s)" + ("" if code == 0 else "\n" + output), flush=True)
 
     def add(self, name, junit, code, output, seconds):
         passed = failed = skipped = 0
@@ -60,16 +70,17 @@ class Totals:
         if passed + failed + skipped == 0 or (code != 0 and failed == 0):
             failed += 1
             bad.append(f"ended with {code}")
-        self.passed += passed
-        self.failed += failed
-        self.skipped += skipped
-        state = "FAILED" if failed else "ok"
-        print(f"{state:7s}{name}: {passed} passed, {failed} failed, {skipped} skipped ({seconds:.1f} s)", flush=True)
-        for line in why:
-            print(f"       skipped {line}")
-        if failed:
-            print(f"       failed: {', '.join(str(b) for b in bad)}")
-            print("\n".join("       | " + line for line in output.splitlines()[-80:]), flush=True)
+        with self.lock:
+            self.passed += passed
+            self.failed += failed
+            self.skipped += skipped
+            state = "FAILED" if failed else "ok"
+            print(f"{state:7s}{name}: {passed} passed, {failed} failed, {skipped} skipped ({seconds:.1f} s)", flush=True)
+            for line in why:
+                print(f"       skipped {line}")
+            if failed:
+                print(f"       failed: {', '.join(str(b) for b in bad)}")
+                print("\n".join("       | " + line for line in output.splitlines()[-80:]), flush=True)
 
 
 def main():
@@ -83,12 +94,13 @@ def main():
     totals = Totals()
     wanted = lambda name: arguments.only is None or arguments.only in name
 
-    with tempfile.TemporaryDirectory() as folder:
-        if wanted("layers"):
-            code, output, seconds = run([sys.executable, "tests/check_layers.py"], TIMEOUT_S, environment)
-            totals.passed += code == 0
-            totals.failed += code != 0
-            print(f"{'ok' if code == 0 else 'FAILED':7s}layers ({seconds:.1f} s)" + ("" if code == 0 else "\n" + output))
+    def run_layers():
+        if not wanted("layers"):
+            return
+        code, output, seconds = run([sys.executable, "tests/check_layers.py"], TIMEOUT_S, environment)
+        totals.add_one("layers", code, output, seconds)
+
+    def run_c(folder):
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
             source = os.path.join(ROOT, "tests", kind)
             for name in sorted(os.listdir(source)) if os.path.isdir(source) else []:
@@ -98,11 +110,11 @@ def main():
                 code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", kind, name[:-2])], TIMEOUT_S,
                                             dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
                 totals.add(f"{kind}/{name[:-2]}", junit, code, output, seconds)
+
+    def run_python(folder):
         for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:
             source = os.path.join(ROOT, "tests", kind)
-            if not os.path.isdir(source):
-                continue
-            for name in sorted(os.listdir(source)):
+            for name in sorted(os.listdir(source)) if os.path.isdir(source) else []:
                 if not (name.startswith("test_") and name.endswith(".py") and wanted(name)):
                     continue
                 junit = os.path.join(folder, kind + name + ".xml")
@@ -114,6 +126,12 @@ def main():
                 if code == 5 and arguments.quick:  # every test of the file is a slow one
                     continue
                 totals.add(f"{kind}/{name[:-3]}", junit, code, output, seconds)
+
+    with tempfile.TemporaryDirectory() as folder:
+        run_layers()
+        with concurrent.futures.ThreadPoolExecutor(max_workers=2 if arguments.quick else 1) as lanes:
+            for lane in [lanes.submit(run_c, folder), lanes.submit(run_python, folder)]:
+                lane.result()
 
     tail = f", {totals.skipped} skipped" if totals.skipped else ""
     print(f"{totals.passed} passed, {totals.failed} failed{tail}", flush=True)
