@@ -97,6 +97,12 @@ static double surface_value(const struct check *k, const struct point *p, const 
             m->eval(p->surface, s->image_wi, s->wo, rgb, NULL);
             for (int c = 0; c < 3; c++) sum += t[c] * (double)rgb[c] * (double)s->image[c];
         }
+        if (s->probe_light > 0) {
+            float ahead[3];
+            m->eval(p->surface, s->probe_wi, s->wo, rgb, NULL);
+            m->eval(p->surface, s->probe_light_wi, s->probe_wo, ahead, NULL);
+            for (int c = 0; c < 3; c++) sum += t[c] * (double)rgb[c] * (double)ahead[c] * (double)s->probe_light;
+        }
         if (s->weight <= 0) continue; /* the path ended here */
         m->eval(p->surface, s->wi, s->wo, rgb, NULL);
         for (int c = 0; c < 3; c++) {

@@ -156,6 +156,7 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
             goto out;
         }
         path_setting_init_sets(&r.setting[i], q->scene, &sets, &q->configuration[i], q->want_jacobian);
+        r.setting[i].probes = r.setting[i].probes && !q->no_probes;
         camera_init(&r.camera[i], &q->configuration[i]);
     }
     struct estimate_blocks blocks = {.n_configuration = q->n_configuration,

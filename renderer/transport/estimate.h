@@ -24,6 +24,7 @@ struct estimate_request {
     uint32_t iteration, replica; /* rng.h; configuration i uses stream configuration = i */
     bool want_jacobian;
     size_t n_set; /* parameter sets for the scene's material groups; 0 and 1: one set for all fibers */
+    bool no_probes; /* plain paths without probes towards the lamp (path_tracer.h): same means, more variance */
     bool share_camera_paths; /* configurations that differ in their lamp only are estimated from the same paths
                                 (as many as the one that asks for most): 1.4 to 1.9 times the paths in the same time
                                 for two lamps, but the errors of such configurations go together. Off for fits,

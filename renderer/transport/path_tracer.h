@@ -1,7 +1,7 @@
 /* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric
  * thesis 5.5.1, figure 5.3): beside the throughput T runs the sum H of scores d ln S / d p, and every light connection
  * adds L and L (H + score). The sampling densities, the roulette and the weights that combine lamp and scattering
- * samples (power heuristic) are held fixed.
+ * samples (power heuristic) and those of probes and the walk (balance heuristic) are held fixed.
  */
 #ifndef SELVEDGE_RENDERER_PATH_TRACER_H
 #define SELVEDGE_RENDERER_PATH_TRACER_H
@@ -10,7 +10,7 @@
 #include "renderer/scattering/scattering.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/environment.h"
-#include "renderer/transport/lamp.h"
+#include "renderer/transport/lamp_guide.h"
 #include "renderer/transport/parameter_sets.h"
 
 enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT, PATH_MAX_LAMP = 16 };
@@ -26,6 +26,8 @@ struct path_setting {
     float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
     const struct environment *image; /* or NULL */
     float image_turn[2]; /* cosine and sine of the angle from the cloth's frame to the world's */
+    bool probes; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
+    struct lamp_guide_energy energy[SCATTERING_MAX_SET]; /* by material group: probes are as frequent as light goes on forwards */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     bool want_jacobian;
 };
@@ -46,13 +48,17 @@ struct path_result {
 };
 
 /* All that a path's value depends on besides S: value = sum over steps of
- * T (S(light_wi, wo) light + S(image_wi, wo) image) + T' escape with T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
+ * T (S(light_wi, wo) light + S(image_wi, wo) image + S(probe_wi, wo) S'(probe_light_wi, probe_wo) probe_light) + T' escape
+ * with T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
 struct path_step {
     float wo[3], wi[3];
     float weight; /* cos th_i / (density * survival) */
     float light_wi[3];
     float light;     /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
     float image_wi[3], image[3]; /* the same for a sample of the image environment, rgb */
+    float probe_wi[3], probe_wo[3], probe_light_wi[3]; /* the last two at the fiber that the probe met */
+    float probe_light;           /* with all weights of the probe; 0: no light found */
+    uint32_t i_probe_group;      /* material group of that fiber: S' is that group's */
     uint32_t i_group;            /* material group: S is that group's */
     float escape[3]; /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
 };
