@@ -149,11 +149,14 @@ static void test_mean_over_rotations(void **unused)
     q.n_path = n_path;
     assert_int_equal(appearance_estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
     assert_memory_equal(&mean[1], &turned[N_ROTATION], sizeof mean[1]);
+    double least = INFINITY, most = 0.0;
     for (int k = 0; k < N_ROTATION; k++) {
+        least = fmin(least, turned[k].mean[1]);
+        most = fmax(most, turned[k].mean[1]);
         sum += turned[k].mean[1] / N_ROTATION;
         var += turned[k].var[1] / (N_ROTATION * N_ROTATION);
     }
-    assert_true(fabs(turned[0].mean[1] - turned[1].mean[1]) > 0.05 * sum); /* rotations of this cloth differ */
+    assert_true(most - least > 0.05 * sum); /* not one of them for all */
     assert_true(fabs(mean[0].mean[1] - sum) < 1e-12 && fabs(mean[0].var[1] - var) < 1e-12 * var);
     size_t i_width = a.n_param + 6; /* green by beta_R */
     sum = 0.0;
