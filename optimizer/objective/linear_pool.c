@@ -101,9 +101,10 @@ static void add_residuals(struct linear_model *m, const struct linear_history *h
     }
 }
 
-/* Variance of one path's derivatives of configuration i, and the square of the mean derivatives, both summed over
- * columns and channels. */
+/* Variance of one path's derivatives of configuration i, by channel and column and summed over both, and the square of the
+ * mean derivatives, summed likewise. */
 struct derivative_scale {
+    double by[3][SCATTERING_MAX_PARAM];
     double path_variance, square;
 };
 
@@ -118,11 +119,15 @@ static struct derivative_scale derivative_scale(const struct linear_history *h, 
             n_path += n;
             for (size_t p = 0; p < h->n_param; p++)
                 for (size_t c = 0; c < 3; c++)
-                    scale.path_variance += n * strength(h, i, n) * w * s->slope[p] * s->slope[p] *
-                                           s->replica[q][i].jac_var[c * h->n_param + p];
+                    scale.by[c][p] += n * strength(h, i, n) * w * s->slope[p] * s->slope[p] *
+                                      s->replica[q][i].jac_var[c * h->n_param + p];
         }
     }
-    scale.path_variance = n_path > 0.0 ? scale.path_variance / n_path : 0.0;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t p = 0; p < h->n_param; p++) {
+            scale.by[c][p] = n_path > 0.0 ? scale.by[c][p] / n_path : 0.0;
+            scale.path_variance += scale.by[c][p];
+        }
     for (size_t j = 3 * i * h->n_param; j < 3 * (i + 1) * h->n_param; j++) scale.square += mean[j] * mean[j];
     return scale;
 }
@@ -145,19 +150,65 @@ static double derivative_weight(const struct linear_history *h, size_t i, size_t
     return 1.0 / (scale->path_variance * per_path(h, i, k) + bend_j * change->net * scale->square + hidden_j * change->j + 1e-12);
 }
 
+/* A step's way to x_ref: dx, how far that is, the change of the means as the derivatives of all steps say it, and the paths
+ * of these (1 / strength). */
+struct carried {
+    double dx[SCATTERING_MAX_PARAM], change[2][3], per_path;
+    struct bend bend;
+};
+
+/* Derivatives half way, those near the middle counting most. (Those of the step itself are noisier, and by the same rare
+ * paths as its mean.) */
+static void carry(const struct linear_history *h, const double *mean, size_t i, const struct derivative_scale *scale,
+                  const double *x_ref, const double *x, struct carried *out)
+{
+    double sum = 0.0, away[SCATTERING_MAX_PARAM];
+    memset(out, 0, sizeof *out);
+    for (size_t p = 0; p < h->n_param; p++) out->dx[p] = x_ref[p] - x[p];
+    bent_change(mean, i, out->dx, h->n_param, &out->bend);
+    for (size_t k = 0; k < h->n_step; k++) {
+        const struct history_step *s = &h->step[k];
+        struct bend b;
+        if (s->replica[0][i].n_path == 0) continue;
+        for (size_t p = 0; p < h->n_param; p++) away[p] = x_ref[p] - 0.5 * out->dx[p] - s->x[p];
+        bent_change(mean, i, away, h->n_param, &b);
+        double weight = derivative_weight(h, i, k, scale, &b);
+        sum += weight;
+        out->per_path += weight * weight * per_path(h, i, k);
+        for (int q = 0; q < 2; q++)
+            for (size_t c = 0; c < 3; c++)
+                for (size_t p = 0; p < h->n_param; p++)
+                    out->change[q][c] += weight * s->replica[q][i].jac[c * h->n_param + p] * s->slope[p] * out->dx[p];
+    }
+    if (!(sum > 0.0)) return;
+    out->per_path /= sum * sum;
+    for (int q = 0; q < 2; q++)
+        for (size_t c = 0; c < 3; c++) out->change[q][c] /= sum;
+}
+
+/* Variance of a change over dx by the noise of derivatives. */
+static double change_variance(const struct derivative_scale *scale, size_t c, const double *dx, size_t n, double per_path)
+{
+    double sum = 0.0;
+    for (size_t p = 0; p < n; p++) sum += dx[p] * dx[p] * scale->by[c][p];
+    return sum * per_path;
+}
+
 struct pool_weight {
     double r, j;
 };
 
 /* Weights of all steps for configuration i, summing to 1. */
 static void pool_weights(const struct linear_history *h, size_t i, const struct derivative_scale *scale,
-                         const struct bend *change, struct pool_weight *weight, double *n_effective)
+                         const struct carried *carried, struct pool_weight *weight, double *n_effective)
 {
     double path_variance = noise_variance(h, i), sum_r = 0.0, sum_j = 0.0, sum_square = 0.0;
     for (size_t k = 0; k < h->n_step; k++) {
-        double net = change[k].net, bend = bend_r * net * net * net + hidden_r * change[k].r;
-        weight[k].r = 1.0 / (path_variance * per_path(h, i, k) + bend + 1e-12);
-        weight[k].j = derivative_weight(h, i, k, scale, &change[k]);
+        const struct carried *way = &carried[k];
+        double net = way->bend.net, bend = bend_r * net * net * net + hidden_r * way->bend.r, noise = 0.0;
+        for (size_t c = 0; c < 3; c++) noise += change_variance(scale, c, way->dx, h->n_param, way->per_path) / 3.0;
+        weight[k].r = 1.0 / (path_variance * per_path(h, i, k) + noise + bend + 1e-12);
+        weight[k].j = derivative_weight(h, i, k, scale, &way->bend);
         sum_r += weight[k].r;
         sum_j += weight[k].j;
     }
@@ -170,56 +221,44 @@ static void pool_weights(const struct linear_history *h, size_t i, const struct 
     *n_effective += sum_square > 0.0 ? 1.0 / sum_square : 0.0;
 }
 
-/* Change of the means of configuration i over dx up to x_ref, by the derivatives half way as all steps say them. (Those of
- * the step itself are noisier, and by the same rare paths as its mean.) */
-static void carry(const struct linear_history *h, const double *mean, size_t i, const struct derivative_scale *scale,
-                  const double *x_ref, const double *dx, double change[2][3])
+/* All steps are carried by the same derivatives, so their errors by these go together: as those of one step whose way is the
+ * mean of theirs. */
+static void add_carried_noise(struct linear_model *m, const struct linear_history *h, size_t i, const struct derivative_scale *scale,
+                              const struct carried *carried, const struct pool_weight *weight)
 {
-    double sum = 0.0, away[SCATTERING_MAX_PARAM];
-    memset(change, 0, 2 * sizeof *change);
+    double dx[SCATTERING_MAX_PARAM] = {0}, per_path = 0.0;
     for (size_t k = 0; k < h->n_step; k++) {
-        const struct history_step *s = &h->step[k];
-        struct bend b;
-        for (size_t p = 0; p < h->n_param; p++) away[p] = x_ref[p] - 0.5 * dx[p] - s->x[p];
-        bent_change(mean, i, away, h->n_param, &b);
-        double weight = derivative_weight(h, i, k, scale, &b);
-        sum += weight;
-        for (int q = 0; q < 2; q++)
-            for (size_t c = 0; c < 3; c++)
-                for (size_t p = 0; p < h->n_param; p++)
-                    change[q][c] += weight * s->replica[q][i].jac[c * h->n_param + p] * s->slope[p] * dx[p];
+        per_path += weight[k].r * carried[k].per_path;
+        for (size_t p = 0; p < h->n_param; p++) dx[p] += weight[k].r * carried[k].dx[p];
     }
-    for (int q = 0; q < 2; q++)
-        for (size_t c = 0; c < 3; c++) change[q][c] = sum > 0.0 ? change[q][c] / sum : 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        double var = change_variance(scale, c, dx, h->n_param, per_path);
+        for (int q = 0; q < 2; q++) m->r_var[q][3 * i + c] += var;
+    }
 }
 
 static void pool_configuration(struct linear_model *m, const struct linear_history *h, const double *mean, size_t i,
-                               struct bend *change, struct pool_weight *weight)
+                               struct carried *carried, struct pool_weight *weight)
 {
     const struct derivative_scale scale = derivative_scale(h, mean, i);
-    double dx[SCATTERING_MAX_PARAM], carried[2][3];
+    for (size_t k = 0; k < h->n_step; k++) carry(h, mean, i, &scale, m->x_ref, h->step[k].x, &carried[k]);
+    pool_weights(h, i, &scale, carried, weight, &m->n_effective);
     for (size_t k = 0; k < h->n_step; k++) {
-        for (size_t p = 0; p < m->n_param; p++) dx[p] = m->x_ref[p] - h->step[k].x[p];
-        bent_change(mean, i, dx, m->n_param, &change[k]);
-    }
-    pool_weights(h, i, &scale, change, weight, &m->n_effective);
-    for (size_t k = 0; k < h->n_step; k++) {
-        for (size_t p = 0; p < m->n_param; p++) dx[p] = m->x_ref[p] - h->step[k].x[p];
-        carry(h, mean, i, &scale, m->x_ref, dx, carried);
         for (int q = 0; q < 2; q++) {
             add_derivatives(m, h, &h->step[k], q, i, weight[k].j);
-            add_residuals(m, h, &h->step[k], q, i, carried[q], weight[k].r);
+            add_residuals(m, h, &h->step[k], q, i, carried[k].change[q], weight[k].r);
         }
     }
+    add_carried_noise(m, h, i, &scale, carried, weight);
 }
 
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)
 {
     status s = STATUS_OK;
     double *mean = malloc(m->n_row * m->n_param * sizeof *mean);
-    struct bend *change = malloc(h->n_step * sizeof *change);
+    struct carried *carried = malloc(h->n_step * sizeof *carried);
     struct pool_weight *weight = malloc(h->n_step * sizeof *weight);
-    if (mean == NULL || weight == NULL || change == NULL) {
+    if (mean == NULL || weight == NULL || carried == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot average estimates: out of memory");
         goto out;
     }
@@ -228,7 +267,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     mean_derivatives(h, mean);
     m->n_effective = 0.0;
     for (size_t i = 0; i < h->observation->n; i++)
-        pool_configuration(m, h, mean, i, change, weight);
+        pool_configuration(m, h, mean, i, carried, weight);
     for (size_t row = 0; row < m->n_row; row++) {
         m->photograph_var[row] = objective_photograph_variance(&h->observation->item[row / 3], row % 3);
         m->extra[row] = h->observation->item[row / 3].weight;
@@ -237,7 +276,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     if (m->gain_sd > 0.0) linear_gain_absorb(m, h->observation);
 out:
     free(mean);
-    free(change);
+    free(carried);
     free(weight);
     return s;
 }

@@ -9,18 +9,31 @@ enum { N = SCATTERING_MAX_PARAM };
 /* A quantity that is positive and spans decades is not known when it may be half or twice as large (one standard error). */
 static const double log_determined = 0.69;
 
-/* V of one row, without Monte-Carlo noise. */
-static double row_variance(const struct linear_model *m, size_t row, double misfit)
+/* Share of a photograph's stated variance that its three channels have in common: exposure, lamp and the patch of cloth are
+ * the same for them, noise is not. Sources state no correlation; taken as independent (0), errors of widths, which all
+ * channels tell together, would be up to 30 % too small where half of the variance is common. */
+static const double photograph_in_common = 0.5;
+
+/* The part of V of one row that goes with no other row. */
+static double own_variance(const struct linear_model *m, size_t row, double misfit)
 {
-    return m->photograph_var[row] + misfit * m->extra[row];
+    return (1.0 - photograph_in_common) * m->photograph_var[row] + misfit * m->extra[row];
 }
 
-/* The three channels of a configuration come from the same paths: their Monte-Carlo noise moves together. */
-static void add_path_noise(const struct linear_model *m, size_t i, const size_t *index, size_t n, double *b)
+static double path_variance(const struct linear_model *m, size_t row) { return linear_model_row_noise(m, row); }
+
+static double common_variance(const struct linear_model *m, size_t row)
+{
+    return photograph_in_common * m->photograph_var[row];
+}
+
+/* Noise that moves the three channels of a configuration together: they come from the same paths, the same exposure. */
+static void add_common_noise(const struct linear_model *m, size_t i, double (*variance)(const struct linear_model *m, size_t row),
+                             const size_t *index, size_t n, double *b)
 {
     double va[N] = {0}, vb[N] = {0};
     for (size_t row = 3 * i; row < 3 * i + 3; row++) {
-        double sd = m->weight[row] * sqrt(linear_model_row_noise(m, row));
+        double sd = m->weight[row] * sqrt(variance(m, row));
         for (size_t p = 0; p < n; p++) {
             va[p] += sd * m->j[0][row * m->n_param + index[p]];
             vb[p] += sd * m->j[1][row * m->n_param + index[p]];
@@ -40,9 +53,9 @@ static void normal_matrices(const struct linear_model *m, const size_t *index,
     for (size_t row = 0; row < m->n_row; row++) {
         const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
         const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
-        double u = m->weight[row], v = row_variance(m, row, misfit),
+        double u = m->weight[row], v = own_variance(m, row, misfit),
                r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * linear_model_row_noise(m, row);
-        *mean_variance += u * (v + linear_model_row_noise(m, row)) / (double)m->n_row;
+        *mean_variance += u * (v + common_variance(m, row) + path_variance(m, row)) / (double)m->n_row;
         for (size_t p = 0; p < n; p++) {
             for (size_t q = 0; q < n; q++) {
                 double jj = 0.5 * (ja[index[p]] * jb[index[q]] + jb[index[p]] * ja[index[q]]);
@@ -52,7 +65,10 @@ static void normal_matrices(const struct linear_model *m, const size_t *index,
             b[p * n + p] += u * u * r2 * 0.25 * (va[index[p]] + vb[index[p]]);
         }
     }
-    for (size_t i = 0; i < m->n_row / 3; i++) add_path_noise(m, i, index, n, b);
+    for (size_t i = 0; i < m->n_row / 3; i++) {
+        add_common_noise(m, i, path_variance, index, n, b);
+        add_common_noise(m, i, common_variance, index, n, b);
+    }
 }
 
 /* Covariance of the parameters index[0..n-1], all others held. */

@@ -184,15 +184,17 @@ static void test_uncertainty(void **state)
     bool fixed[2] = {false, false};
     assert_int_equal(linear_model_init(&m, ROWS, 2, NULL), STATUS_OK);
     for (size_t p = 0; p < 2; p++) coordinate_init(&k[p], &fake_param[6], fake_param[6].lower, fake_param[6].upper);
-    double jj = 0.0;
+    double jj = 0.0, common = 0.0, of_three = 0.0;
     for (size_t row = 0; row < ROWS; row++) {
         m.photograph_var[row] = 0.01 * 0.01;
         for (int q = 0; q < 2; q++) m.j[q][2 * row] = 0.5 + 0.01 * (double)row;
         jj += m.j[0][2 * row] * m.j[0][2 * row];
+        of_three = (row % 3 > 0 ? of_three : 0.0) + m.j[0][2 * row];
+        if (row % 3 == 2) common += of_three * of_three;
     }
     m.x_ref[0] = m.x_ref[1] = log(fake_param[6].start);
     uncertainty_compute(&m, k, fixed, &u);
-    double want = 0.01 / sqrt(jj);
+    double want = 0.01 * sqrt(0.5 * jj + 0.5 * common) / jj; /* half of a photograph's variance is common to its channels */
     assert_true(fabs(sqrt(u.cov[0]) / want - 1.0) < 1e-2);
     assert_true(fabs(u.se_param[0] / (want * fake_param[6].start) - 1.0) < 1e-2);
     assert_true(u.determined[0] && !u.determined[1] && !u.at_bound[0]);
