@@ -82,6 +82,7 @@ struct descent_method {
     const char *title;
     uint64_t default_path_budget;
     size_t default_max_iteration;
+    bool plain_paths; /* estimator.h */
     status (*run)(const struct fit_problem *problem, struct fit_result *result, struct error *err);
 };
 

@@ -17,6 +17,7 @@ struct descent_run {
     uint64_t path_budget, n_path_total, n_path_step;
     size_t n_step;
     double wall_s;
+    bool plain_paths; /* the method's */
 };
 
 status descent_run_init(struct descent_run *run, const struct fit_problem *problem, const struct descent_method *method,

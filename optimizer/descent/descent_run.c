@@ -31,6 +31,7 @@ status descent_run_init(struct descent_run *run, const struct fit_problem *probl
     if (s != STATUS_OK) return s;
     size_t n = problem->observation->n;
     run->path_budget = problem->path_budget > 0 ? problem->path_budget : method->default_path_budget;
+    run->plain_paths = method->plain_paths;
     run->n_path = calloc(n, sizeof *run->n_path);
     run->replica[0] = calloc(n, sizeof(struct estimate));
     run->replica[1] = calloc(n, sizeof(struct estimate));
@@ -75,7 +76,7 @@ status descent_estimate(struct descent_run *run, const double *param, uint32_t i
     run->n_path_step = 0;
     for (uint32_t q = 0; q < 2; q++) {
         struct estimator_call call = {param, run->n_path, iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B,
-                                      want_jacobian};
+                                      want_jacobian, run->plain_paths};
         double wall_s = 0.0;
         status s = e->run(e->context, &call, &progress, run->replica[q], &wall_s, err);
         if (s != STATUS_OK) return s;

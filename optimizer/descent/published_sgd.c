@@ -235,5 +235,6 @@ const struct descent_method descent_published_sgd = {
     .title = "stochastic gradient descent in rescaled parameters, as published (fabric thesis 5.5)",
     .default_path_budget = 0,
     .default_max_iteration = N_ITERATION,
+    .plain_paths = true,
     .run = run_published_sgd,
 };

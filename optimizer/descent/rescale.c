@@ -97,7 +97,7 @@ static status measure_symbol(const struct fit_problem *problem, size_t first, si
     for (size_t p = 0; p < problem->n_param; p++) param[p] = problem->param[p].start;
     for (size_t j = 0; j < curve->n; j++) {
         for (size_t s = 0; s < n_slot; s++) param[first + s] = curve->c[j];
-        struct estimator_call call = {param, n_path, 0, REPLICA_RESCALE, false};
+        struct estimator_call call = {param, n_path, 0, REPLICA_RESCALE, false, true};
         double seconds = 0.0;
         status s = e->run(e->context, &call, problem->progress, buffer[j % 2], &seconds, err);
         if (s != STATUS_OK) return s;

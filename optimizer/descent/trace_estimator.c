@@ -17,7 +17,8 @@ static status trace(void *context, const struct estimator_call *call, const stru
                                          .seed = t->seed,
                                          .iteration = call->iteration,
                                          .replica = call->replica,
-                                         .want_jacobian = call->want_jacobian};
+                                         .want_jacobian = call->want_jacobian,
+                                         .no_probes = call->plain_paths};
     double start_s = clock_monotonic_s();
     status s = appearance_estimate_run(&q, t->pool, progress, out, err);
     *wall_s = clock_monotonic_s() - start_s;

@@ -15,7 +15,8 @@ static status estimate_surface(const struct appearance_request *q, struct thread
                                              .seed = q->seed,
                                              .iteration = q->iteration,
                                              .replica = q->replica,
-                                             .want_jacobian = q->want_jacobian};
+                                             .want_jacobian = q->want_jacobian,
+                                             .no_probes = q->no_probes};
     return estimate_run(&request, pool, progress, out, err);
 }
 

@@ -27,6 +27,7 @@ struct appearance_request {
     uint64_t seed;
     uint32_t iteration, replica;
     bool want_jacobian;
+    bool no_probes; /* estimate.h; volumes have none */
 };
 
 /* What estimate_run or volume_estimate_run give, and means over rotations where a configuration asks for them (rotation_mean.h;

@@ -10,7 +10,7 @@
  *       lamp only (two and two) share their paths
  *   transport.fleece.peak_bytes   largest resident memory of a process that makes the fibers (as many as the Fleece
  *       cloth has: 31,091 with 580,660 segments) into a scene and traces 16 x 256 paths with derivatives
- *   transport.published_iteration_s.gabardine   processor seconds of 16 configurations x 2 replicas x 64 x 64 x 64 paths, traced
+ *   transport.published_iteration_s.gabardine   processor seconds of 16 configurations x 2 replicas x 64 x 64 x 64 plain paths, traced
  * bench_transport [PATHS] [NAME]: paths a configuration (16384; published_iteration has its own); only that set, "fleece" or
  * "published".
  */
@@ -170,14 +170,14 @@ struct bench {
 };
 
 /* Estimates with all derivatives; gives the processor seconds. Ends the program when it fails. */
-static double trace(const struct bench *b, const double param[9], size_t n_path, uint32_t replica, bool share, struct estimate e[N_CONFIGURATION])
+static double trace(const struct bench *b, const double param[9], size_t n_path, uint32_t replica, bool share, bool plain, struct estimate e[N_CONFIGURATION])
 {
     struct error err = {0};
     size_t n[N_CONFIGURATION];
     for (int i = 0; i < N_CONFIGURATION; i++) n[i] = n_path;
     const struct estimate_request q = {.scene = b->scene, .model = scattering_find("two_lobe.v1"), .param = param, .configuration = b->configuration,
                                        .n_configuration = N_CONFIGURATION, .n_path = n, .seed = 1, .replica = replica, .want_jacobian = true,
-                                       .share_camera_paths = share};
+                                       .share_camera_paths = share, .no_probes = plain};
     double t0 = processor_s();
     if (estimate_run(&q, b->pool, NULL, e, &err) != STATUS_OK) {
         fprintf(stderr, "%s\n", err.text);
@@ -224,13 +224,13 @@ static void bench_set(const struct bench *b, const char *set, const double param
                  {"gamma_TT.s_to_5pct_derivative", 8, false}};
     static const char *const width[3] = {"beta_R.s_to_1pct_of_mean", "beta_TT.s_to_1pct_of_mean", "gamma_TT.s_to_1pct_of_mean"};
     static struct estimate e[N_CONFIGURATION];
-    trace(b, param, 256, 1, false, e); /* warm up */
-    double alone_s = trace(b, param, b->n_path, 0, false, e), per_path = alone_s / (N_CONFIGURATION * (double)e[0].n_path);
+    trace(b, param, 256, 1, false, false, e); /* warm up */
+    double alone_s = trace(b, param, b->n_path, 0, false, false, e), per_path = alone_s / (N_CONFIGURATION * (double)e[0].n_path);
     print_times(set, e, per_path);
     for (size_t p = 0; p < sizeof other / sizeof other[0]; p++)
         print(set, other[p].name, s_to_derivative(e, other[p].first, other[p].colour, per_path), "s", "lower");
     for (size_t p = 0; p < 3; p++) print(set, width[p], s_to_log_derivative(e, 6 + p, param[6 + p], per_path), "s", "lower");
-    print(set, "shared_camera_speedup", alone_s / trace(b, param, b->n_path, 0, true, e), "", "higher");
+    print(set, "shared_camera_speedup", alone_s / trace(b, param, b->n_path, 0, true, false, e), "", "higher");
 }
 
 /* What one iteration of the published method traces. */
@@ -238,7 +238,7 @@ static void bench_published(const struct bench *b, const char *set, const double
 {
     static struct estimate e[N_CONFIGURATION];
     double s = 0;
-    for (uint32_t replica = 0; replica < 2; replica++) s += trace(b, param, 64 * 64 * 64, replica, false, e);
+    for (uint32_t replica = 0; replica < 2; replica++) s += trace(b, param, 64 * 64 * 64, replica, false, true, e);
     print("published_iteration_s", set, s, "s", "lower");
 }
 

@@ -4,6 +4,7 @@
 #include "optimizer/descent/descent.h"
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/estimate_journal.h"
+#include "optimizer/descent/method_names.h"
 #include "tests/support/fake_estimator.h"
 #include "tests/support/scratch_folder.h"
 
@@ -70,6 +71,38 @@ static void run(struct fixture *x, const struct descent_method *method, struct f
     if (method->run(&x->problem, result, &err) != STATUS_OK) fail_msg("%s: %s", method->id, err.text);
     assert_int_equal(result->n_step, x->n_reported);
     assert_true(result->reason[0] != '\0' && result->n_path > 0);
+}
+
+/* The estimator of the fixture, counting calls of either kind. */
+struct counted {
+    struct estimator inner;
+    size_t n_plain, n_probing;
+};
+
+static status counted_run(void *context, const struct estimator_call *call, const struct progress *progress,
+                          struct estimate *out, double *wall_s, struct error *err)
+{
+    struct counted *c = context;
+    ++*(call->plain_paths ? &c->n_plain : &c->n_probing);
+    return c->inner.run(c->inner.context, call, progress, out, wall_s, err);
+}
+
+/* The published method is traced as published, ours with all that the renderer has. */
+static void test_kind_of_paths(void **state)
+{
+    (void)state;
+    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+        struct fixture x;
+        struct fit_result r;
+        setup(&x, 1, 400000);
+        struct counted c = {.inner = x.estimator};
+        struct estimator e = {&c, x.estimator.n_configuration, x.estimator.n_param, counted_run};
+        x.problem.estimator = &e;
+        run(&x, *m, &r);
+        bool published = strcmp((*m)->id, METHOD_PUBLISHED_SGD) == 0;
+        assert_true(c.n_plain + c.n_probing > 0 && (published ? c.n_probing : c.n_plain) == 0);
+        observation_set_release(&x.observation);
+    }
 }
 
 static void test_every_method_recovers(void **state)
@@ -270,7 +303,7 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
+        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
         cmocka_unit_test(test_every_method_repeats),  cmocka_unit_test(test_resume),
         cmocka_unit_test(test_foreign_journal),       cmocka_unit_test(test_stale_writer),
         cmocka_unit_test(test_bounded_quadratic),     cmocka_unit_test(test_bad_problems),
