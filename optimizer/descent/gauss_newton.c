@@ -46,7 +46,7 @@ static const double target_rel_rms = 0.0007, target_share = 0.002;
 /* Variance of a residual by tracing, in units of that by the photographs' stated errors, that ends a fit whose budget is
  * the default one: its errors are then sqrt(1 + photograph_share) times what exact renderings would leave. Not before
  * the pooled means have least_effective paths each: their derivatives are several times noisier than they are. */
-static const double photograph_share = 1.0, least_effective = 80000.0;
+static const double photograph_share = 0.6, least_effective = 120000.0;
 /* Share of the objective below which a promised gain is not told from the model's curvature any more. */
 static const double arrived_share = 0.02;
 /* No iteration takes more than this share of the budget, so several large ones see the end point. */
