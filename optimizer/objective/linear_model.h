@@ -4,7 +4,8 @@
  * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by the
  * derivatives half way (averages of all steps, those near the middle counting most: exact to second order), and they
  * are averaged with weights 1 / (noise^2 + bend^2): noise from the path count and the configuration's pooled variance
- * per path (not from the estimate's own variance, which is correlated with its value), bend from the cube of the
+ * per path (not from the estimate's own variance, which is correlated with its value) and from that of the derivatives on
+ * the way, which r_var counts, too; bend from the cube of the
  * predicted change of the residuals between the two points and from the changes by single parameters, which cancel
  * along a valley while their bends do not. So early, cheap iterations fade out and the last ones add up: this is the
  * averaging over the last steps.

@@ -155,7 +155,7 @@ static void test_says_when_it_has_not_converged(void **state)
     assert_non_null(strstr(r.reason, "path budget ended"));
 }
 
-/* A cloth that looks the same whatever parameter 8 is, and where its value first settled and last was. */
+/* A cloth that looks the same whatever parameter 8 is; its value in the first and in the last iteration. */
 struct blind {
     struct estimator inner;
     double same, first, last;

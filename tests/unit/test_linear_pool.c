@@ -105,8 +105,46 @@ static void test_carried_to_second_order(void **state)
     observation_set_release(&o);
 }
 
+/* One estimate, carried by its own derivative: the variance is its own and dx^2 times that of the derivative. */
+static void test_noise_of_carrying(void **state)
+{
+    (void)state;
+    const struct param_info info = {"w", "w", "deg", -1, 0.1, 10.0, 1.0};
+    struct coordinate k;
+    struct observation_set o;
+    struct observation item = {.mean_rgb = {1.0, 1.0, 1.0}, .weight = 1.0};
+    struct linear_history h;
+    struct linear_model m;
+    struct estimate e = {.n_path = 4096};
+    double x = 0.2, dx = -0.3, slope, weight = objective_weight(&item);
+    coordinate_init(&k, &info, info.lower, info.upper);
+    observation_set_init(&o);
+    assert_int_equal(observation_set_append(&o, &item, NULL), STATUS_OK);
+    linear_history_init(&h, &o, &k, 1);
+    assert_int_equal(linear_model_init(&m, 3, 1, NULL), STATUS_OK);
+    for (size_t c = 0; c < 3; c++) {
+        e.mean[c] = e.jac[c] = 1.0;
+        e.var[c] = 1e-4 * (double)(c + 1);
+        e.jac_var[c] = 0.02 * (double)(c + 1);
+    }
+    assert_int_equal(linear_history_append(&h, &x, &e, &e, NULL), STATUS_OK);
+    slope = coordinate_slope(&k, coordinate_to_param(&k, x));
+    for (int moved = 0; moved < 2; moved++) {
+        double at = x + moved * dx, way = moved * dx * slope;
+        assert_int_equal(linear_model_pool(&m, &h, &at, NULL), STATUS_OK);
+        for (size_t c = 0; c < 3; c++) {
+            double want = weight * (e.var[c] + way * way * e.jac_var[c]);
+            assert_true(fabs(m.r_var[0][c] / want - 1.0) < 1e-9 && fabs(m.r_var[1][c] / want - 1.0) < 1e-9);
+        }
+    }
+    linear_model_release(&m);
+    linear_history_release(&h);
+    observation_set_release(&o);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_pool), cmocka_unit_test(test_carried_to_second_order)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_pool), cmocka_unit_test(test_carried_to_second_order),
+                                       cmocka_unit_test(test_noise_of_carrying)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
