@@ -129,7 +129,7 @@ bench-fit: | deps  ## recovery of known parameters, errors, seeds, real tables (
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
 
-bench-published: | deps ## the published method with its own budget, 3.3e9 paths (5 hours on 2 cores; continues when stopped)
+bench-published: | deps ## the published method with its own budget, 3.3e9 paths (8 hours on 2 cores; continues when stopped)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@nice -n 19 $(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --journal $(BUILD)/bench-fit/published.journal published
 

@@ -1,13 +1,13 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- *             [--sgd-budget N] [--curve-paths N] [--journal FILE] [--model M] [--yarn FILE|none] [--as-stated] [--row-paths N]
+ *             [--sgd-budget N] [--curve-paths N] [--journal FILE] [--model M] [--yarn FILE|none] [--flatness F] [--as-stated] [--row-paths N]
  * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "grazing"; nothing: all. "published": the published method
  * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 200,000 a held-out mean of the truth, 2 x 50,000
  * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ and yarns/ are.
  * "grazing" takes --model (of the four); "real" --sample (a table), --model, --yarn (file of the weave's yarn; none: smooth
- * yarns), --as-stated (cloth lies as the tables state; rows otherwise are means over all rotations, as isotropic data are)
- * and --row-paths (tells rendered / measured of every row).
+ * yarns), --flatness (of the yarns; 3.6), --as-stated (cloth lies as the tables state; rows otherwise are means over all
+ * rotations, as isotropic data are) and --row-paths (tells rendered / measured of every row).
  *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
@@ -311,6 +311,8 @@ static bool take_option(struct bench *b, const char *name, const char *value)
         b->row_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--yarn") == 0)
         b->yarn = value;
+    else if (strcmp(name, "--flatness") == 0)
+        b->flatness = strtod(value, NULL);
     else if (strcmp(name, "--photograph-paths") == 0)
         b->photograph_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--kept-paths") == 0)
@@ -339,6 +341,7 @@ int main(int argc, char **argv)
         .kept_paths = 200000,
         .score_paths = 50000,
         .curve_paths = 10000,
+        .flatness = 3.6,
         .sgd_budget = 20000000,
     };
     struct error err = {0};

@@ -19,6 +19,7 @@ struct bench {
     const char *sample; /* NULL: all measured tables */
     const char *model;  /* NULL: all four on measured tables */
     const char *yarn;   /* file of the measured tables' yarn; NULL: yarns/cotton1.txt of SELVEDGE_DATA; "none": smooth yarns */
+    double flatness; /* of the measured tables' yarns: width over height */
     bool as_stated;     /* measured tables at the rotations that they state, not as means over all */
     bool prepare;
 };

@@ -86,7 +86,7 @@ void bench_grazing(const struct bench *b)
     const struct fit_fabric *fabric = fit_fabric_find("gabardine");
     struct fit_cloth cloth;
     struct fit_phantom truth;
-    fit_cloth_init(&cloth, fabric->weave, NULL, true, b->pool);
+    fit_cloth_init(&cloth, &(struct fit_cloth_option){.weave = fabric->weave, .with_volume = true}, b->pool);
     fit_phantom_init_on(&truth, b->folder, b->pool, &cloth, fabric->model_id, fabric->truth);
     bench_keep_truth_inside(&truth);
     bench_photograph(b, &truth);

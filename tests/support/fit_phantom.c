@@ -41,7 +41,7 @@ static void make_volume(struct fit_cloth *c, double voxel_m, struct thread_pool 
     c->has_volume = true;
 }
 
-/* As `selvedge-phantom cloth --yarn FILE --flatness 1.8 --cover 1.1`: looser than smooth yarns, as flat, and closed all the same. */
+/* As `selvedge-phantom cloth --yarn FILE --cover 1.1`: looser than smooth yarns, and closed all the same. */
 static void take_yarn(struct phantom_option *o, const char *file)
 {
     struct error err = {0};
@@ -50,24 +50,32 @@ static void take_yarn(struct phantom_option *o, const char *file)
     o->cover = 1.1;
 }
 
-void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, const char *yarn_file, bool with_volume, struct thread_pool *pool)
+static void take_felt(struct phantom_option *o, bool lofty)
+{
+    o->n_fiber_per_yarn = lofty ? 500 : 400;
+    o->felt_tile_m = lofty ? 1e-3 : 6e-4;
+    o->felt_thickness_m = lofty ? 1e-3 : 2.5e-4;
+}
+
+void fit_cloth_init(struct fit_cloth *c, const struct fit_cloth_option *option, struct thread_pool *pool)
 {
     struct error err = {0};
     struct phantom_option o;
     struct phantom_report report;
     *c = (struct fit_cloth){0};
     fiber_set_init(&c->fiber);
-    phantom_option_default(&o, weave);
-    o.n_fiber_per_yarn = weave == PHANTOM_FELT ? 400 : 37;
-    o.felt_tile_m = 6e-4;
-    o.felt_thickness_m = 2.5e-4;
+    phantom_option_default(&o, option->weave);
+    o.n_fiber_per_yarn = 37;
     o.vertex_spacing_m = 8e-6;
-    if (yarn_file != NULL) take_yarn(&o, yarn_file);
+    if (option->weave == PHANTOM_FELT) take_felt(&o, option->lofty);
+    if (option->yarn_file != NULL) take_yarn(&o, option->yarn_file);
+    if (option->flatness > 0.0) o.flatness = option->flatness;
     fit_check(phantom_generate(&o, pool, NULL, &c->fiber, &report, &err), &err);
-    fprintf(stderr, "phantom %s%s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n", yarn_file != NULL ? "plied " : "",
-            phantom_weave_name(weave), c->fiber.n_fiber, c->fiber.n_vertex, report.cover, report.volume_fraction);
+    fprintf(stderr, "phantom %s%s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n", option->yarn_file != NULL ? "plied " : "",
+            phantom_weave_name(option->weave), c->fiber.n_fiber, c->fiber.n_vertex, report.cover, report.volume_fraction);
     fit_check(scene_new(&c->fiber, &(struct scene_option){.black_sheet = true}, &c->scene, &err), &err);
-    if (with_volume) make_volume(c, yarn_file != NULL ? 0.5 * o.fiber_radius_m[0] : 2e-6, pool);
+    bool coarse = option->yarn_file != NULL || option->lofty;
+    if (option->with_volume) make_volume(c, coarse ? 0.5 * o.fiber_radius_m[0] : 2e-6, pool);
 }
 
 void fit_cloth_release(struct fit_cloth *c)
@@ -102,7 +110,7 @@ void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_p
                       const char *model_id, const double *truth_file_unit)
 {
     start(f, folder, pool, model_id, truth_file_unit);
-    fit_cloth_init(&f->cloth, weave, NULL, f->model.kind == APPEARANCE_VOLUME, pool);
+    fit_cloth_init(&f->cloth, &(struct fit_cloth_option){.weave = weave, .with_volume = f->model.kind == APPEARANCE_VOLUME}, pool);
 }
 
 void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const struct fit_cloth *cloth,
@@ -150,6 +158,7 @@ struct kept_call {
     uint64_t seed;
     uint32_t replica;
     bool want_jacobian;
+    bool plain_paths;
 };
 
 static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
@@ -168,13 +177,14 @@ static void run_estimate(const struct fit_phantom *f, const struct kept_call *c,
                                          .seed = c->seed,
                                          .iteration = iteration,
                                          .replica = c->replica,
-                                         .want_jacobian = c->want_jacobian};
+                                         .want_jacobian = c->want_jacobian,
+                                         .no_probes = c->plain_paths};
     fit_check(appearance_estimate_run(&q, f->pool, NULL, out, &err), &err);
 }
 
 void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out)
 {
-    const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false};
+    const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false, false};
     run_estimate(f, &call, 1, n_path, out);
 }
 
@@ -267,7 +277,7 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
     check_memory(t);
     check_memory(e);
     views(t, configuration);
-    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, false};
+    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, false, true};
     kept_estimate(f, &call, how->part * n_chunks(how->n_path), how->n_path, e);
     rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);
@@ -290,7 +300,7 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
 
 uint64_t fit_phantom_fingerprint(const struct fit_phantom *f)
 {
-    const struct kept_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false};
+    const struct kept_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false, false};
     uint32_t sum = 0;
     for (size_t i = 0; i < f->fitted.n; i++)
         sum = (uint32_t)crc32_z(sum, (const void *)f->fitted.item[i].mean_rgb, sizeof f->fitted.item[i].mean_rgb);
@@ -346,7 +356,7 @@ static void scorer_release(struct scorer *s)
 static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept, s->replica[q]);
+        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true, false}, 0, n_kept, s->replica[q]);
     append_here(s, f, at);
 }
 
@@ -367,14 +377,14 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
     if (at != NULL) append_kept(&s, f, at, n_kept);
     if (n_path > 0) {
         for (uint32_t q = 0; q < 2; q++)
-            run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true}, 0, n_path,
+            run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true, false}, 0, n_path,
                          s.replica[q]);
         append_here(&s, f, param);
     }
     pool_at(&s, f, param);
     double value = fmax(linear_model_objective(&s.model, &se), 0.0), n_row = (double)s.model.n_row;
     struct fit_score score = {.rel_rms = sqrt(value / n_row)};
-    score.se = score.rel_rms > 0.0 ? 0.5 * se / (n_row * score.rel_rms) : 0.0;
+    score.se = fmin(0.5 * se / (n_row * score.rel_rms), sqrt(se / n_row));
     scorer_release(&s);
     return score;
 }

@@ -1,8 +1,8 @@
 /* Phantom cloth with photographs of it, for the figures of fits: made once, kept in a folder, scored against the truth.
  *
- * Photographs are path-traced mean radiances of the 16 + 24 built-in configurations (phantom_view_table.h) with seeds
- * that no fit uses, in chunks of at most FIT_CHUNK paths a configuration; a chunk is a file, so an interrupted run goes on.
- * A file's name states everything that it depends on but the renderer itself: empty the folder after a change of that.
+ * Photographs are path-traced mean radiances of the 16 + 24 built-in configurations (phantom_view_table.h) with seeds that no fit uses,
+ * by plain paths (a fault of the probes that fits use would show as a misfit), in chunks of at most FIT_CHUNK paths a configuration; a
+ * chunk is a file, so an interrupted run goes on. A file's name states everything that it depends on but the renderer itself: empty the folder after a change of that.
  *
  * Score of a parameter set: relative RMS error of the held-out means (objective.h) from two independent replicas,
  * without Monte-Carlo bias. Estimates at the truth (kept as well) and at the parameters are carried to one another by
@@ -40,10 +40,16 @@ struct fit_phantom {
 /* Status and error to standard error, then exit(1), unless s is STATUS_OK. */
 void fit_check(status s, const struct error *err);
 
-/* One tile of a phantom: fibers of 14 um, black sheet below. yarn_file NULL: smooth yarns of 37 parallel fibers (felt: 0.6 x 0.6 x
- * 0.25 mm); else a file of a real yarn's parameters (phantom_yarn_read): plied yarns with hairs. with_volume: also as
- * densities and directions, on a grid of 2 um (plied: of half a radius). */
-void fit_cloth_init(struct fit_cloth *c, enum phantom_weave weave, const char *yarn_file, bool with_volume, struct thread_pool *pool);
+/* One tile of a phantom: fibers of 14 um, black sheet below. */
+struct fit_cloth_option {
+    enum phantom_weave weave;
+    const char *yarn_file; /* of a real yarn's parameters (phantom_yarn_read): plied yarns with hairs; NULL: smooth ones of 37 parallel fibers */
+    double flatness;       /* of yarns; 0: the phantom's own, 1.8 */
+    bool lofty;            /* felt of 1 x 1 x 1 mm, an eighth of it fiber, as craft felts are; else 0.6 x 0.6 x 0.25 mm, half of it fiber */
+    bool with_volume;      /* also as densities and directions, on a grid of 2 um (plied or lofty: of half a radius) */
+};
+
+void fit_cloth_init(struct fit_cloth *c, const struct fit_cloth_option *option, struct thread_pool *pool);
 void fit_cloth_release(struct fit_cloth *c);
 
 /* Cloth and model; no observations yet. truth_file_unit: NULL leaves the truth at the model's start. */
