@@ -11,6 +11,7 @@
 #ifndef SELVEDGE_RENDERER_CONFIGURATION_H
 #define SELVEDGE_RENDERER_CONFIGURATION_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 struct environment; /* renderer/transport/environment.h */
@@ -53,5 +54,9 @@ struct configuration {
     uint32_t n_rotation;     /* 0 or 1: the cloth lies at cloth_rotation_rad; more: estimates are of the mean over so many
                                 rotations, equally spaced from there on (appearance_estimate.h; pictures show the first) */
 };
+
+/* For messages, in degrees: "lamp 45/0, camera 45/180, cloth turned by 90". */
+enum { CONFIGURATION_TEXT = 128 };
+void configuration_describe(const struct configuration *c, char text[CONFIGURATION_TEXT]);
 
 #endif

@@ -124,12 +124,13 @@ static void take_apart(const struct run *r, struct estimate *out)
     }
 }
 
-static status numeric_error(const struct scattering_model *m, size_t i_configuration, size_t i_value, struct error *err)
+static status numeric_error(const struct scattering_model *m, const struct configuration *c, size_t i_value, struct error *err)
 {
     const char *name = i_value < 3 ? "" : m->param[(i_value - 3) % m->n_param].name;
-    return error_set_field(err, STATUS_NUMERIC, name,
-                           "scattering model '%s' gave a value that is not finite in configuration %zu (%s)", m->id,
-                           i_configuration, name[0] != '\0' ? name : "radiance");
+    char view[CONFIGURATION_TEXT];
+    configuration_describe(c, view);
+    return error_set_field(err, STATUS_NUMERIC, name, "scattering model '%s' gave a value that is not finite (%s; %s)", m->id,
+                           name[0] != '\0' ? name : "radiance", view);
 }
 
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,
@@ -184,7 +185,7 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
         bad_configuration = r.member[r.group[bad_configuration].first + bad_value / (3 + r.n_jac)];
         bad_value %= 3 + r.n_jac;
     }
-    if (st == STATUS_NUMERIC) st = numeric_error(q->model, bad_configuration, bad_value, err);
+    if (st == STATUS_NUMERIC) st = numeric_error(q->model, &q->configuration[bad_configuration], bad_value, err);
     if (st == STATUS_OK && q->share_camera_paths) take_apart(&r, out);
 out:
     free(r.e);

@@ -27,9 +27,10 @@ static status numeric_error(const struct volume_estimate_request *q, size_t i_co
         size_t p = (i_value - 3) % (q->model->n_param + 1);
         name = p < q->model->n_param ? q->model->param[p].name : "d";
     }
-    return error_set_field(err, STATUS_NUMERIC, name,
-                           "phase function '%s' gave a value that is not finite in configuration %zu (%s)",
-                           q->model->id, i_configuration, name[0] != '\0' ? name : "radiance");
+    char view[CONFIGURATION_TEXT];
+    configuration_describe(&q->configuration[i_configuration], view);
+    return error_set_field(err, STATUS_NUMERIC, name, "phase function '%s' gave a value that is not finite (%s; %s)", q->model->id,
+                           name[0] != '\0' ? name : "radiance", view);
 }
 
 status volume_check_multiplier(double multiplier_per_m, struct error *err)

@@ -295,6 +295,9 @@ static void nan_is_named(void **state)
     q.param = param;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_NUMERIC);
     assert_non_null(strstr(err.text, "broken.v1"));
+    char view[CONFIGURATION_TEXT];
+    configuration_describe(q.configuration, view);
+    if (strstr(err.text, view) == NULL) fail_msg("'%s' does not name %s", err.text, view);
     assert_string_equal(err.field, "C.g");
 }
 
