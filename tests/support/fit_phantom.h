@@ -2,7 +2,8 @@
  *
  * Photographs are path-traced mean radiances of the 16 + 24 built-in configurations (phantom_view_table.h) with seeds that no fit uses,
  * by plain paths (a fault of the probes that fits use would show as a misfit), in chunks of at most FIT_CHUNK paths a configuration; a
- * chunk is a file, so an interrupted run goes on. A file's name states everything that it depends on but the renderer itself: empty the folder after a change of that.
+ * chunk is a file, so an interrupted run goes on. A file's name states everything that it depends on but the renderer itself: empty the
+ * folder after a change of that.
  *
  * Score of a parameter set: relative RMS error of the held-out means (objective.h) from two independent replicas,
  * without Monte-Carlo bias. Estimates at the truth (kept as well) and at the parameters are carried to one another by
@@ -43,9 +44,9 @@ void fit_check(status s, const struct error *err);
 /* One tile of a phantom: fibers of 14 um, black sheet below. */
 struct fit_cloth_option {
     enum phantom_weave weave;
-    const char *yarn_file; /* of a real yarn's parameters (phantom_yarn_read): plied yarns with hairs; NULL: smooth ones of 37 parallel fibers */
+    const char *yarn_file; /* of a real yarn's parameters (phantom_yarn_read): plied, with hairs; NULL: 37 smooth parallel fibers */
     double flatness;       /* of yarns; 0: the phantom's own, 1.8 */
-    bool lofty;            /* felt of 1 x 1 x 1 mm, an eighth of it fiber, as craft felts are; else 0.6 x 0.6 x 0.25 mm, half of it fiber */
+    bool lofty;            /* felt of 1 x 1 x 1 mm, an eighth of it fiber, as craft felts are; else 0.6 x 0.6 x 0.25 mm and a half */
     bool with_volume;      /* also as densities and directions, on a grid of 2 um (plied or lofty: of half a radius) */
 };
 
