@@ -11,7 +11,6 @@
 #ifndef SELVEDGE_RENDERER_CONFIGURATION_H
 #define SELVEDGE_RENDERER_CONFIGURATION_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 struct environment; /* renderer/transport/environment.h */

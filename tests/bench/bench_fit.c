@@ -312,7 +312,7 @@ static bool take_option(struct bench *b, const char *name, const char *value)
     else if (strcmp(name, "--yarn") == 0)
         b->yarn = value;
     else if (strcmp(name, "--flatness") == 0)
-        b->flatness = strtod(value, NULL);
+        return (b->flatness = strtod(value, NULL)) >= 1.0;
     else if (strcmp(name, "--photograph-paths") == 0)
         b->photograph_paths = strtoul(value, NULL, 10);
     else if (strcmp(name, "--kept-paths") == 0)
@@ -352,7 +352,7 @@ int main(int argc, char **argv)
         } else if (strcmp(argv[i], "--as-stated") == 0) {
             b.as_stated = true;
         } else if (i + 1 == argc || !take_option(&b, argv[i], argv[i + 1])) {
-            fprintf(stderr, "unknown option '%s', or its value is missing\n", argv[i]);
+            fprintf(stderr, "unknown option '%s', or its value is missing or makes no sense\n", argv[i]);
             return 1;
         } else {
             i++;

@@ -157,8 +157,7 @@ struct kept_call {
     size_t n_configuration;
     uint64_t seed;
     uint32_t replica;
-    bool want_jacobian;
-    bool plain_paths;
+    bool want_jacobian, plain_paths;
 };
 
 static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
@@ -184,7 +183,7 @@ static void run_estimate(const struct fit_phantom *f, const struct kept_call *c,
 
 void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out)
 {
-    const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false, false};
+    const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false};
     run_estimate(f, &call, 1, n_path, out);
 }
 
@@ -277,7 +276,7 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
     check_memory(t);
     check_memory(e);
     views(t, configuration);
-    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, false, true};
+    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, .plain_paths = true};
     kept_estimate(f, &call, how->part * n_chunks(how->n_path), how->n_path, e);
     rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);
@@ -300,7 +299,7 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
 
 uint64_t fit_phantom_fingerprint(const struct fit_phantom *f)
 {
-    const struct kept_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false, false};
+    const struct kept_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false};
     uint32_t sum = 0;
     for (size_t i = 0; i < f->fitted.n; i++)
         sum = (uint32_t)crc32_z(sum, (const void *)f->fitted.item[i].mean_rgb, sizeof f->fitted.item[i].mean_rgb);
@@ -356,7 +355,7 @@ static void scorer_release(struct scorer *s)
 static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true, false}, 0, n_kept, s->replica[q]);
+        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept, s->replica[q]);
     append_here(s, f, at);
 }
 
@@ -377,7 +376,7 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
     if (at != NULL) append_kept(&s, f, at, n_kept);
     if (n_path > 0) {
         for (uint32_t q = 0; q < 2; q++)
-            run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true, false}, 0, n_path,
+            run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true}, 0, n_path,
                          s.replica[q]);
         append_here(&s, f, param);
     }

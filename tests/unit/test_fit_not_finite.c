@@ -1,5 +1,5 @@
 /* A model of scattering that gives no number, in a fit through the real path tracer: fiber surfaces and a volume. The fit
- * ends with an error that names model and parameter, whenever it begins. */
+ * ends with an error that names model, parameter and configuration, whenever it begins. */
 #include "optimizer/descent/fit_run.h"
 #include "optimizer/descent/trace_estimator.h"
 #include "tests/support/hand_volume.h"
@@ -59,6 +59,13 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
         atomic_store(&n_good, n_before);
         if (fit_run(*m, &problem, NULL, &r, &err) != STATUS_NUMERIC) fail_msg("%s: %s", (*m)->id, err.text);
         if (strstr(err.text, model) == NULL || strstr(err.text, "not finite") == NULL) fail_msg("%s: %s", (*m)->id, err.text);
+        bool named = false;
+        for (size_t i = 0; i < N_ROW; i++) {
+            char view[CONFIGURATION_TEXT];
+            configuration_describe(&t->configuration[i], view);
+            named = named || strstr(err.text, view) != NULL;
+        }
+        if (!named) fail_msg("%s names no configuration: %s", (*m)->id, err.text);
         if (field != NULL) assert_string_equal(err.field, field);
     }
     observation_set_release(&o);

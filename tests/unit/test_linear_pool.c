@@ -66,7 +66,35 @@ static void test_pool(void **state)
     observation_set_release(&o);
 }
 
-/* One photograph and one parameter x = ln(p) whose radiance is 1 + x / 2 + x^2. */
+/* One photograph of radiance 1 and one parameter, x = ln(p). */
+struct one_row {
+    struct coordinate k;
+    struct observation_set o;
+    struct linear_history h;
+    struct linear_model m;
+    double weight; /* objective_weight */
+};
+
+static void one_row_init(struct one_row *r)
+{
+    const struct param_info info = {"w", "w", "deg", -1, 0.1, 10.0, 1.0};
+    const struct observation item = {.mean_rgb = {1.0, 1.0, 1.0}, .weight = 1.0};
+    coordinate_init(&r->k, &info, info.lower, info.upper);
+    observation_set_init(&r->o);
+    assert_int_equal(observation_set_append(&r->o, &item, NULL), STATUS_OK);
+    linear_history_init(&r->h, &r->o, &r->k, 1);
+    assert_int_equal(linear_model_init(&r->m, 3, 1, NULL), STATUS_OK);
+    r->weight = objective_weight(&item);
+}
+
+static void one_row_release(struct one_row *r)
+{
+    linear_model_release(&r->m);
+    linear_history_release(&r->h);
+    observation_set_release(&r->o);
+}
+
+/* The radiance is 1 + x / 2 + x^2. */
 static void append_parabola(struct linear_history *h, double x, uint64_t n_path)
 {
     struct estimate e = {.n_path = n_path, .n_vertex = n_path};
@@ -83,63 +111,41 @@ static void append_parabola(struct linear_history *h, double x, uint64_t n_path)
 static void test_carried_to_second_order(void **state)
 {
     (void)state;
-    const struct param_info info = {"w", "w", "deg", -1, 0.1, 10.0, 1.0};
-    struct coordinate k;
-    struct observation_set o;
-    struct observation item = {.mean_rgb = {1.0, 1.0, 1.0}, .weight = 1.0};
-    struct linear_history h;
-    struct linear_model m;
+    struct one_row r;
     double x = 0.1;
-    coordinate_init(&k, &info, info.lower, info.upper);
-    observation_set_init(&o);
-    assert_int_equal(observation_set_append(&o, &item, NULL), STATUS_OK);
-    linear_history_init(&h, &o, &k, 1);
-    assert_int_equal(linear_model_init(&m, 3, 1, NULL), STATUS_OK);
-    append_parabola(&h, 0.0, 1000000);
-    append_parabola(&h, 0.05, 1);
-    assert_int_equal(linear_model_pool(&m, &h, &x, NULL), STATUS_OK);
-    double want = sqrt(objective_weight(&item)) * (0.5 * x + x * x);
-    for (size_t row = 0; row < 3; row++) assert_true(fabs(m.r[0][row] - want) < 1e-4 && fabs(m.r[1][row] - want) < 1e-4);
-    linear_model_release(&m);
-    linear_history_release(&h);
-    observation_set_release(&o);
+    one_row_init(&r);
+    append_parabola(&r.h, 0.0, 1000000);
+    append_parabola(&r.h, 0.05, 1);
+    assert_int_equal(linear_model_pool(&r.m, &r.h, &x, NULL), STATUS_OK);
+    double want = sqrt(r.weight) * (0.5 * x + x * x);
+    for (size_t c = 0; c < 3; c++) assert_true(fabs(r.m.r[0][c] - want) < 1e-4 && fabs(r.m.r[1][c] - want) < 1e-4);
+    one_row_release(&r);
 }
 
 /* One estimate, carried by its own derivative: the variance is its own and dx^2 times that of the derivative. */
 static void test_noise_of_carrying(void **state)
 {
     (void)state;
-    const struct param_info info = {"w", "w", "deg", -1, 0.1, 10.0, 1.0};
-    struct coordinate k;
-    struct observation_set o;
-    struct observation item = {.mean_rgb = {1.0, 1.0, 1.0}, .weight = 1.0};
-    struct linear_history h;
-    struct linear_model m;
+    struct one_row r;
     struct estimate e = {.n_path = 4096};
-    double x = 0.2, dx = -0.3, slope, weight = objective_weight(&item);
-    coordinate_init(&k, &info, info.lower, info.upper);
-    observation_set_init(&o);
-    assert_int_equal(observation_set_append(&o, &item, NULL), STATUS_OK);
-    linear_history_init(&h, &o, &k, 1);
-    assert_int_equal(linear_model_init(&m, 3, 1, NULL), STATUS_OK);
+    double x = 0.2, dx = -0.3;
+    one_row_init(&r);
     for (size_t c = 0; c < 3; c++) {
         e.mean[c] = e.jac[c] = 1.0;
         e.var[c] = 1e-4 * (double)(c + 1);
         e.jac_var[c] = 0.02 * (double)(c + 1);
     }
-    assert_int_equal(linear_history_append(&h, &x, &e, &e, NULL), STATUS_OK);
-    slope = coordinate_slope(&k, coordinate_to_param(&k, x));
+    assert_int_equal(linear_history_append(&r.h, &x, &e, &e, NULL), STATUS_OK);
+    double slope = coordinate_slope(&r.k, coordinate_to_param(&r.k, x));
     for (int moved = 0; moved < 2; moved++) {
         double at = x + moved * dx, way = moved * dx * slope;
-        assert_int_equal(linear_model_pool(&m, &h, &at, NULL), STATUS_OK);
+        assert_int_equal(linear_model_pool(&r.m, &r.h, &at, NULL), STATUS_OK);
         for (size_t c = 0; c < 3; c++) {
-            double want = weight * (e.var[c] + way * way * e.jac_var[c]);
-            assert_true(fabs(m.r_var[0][c] / want - 1.0) < 1e-9 && fabs(m.r_var[1][c] / want - 1.0) < 1e-9);
+            double want = r.weight * (e.var[c] + way * way * e.jac_var[c]);
+            assert_true(fabs(r.m.r_var[0][c] / want - 1.0) < 1e-9 && fabs(r.m.r_var[1][c] / want - 1.0) < 1e-9);
         }
     }
-    linear_model_release(&m);
-    linear_history_release(&h);
-    observation_set_release(&o);
+    one_row_release(&r);
 }
 
 int main(void)
