@@ -1,8 +1,9 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- *             [--sgd-budget N] [--curve-paths N] [--journal FILE] [--model M] [--yarn FILE|none] [--flatness F] [--as-stated] [--row-paths N]
+ *             [--sgd-budget N] [--curve-paths N] [--fabric NAME] [--journal FILE] [--model M] [--yarn FILE|none] [--flatness F] [--as-stated] [--row-paths N]
  * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "grazing"; nothing: all. "published": the published method
- * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped. --prepare renders photographs only.
+ * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped; it and "curve" take --fabric (gabardine).
+ * --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 200,000 a held-out mean of the truth, 2 x 50,000
  * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ and yarns/ are.
  * "grazing" takes --model (of the four); "real" --sample (a table), --model, --yarn (file of the weave's yarn; none: smooth
@@ -17,11 +18,11 @@
  *                                        share of determined parameters within 2 se
  *   fit.seeds.worst_over_median          10 fits of gabardine with other seeds: held-out error; first_order_worst_over_median: by
  *                                        first_order_ratio
- *   fit.curve.<method>                   held-out error of gabardine against paths and seconds, one line a point; the
+ *   fit.curve.<method>                   held-out error of --fabric against paths and seconds, one line a point; the
  *                                        published method with --sgd-budget paths (20 million) in all
  *   fit.analytic.<method>                error of the fitted means against the exact ones, Gabardine's parameters on the
  *                                        analytic cloth of the tests, both methods with their own budgets, 10 seeds
- *   fit.published.{wall_s,paths,heldout_rel_rms}   gabardine by the published method
+ *   fit.published.<fabric>.{wall_s,paths,heldout_rel_rms,truth_rel_rms}   that fabric by the published method
  *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave of plied yarns, felts on felt
  *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
  *                                        from the normal, as fitted by each model to the 16 photographs; _brightest: at 80 degrees, of any microflakes
@@ -32,6 +33,8 @@
 #include "tests/support/fake_estimator.h"
 #include "tests/support/fit_fabrics.h"
 
+#include <ctype.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -206,7 +209,7 @@ static void bench_curve(const struct bench *b)
     struct fit_phantom f;
     struct fit_curve *c = calloc(1, sizeof *c);
     if (c == NULL) exit(1);
-    open_fabric(b, "gabardine", &f);
+    open_fabric(b, b->fabric, &f);
     bench_print("curve.truth_rel_rms", "", score(b, &f, f.truth).rel_rms, "1", "lower");
     for (size_t k = 0; k < 2; k++) {
         struct fit_result r;
@@ -222,12 +225,15 @@ static void bench_published(const struct bench *b)
 {
     struct fit_phantom f;
     struct fit_result r;
-    open_fabric(b, "gabardine", &f);
+    char of[64];
+    snprintf(of, sizeof of, "published.%s", b->fabric);
+    open_fabric(b, b->fabric, &f);
     bench_run_fit(&f, METHOD_PUBLISHED_SGD, 1, 0, b->journal, &r, NULL);
     bench_tell_fit(&f, &r);
-    bench_print("published", "wall_s", r.wall_s, "s", "lower");
-    bench_print("published", "paths", (double)r.n_path, "path", "lower");
-    bench_print("published", "heldout_rel_rms", score(b, &f, r.param).rel_rms, "1", "lower");
+    bench_print(of, "wall_s", r.wall_s, "s", "lower");
+    bench_print(of, "paths", (double)r.n_path, "path", "lower");
+    bench_print(of, "heldout_rel_rms", score(b, &f, r.param).rel_rms, "1", "lower");
+    bench_print(of, "truth_rel_rms", score(b, &f, f.truth).rel_rms, "1", "lower");
     fit_phantom_release(&f);
 }
 
@@ -299,37 +305,36 @@ static void run_one(const struct bench *b, const char *what)
     }
 }
 
+/* A whole number of 1 or more, all of the text. */
+static bool take_count(const char *text, uint64_t *count)
+{
+    char *end;
+    errno = 0;
+    *count = strtoull(text, &end, 10);
+    return isdigit((unsigned char)text[0]) && *end == '\0' && errno == 0 && *count > 0;
+}
+
 static bool take_option(struct bench *b, const char *name, const char *value)
 {
-    if (strcmp(name, "--folder") == 0)
-        b->folder = value;
-    else if (strcmp(name, "--sample") == 0)
-        b->sample = value;
-    else if (strcmp(name, "--model") == 0)
-        b->model = value;
-    else if (strcmp(name, "--row-paths") == 0)
-        b->row_paths = strtoul(value, NULL, 10);
-    else if (strcmp(name, "--yarn") == 0)
-        b->yarn = value;
-    else if (strcmp(name, "--flatness") == 0)
-        return (b->flatness = strtod(value, NULL)) >= 1.0;
-    else if (strcmp(name, "--photograph-paths") == 0)
-        b->photograph_paths = strtoul(value, NULL, 10);
-    else if (strcmp(name, "--kept-paths") == 0)
-        b->kept_paths = strtoul(value, NULL, 10);
-    else if (strcmp(name, "--score-paths") == 0)
-        b->score_paths = strtoul(value, NULL, 10);
-    else if (strcmp(name, "--curve-paths") == 0)
-        b->curve_paths = strtoul(value, NULL, 10);
-    else if (strcmp(name, "--path-budget") == 0)
-        b->path_budget = strtoull(value, NULL, 10);
-    else if (strcmp(name, "--sgd-budget") == 0)
-        b->sgd_budget = strtoull(value, NULL, 10);
-    else if (strcmp(name, "--journal") == 0)
-        b->journal = value;
-    else
-        return false;
-    return true;
+    const struct {
+        const char *name, **to;
+    } text[] = {{"--folder", &b->folder}, {"--fabric", &b->fabric}, {"--sample", &b->sample},
+                {"--model", &b->model},   {"--yarn", &b->yarn},     {"--journal", &b->journal}};
+    const struct {
+        const char *name;
+        uint64_t *to;
+    } count[] = {{"--row-paths", &b->row_paths},     {"--photograph-paths", &b->photograph_paths},
+                 {"--kept-paths", &b->kept_paths},   {"--score-paths", &b->score_paths},
+                 {"--curve-paths", &b->curve_paths}, {"--path-budget", &b->path_budget},
+                 {"--sgd-budget", &b->sgd_budget}};
+    for (size_t i = 0; i < sizeof text / sizeof text[0]; i++) {
+        if (strcmp(name, text[i].name) != 0) continue;
+        *text[i].to = value;
+        return fit_fabric_find(b->fabric) != NULL && bench_has_model(b->model);
+    }
+    for (size_t i = 0; i < sizeof count / sizeof count[0]; i++)
+        if (strcmp(name, count[i].name) == 0) return take_count(value, count[i].to);
+    return strcmp(name, "--flatness") == 0 && (b->flatness = strtod(value, NULL)) >= 1.0;
 }
 
 int main(int argc, char **argv)
@@ -337,6 +342,7 @@ int main(int argc, char **argv)
     static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "real", "grazing"};
     struct bench b = {
         .folder = "build/bench-fit",
+        .fabric = "gabardine",
         .photograph_paths = 1000000,
         .kept_paths = 200000,
         .score_paths = 50000,

@@ -14,6 +14,13 @@ const struct bench_model_name bench_model[BENCH_N_MODEL] = {{"two_lobe", "two_lo
 
 bool bench_takes_model(const struct bench *b, size_t k) { return b->model == NULL || strcmp(b->model, bench_model[k].name) == 0; }
 
+bool bench_has_model(const char *name)
+{
+    for (size_t k = 0; k < BENCH_N_MODEL; k++)
+        if (name == NULL || strcmp(name, bench_model[k].name) == 0) return true;
+    return false;
+}
+
 void bench_print(const char *of, const char *what, double value, const char *unit, const char *better)
 {
     printf("{\"name\":\"fit.%s%s%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", of, what[0] ? "." : "", what,

@@ -12,9 +12,10 @@ enum { BENCH_N_MODEL = 4, BENCH_MAX_STEP = 600 };
 struct bench {
     struct thread_pool *pool;
     const char *folder;
-    size_t row_paths; /* for each row of a measured table told by itself; 0: none is */
-    size_t photograph_paths, kept_paths, score_paths, curve_paths;
+    uint64_t row_paths; /* for each row of a measured table told by itself; 0: none is */
+    uint64_t photograph_paths, kept_paths, score_paths, curve_paths;
     uint64_t path_budget, sgd_budget;
+    const char *fabric;  /* of "curve" and "published" */
     const char *journal; /* of the published method; NULL: not kept */
     const char *sample; /* NULL: all measured tables */
     const char *model;  /* NULL: all four on measured tables */
@@ -36,6 +37,8 @@ struct fit_curve {
 
 /* One JSON object fit.<of>.<what>, without the dot when `what` is empty. */
 void bench_print(const char *of, const char *what, double value, const char *unit, const char *better);
+/* One of bench_model, or NULL: all. */
+bool bench_has_model(const char *name);
 /* --model: all (NULL) or the k-th. */
 bool bench_takes_model(const struct bench *b, size_t k);
 /* Step by step into a struct fit_curve; steps beyond BENCH_MAX_STEP are not kept. */

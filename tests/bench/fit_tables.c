@@ -150,6 +150,10 @@ void bench_real(const struct bench *b)
         if (b->sample != NULL && strcmp(b->sample, row[n].sample) != 0) continue;
         read_table(b, found.gl_pathv[i], &row[n++]);
     }
+    if (n == 0) {
+        fprintf(stderr, "no table '%s' in '%s'\n", b->sample, pattern);
+        exit(1);
+    }
     for (size_t k = 0; k < BENCH_N_MODEL; k++)
         for (size_t i = 0; i < n && bench_takes_model(b, k); i++) fit_table(b, real_cloth(b, data, row[i].sample, cloth), k, &row[i]);
     print_table(row, n);
