@@ -21,7 +21,6 @@ struct bench {
     const char *model;  /* NULL: all four on measured tables */
     const char *yarn;   /* file of the measured tables' yarn; NULL: yarns/cotton1.txt of SELVEDGE_DATA; "none": smooth yarns */
     double flatness; /* of the measured tables' yarns: width over height */
-    bool as_stated;     /* measured tables at the rotations that they state, not as means over all */
     bool prepare;
 };
 
@@ -53,7 +52,7 @@ void bench_keep_truth_inside(struct fit_phantom *f);
 void bench_photograph(const struct bench *b, struct fit_phantom *f);
 
 /* The parts in files of their own. */
-void bench_real(const struct bench *b);    /* fit_tables.c */
+void bench_real(const struct bench *b, bool all_rotations); /* fit_tables.c */
 void bench_grazing(const struct bench *b); /* fit_grazing.c */
 
 #endif

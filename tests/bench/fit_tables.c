@@ -1,4 +1,4 @@
-/* Measured tables: figures fit.real.* of bench_fit. */
+/* Measured tables: figures fit.real.* and fit.real_all_rotations.* of bench_fit. */
 #include "base/durable.h"
 #include "optimizer/descent/method_names.h"
 #include "optimizer/photographs/measurement_table.h"
@@ -14,6 +14,12 @@
  * more paths do not pay. */
 enum { MAX_REAL = 32, REAL_BUDGET = 2000000, MOST_SCORE_PATHS = 400000 };
 static const double score_se = 0.01;
+
+struct real {
+    const struct bench *bench;
+    bool all_rotations;
+    struct fit_cloth cloth[2]; /* weave, felt: made when the first sample asks for it */
+};
 
 struct real_row {
     char sample[64];
@@ -50,7 +56,7 @@ static void take_as_isotropic(struct observation_set *o)
     o->n = n;
 }
 
-static void read_table(const struct bench *b, const char *path, struct real_row *row)
+static void read_table(const struct real *real, const char *path, struct real_row *row)
 {
     struct error err = {0};
     char *text = NULL;
@@ -60,7 +66,7 @@ static void read_table(const struct bench *b, const char *path, struct real_row 
     observation_set_init(&row->observation);
     fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
     fit_check(measurement_table_parse(text, n, row->sample, &set_up, &row->observation, &err), &err);
-    if (!b->as_stated) take_as_isotropic(&row->observation);
+    if (real->all_rotations) take_as_isotropic(&row->observation);
     free(text);
 }
 
@@ -76,20 +82,21 @@ static struct fit_score score_rows(const struct bench *b, const struct fit_phant
 }
 
 /* Both errors by fresh paths: the fit's own objective is at its lowest partly by the luck of the paths that it was fitted to. */
-static void score_table(const struct bench *b, const struct fit_phantom *f, const double *param, size_t k, struct real_row *row)
+static void score_table(const struct real *real, const struct fit_phantom *f, const double *param, size_t k, struct real_row *row)
 {
     for (int held_out = 0; held_out < 2; held_out++) {
         char what[160];
-        const struct fit_score s = score_rows(b, f, held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT, param);
+        const struct fit_score s = score_rows(real->bench, f, held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT, param);
         row->error[k][held_out] = s.rel_rms;
         fprintf(stderr, "  %s %.3f +- %.3f\n", held_out ? "held out" : "fitted", s.rel_rms, s.se);
         snprintf(what, sizeof what, "%s.%s.%s", row->sample, bench_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");
-        bench_print("real", what, s.rel_rms, "1", "lower");
+        bench_print(real->all_rotations ? "real_all_rotations" : "real", what, s.rel_rms, "1", "lower");
     }
 }
 
-static void fit_table(const struct bench *b, const struct fit_cloth *cloth, size_t k, struct real_row *row)
+static void fit_table(const struct real *real, const struct fit_cloth *cloth, size_t k, struct real_row *row)
 {
+    const struct bench *b = real->bench;
     struct fit_phantom f;
     struct fit_result r;
     fprintf(stderr, "%s, %s\n", row->sample, bench_model[k].name);
@@ -98,67 +105,72 @@ static void fit_table(const struct bench *b, const struct fit_cloth *cloth, size
     bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget > 0 ? b->path_budget : REAL_BUDGET, NULL, &r, NULL);
     bench_tell_fit(&f, &r);
     if (b->row_paths > 0) tell_rows(&f, r.param, b->row_paths);
-    score_table(b, &f, r.param, k, row);
+    score_table(real, &f, r.param, k, row);
     fit_phantom_release(&f);
 }
 
-static void print_table(const struct real_row *row, size_t n)
+static void print_table(const struct bench *b, const struct real_row *row, size_t n)
 {
     fprintf(stderr, "%-32s", "relative RMS, fitted / held out");
-    for (size_t k = 0; k < BENCH_N_MODEL; k++) fprintf(stderr, "%20s", bench_model[k].name);
+    for (size_t k = 0; k < BENCH_N_MODEL; k++)
+        if (bench_takes_model(b, k)) fprintf(stderr, "%20s", bench_model[k].name);
     for (size_t i = 0; i < n; i++) {
         fprintf(stderr, "\n%-32s", row[i].sample);
         for (size_t k = 0; k < BENCH_N_MODEL; k++)
-            fprintf(stderr, "%12.3f / %.3f", row[i].error[k][0], row[i].error[k][1]);
+            if (bench_takes_model(b, k)) fprintf(stderr, "%12.3f / %.3f", row[i].error[k][0], row[i].error[k][1]);
     }
     fputc('\n', stderr);
 }
 
-/* The cloth that a sample is fitted on, made when the first one asks for it. */
-static const struct fit_cloth *real_cloth(const struct bench *b, const char *data, const char *sample, struct fit_cloth cloth[2])
+static const struct fit_cloth *real_cloth(struct real *real, const char *data, const char *sample)
 {
+    const struct bench *b = real->bench;
     const bool felt = strstr(sample, "felt") != NULL;
+    struct fit_cloth *cloth = &real->cloth[felt];
     char yarn[1024];
-    if (cloth[felt].scene != NULL) return &cloth[felt];
+    if (cloth->scene != NULL) return cloth;
     snprintf(yarn, sizeof yarn, "%s/yarns/cotton1.txt", data);
     const char *file = b->yarn == NULL ? yarn : b->yarn;
     const struct fit_cloth_option weave = {.weave = PHANTOM_PLAIN, .yarn_file = strcmp(file, "none") == 0 ? NULL : file,
                                            .flatness = b->flatness, .with_volume = true},
                                   lofty = {.weave = PHANTOM_FELT, .lofty = true, .with_volume = true};
-    fit_cloth_init(&cloth[felt], felt ? &lofty : &weave, b->pool);
-    return &cloth[felt];
+    fit_cloth_init(cloth, felt ? &lofty : &weave, b->pool);
+    return cloth;
 }
 
-void bench_real(const struct bench *b)
+static size_t read_tables(const struct real *real, const char *pattern, struct real_row row[MAX_REAL])
+{
+    glob_t found;
+    size_t n = 0;
+    if (glob(pattern, 0, NULL, &found) != 0) {
+        fprintf(stderr, "skipped: no '%s' (set SELVEDGE_DATA)\n", pattern);
+        return 0;
+    }
+    for (size_t i = 0; i < found.gl_pathc && n < MAX_REAL; i++) {
+        const char *slash = strrchr(found.gl_pathv[i], '/'), *sample = real->bench->sample;
+        snprintf(row[n].sample, sizeof row[n].sample, "%s", slash != NULL ? slash + 1 : found.gl_pathv[i]);
+        row[n].sample[strcspn(row[n].sample, ".")] = '\0';
+        if (sample == NULL || strcmp(sample, row[n].sample) == 0) read_table(real, found.gl_pathv[i], &row[n++]);
+    }
+    globfree(&found);
+    if (n > 0) return n;
+    fprintf(stderr, "no table '%s' in '%s'\n", real->bench->sample, pattern);
+    exit(1);
+}
+
+void bench_real(const struct bench *b, bool all_rotations)
 {
     const char *set = getenv("SELVEDGE_DATA"), *data = set != NULL ? set : "../shared/data";
     char pattern[1024];
-    glob_t found;
     struct real_row row[MAX_REAL] = {0};
-    struct fit_cloth cloth[2];
-    size_t n = 0;
-    memset(cloth, 0, sizeof cloth);
+    struct real real = {.bench = b, .all_rotations = all_rotations};
     snprintf(pattern, sizeof pattern, "%s/measured-reflectance/*.csv", data);
-    if (glob(pattern, 0, NULL, &found) != 0) {
-        fprintf(stderr, "skipped: no '%s' (set SELVEDGE_DATA)\n", pattern);
-        return;
-    }
-    for (size_t i = 0; i < found.gl_pathc && n < MAX_REAL; i++) {
-        const char *slash = strrchr(found.gl_pathv[i], '/');
-        snprintf(row[n].sample, sizeof row[n].sample, "%s", slash != NULL ? slash + 1 : found.gl_pathv[i]);
-        row[n].sample[strcspn(row[n].sample, ".")] = '\0';
-        if (b->sample != NULL && strcmp(b->sample, row[n].sample) != 0) continue;
-        read_table(b, found.gl_pathv[i], &row[n++]);
-    }
-    if (n == 0) {
-        fprintf(stderr, "no table '%s' in '%s'\n", b->sample, pattern);
-        exit(1);
-    }
+    size_t n = read_tables(&real, pattern, row);
     for (size_t k = 0; k < BENCH_N_MODEL; k++)
-        for (size_t i = 0; i < n && bench_takes_model(b, k); i++) fit_table(b, real_cloth(b, data, row[i].sample, cloth), k, &row[i]);
-    print_table(row, n);
+        for (size_t i = 0; i < n && bench_takes_model(b, k); i++)
+            fit_table(&real, real_cloth(&real, data, row[i].sample), k, &row[i]);
+    if (n > 0) print_table(b, row, n);
     for (size_t i = 0; i < n; i++) observation_set_release(&row[i].observation);
     for (size_t k = 0; k < 2; k++)
-        if (cloth[k].scene != NULL) fit_cloth_release(&cloth[k]);
-    globfree(&found);
+        if (real.cloth[k].scene != NULL) fit_cloth_release(&real.cloth[k]);
 }
