@@ -116,10 +116,24 @@ bool uncertainty_determined(const struct coordinate *k, double sd, double se_par
            se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
 }
 
+/* Of a residual of extra weight 1, over the rows that count. */
+static void mean_variances(const struct linear_model *m, struct uncertainty *u)
+{
+    double n = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) {
+        if (!(m->extra[row] > 0.0)) continue;
+        u->noise_var += linear_model_row_noise(m, row) / m->extra[row];
+        u->photograph_var += m->photograph_var[row] / m->extra[row];
+        n += 1.0;
+    }
+    u->noise_var /= fmax(n, 1.0);
+    u->photograph_var /= fmax(n, 1.0);
+}
+
 void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
                          const bool *fixed, struct uncertainty *u)
 {
-    size_t n = m->n_param, moving[N], inner[N], n_moving = 0, n_inner = 0;
+    size_t n = m->n_param, moving[N], n_moving = 0, n_inner = 0;
     double cov[N * N];
     memset(u, 0, sizeof *u);
     u->n_param = n;
@@ -127,19 +141,13 @@ void uncertainty_compute(const struct linear_model *m, const struct coordinate *
         double value = coordinate_to_param(&k[p], m->x_ref[p]), margin = 1e-3 * (k[p].param_upper - k[p].param_lower);
         u->at_bound[p] = !fixed[p] && (value <= k[p].param_lower + margin || value >= k[p].param_upper - margin);
         if (!fixed[p]) moving[n_moving++] = p;
-        if (!fixed[p] && !u->at_bound[p]) inner[n_inner++] = p;
+        n_inner += !fixed[p] && !u->at_bound[p];
     }
     u->misfit_var = linear_model_misfit(m, n_inner);
-    u->noise_var = linear_model_mean_noise(m);
-    u->photograph_var = 0.0;
-    for (size_t row = 0; row < m->n_row; row++) u->photograph_var += m->photograph_var[row] / (double)m->n_row;
+    mean_variances(m, u);
     if (n_moving > 0) {
         covariance(m, k, moving, n_moving, u->misfit_var, cov);
         scatter(cov, moving, n_moving, n, u->cov);
-    }
-    if (n_inner > 0 && n_inner < n_moving) {
-        covariance(m, k, inner, n_inner, u->misfit_var, cov);
-        scatter(cov, inner, n_inner, n, u->cov);
     }
     for (size_t p = 0; p < n; p++) {
         double uniform = (k[p].param_upper - k[p].param_lower) / sqrt(12.0);
@@ -149,9 +157,9 @@ void uncertainty_compute(const struct linear_model *m, const struct coordinate *
         u->determined[p] = fixed[p] || uncertainty_determined(&k[p], sqrt(u->cov[p * n + p]), u->se_param[p]);
         u->correlation[p * n + p] = 1.0;
     }
-    for (size_t a = 0; a < n_inner; a++) {
+    for (size_t a = 0; a < n_moving; a++) {
         for (size_t c = 0; c < a; c++) {
-            size_t p = inner[a], q = inner[c];
+            size_t p = moving[a], q = moving[c];
             double r = u->cov[p * n + q] / sqrt(u->cov[p * n + p] * u->cov[q * n + q]);
             u->correlation[p * n + q] = u->correlation[q * n + p] = fmin(fmax(r, -1.0), 1.0);
         }

@@ -126,6 +126,35 @@ static void test_ends_at_the_noise_of_the_photographs(void **state)
     assert_true(r.n_path > 5000000);
 }
 
+/* Wide lobes and photographs known to 1 %: some fits end with gamma_TT at its bound of 45 degrees. It is not known for that, so the
+ * errors of the colours, which go with it, must hold all the same (they were ten times too small where it counted as known). */
+static void test_errors_where_a_width_ends_at_its_bound(void **state)
+{
+    (void)state;
+    enum { FITS = 40 };
+    static const double wide[FAKE_N_PARAM] = {0.15, 0.15, 0.15, 0.7, 0.6, 0.4, 5.0, 15.0, 30.0};
+    double square = 0.0, n = 0.0;
+    size_t n_at_bound = 0;
+    for (uint64_t seed = 100; seed < 100 + FITS; seed++) {
+        struct fake_cloth f;
+        struct fit_result r;
+        double truth[FAKE_N_PARAM];
+        fit(wide, seed, 2000000, 1.0, 0.01, truth, &f, &r);
+        n_at_bound += r.uncertainty.at_bound[8];
+        for (size_t p = 3; p < 6; p++) {
+            if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
+            double z = (r.param[p] - truth[p]) / r.uncertainty.se_param[p];
+            square += z * z;
+            n += 1.0;
+            if (fabs(z) > 4.0) fail_msg("seed %d, %s: %.4f +- %.4f for %.4f", (int)seed, fake_param[p].name, r.param[p], r.uncertainty.se_param[p], truth[p]);
+        }
+    }
+    print_message("%zu of %d fits end at the bound; C_TT is off by %.2f standard errors (RMS of %.0f)\n", n_at_bound, FITS, sqrt(square / n), n);
+    assert_true(n_at_bound >= 1);
+    /* channels share their paths, so some 40 free numbers: 1 +- 0.11, and errors that are a little too large are allowed */
+    assert_true(sqrt(square / n) > 0.6 && sqrt(square / n) < 1.33);
+}
+
 /* Exact renderings of photographs that are not: the weighted minimum is not that of f, and the fit ends there all the same. */
 static void test_exact_renderings_of_noisy_photographs(void **state)
 {
@@ -252,6 +281,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact), cmocka_unit_test(test_recovery_and_errors),
                                        cmocka_unit_test(test_ends_at_the_noise_of_the_photographs),
+                                       cmocka_unit_test(test_errors_where_a_width_ends_at_its_bound),
                                        cmocka_unit_test(test_exact_renderings_of_noisy_photographs),
                                        cmocka_unit_test(test_says_when_it_has_not_converged),
                                        cmocka_unit_test(test_pull)};
