@@ -37,10 +37,14 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
     for (size_t i = 0; i < o->n; i++) n_path[i] = (size_t)fmin(fmax(share, LEAST_PATH), MOST_PATH);
     struct pipeline_trace trace;
     struct fit_option option;
+    struct fit_layout layout;
     double wall_s;
     pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty, option.photograph_gain_sd};
     struct progress quiet = {.cancel = c->progress.cancel};
-    status s = pipeline_trace_open(&trace, c, "report", "candidates.journal", i_model, o, err);
+    status s = fit_layout_init(&layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
+    if (s != STATUS_OK) return s;
+    s = pipeline_trace_open(&trace, c, "report", "candidates.journal", i_model, o, err);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
         struct estimator e = estimate_journal_estimator(trace.journal);
         struct estimator_call call = {m->fit.param, n_path, 0, q == 0 ? REPLICA_CANDIDATE_A : REPLICA_CANDIDATE_B, true};
@@ -48,8 +52,7 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
     }
     for (size_t i = 0; i < o->n && s == STATUS_OK; i++) {
         m->candidate[i].i_candidate = i;
-        next_photograph_score(m->appearance.param, m->parameter, m->fit.param, &m->fit.uncertainty, option.leader,
-                              option.ratio, &replica[0][i], &replica[1][i], &m->candidate[i].score);
+        next_photograph_score(&fit, &replica[0][i], &replica[1][i], &m->candidate[i].score);
     }
     if (s == STATUS_OK) qsort(m->candidate, o->n, sizeof *m->candidate, compare_rank);
     pipeline_trace_close(&trace);

@@ -73,6 +73,8 @@ struct fit_result {
     double prior_penalty; /* what the priors add to the objective at `param` */
     /* Filled in by fit_run (fit_run.h): */
     struct fit_nuisance nuisance;
+    double unknown[SCATTERING_MAX_PARAM]; /* of fit_layout.h: leaders of ties and nuisance terms */
+    struct uncertainty unknown_uncertainty;
     size_t n_start; /* entries of start; 0: there was one only */
     struct fit_start start[FIT_MAX_START];
 };

@@ -108,8 +108,7 @@ static void expand_uncertainty(const struct fit_layout *l, const struct param_in
         for (size_t q = 0; q < n; q++) {
             size_t j = l->owner[q];
             full->cov[p * n + q] = stretch * fit_layout_stretch(l, info, unknown, q) * u->cov[k * m + j];
-            bool free = !l->parameter[k].fixed && !u->at_bound[k];
-            full->correlation[p * n + q] = p == q ? 1.0 : k != j || free ? u->correlation[k * m + j] : 0.0;
+            full->correlation[p * n + q] = p == q ? 1.0 : k != j || !l->parameter[k].fixed ? u->correlation[k * m + j] : 0.0;
         }
     }
 }
@@ -121,6 +120,8 @@ static void expand(const struct fit *f, const struct fit_result *r, struct fit_r
     fit_layout_full(&f->layout, r->param, out->param);
     expand_uncertainty(&f->layout, f->problem->info, r->param, &r->uncertainty, &out->uncertainty);
     nuisance_of(&f->layout, r->param, r->uncertainty.se_param, r->uncertainty.at_bound, &out->nuisance);
+    memcpy(out->unknown, r->param, sizeof out->unknown);
+    out->unknown_uncertainty = r->uncertainty;
 }
 
 /* ---- starts ---- */
