@@ -156,15 +156,21 @@ static status check_density(const struct pipeline_context *c, struct error *err)
     return c->doc->fit_density && !from_behind ? job_density_undetermined(c->doc->black_sheet, err) : STATUS_OK;
 }
 
+size_t pipeline_n_free(const struct pipeline_model *m)
+{
+    size_t n = 0;
+    for (size_t p = 0; p < m->appearance.n_param; p++) n += !m->parameter[p].fixed && m->option->leader[p] == p;
+    return n;
+}
+
 static void warn_few_rows(struct pipeline_context *c)
 {
     for (size_t i = 0; i < c->n_model; i++) {
-        size_t n_free = 0;
+        const size_t n_free = pipeline_n_free(&c->model[i]);
         char warning[300];
-        for (size_t p = 0; p < c->model[i].appearance.n_param; p++) n_free += !c->model[i].parameter[p].fixed;
         if (3 * c->fitted.n >= n_free) continue;
         snprintf(warning, sizeof warning,
-                 "%zu fitted rows give %zu numbers for %zu parameters of model '%s': some will stay undetermined",
+                 "%zu fitted rows give %zu numbers for %zu free parameters of model '%s': some will stay undetermined",
                  c->fitted.n, 3 * c->fitted.n, n_free, c->model[i].appearance.id);
         worker_status_warn(c->status, warning);
     }
@@ -204,7 +210,11 @@ static status select_rows(struct pipeline_context *c, struct error *err)
 {
     const struct job_document *doc = c->doc;
     status s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
-    if (s == STATUS_OK) s = observation_set_select(&c->observation, JOB_SET_FIT, &c->row, err);
+    observation_set_weigh(&c->fitted);
+    if (s == STATUS_OK && c->fitted.n == 0)
+        s = error_set_field(err, STATUS_INVALID, doc->measurement_file[0] != '\0' ? "measurements.file" : "photographs",
+                            "all rows of the set 'fit' have the weight 0: give at least one a weight above it");
+    if (s == STATUS_OK) s = observation_set_select(&c->fitted, JOB_SET_FIT, &c->row, err);
     if (s != STATUS_OK || !(doc->texture_block_mm > 0.0)) return s;
     s = observation_set_append_contrasts(&c->observation, doc->texture_weight, &c->contrast, err);
     return s == STATUS_OK && doc->texture_weight > 0.0

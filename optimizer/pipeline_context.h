@@ -130,6 +130,8 @@ status pipeline_model_path(const struct pipeline_context *c, const char *stage, 
                            char path[WORKER_PATH_BYTES], struct error *err);
 /* The cloth in all forms that there are. */
 struct appearance_scene pipeline_scene(const struct pipeline_context *c);
+/* Unknowns of a model's fit: parameters that are neither fixed nor follow another. */
+size_t pipeline_n_free(const struct pipeline_model *m);
 /* The model with the lowest error over the held-out rows (the fitted rows when there are none). After validation. */
 size_t pipeline_best_model(const struct pipeline_context *c);
 

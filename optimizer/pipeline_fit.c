@@ -91,6 +91,35 @@ static void warn_density(struct pipeline_context *c, const struct pipeline_model
     worker_status_warn(c->status, warning);
 }
 
+/* "a, b, c" of the flagged parameters; false when there is none. */
+static bool list_names(const struct pipeline_model *m, const bool *flag, size_t n_text, char *text)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (size_t p = 0; p < m->appearance.n_param && used < n_text; p++)
+        if (flag[p]) used += (size_t)snprintf(text + used, n_text - used, "%s%s", used > 0 ? ", " : "", m->appearance.param[p].name);
+    return used > 0;
+}
+
+static void warn_parameters(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    bool at_bound[SCATTERING_MAX_PARAM], unknown[SCATTERING_MAX_PARAM];
+    char names[300], warning[400];
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        bool density = strcmp(m->appearance.param[p].name, APPEARANCE_DENSITY_MULTIPLIER) == 0; /* warn_density */
+        at_bound[p] = !m->parameter[p].fixed && m->fit.uncertainty.at_bound[p];
+        unknown[p] = !m->parameter[p].fixed && !m->fit.uncertainty.determined[p] && !density;
+    }
+    if (list_names(m, at_bound, sizeof names, names)) {
+        snprintf(warning, sizeof warning, "at the edge of the allowed range in the fit of %s: %s", m->appearance.id, names);
+        worker_status_warn(c->status, warning);
+    }
+    if (list_names(m, unknown, sizeof names, names)) {
+        snprintf(warning, sizeof warning, "not determined by these measurements in the fit of %s: %s", m->appearance.id, names);
+        worker_status_warn(c->status, warning);
+    }
+}
+
 /* Of a fit that was made, now or by an earlier attempt. */
 static void tell(struct pipeline_context *c, const struct pipeline_model *m)
 {
@@ -100,6 +129,7 @@ static void tell(struct pipeline_context *c, const struct pipeline_model *m)
     warn_convergence(c, m);
     warn_of_starts(c, m);
     warn_density(c, m);
+    warn_parameters(c, m);
 }
 
 static status fit_model(struct fit_listener *listener, struct error *err)
@@ -149,7 +179,7 @@ static status store_fits(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.4", section, n, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.5", section, n, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
@@ -158,7 +188,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     struct work_section section[JOB_MAX_MODEL + 1];
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    if (s == STATUS_OK) s = work_file_read(path, "fit.4", section, n, err);
+    if (s == STATUS_OK) s = work_file_read(path, "fit.5", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) tell(c, &c->model[i]);
     return s;

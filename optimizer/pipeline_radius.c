@@ -138,8 +138,7 @@ static void conclude(struct pipeline_context *c)
 {
     struct pipeline_radius *r = &c->radius;
     const struct pipeline_model *m = &c->model[r->i_model];
-    double n_free = 1.0, n_row = 3.0 * (double)c->fitted.n;
-    for (size_t p = 0; p < m->appearance.n_param; p++) n_free += m->parameter[p].fixed ? 0.0 : 1.0;
+    double n_free = 1.0 + (double)pipeline_n_free(m), n_row = 3.0 * (double)c->fitted.n;
     double s2 = fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), objective_mean_photograph_variance(&c->fitted));
     double var = r->curve.u_se * r->curve.u_se + (r->curve.curvature > 0.0 ? 2.0 * s2 / r->curve.curvature : INFINITY);
     double range = log(r->upper_m / r->lower_m);

@@ -57,8 +57,9 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
     *value = (struct objective_value){NAN, NAN, NAN};
     status s = a != NULL ? observation_set_select(&c->observation, set, &part, err)
                          : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    observation_set_weigh(&part); /* as the fit does */
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
-        if (c->observation.item[i].set != set) continue;
+        if (c->observation.item[i].set != set || !(c->observation.item[i].weight > 0.0)) continue;
         nuisance_show(&m->fit.nuisance, &v->replica[0][i], &a[n_part]);
         nuisance_show(&m->fit.nuisance, &v->replica[1][i], &b[n_part++]);
     }

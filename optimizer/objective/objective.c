@@ -46,7 +46,7 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
         double w = objective_weight(&o->item[i]);
         value += w * product;
         var += w * w * sd * sd;
-        if (observation_is_contrast(&o->item[i])) continue;
+        if (observation_is_contrast(&o->item[i]) || !(o->item[i].weight > 0.0)) continue;
         relative += objective_relative_weight(&o->item[i]) * product;
         n_radiance += 3.0;
     }

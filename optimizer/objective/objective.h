@@ -12,7 +12,7 @@
  * an upper estimate, too large by at most a factor sqrt(3).
  *
  * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out.
- * Contrasts are left out of that figure. The Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer
+ * Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer
  * paths are used.
  */
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H

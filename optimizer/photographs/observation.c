@@ -51,6 +51,20 @@ status observation_set_select(const struct observation_set *o, enum job_set set,
     return STATUS_OK;
 }
 
+void observation_set_weigh(struct observation_set *o)
+{
+    size_t n = 0;
+    double mean = 0.0;
+    for (size_t i = 0; i < o->n; i++) {
+        if (!(o->item[i].weight > 0.0)) continue;
+        mean += o->item[i].weight;
+        o->item[n++] = o->item[i];
+    }
+    o->n = n;
+    mean /= n > 0 ? (double)n : 1.0;
+    for (size_t i = 0; i < n; i++) o->item[i].weight /= mean;
+}
+
 bool observation_is_contrast(const struct observation *o) { return o->configuration.contrast_cells > 0; }
 
 struct observation observation_of_contrast(const struct observation *o, double weight)

@@ -34,6 +34,9 @@ size_t observation_set_count(const struct observation_set *o, enum job_set set);
 /* Copies the observations of one set, in order, into `part` (initialised). */
 status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
                               struct error *err);
+/* What a fit sees of a set: rows of weight 0 are taken out, and the other weights divided by their mean, so that only their
+ * ratios count. */
+void observation_set_weigh(struct observation_set *o);
 
 /* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb are those of the
  * contrast, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */

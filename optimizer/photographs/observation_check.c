@@ -39,7 +39,7 @@ static void check_dark(const struct observation_set *o, observation_warning warn
     for (size_t i = 0; i < o->n; i++) {
         double a = brightness(&o->item[i]);
         char text[300];
-        if (a > 0.0 && a >= dark_share * median) continue;
+        if ((a > 0.0 && a >= dark_share * median) || !(o->item[i].weight > 0.0)) continue;
         if (++n_dark > NAMED) continue;
         if (a > 0.0)
             snprintf(text, sizeof text, "row '%s' is dark: its brightness %.2g is far below that of the others (%.2g)",
@@ -82,7 +82,7 @@ static void check_contradictions(const struct observation_set *o, observation_wa
         for (size_t j = 0; j < i; j++) {
             const struct observation *a = &o->item[j], *b = &o->item[i];
             char text[500];
-            if (!same_configuration(&a->configuration, &b->configuration)) continue;
+            if (!(a->weight > 0.0 && b->weight > 0.0) || !same_configuration(&a->configuration, &b->configuration)) continue;
             double difference = contradiction(a, b);
             if (!(difference > 0.0) || ++n > NAMED) continue;
             snprintf(text, sizeof text,
