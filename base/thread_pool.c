@@ -31,14 +31,37 @@ struct start_argument {
     size_t i_thread;
 };
 
-static void set_flush_to_zero(void)
+/* Control word of the thread's floating-point unit. */
+static unsigned long float_mode(void)
 {
 #if defined(__SSE2__)
-    _mm_setcsr(_mm_getcsr() | 0x8040u); /* flush-to-zero, denormals-are-zero */
+    return _mm_getcsr();
 #elif defined(__aarch64__)
     unsigned long fpcr;
     __asm__ volatile("mrs %0, fpcr" : "=r"(fpcr));
-    __asm__ volatile("msr fpcr, %0" : : "r"(fpcr | (1ul << 24)));
+    return fpcr;
+#else
+    return 0;
+#endif
+}
+
+static void set_float_mode(unsigned long mode)
+{
+#if defined(__SSE2__)
+    _mm_setcsr((unsigned int)mode);
+#elif defined(__aarch64__)
+    __asm__ volatile("msr fpcr, %0" : : "r"(mode));
+#else
+    (void)mode;
+#endif
+}
+
+static void set_flush_to_zero(void)
+{
+#if defined(__SSE2__)
+    set_float_mode(float_mode() | 0x8040u); /* flush-to-zero, denormals-are-zero */
+#elif defined(__aarch64__)
+    set_float_mode(float_mode() | 1ul << 24);
 #endif
 }
 
@@ -146,11 +169,8 @@ static status run_in_caller(size_t n_task, task_function run, void *context, con
     return STATUS_OK;
 }
 
-status thread_pool_run(struct thread_pool *p, size_t n_task, task_function run, void *context,
-                       const struct progress *progress)
+static status run_in_all(struct thread_pool *p, size_t n_task, task_function run, void *context, const struct progress *progress)
 {
-    set_flush_to_zero();
-    if (p == NULL) return run_in_caller(n_task, run, context, progress);
     pthread_mutex_lock(&p->lock);
     p->run = run;
     p->context = context;
@@ -168,4 +188,15 @@ status thread_pool_run(struct thread_pool *p, size_t n_task, task_function run, 
     bool complete = p->n_done == n_task;
     pthread_mutex_unlock(&p->lock);
     return complete ? STATUS_OK : STATUS_CANCELLED;
+}
+
+/* The caller computes as before when it is done: what it does later must not depend on whether this process has used a pool. */
+status thread_pool_run(struct thread_pool *p, size_t n_task, task_function run, void *context,
+                       const struct progress *progress)
+{
+    unsigned long mode = float_mode();
+    set_flush_to_zero();
+    status s = p == NULL ? run_in_caller(n_task, run, context, progress) : run_in_all(p, n_task, run, context, progress);
+    set_float_mode(mode);
+    return s;
 }

@@ -9,7 +9,7 @@
 struct thread_pool;
 
 /* n_thread = 0: one per available processor (affinity mask). The caller of thread_pool_run is one of them. Flush-to-zero and
- * denormals-are-zero are set in every thread, as Embree wants, and in the caller from its first thread_pool_run on. STATUS_NO_MEMORY. */
+ * denormals-are-zero are set while tasks run, as Embree wants; in the caller only that long. STATUS_NO_MEMORY. */
 status thread_pool_new(size_t n_thread, struct thread_pool **pool, struct error *err);
 void thread_pool_free(struct thread_pool *pool);
 size_t thread_pool_n_thread(const struct thread_pool *pool);

@@ -111,6 +111,7 @@ def test_killed_at_several_points(reference, tmp_path, threads):
     if "models" in fit:
         kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", "-1") >= 3 * record)
     kills += kill_when(folder, threads, lambda: journal_bytes(folder, "validation") > 20)
+    kills += kill_when(folder, threads, lambda: os.path.exists(os.path.join(folder, "work", "validation.done")))  # the rest never traced
     assert kills >= 3, "the fit is too fast for this test"
     finish(folder, threads)
     assert outcome(folder) == want

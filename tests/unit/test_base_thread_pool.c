@@ -114,6 +114,37 @@ static void hear(void *context, double fraction)
     h->n++;
 }
 
+static bool keeps_denormals(void)
+{
+    volatile double small = 2.5e-308;
+    volatile double tenth = 0.1 * small;
+    return tenth > 0.0;
+}
+
+static void count_flushed(void *context, size_t i, size_t i_thread)
+{
+    (void)i, (void)i_thread;
+    if (!keeps_denormals()) atomic_fetch_add((atomic_size_t *)context, 1);
+}
+
+/* A resumed job may use the pool later than one that was not interrupted: the caller must compute alike before and after. */
+static void test_caller_computes_as_before(void **state)
+{
+    (void)state;
+    for (size_t n_thread = 0; n_thread <= 2; n_thread++) {
+        struct thread_pool *pool = NULL;
+        atomic_size_t n_flushed = 0;
+        if (n_thread > 0) assert_int_equal(thread_pool_new(n_thread, &pool, NULL), STATUS_OK);
+        assert_true(keeps_denormals());
+        assert_int_equal(thread_pool_run(pool, 100, count_flushed, &n_flushed, NULL), STATUS_OK);
+        assert_true(keeps_denormals());
+#if defined(__SSE2__) || defined(__aarch64__)
+        assert_int_equal(n_flushed, 100);
+#endif
+        thread_pool_free(pool);
+    }
+}
+
 static void test_progress_rises_to_one(void **state)
 {
     (void)state;
@@ -140,6 +171,7 @@ int main(void)
         cmocka_unit_test(test_default_is_at_least_one_thread),
         cmocka_unit_test(test_too_many_threads_are_refused),
         cmocka_unit_test(test_cancellation),
+        cmocka_unit_test(test_caller_computes_as_before),
         cmocka_unit_test(test_progress_rises_to_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
