@@ -101,7 +101,7 @@ size_t pipeline_best_model(const struct pipeline_context *c)
     for (size_t i = 1; i < c->n_model; i++) {
         const struct validation *a = &c->model[i].validation, *b = &c->model[best].validation;
         bool held_out = isfinite(a->held_out.rel_rms) && isfinite(b->held_out.rel_rms);
-        if (held_out ? a->held_out.rel_rms < b->held_out.rel_rms : a->fit.rel_rms < b->fit.rel_rms) best = i;
+        if (held_out ? a->held_out.rel_square < b->held_out.rel_square : a->fit.rel_square < b->fit.rel_square) best = i;
     }
     return best;
 }

@@ -132,7 +132,7 @@ status pipeline_model_path(const struct pipeline_context *c, const char *stage, 
 struct appearance_scene pipeline_scene(const struct pipeline_context *c);
 /* Unknowns of a model's fit: parameters that are neither fixed nor follow another. */
 size_t pipeline_n_free(const struct pipeline_model *m);
-/* The model with the lowest error over the held-out rows (the fitted rows when there are none). After validation. */
+/* The model with the lowest squared error (rel_square) over the held-out rows (the fitted rows when there are none). After validation. */
 size_t pipeline_best_model(const struct pipeline_context *c);
 
 #endif

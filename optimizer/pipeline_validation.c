@@ -54,7 +54,7 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
     size_t n = c->observation.n, n_part = 0;
     struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
     observation_set_init(&part);
-    *value = (struct objective_value){NAN, NAN, NAN};
+    *value = (struct objective_value){.value = NAN, .se = NAN, .rel_rms = NAN, .rel_square = NAN, .rel_square_se = NAN, .rel_rms_se = NAN};
     status s = a != NULL ? observation_set_select(&c->observation, set, &part, err)
                          : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
     observation_set_weigh(&part); /* as the fit does */
@@ -117,6 +117,26 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
     return s;
 }
 
+/* Models whose error cannot be told from that of the best one: which is best is chance. */
+static void warn_of_equals(struct pipeline_context *c)
+{
+    size_t best = pipeline_best_model(c), used = 0, n;
+    const struct validation *b = &c->model[best].validation;
+    const bool held_out = isfinite(b->held_out.rel_rms);
+    char text[600];
+    for (size_t i = 0; i < c->n_model && used < sizeof text; i++) {
+        const struct objective_value *x = held_out ? &b->held_out : &b->fit,
+                                     *y = held_out ? &c->model[i].validation.held_out : &c->model[i].validation.fit;
+        if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
+        if (used == 0)
+            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.1g %%) from", held_out ? "held-out" : "fitted",
+                                    c->model[best].appearance.id, 100.0 * x->rel_rms, 100.0 * x->rel_rms_se);
+        n = used < sizeof text ? sizeof text - used : 0;
+        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.2g +- %.1g %%)", c->model[i].appearance.id, 100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
+    }
+    if (used > 0) worker_status_warn(c->status, text);
+}
+
 static status validate_model(struct pipeline_context *c, size_t i_model, size_t *n_path, struct error *err)
 {
     struct pipeline_model *m = &c->model[i_model];
@@ -135,10 +155,10 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     if (s == STATUS_OK) s = score_validation(c, m, err);
     if (s != STATUS_OK) goto out;
     log_info(c->log,
-             "validation of %s: relative RMS error %.4f over the fitted rows, %.4f over the held-out rows; rendered "
+             "validation of %s: relative RMS error %.4f +- %.4f over the fitted rows, %.4f +- %.4f over the held-out rows; rendered "
              "means have a standard error below %.2f %%",
-             m->appearance.id, m->validation.fit.rel_rms, m->validation.held_out.rel_rms,
-             100.0 * m->validation.worst_rel_se);
+             m->appearance.id, m->validation.fit.rel_rms, m->validation.fit.rel_rms_se, m->validation.held_out.rel_rms,
+             m->validation.held_out.rel_rms_se, 100.0 * m->validation.worst_rel_se);
 out:
     pipeline_trace_close(&trace);
     return s;
@@ -173,6 +193,7 @@ status stage_validation_load(struct pipeline_context *c, struct error *err)
     estimate_sections(c, section);
     s = work_file_read(path, "validation.2", section, 4 * c->n_model, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = score_validation(c, &c->model[i], err);
+    if (s == STATUS_OK) warn_of_equals(c);
     return s;
 }
 
@@ -183,6 +204,7 @@ status stage_validation(struct pipeline_context *c, struct error *err)
                               : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = validate_model(c, i, n_path, err);
     if (s == STATUS_OK) s = store_validations(c, err);
+    if (s == STATUS_OK) warn_of_equals(c);
     free(n_path);
     return s;
 }

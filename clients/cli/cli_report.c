@@ -124,21 +124,35 @@ static void print_parameter(const json_t *parameter, FILE *out)
     fputc('\n', out);
 }
 
+/* "2.41 +- 0.05 %", "2.41 %" where a result of before states no error, "-" where there is none. */
+static void percent(const json_t *of, const char *key, char *text, size_t n)
+{
+    char key_se[64];
+    snprintf(key_se, sizeof key_se, "%s_se", key);
+    const double x = member_number(of, key), se = member_number(of, key_se);
+    if (isnan(x))
+        snprintf(text, n, "-");
+    else if (isnan(se))
+        snprintf(text, n, "%.2f %%", 100.0 * x);
+    else
+        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * x, 100.0 * se);
+}
+
 /* One line a model, when there are several. */
 static void print_models(const json_t *models, FILE *out)
 {
     size_t i;
     const json_t *m;
     if (json_array_size(models) < 2) return;
-    fprintf(out, "%-24s %10s %10s %12s %8s\n", "model (rel. RMS error)", "fitted", "held out", "paths", "time");
+    fprintf(out, "%-24s %16s %16s %12s %8s\n", "model (rel. RMS error)", "fitted", "held out", "paths", "time");
     json_array_foreach(models, i, m)
     {
-        char id[64], held_out[32] = "-", time[CLI_SHORT_TEXT];
-        double x = member_number(m, "heldout_rel_rms");
+        char id[64], fitted[48], held_out[48], time[CLI_SHORT_TEXT];
         text_clean(member_text(m, "id"), id, sizeof id);
-        if (!isnan(x)) snprintf(held_out, sizeof held_out, "%.2f %%", 100.0 * x);
+        percent(m, "fit_rel_rms", fitted, sizeof fitted);
+        percent(m, "heldout_rel_rms", held_out, sizeof held_out);
         text_duration(member_number(m, "fit_wall_s"), time);
-        fprintf(out, "  %-22s %8.2f %% %10s %12.3g %8s  %s%s\n", id, 100.0 * member_number(m, "fit_rel_rms"), held_out,
+        fprintf(out, "  %-22s %16s %16s %12.3g %8s  %s%s\n", id, fitted, held_out,
                 member_number(m, "n_path_fit"), time, json_is_true(json_object_get(m, "best")) ? "best " : "",
                 json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
     }
@@ -167,8 +181,9 @@ void report_result(const json_t *job, FILE *out)
     if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
     json_array_foreach(parameters, i, parameter) print_parameter(parameter, out);
     for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {
-        double x = member_number(result, residual[i].key);
-        if (!isnan(x)) fprintf(out, "%s: %.2f %%\n", residual[i].label, 100.0 * x);
+        char text[48];
+        percent(result, residual[i].key, text, sizeof text);
+        if (strcmp(text, "-") != 0) fprintf(out, "%s: %s\n", residual[i].label, text);
     }
     json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, out);
     const json_t *converged = json_object_get(result, "converged");

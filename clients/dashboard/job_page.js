@@ -4,7 +4,7 @@ import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
-import { duration, el, isNumber, percent, refill, size, stateTag, when, withError } from "./page_parts.js";
+import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
 import { configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
@@ -38,9 +38,9 @@ function factsOf(job) {
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
   const of = job.result ?? job; // at the end: of the best model, at fresh paths
   if (isNumber(of.objective)) facts.push(fact("objective", withError(of.objective, of.objective_se)));
-  const { fit, held } = residuals(job);
-  if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percent(fit, 2)));
-  if (isNumber(held)) facts.push(fact("held out", percent(held, 2)));
+  const { fit, fitSe, held, heldSe } = residuals(job);
+  if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percentWithError(fit, fitSe)));
+  if (isNumber(held)) facts.push(fact("held out", percentWithError(held, heldSe)));
   const radius = radiusSearch(job);
   if (radius) facts.push(fact("fiber radius, fitted", `${withError(radius.value, radius.se)} µm ${radius.flags.join(", ")}`));
   if (isNumber(job.started_unix_s) && isNumber(job.finished_unix_s)) facts.push(fact("took", duration(job.finished_unix_s - job.started_unix_s)));
@@ -65,7 +65,7 @@ function notesOf(job) {
 
 // The comparison that several models are fitted for.
 function modelTable(list) {
-  const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percent(m.fit, 2)), el("td", { class: "number" }, percent(m.held, 2)),
+  const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.fit, m.fitSe)), el("td", { class: "number" }, percentWithError(m.held, m.heldSe)),
     el("td", { class: "number" }, isNumber(m.paths) ? `${(m.paths / 1e6).toPrecision(3)} M` : "–"), el("td", { class: "number" }, duration(m.seconds)),
     el("td", {}, m.best ? el("span", { class: "tag" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
   return [el("p", { class: "hint" }, "Relative RMS errors of mean radiances; the best model has the lowest error over the held-out rows. Everything else on this page is of the best one."),

@@ -53,6 +53,7 @@ export function withError(value, se) {
 }
 
 export const percent = (x, digits = 1) => (isNumber(x) ? `${(100 * x).toFixed(digits)} %` : "–");
+export const percentWithError = (x, se, digits = 2) => (isNumber(x) && isNumber(se) ? `${(100 * x).toFixed(digits)} ± ${(100 * se).toFixed(digits)} %` : percent(x, digits));
 export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
 export const stateTag = (state) => el("span", { class: `state ${state}` }, state);
 

@@ -25,7 +25,7 @@ export function describedParameters(model, job, n) {
 // Every model of the job: [{id, title, best, converged, fit, held, paths, seconds, parameters}]
 export function models(job) {
   return (job.result?.models ?? []).map((m) => ({
-    id: m.id, title: m.title, best: m.best, converged: m.converged, fit: m.fit_rel_rms, held: m.heldout_rel_rms, paths: m.n_path_fit, seconds: m.fit_wall_s,
+    id: m.id, title: m.title, best: m.best, converged: m.converged, fit: m.fit_rel_rms, fitSe: m.fit_rel_rms_se, held: m.heldout_rel_rms, heldSe: m.heldout_rel_rms_se, paths: m.n_path_fit, seconds: m.fit_wall_s,
     parameters: fitted(m),
   }));
 }
@@ -71,5 +71,7 @@ export function configurations(job, urls) {
 // Pictures of slices and the fiber file among the results.
 export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
 export const fiberFile = (files) => files.find((f) => f.path.endsWith(".hair")) ?? null;
-export const residuals = (job) => ({ fit: job.result?.fit_rel_rms, held: job.result?.heldout_rel_rms, converged: job.result?.converged });
+export const residuals = (job) => ({
+  fit: job.result?.fit_rel_rms, fitSe: job.result?.fit_rel_rms_se, held: job.result?.heldout_rel_rms, heldSe: job.result?.heldout_rel_rms_se, converged: job.result?.converged,
+});
 export const finite = (x) => (isNumber(x) ? x : null);

@@ -34,7 +34,7 @@ double objective_image_difference(const double x_rgb[3], const double y_rgb[3])
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out)
 {
-    double value = 0.0, var = 0.0, relative = 0.0, n_radiance = 0.0;
+    double value = 0.0, var = 0.0, relative = 0.0, relative_var = 0.0, n_radiance = 0.0;
     for (size_t i = 0; i < o->n; i++) {
         double product = 0.0, sd = 0.0;
         for (int c = 0; c < 3; c++) {
@@ -47,12 +47,19 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
         value += w * product;
         var += w * w * sd * sd;
         if (observation_is_contrast(&o->item[i]) || !(o->item[i].weight > 0.0)) continue;
-        relative += objective_relative_weight(&o->item[i]) * product;
+        w = objective_relative_weight(&o->item[i]);
+        relative += w * product;
+        relative_var += w * w * sd * sd;
         n_radiance += 3.0;
     }
     out->value = value;
     out->se = sqrt(var);
-    out->rel_rms = n_radiance > 0.0 ? sqrt(fmax(0.0, relative) / n_radiance) : 0.0;
+    n_radiance = fmax(n_radiance, 1.0);
+    out->rel_square = relative / n_radiance;
+    out->rel_square_se = sqrt(relative_var) / n_radiance;
+    out->rel_rms = sqrt(fmax(0.0, out->rel_square));
+    out->rel_rms_se = sqrt(out->rel_square_se); /* near 0 */
+    if (out->rel_rms > 0.0) out->rel_rms_se = fmin(out->rel_rms_se, 0.5 * out->rel_square_se / out->rel_rms);
 }
 
 void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,

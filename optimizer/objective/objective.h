@@ -30,6 +30,9 @@
 struct objective_value {
     double value, se;
     double rel_rms;
+    /* Only by objective_evaluate: what rel_rms is the root of, which is free of bias and below 0 where noise is all there is, and
+     * standard errors. */
+    double rel_square, rel_square_se, rel_rms_se;
 };
 
 /* 1 / max(a_i, tau)^2, without the observation's extra weight. */

@@ -112,7 +112,9 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
     json_object_set_new(json, "objective", json_number(m->validation.fit.value));
     json_object_set_new(json, "objective_se", json_number(m->validation.fit.se));
     json_object_set_new(json, "fit_rel_rms", json_number(m->validation.fit.rel_rms));
+    json_object_set_new(json, "fit_rel_rms_se", json_number(m->validation.fit.rel_rms_se));
     json_object_set_new(json, "heldout_rel_rms", json_number(m->validation.held_out.rel_rms));
+    json_object_set_new(json, "heldout_rel_rms_se", json_number(m->validation.held_out.rel_rms_se));
     json_object_set_new(json, "misfit_rel_rms", json_number(sqrt(m->fit.uncertainty.misfit_var)));
     json_object_set_new(json, "validation_worst_rel_se", json_number(m->validation.worst_rel_se));
     result_fit_options(c, m, json);

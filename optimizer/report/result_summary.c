@@ -49,17 +49,25 @@ static void print_rows(const struct pipeline_context *c, const struct pipeline_m
     }
 }
 
+/* "2.41 +- 0.05 %"; "-" where there are no such rows. */
+static void percent(const struct objective_value *v, char *text, size_t n)
+{
+    if (isfinite(v->rel_rms))
+        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * v->rel_rms, 100.0 * v->rel_rms_se);
+    else
+        snprintf(text, n, "-");
+}
+
 /* All models side by side, when there are several. */
 static void print_comparison(const struct pipeline_context *c, FILE *out)
 {
-    fprintf(out, "%-24s %10s %10s %9s %9s  %s\n", "model", "fitted", "held out", "paths", "time", "");
+    fprintf(out, "%-24s %16s %16s %9s %9s  %s\n", "model", "fitted", "held out", "paths", "time", "");
     for (size_t i = 0; i < c->n_model; i++) {
         const struct pipeline_model *m = &c->model[i];
-        char held_out[32] = "-";
-        if (isfinite(m->validation.held_out.rel_rms))
-            snprintf(held_out, sizeof held_out, "%.2f %%", 100.0 * m->validation.held_out.rel_rms);
-        fprintf(out, "%-24s %8.2f %% %10s %9.3g %7.0f s  %s%s\n", m->appearance.id,
-                100.0 * m->validation.fit.rel_rms, held_out, (double)m->fit.n_path, m->fit.wall_s,
+        char fitted[48], held_out[48];
+        percent(&m->validation.fit, fitted, sizeof fitted);
+        percent(&m->validation.held_out, held_out, sizeof held_out);
+        fprintf(out, "%-24s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, held_out, (double)m->fit.n_path, m->fit.wall_s,
                 i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
     }
     fprintf(out, "relative RMS errors; what follows is of the best model\n\n");
@@ -84,9 +92,10 @@ static void print_summary(struct pipeline_context *c, FILE *out)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m,
                 1e6 * c->radius.se_m, 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
                 c->radius.curve.at_bound ? " (at the edge of its range)" : "");
-    fprintf(out, "relative RMS error over the fitted rows    %.2f %%\n", 100.0 * m->validation.fit.rel_rms);
-    if (isfinite(m->validation.held_out.rel_rms))
-        fprintf(out, "relative RMS error over the held-out rows  %.2f %%\n", 100.0 * m->validation.held_out.rel_rms);
+    percent(&m->validation.fit, text, sizeof text);
+    fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
+    percent(&m->validation.held_out, text, sizeof text);
+    if (isfinite(m->validation.held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
             m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
     print_parameters(m, out);

@@ -44,6 +44,12 @@ def test_all_are_fitted_and_compared(finished):
     assert (d["name"], d["unit"], d["value"], d["fixed"]) == ("density_multiplier", "1/cm", 2000, True)
     best = [m for m in result["models"] if m["best"]]
     assert len(best) == 1 and best[0]["heldout_rel_rms"] == min(m["heldout_rel_rms"] for m in result["models"])
+    assert all(m[key] > 0 for m in result["models"] for key in ("fit_rel_rms_se", "heldout_rel_rms_se"))
+    other = next(m for m in result["models"] if not m["best"])
+    apart = sum((m["heldout_rel_rms"] * m["heldout_rel_rms_se"] * 2) ** 2 for m in result["models"]) ** 0.5
+    told = [w for w in result["warnings"] if "do not tell" in w]
+    if min(m["heldout_rel_rms"] for m in result["models"]) > 0:
+        assert bool(told) == (other["heldout_rel_rms"] ** 2 - best[0]["heldout_rel_rms"] ** 2 < 2 * apart), result["warnings"]
     # the top of the result is the best model's: clients that know of one model read on as before
     assert result["model"] == best[0]["id"] and state["parameters"] == best[0]["parameters"]
     for key in ("fit_rel_rms", "heldout_rel_rms", "objective", "n_path_fit", "converged", "correlation"):

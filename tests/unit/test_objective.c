@@ -32,7 +32,17 @@ static void test_by_hand(void **state)
     double f0 = 25.0 * (0.1 * 0.2), f1 = 2500.0 * (-0.001 * 0.002);
     assert_true(fabs(v.value - (f0 + 4.0 * f1)) < 1e-12);
     assert_true(v.se == 0.0);
-    assert_true(fabs(v.rel_rms - sqrt((f0 + f1) / 6.0)) < 1e-12);
+    assert_true(fabs(v.rel_rms - sqrt((f0 + f1) / 6.0)) < 1e-12 && fabs(v.rel_square - (f0 + f1) / 6.0) < 1e-12);
+    a[0].var[0] = 0.02 * 0.02; /* ra^2 vb + rb^2 va - va vb with vb = 0 */
+    objective_evaluate(&o, a, b, &v);
+    assert_true(fabs(v.rel_square_se - 25.0 * 0.2 * 0.02 / 6.0) < 1e-12);
+    assert_true(fabs(v.rel_rms_se - 0.5 * v.rel_square_se / v.rel_rms) < 1e-12);
+    item[1].weight = 0.0; /* counts nowhere */
+    objective_evaluate(&o, a, b, &v);
+    assert_true(fabs(v.value - f0) < 1e-12 && fabs(v.rel_square - f0 / 3.0) < 1e-12);
+    a[0].mean[0] = 0.0; /* products below 0: the root is 0, its square is told as it is */
+    objective_evaluate(&o, a, b, &v);
+    assert_true(v.rel_rms == 0.0 && fabs(v.rel_square + f0 / 3.0) < 1e-12 && v.rel_rms_se == sqrt(v.rel_square_se));
 }
 
 /* The product of two replicas has the mean of the true square, and its stated error is not too small. */
