@@ -307,17 +307,24 @@ static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_obse
     return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
 }
 
+/* What further steps could gain of the objective as the fit weighs rows, in percent. It is told to first order: not more than all. */
+static double promised_percent(const struct gauss_newton *g)
+{
+    double weighted = linear_model_weighted_objective(&g->model);
+    return weighted > 0.0 ? fmin(100.0, 100.0 * g->far_gain / weighted) : 100.0;
+}
+
 static void explain_end(const struct gauss_newton *g, bool precise, double f, double se, struct fit_result *result)
 {
     char *text = result->reason;
     size_t n = sizeof result->reason;
     if (precise)
-        snprintf(text, n, "further steps promise %.2g, the objective is %.3g with a noise of %.1g", g->far_gain, f, se);
+        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %.1g %%", f, se, promised_percent(g));
     else
         snprintf(text, n,
-                 "further steps promise %.2g, and tracing adds %.1f times the photographs' own variance; exact renderings would "
-                 "narrow the errors by some %.0f %%",
-                 g->far_gain, noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
+                 "further steps promise to lower the objective by %.1g %%, and tracing adds %.1f times the photographs' own variance; exact "
+                 "renderings would narrow the errors by some %.0f %%",
+                 promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
 
 /* Why a fit whose budget or iterations are used up has converged or not. */
@@ -328,22 +335,22 @@ static void explain_early_end(const struct gauss_newton *g, const char *used, bo
     size_t n = sizeof result->reason;
     if (result->converged)
         snprintf(text, n,
-                 "%s ended when further steps promised %.2g of the objective, %.3g with a noise of %.1g; more paths "
+                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %.1g %%; more paths "
                  "would narrow the errors",
-                 used, g->far_gain, f, se);
+                 used, f, se, promised_percent(g));
     else if (failed)
         snprintf(text, n, "%s ended with a step that made the objective worse and was taken back", used);
     else if (arrived)
         snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used, g->history.n_step);
     else
-        snprintf(text, n, "%s ended while further steps still promised to lower the objective by %.2g from %.3g", used,
-                 g->far_gain, f);
+        snprintf(text, n, "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about %.0f %%", used,
+                 f, se, promised_percent(g));
 }
 
 /* The pull ends with enough paths, or with half of what may be spent; where no row says anything there is none. */
 static void let_go(struct gauss_newton *g, size_t max_iteration)
 {
-    bool half = 2 * g->run.n_path_total >= g->run.path_budget || 2 * g->run.n_step >= max_iteration, silent = true;
+    bool half = 2 * g->run.n_path_total >= g->run.path_budget || 2 * (g->run.n_step + 1) > max_iteration, silent = true;
     for (size_t row = 0; row < g->model.n_row; row++) silent = silent && !(g->model.weight[row] > 0.0);
     if (g->model.n_effective >= pull_until || half || silent) g->pulls = false;
 }

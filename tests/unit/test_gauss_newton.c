@@ -182,6 +182,10 @@ static void test_says_when_it_has_not_converged(void **state)
     fit(cloth[2], 1, 70000, 1.0, 0.005, truth, &f, &r);
     assert_false(r.converged);
     assert_non_null(strstr(r.reason, "path budget ended"));
+    const char *share = strstr(r.reason, "by about "); /* first-order promises can be more than there is: not told so */
+    assert_non_null(share);
+    double percent = strtod(share + strlen("by about "), NULL);
+    assert_true(percent > 0.0 && percent <= 100.0);
 }
 
 /* A cloth that looks the same whatever parameter 8 is; its value in the first and in the last iteration. */
@@ -215,7 +219,7 @@ static status blind_report(void *context, const struct fit_step *step, struct er
 }
 
 /* A fit of that, with parameter 8 as info says and from `start`. */
-static struct blind fit_blind(const struct param_info *eighth, double start, struct fit_result *r)
+static struct blind fit_blind(const struct param_info *eighth, double start, size_t max_iteration, struct fit_result *r)
 {
     struct fake_cloth f;
     struct observation_set o;
@@ -240,6 +244,7 @@ static struct blind fit_blind(const struct param_info *eighth, double start, str
                                   .param = parameter,
                                   .observation = &o,
                                   .estimator = &e,
+                                  .max_iteration = max_iteration,
                                   .report = blind_report,
                                   .report_context = &b};
     if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
@@ -258,12 +263,12 @@ static void test_pull(void **state)
     struct param_info density = width;
     density.unit = "1/cm";
     double stated = 1.5 * width.start, range = log(width.upper / width.lower);
-    struct blind b = fit_blind(&width, width.start, &r[0]);
+    struct blind b = fit_blind(&width, width.start, 0, &r[0]);
     assert_true(b.first == width.start);
     assert_true(fabs(log(b.last / width.lower) / range - 0.8) < 0.03);
-    b = fit_blind(&width, stated, &r[1]);
+    b = fit_blind(&width, stated, 0, &r[1]);
     assert_true(fabs(log(b.last / stated)) < 1e-6);
-    b = fit_blind(&density, width.start, &r[2]);
+    b = fit_blind(&density, width.start, 0, &r[2]);
     assert_true(fabs(log(b.last / width.start)) < 1e-6);
     double truth[FAKE_N_PARAM];
     fake_param_set(cloth[0], truth);
@@ -275,6 +280,8 @@ static void test_pull(void **state)
             assert_true(r[k].uncertainty.at_bound[p] || fabs(r[k].param[p] - truth[p]) < 4.0 * r[k].uncertainty.se_param[p]);
         assert_true(fake_rel_rms(&f, 0, FAKE_N_FIT, r[k].param, truth) < 0.01);
     }
+    (void)fit_blind(&width, width.start, 1, &r[0]); /* no fit ends with it, not even one of a single step */
+    assert_true(fabs(log(r[0].param[8] / width.start)) < 1e-6);
 }
 
 int main(void)
