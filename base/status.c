@@ -1,4 +1,5 @@
 #include "base/status.h"
+#include "base/utf8.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -39,6 +40,8 @@ static void fill(struct error *err, status code, int errno_value, const char *wh
     vsnprintf(text, sizeof text, format, args);
     char field_copy[sizeof err->field];
     snprintf(field_copy, sizeof field_copy, "%s", field == NULL ? "" : field);
+    utf8_repair(text); /* both end up in JSON, and quote files that may hold anything */
+    utf8_repair(field_copy);
     memcpy(err->text, text, sizeof text);
     memcpy(err->field, field_copy, sizeof field_copy);
 }
@@ -68,6 +71,7 @@ status error_set_errno_at(struct error *err, const char *where, const char *fiel
     va_end(args);
     size_t used = strlen(err->text);
     snprintf(err->text + used, sizeof err->text - used, ": %s", strerror(saved));
+    utf8_repair(err->text);
     return code;
 }
 
@@ -83,5 +87,6 @@ status error_prefix(struct error *err, status code, const char *format, ...)
     memcpy(rest, err->text, sizeof rest);
     size_t used = (size_t)snprintf(err->text, sizeof err->text, "%s", prefix);
     if (used < sizeof err->text - 1) snprintf(err->text + used, sizeof err->text - used, ": %s", rest);
+    utf8_repair(err->text);
     return code;
 }

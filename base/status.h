@@ -3,7 +3,8 @@
  * Rule: a function that can fail returns `status` and takes `struct error *err` last; on failure it
  * fills err (if not NULL) and leaves its outputs untouched or releasable. Nothing below main() prints
  * or exits. Texts say what is wrong first, put the subject in quotes and end with the cause:
- * "cannot read volume 'silk.tif': page 211 is 8-bit, page 1 is 16-bit".
+ * "cannot read volume 'silk.tif': page 211 is 8-bit, page 1 is 16-bit". Texts and fields are
+ * always UTF-8: other bytes of what they quote become '?' (utf8.h).
  */
 #ifndef SELVEDGE_BASE_STATUS_H
 #define SELVEDGE_BASE_STATUS_H

@@ -1,6 +1,7 @@
 #include "optimizer/worker_status.h"
 #include "base/clock.h"
 #include "base/durable.h"
+#include "base/utf8.h"
 #include "optimizer/job_folder.h"
 #include "optimizer/report/json_number.h"
 
@@ -32,6 +33,13 @@ struct worker_status {
     size_t n_warning;
     char warning[MAX_WARNING][WARNING_BYTES];
 };
+
+/* Keeps a text for status.json, which takes UTF-8 only; the cut may have split a character. */
+static void keep(char *to, size_t n_bytes, const char *text)
+{
+    snprintf(to, n_bytes, "%s", text);
+    utf8_repair(to);
+}
 
 /* Remaining time by the speed so far; unknown before one per cent is done. */
 static double eta_s(const struct worker_status *st, double fraction)
@@ -148,7 +156,7 @@ status worker_status_finish(struct worker_status *st, const char *state, const s
     if (strcmp(state, "succeeded") == 0)
         snprintf(st->message, sizeof st->message, "done");
     else
-        snprintf(st->message, sizeof st->message, "%s", error != NULL ? error->text : state);
+        keep(st->message, sizeof st->message, error != NULL ? error->text : state);
     char *text = status_text(st, state, error);
     pthread_mutex_unlock(&st->mutex);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the final status: out of memory");
@@ -174,7 +182,7 @@ void worker_status_stage(struct worker_status *st, const char *name, const char 
 {
     pthread_mutex_lock(&st->mutex);
     snprintf(st->stage, sizeof st->stage, "%s", name);
-    snprintf(st->message, sizeof st->message, "%s", title);
+    keep(st->message, sizeof st->message, title);
     st->i_stage = i_stage;
     st->n_stage = n_stage;
     st->base = base;
@@ -201,7 +209,7 @@ void worker_status_restart_eta(struct worker_status *st)
 void worker_status_message(struct worker_status *st, const char *text)
 {
     pthread_mutex_lock(&st->mutex);
-    snprintf(st->message, sizeof st->message, "%s", text);
+    keep(st->message, sizeof st->message, text);
     pthread_mutex_unlock(&st->mutex);
 }
 
@@ -221,7 +229,7 @@ void worker_status_warn(struct worker_status *st, const char *text)
     pthread_mutex_lock(&st->mutex);
     bool known = false;
     for (size_t i = 0; i < st->n_warning; i++) known |= strncmp(st->warning[i], text, WARNING_BYTES - 1) == 0;
-    if (!known && st->n_warning < MAX_WARNING) snprintf(st->warning[st->n_warning++], WARNING_BYTES, "%s", text);
+    if (!known && st->n_warning < MAX_WARNING) keep(st->warning[st->n_warning++], WARNING_BYTES, text);
     pthread_mutex_unlock(&st->mutex);
 }
 
