@@ -12,6 +12,13 @@
 
 /* ---- names and exposure ---- */
 
+static bool name_taken(picture_name *list, size_t i)
+{
+    for (size_t j = 0; j < i; j++)
+        if (strcmp(list[i], list[j]) == 0) return true;
+    return false;
+}
+
 status result_picture_names(const struct observation_set *o, picture_name **name, struct error *err)
 {
     picture_name *list = calloc(o->n > 0 ? o->n : 1, sizeof *list);
@@ -20,9 +27,9 @@ status result_picture_names(const struct observation_set *o, picture_name **name
         const char *from = o->item[i].name, *dot = strrchr(from, '.');
         int n = dot != NULL && dot > from ? (int)(dot - from) : (int)strlen(from);
         snprintf(list[i], sizeof list[i], "%.*s", n, from);
-        for (size_t j = 0; j < i; j++)
-            if (strcmp(list[i], list[j]) == 0)
-                snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, i);
+        /* a row may itself be named like what another one was given */
+        for (size_t number = i; name_taken(list, i); number += o->n)
+            snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, number);
     }
     *name = list;
     return STATUS_OK;

@@ -28,6 +28,25 @@ static void test_picture_names(void **state)
     free(picture);
 }
 
+static void test_picture_names_that_are_given_are_unique_too(void **state)
+{
+    (void)state;
+    char longer[JOB_MAX_NAME_BYTES];
+    memset(longer, 'y', sizeof longer);
+    longer[sizeof longer - 1] = '\0';
+    const char *const name[] = {"x-2", "x", "x", "x-6", "x", "x-3", "x", longer, longer};
+    enum { COUNT = sizeof name / sizeof name[0] };
+    struct observation item[COUNT] = {0};
+    struct observation_set o = {.n = COUNT, .item = item};
+    picture_name *picture = NULL;
+    for (size_t i = 0; i < COUNT; i++) snprintf(item[i].name, sizeof item[i].name, "%s", name[i]);
+    assert_int_equal(result_picture_names(&o, &picture, NULL), STATUS_OK);
+    assert_string_equal(picture[0], "x-2");
+    for (size_t i = 0; i < COUNT; i++)
+        for (size_t j = 0; j < i; j++) assert_string_not_equal(picture[i], picture[j]);
+    free(picture);
+}
+
 static void test_exposure(void **state)
 {
     (void)state;
@@ -43,6 +62,8 @@ static void test_exposure(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_picture_names), cmocka_unit_test(test_exposure)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_picture_names),
+                                       cmocka_unit_test(test_picture_names_that_are_given_are_unique_too),
+                                       cmocka_unit_test(test_exposure)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
