@@ -13,6 +13,8 @@
 #include <sys/stat.h>
 #include <zlib.h>
 
+enum { NAMED_PHOTOGRAPHS = 3 };
+
 struct stage_code {
     const char *name;
     status (*run)(struct pipeline_context *c, struct error *err);
@@ -112,6 +114,37 @@ static void warn_observation(void *context, const char *text)
 {
     struct pipeline_context *c = context;
     worker_status_warn(c->status, text);
+}
+
+/* A series of photographs is often uneven alike: name a few of them and count the rest. */
+struct uneven_photographs {
+    struct pipeline_context *pipeline;
+    size_t n;
+};
+
+static void warn_photograph(void *context, const char *text)
+{
+    struct uneven_photographs *uneven = context;
+    if (++uneven->n <= NAMED_PHOTOGRAPHS)
+        worker_status_warn(uneven->pipeline->status, text);
+    else
+        log_warning(uneven->pipeline->log, "%s", text);
+}
+
+static status load_observations(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], warning[100];
+    struct uneven_photographs uneven = {.pipeline = c};
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
+    status s = observation_set_load(c->doc, path, warn_photograph, &uneven, &c->observation, err);
+    if (s != STATUS_OK) return s;
+    if (uneven.n > NAMED_PHOTOGRAPHS) {
+        snprintf(warning, sizeof warning, "%zu more photographs are not uniform: the job's log names them",
+                 uneven.n - NAMED_PHOTOGRAPHS);
+        worker_status_warn(c->status, warning);
+    }
+    observation_set_check(&c->observation, warn_observation, c);
+    return STATUS_OK;
 }
 
 static status set_parameters(const struct job_model *given, struct pipeline_model *m, struct error *err)
@@ -248,9 +281,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     free(text);
     if (s == STATUS_OK) s = set_models(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
-    if (s == STATUS_OK) s = observation_set_load(c->doc, path, warn_observation, c, &c->observation, err);
-    if (s == STATUS_OK) observation_set_check(&c->observation, warn_observation, c);
+    if (s == STATUS_OK) s = load_observations(c, err);
     if (s == STATUS_OK) s = select_rows(c, err);
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);

@@ -30,7 +30,7 @@ struct worker_status {
     bool has_objective;
     size_t step;
     double objective, objective_se;
-    size_t n_warning;
+    size_t n_warning, n_more; /* more: in the log only */
     char warning[MAX_WARNING][WARNING_BYTES];
 };
 
@@ -223,13 +223,24 @@ void worker_status_objective(struct worker_status *st, size_t step, double objec
     pthread_mutex_unlock(&st->mutex);
 }
 
+/* With the mutex held. The last place of the list counts what finds none. */
+static void add_warning(struct worker_status *st, const char *text)
+{
+    if (st->n_warning < MAX_WARNING - 1) {
+        keep(st->warning[st->n_warning++], WARNING_BYTES, text);
+        return;
+    }
+    st->n_warning = MAX_WARNING;
+    snprintf(st->warning[MAX_WARNING - 1], WARNING_BYTES, "%zu more warnings are in the job's log", ++st->n_more);
+}
+
 void worker_status_warn(struct worker_status *st, const char *text)
 {
     log_warning(st->log, "%s", text);
     pthread_mutex_lock(&st->mutex);
     bool known = false;
     for (size_t i = 0; i < st->n_warning; i++) known |= strncmp(st->warning[i], text, WARNING_BYTES - 1) == 0;
-    if (!known && st->n_warning < MAX_WARNING) keep(st->warning[st->n_warning++], WARNING_BYTES, text);
+    if (!known) add_warning(st, text);
     pthread_mutex_unlock(&st->mutex);
 }
 

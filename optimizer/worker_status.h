@@ -32,7 +32,8 @@ void worker_status_fraction(struct worker_status *st, double stage_fraction);
 void worker_status_restart_eta(struct worker_status *st);
 void worker_status_message(struct worker_status *st, const char *text);
 void worker_status_objective(struct worker_status *st, size_t step, double objective, double se);
-/* Kept in the list (at most 50) and written to the log. */
+/* Kept in the list and written to the log. From the 50th on they are in the log only, and the list's last entry counts
+ * them. */
 void worker_status_warn(struct worker_status *st, const char *text);
 size_t worker_status_n_warning(struct worker_status *st);
 /* Copies warning i; false when there is none. */

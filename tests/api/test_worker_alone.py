@@ -1,7 +1,9 @@
 """The worker without a daemon, on job folders made by hand: what it says about tables, warnings and budgets."""
 import json
 import os
+import struct
 import subprocess
+import zlib
 
 import pytest
 from daemon_under_test import program
@@ -10,18 +12,37 @@ from small_cloth import TABLE, hair
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 
 
-def run(folder, table=TABLE, expect=0, **fit):
-    """Runs a job of the small cloth; gives status.json."""
-    document = {"sample": "alone", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
+def run(folder, table=TABLE, expect=0, photographs=(), **fit):
+    """Runs a job of the small cloth, with a table or with photographs [(bytes of a PNG, keys)]; gives status.json."""
+    document = {"sample": "alone", "fibers": {"file": "cloth.hair"},
                 "fit": {"path_budget": 100000, "render_px": 8, "render_samples": 1, **fit}}
     (folder / "input").mkdir()
-    (folder / "job.json").write_text(json.dumps(document))
     (folder / "input" / "cloth.hair").write_bytes(hair())
-    (folder / "input" / "rows.csv").write_bytes(table if isinstance(table, bytes) else table.encode())
+    if photographs:
+        document["photographs"] = [{"file": f"p{i:02d}.png", **keys} for i, (_, keys) in enumerate(photographs)]
+        for i, (data, _) in enumerate(photographs):
+            (folder / "input" / f"p{i:02d}.png").write_bytes(data)
+    else:
+        document["measurements"] = {"file": "rows.csv"}
+        (folder / "input" / "rows.csv").write_bytes(table if isinstance(table, bytes) else table.encode())
+    (folder / "job.json").write_text(json.dumps(document))
     p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
     log = (folder / "log.txt").read_text()
     assert p.returncode == expect, log
     return json.loads((folder / "status.json").read_text())
+
+
+def result(folder):
+    return json.loads((folder / "results" / "result.json").read_text())
+
+
+def png(width, height, value):
+    """An 8-bit rgb PNG; value(x, y) gives a pixel."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    raw = b"".join(b"\0" + bytes(v for x in range(width) for v in value(x, y)) for y in range(height))
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b"")
 
 
 @pytest.mark.parametrize("table", [TABLE.replace("set,", "größe,", 1).encode("latin-1"), TABLE.replace("set,", "s" + "é" * 60 + ",", 1).encode()],
@@ -30,3 +51,14 @@ def test_a_table_of_strange_bytes_fails_with_its_message(tmp_path, table):
     state = run(tmp_path, table, expect=1)
     assert state["state"] == "failed"
     assert state["error"]["field"] == "measurements.file" and "rows.csv" in state["error"]["text"]
+
+
+def test_many_uneven_photographs_leave_room_for_other_warnings(tmp_path):
+    half = png(32, 32, lambda x, y: (30, 25, 15) if x < 16 else (10, 8, 5))
+    angles = [{"light_theta_deg": 1 + i, "light_phi_deg": 0, "camera_theta_deg": 20, "camera_phi_deg": 180} for i in range(60)]
+    state = run(tmp_path, photographs=[(half, a) for a in angles], path_budget=1000)
+    warnings = state["warnings"]
+    uneven = [w for w in warnings if "is not uniform" in w]
+    assert len(uneven) == 3 and "57 more photographs are not uniform: the job's log names them" in warnings
+    assert (tmp_path / "log.txt").read_text().count("is not uniform") == 60
+    assert any("has not converged" in w for w in warnings) and warnings == result(tmp_path)["warnings"]
