@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_CELL = 64, MAX_ROW = 4096 };
+enum { MAX_CELL = 64, MAX_ROW = CONFIGURATION_MAX_COUNT };
 
 enum column {
     COLUMN_SET,
@@ -54,6 +54,7 @@ struct table {
     int place[COLUMN_COUNT]; /* the file's column for an enum column, or -1 */
     char *cell[MAX_CELL];
     size_t n_cell;
+    size_t n_configuration; /* of the rows so far; fitted and held-out ones are traced together in the end */
 };
 
 #define table_error(t, code, ...)                                                                                      \
@@ -155,6 +156,17 @@ static status cell_not_negative(const struct table *t, enum column c, double mis
     return STATUS_OK;
 }
 
+static status count_configurations(struct table *t, uint32_t n_rotation, struct error *err)
+{
+    t->n_configuration += n_rotation > 1 ? n_rotation : 1;
+    if (t->n_configuration <= CONFIGURATION_MAX_COUNT) return STATUS_OK;
+    return table_error(t, STATUS_TOO_LARGE,
+                       "more than %d renderings for fitted and held-out rows together: a row with cloth_rotation_deg "
+                       "'all' takes %d, so at most %d such rows, any other row takes one",
+                       t->file, t->line, CONFIGURATION_MAX_COUNT, CONFIGURATION_ALL_ROTATIONS,
+                       CONFIGURATION_MAX_COUNT / CONFIGURATION_ALL_ROTATIONS);
+}
+
 static status read_row(struct table *t, struct observation_set *o, struct error *err)
 {
     if (t->n_cell != t->n_column)
@@ -177,6 +189,7 @@ static status read_row(struct table *t, struct observation_set *o, struct error 
     if (s == STATUS_OK) s = cell_polar(t, COLUMN_CAMERA_THETA, false, &camera_theta, err);
     if (s == STATUS_OK) s = cell_angle(t, COLUMN_CAMERA_PHI, -360.0, 360.0, &camera_phi, err);
     if (s == STATUS_OK) s = cell_rotation(t, &rotation, &n_rotation, err);
+    if (s == STATUS_OK) s = count_configurations(t, n_rotation, err);
     for (unsigned c = 0; c < 3 && s == STATUS_OK; c++) {
         s = cell_not_negative(t, COLUMN_R + c, 0.0, 1e6, &item.mean_rgb[c], err);
         if (s == STATUS_OK) s = cell_not_negative(t, COLUMN_R_SE + c, 0.0, 1e6, &item.se_rgb[c], err);

@@ -7,7 +7,8 @@
  * (configuration.h, n_rotation), as it must be for data measured as isotropic. Rows may repeat. Errors are
  * STATUS_FORMAT or STATUS_INVALID with err->field "measurements.file" and a text that names file, line and column: a
  * missing or unknown column, a wrong number of cells, what is no number, NaN or negative radiance, an angle of 90
- * degrees or more from the normal (lamp behind the cloth: only without a black sheet), no row of the set "fit".
+ * degrees or more from the normal (lamp behind the cloth: only without a black sheet), no row of the set "fit". STATUS_TOO_LARGE: more renderings than
+ * CONFIGURATION_MAX_COUNT, where a mean over rotations takes one a rotation.
  */
 #ifndef SELVEDGE_OPTIMIZER_MEASUREMENT_TABLE_H
 #define SELVEDGE_OPTIMIZER_MEASUREMENT_TABLE_H

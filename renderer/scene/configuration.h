@@ -23,6 +23,8 @@ enum configuration_light {
 
 enum {
     CONFIGURATION_MAX_CELLS = 32,
+    CONFIGURATION_MAX_COUNT = 4096, /* of one estimate: so many have random numbers of their own; a mean over rotations
+                                       counts as many times as it has rotations */
     CONFIGURATION_ALL_ROTATIONS = 9 /* n_rotation of a measurement that is a mean over all: odd, so that a weave, which looks nearly
                                        the same after a quarter turn, is seen every 10 degrees */
 };

@@ -213,10 +213,10 @@ static bool configuration_makes_sense(const struct configuration *c)
 status estimate_check_configurations(const struct configuration *configuration, size_t n_configuration,
                                      uint32_t iteration, uint32_t replica, struct error *err)
 {
-    if (n_configuration > 4096)
+    if (n_configuration > CONFIGURATION_MAX_COUNT)
         return error_set_field(err, STATUS_INVALID, "n_configuration",
-                               "cannot estimate %zu configurations: at most 4096 have random numbers of their own",
-                               n_configuration);
+                               "cannot estimate %zu configurations: at most %d have random numbers of their own",
+                               n_configuration, CONFIGURATION_MAX_COUNT);
     if (iteration > 65535 || replica > 15)
         return error_set_field(err, STATUS_INVALID, "iteration",
                                "cannot estimate iteration %u, replica %u: at most 65535 and 15", iteration, replica);

@@ -72,6 +72,40 @@ static void test_rotations(void **state)
     check_error(HEAD "fit,0,20,0,20,180,any,0.1,0.1,0.1\n", STATUS_FORMAT, "column 'cloth_rotation_deg': 'any'");
 }
 
+/* A header, n_all rows over all rotations and n_one rows at one; free(). */
+static char *long_table(size_t n_all, size_t n_one)
+{
+    static const char all[] = "held-out,0,20,0,20,180,all,0.1,0.1,0.1\n", one[] = "fit,0,20,0,20,180,0,0.1,0.1,0.1\n";
+    char *text = malloc(sizeof HEAD + n_all * sizeof all + n_one * sizeof one), *end = text;
+    assert_non_null(text);
+    end = mempcpy(end, HEAD, sizeof HEAD - 1);
+    for (size_t i = 0; i < n_one; i++) end = mempcpy(end, one, sizeof one - 1);
+    for (size_t i = 0; i < n_all; i++) end = mempcpy(end, all, sizeof all - 1);
+    *end = '\0';
+    return text;
+}
+
+/* What the renderer takes at once: a row over all rotations is nine of them. */
+static void test_too_many_renderings(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t n_all, n_one;
+        bool good;
+    } golden[] = {{455, 1, true}, {455, 2, false}, {456, 1, false}, {0, 4096, true}, {0, 4097, false}, {1, 4088, false}};
+    for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
+        char *text = long_table(golden[i].n_all, golden[i].n_one);
+        struct observation_set o;
+        observation_set_init(&o);
+        if (golden[i].good)
+            assert_int_equal(measurement_table_parse(text, strlen(text), "t.csv", &set_up, &o, NULL), STATUS_OK);
+        else
+            check_error(text, STATUS_TOO_LARGE, golden[i].n_all > 0 ? "'all' takes 9, so at most 455" : "more than 4096 rows");
+        observation_set_release(&o);
+        free(text);
+    }
+}
+
 static void test_errors(void **state)
 {
     (void)state;
@@ -127,7 +161,8 @@ static void test_real_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_rotations), cmocka_unit_test(test_errors),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_rotations),
+                                       cmocka_unit_test(test_too_many_renderings), cmocka_unit_test(test_errors),
                                        cmocka_unit_test(test_real_tables)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
