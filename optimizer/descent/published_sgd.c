@@ -207,12 +207,12 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
      * end */
     double n_call = RESCALE_POINTS * 5.0 + 2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
     double paths = (double)g->run.path_budget / (n_call * (double)n);
-    if (problem->path_budget == 0) {
-        paths = (double)published_path;
-        g->run.path_budget = (uint64_t)(paths * n_call * (double)n);
-    }
+    if (problem->path_budget == 0) paths = (double)published_path;
     for (size_t i = 0; i < n; i++) g->run.n_path[i] = (size_t)fmax(1.0, floor(paths / BLOCK)) * BLOCK;
-    s = rescale_measure(problem, g->run.coordinate, g->run.n_path, g->curve, &g->run.n_path_total, &g->run.wall_s, err);
+    g->run.path_budget = (uint64_t)(n_call * (double)(n * g->run.n_path[0])); /* what is done of it is the progress */
+    struct fit_problem planned = *problem;
+    planned.path_budget = g->run.path_budget;
+    s = rescale_measure(&planned, g->run.coordinate, g->run.n_path, g->curve, &g->run.n_path_total, &g->run.wall_s, err);
     if (s != STATUS_OK) goto out;
     double a = 0.0;
     start_run(g, 0.0);

@@ -87,6 +87,16 @@ static double curve_step(const struct observation_set *o, const struct estimate 
     return sum;
 }
 
+/* The next rendering as a part of the whole fit. */
+static struct progress_part part_of_budget(const struct fit_problem *problem, const size_t *n_path, uint64_t n_path_used)
+{
+    double budget = (double)problem->path_budget, call = 0.0;
+    for (size_t i = 0; i < problem->estimator->n_configuration; i++) call += (double)n_path[i];
+    double from = budget > 0.0 ? fmin(1.0, (double)n_path_used / budget) : 0.0;
+    return (struct progress_part){
+        .outer = problem->progress, .from = from, .share = budget > 0.0 ? fmin(1.0 - from, call / budget) : 0.0};
+}
+
 /* One curve: all slots of the same symbol move together, beyond bounds of their own where these are tighter. */
 static status measure_symbol(const struct fit_problem *problem, size_t first, size_t n_slot, const size_t *n_path,
                              struct rescale_curve *curve, struct estimate *buffer[2], uint64_t *n_path_used,
@@ -99,7 +109,9 @@ static status measure_symbol(const struct fit_problem *problem, size_t first, si
         for (size_t s = 0; s < n_slot; s++) param[first + s] = curve->c[j];
         struct estimator_call call = {param, n_path, 0, REPLICA_RESCALE, false, true};
         double seconds = 0.0;
-        status s = e->run(e->context, &call, problem->progress, buffer[j % 2], &seconds, err);
+        struct progress_part part = part_of_budget(problem, n_path, *n_path_used);
+        struct progress progress = progress_of_part(&part);
+        status s = e->run(e->context, &call, &progress, buffer[j % 2], &seconds, err);
         if (s != STATUS_OK) return s;
         *wall_s += seconds;
         for (size_t i = 0; i < e->n_configuration; i++) *n_path_used += buffer[j % 2][i].n_path;

@@ -105,6 +105,56 @@ static void test_kind_of_paths(void **state)
     }
 }
 
+/* The estimator of the fixture, each call of which reports its own progress from 0 to 1; and what a listener hears. */
+struct heard {
+    struct estimator inner;
+    double fraction, after_first;
+    size_t n_call;
+};
+
+static status telling_run(void *context, const struct estimator_call *call, const struct progress *progress,
+                          struct estimate *out, double *wall_s, struct error *err)
+{
+    struct heard *h = context;
+    progress_report(progress, 0.0);
+    status s = h->inner.run(h->inner.context, call, progress, out, wall_s, err);
+    progress_report(progress, 1.0);
+    if (h->n_call++ == 0) h->after_first = h->fraction;
+    return s;
+}
+
+static void hear(void *context, double fraction)
+{
+    struct heard *h = context;
+    assert_true(fraction >= h->fraction - 1e-9 && fraction <= 1.0);
+    h->fraction = fraction;
+}
+
+/* A rendering that is done is not the whole fit that is done. */
+static void test_progress(void **state)
+{
+    (void)state;
+    static const uint64_t budget[] = {4000000, 200000}; /* less than published_sgd's least, too */
+    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+        for (size_t i = 0; i < 2; i++) {
+            struct fixture x;
+            struct fit_result r;
+            setup(&x, 1, budget[i]);
+            struct heard h = {.inner = x.estimator};
+            struct estimator e = {&h, x.estimator.n_configuration, x.estimator.n_param, telling_run};
+            struct progress progress = {.report = hear, .context = &h};
+            x.problem.estimator = &e;
+            x.problem.progress = &progress;
+            run(&x, *m, &r);
+            print_message("%s: progress %.3f after the first of %zu renderings, %.3f at the end\n", (*m)->id, h.after_first,
+                          h.n_call, h.fraction);
+            assert_true(h.after_first > 0.0 && h.after_first < 4.0 / (double)h.n_call);
+            assert_true(h.fraction > 0.9);
+            observation_set_release(&x.observation);
+        }
+    }
+}
+
 static void test_every_method_recovers(void **state)
 {
     (void)state;
@@ -303,7 +353,7 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
+        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_progress), cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
         cmocka_unit_test(test_every_method_repeats),  cmocka_unit_test(test_resume),
         cmocka_unit_test(test_foreign_journal),       cmocka_unit_test(test_stale_writer),
         cmocka_unit_test(test_bounded_quadratic),     cmocka_unit_test(test_bad_problems),
