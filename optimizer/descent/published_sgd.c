@@ -8,7 +8,7 @@
  * Differs: the thesis does not give the six values of a; here they grow by a factor of 3, and the first step moves the
  * parameter that moves most by 0.5 % .. 120 % of its rescaled range. "Final objective" is the mean over the last five
  * iterations of a run: the value of one iteration is noisy. "Oscillates" means that successive steps point against each
- * other on average. A parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors
+ * other on average; below a mean cosine of turn_limit, over at least N_EXTRA pairs of steps, counts as converged. A parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors
  * come from 4 more estimates at the winner.
  */
 #include "optimizer/descent/descent_methods.h"
@@ -32,7 +32,7 @@ enum {
 };
 
 static const uint64_t published_path = 64 * 64 * 64;
-static const double first_move = 0.005, factor = 3.0;
+static const double first_move = 0.005, factor = 3.0, turn_limit = 0.3;
 
 struct sgd {
     struct descent_run run;
@@ -41,7 +41,7 @@ struct sgd {
     double last_step[N];      /* in r */
     double a;                 /* of this run */
     double objective[N_LAST]; /* ring of the last ones */
-    double turn;              /* sum over the last N_EXTRA steps of the cosine with the step before */
+    double turn;              /* fading sum over some N_EXTRA steps of the cosine with the step before; mean_turn */
     size_t i;                 /* iterations of this run so far */
     uint32_t next_key;        /* iteration number of the random key */
 };
@@ -91,6 +91,17 @@ static status iterate(struct sgd *g, const char *phase, double rate, struct erro
     return STATUS_OK;
 }
 
+/* Steps of this run that had one before to be compared with. */
+static size_t n_compared(const struct sgd *g) { return g->i > 0 ? g->i - 1 : 0; }
+
+/* Mean cosine of successive steps, the last ones counting most. The sum began at 0, as if earlier steps had stood at right
+ * angles: that part is taken out. */
+static double mean_turn(const struct sgd *g)
+{
+    double known = 1.0 - pow(1.0 - 1.0 / N_EXTRA, (double)n_compared(g));
+    return known > 0.0 ? g->turn / known : 0.0;
+}
+
 static double final_objective(const struct sgd *g)
 {
     size_t n = g->i < N_LAST ? g->i : N_LAST;
@@ -124,6 +135,7 @@ static void start_run(struct sgd *g, double a)
 struct winner {
     double param[N], objective, turn, rate, a;
     int i_run;
+    size_t n_compared;
 };
 
 static status run_all(struct sgd *g, size_t n_iteration, double a, struct winner *best, struct error *err)
@@ -139,7 +151,8 @@ static status run_all(struct sgd *g, size_t n_iteration, double a, struct winner
         double f = final_objective(g);
         if (k > 0 && !(f < best->objective)) continue;
         *best = (struct winner){
-            .objective = f, .turn = g->turn, .a = a, .i_run = k, .rate = a / (double)(FIRST_I + n_iteration - 1)};
+            .objective = f, .turn = mean_turn(g), .a = a, .i_run = k, .rate = a / (double)(FIRST_I + n_iteration - 1)};
+        best->n_compared = n_compared(g);
         memcpy(best->param, g->param, sizeof g->param);
     }
     return STATUS_OK;
@@ -154,6 +167,22 @@ static status settle(struct sgd *g, const struct winner *best, struct error *err
         if (s != STATUS_OK) return s;
     }
     return STATUS_OK;
+}
+
+/* Whether the winner's run had come to rest, and why. */
+static void judge(const struct winner *best, struct fit_result *result)
+{
+    bool at_end = best->i_run == 0 || best->i_run == N_RUN - 1, enough = best->n_compared >= N_EXTRA;
+    result->converged = enough && best->turn <= turn_limit && !at_end;
+    int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest objective%s; ", best->i_run + 1, N_RUN,
+                     at_end ? ", which is at the end of the bracket" : "");
+    if (enough)
+        snprintf(result->reason + n, sizeof result->reason - (size_t)n,
+                 "successive steps have a mean cosine of %.2f (below %.1f counts as converged)", best->turn, turn_limit);
+    else
+        snprintf(result->reason + n, sizeof result->reason - (size_t)n,
+                 "%zu pairs of successive steps are too few to tell whether it has converged (%d are needed)",
+                 best->n_compared, N_EXTRA);
 }
 
 /* Estimates at the winner only: objective and errors. */
@@ -181,13 +210,7 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
         result->objective.value = linear_model_objective(&model, &result->objective.se);
         result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)model.n_row);
         uncertainty_compute(&model, g->run.coordinate, g->run.fixed, &result->uncertainty);
-        result->converged = best->turn <= 0.3 && best->i_run > 0 && best->i_run < N_RUN - 1;
-        snprintf(result->reason, sizeof result->reason,
-                 "run %d of %d had the lowest objective%s; successive steps have a mean cosine of %.2f (below 0.3 "
-                 "counts as converged)",
-                 best->i_run + 1, N_RUN,
-                 best->i_run == 0 || best->i_run == N_RUN - 1 ? ", which is at the end of the bracket" : "",
-                 best->turn);
+        judge(best, result);
     }
     linear_model_release(&model);
     linear_history_release(&history);

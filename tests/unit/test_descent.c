@@ -155,6 +155,42 @@ static void test_progress(void **state)
     }
 }
 
+/* A few short runs hold no steps that could be compared: that is not converged, however low the objective. */
+static void test_published_sgd_needs_steps(void **state)
+{
+    (void)state;
+    for (size_t n_iteration = 1; n_iteration <= 10; n_iteration += 3) {
+        struct fixture x;
+        struct fit_result r;
+        setup(&x, 1, 400000);
+        x.problem.max_iteration = n_iteration;
+        run(&x, descent_find(METHOD_PUBLISHED_SGD), &r);
+        if (r.converged || strstr(r.reason, "too few to tell") == NULL)
+            fail_msg("%zu iterations: %s", n_iteration, r.reason);
+        observation_set_release(&x.observation);
+    }
+}
+
+/* Steps that all point the same way have a mean cosine near 1, also in the first run that is long enough. */
+static void test_published_sgd_mean_cosine_has_no_start(void **state)
+{
+    (void)state;
+    struct fixture x;
+    struct fit_result r;
+    double cosine = 0.0;
+    setup(&x, 1, 40000000);
+    x.cloth.noise = 1e-3;
+    x.problem.max_iteration = 11;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) x.parameter[p].fixed = p != 8; /* one parameter: cosines are 1 or -1 */
+    run(&x, descent_find(METHOD_PUBLISHED_SGD), &r);
+    const char *text = strstr(r.reason, "mean cosine of ");
+    assert_non_null(text);
+    cosine = strtod(text + strlen("mean cosine of "), NULL);
+    print_message("%s\n", r.reason);
+    assert_true(fabs(cosine) > 0.99);
+    observation_set_release(&x.observation);
+}
+
 static void test_every_method_recovers(void **state)
 {
     (void)state;
@@ -353,7 +389,9 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_progress), cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
+        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_progress),
+        cmocka_unit_test(test_published_sgd_needs_steps), cmocka_unit_test(test_published_sgd_mean_cosine_has_no_start),
+        cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
         cmocka_unit_test(test_every_method_repeats),  cmocka_unit_test(test_resume),
         cmocka_unit_test(test_foreign_journal),       cmocka_unit_test(test_stale_writer),
         cmocka_unit_test(test_bounded_quadratic),     cmocka_unit_test(test_bad_problems),
