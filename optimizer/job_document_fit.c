@@ -167,9 +167,10 @@ static status parse_density(const struct json_field *f, const struct appearance 
                                      param_to_file_unit(d, d->upper), &doc->density_multiplier_per_cm, err);
         if (s == STATUS_OK) s = json_field_bool(f, "fit_density", &doc->fit_density, err);
         if (s != STATUS_OK) return s;
-        double value = isnan(doc->density_multiplier_per_cm) ? param_to_file_unit(d, d->start)
-                                                             : doc->density_multiplier_per_cm;
-        (doc->fit_density ? doc->model[i].start : doc->model[i].fixed)[model[i].n_param - 1] = value;
+        bool given = !isnan(doc->density_multiplier_per_cm);
+        double value = given ? doc->density_multiplier_per_cm : param_to_file_unit(d, d->start);
+        if (!doc->fit_density) doc->model[i].fixed[model[i].n_param - 1] = value;
+        if (doc->fit_density && given) doc->model[i].start[model[i].n_param - 1] = value; /* else a prior's mean may be */
         any_volume = true;
     }
     static const char *const key[] = {"density_multiplier_per_cm", "fit_density"};

@@ -238,6 +238,35 @@ static void test_fit_options(void **state)
     job_document_free(d);
 }
 
+/* The density multiplier of a volume model, 1/cm: last of phase_two_lobe.v1's parameters. */
+static void test_start_of_density(void **state)
+{
+    (void)state;
+    static const char prior[] = "\"priors\":{\"density_multiplier\":{\"mean\":800,\"se\":100}}";
+    static const struct {
+        const char *more;
+        double start;
+        bool with_prior;
+    } golden[] = {{"\"fit_density\":true", 4000.0, false},
+                  {"\"fit_density\":true", 800.0, true},
+                  {"\"fit_density\":true,\"density_multiplier_per_cm\":2000", 2000.0, false},
+                  {"\"fit_density\":true,\"density_multiplier_per_cm\":2000", 2000.0, true},
+                  {"\"fit_density\":true,\"bounds\":{\"density_multiplier\":[100,1000]}", 1000.0, false}};
+    for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
+        struct job_fit_parameter k[JOB_MAX_PARAM];
+        struct appearance m;
+        char text[600];
+        snprintf(text, sizeof text,
+                 "{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"black_sheet\":false,"
+                 "\"fit\":{\"model\":\"phase_two_lobe.v1\",%s%s%s}}",
+                 golden[i].more, golden[i].with_prior ? "," : "", golden[i].with_prior ? prior : "");
+        resolve(text, k);
+        assert_true(appearance_find("phase_two_lobe.v1", &m));
+        if (fabs(k[m.n_param - 1].start - golden[i].start) > 1e-9 * golden[i].start || k[m.n_param - 1].fixed)
+            fail_msg("%s: starts at %g", text, k[m.n_param - 1].start);
+    }
+}
+
 /* PHOTO's crop is 10 mm. */
 static void test_texture(void **state)
 {
@@ -410,7 +439,7 @@ int main(void)
         cmocka_unit_test(test_volume),
         cmocka_unit_test(test_photographs),
         cmocka_unit_test(test_fit),
-        cmocka_unit_test(test_fit_options), cmocka_unit_test(test_texture),
+        cmocka_unit_test(test_fit_options), cmocka_unit_test(test_start_of_density), cmocka_unit_test(test_texture),
         cmocka_unit_test(test_fit_option_errors),
         cmocka_unit_test(test_bounds_are_values),
         cmocka_unit_test(test_file_names),
