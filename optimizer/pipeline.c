@@ -4,6 +4,7 @@
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
 #include "optimizer/photographs/observation_check.h"
+#include "optimizer/pipeline_budget.h"
 #include "optimizer/pipeline_context.h"
 
 #include <math.h>
@@ -285,7 +286,7 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = select_rows(c, err);
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);
-    return s;
+    return s == STATUS_OK ? pipeline_warn_budget(c, err) : s;
 }
 
 /* ---- running ---- */

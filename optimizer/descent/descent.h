@@ -85,6 +85,8 @@ struct descent_method {
     uint64_t default_path_budget;
     size_t default_max_iteration;
     bool plain_paths; /* estimator.h */
+    /* Paths that a fit takes however small its budget is: with this budget, or more, it stays inside. */
+    uint64_t (*least_budget)(const struct fit_problem *problem);
     status (*run)(const struct fit_problem *problem, struct fit_result *result, struct error *err);
 };
 

@@ -25,6 +25,7 @@
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/method_names.h"
 #include "optimizer/objective/small_matrix.h"
+#include "renderer/transport/appearance_estimate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -408,6 +409,18 @@ static status finish(struct gauss_newton *g, struct fit_result *result, struct e
     return STATUS_OK;
 }
 
+/* One iteration. */
+static uint64_t least_budget(const struct fit_problem *problem)
+{
+    uint64_t sum = 0;
+    for (size_t i = 0; i < problem->observation->n; i++) {
+        const struct configuration *c = &problem->observation->item[i].configuration;
+        size_t cells = (size_t)c->contrast_cells * c->contrast_cells;
+        sum += 2 * appearance_n_path(c, PATH_PER_CELL * cells > MIN_PATH ? PATH_PER_CELL * cells : MIN_PATH);
+    }
+    return sum;
+}
+
 static status run_gauss_newton(const struct fit_problem *problem, struct fit_result *result, struct error *err)
 {
     struct gauss_newton g = {.limit_scale = 1.0, .pulls = true};
@@ -441,4 +454,5 @@ const struct descent_method descent_gauss_newton = {
     .default_path_budget = DEFAULT_BUDGET,
     .default_max_iteration = MAX_ITERATION,
     .run = run_gauss_newton,
+    .least_budget = least_budget,
 };

@@ -14,6 +14,7 @@
 #include "optimizer/descent/descent_methods.h"
 #include "optimizer/descent/method_names.h"
 #include "optimizer/descent/rescale.h"
+#include "renderer/transport/appearance_estimate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,8 +28,7 @@ enum {
     N_EXTRA = 10,
     FIRST_I = 50,
     N_FINAL = 4,
-    N_LAST = 5,
-    BLOCK = 256
+    N_LAST = 5
 };
 
 static const uint64_t published_path = 64 * 64 * 64;
@@ -217,6 +217,43 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
     return s;
 }
 
+/* Renderings of one configuration: the curves, the first rate, the runs, settling, the end. */
+static double n_rendering(const struct fit_problem *problem, const struct coordinate *k)
+{
+    size_t n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
+    return RESCALE_POINTS * (double)rescale_n_curve(problem, k) + 2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
+}
+
+/* Of one rendering of every configuration with as few paths as there can be. */
+static double least_rendering(const struct observation_set *o)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < o->n; i++) sum += (double)appearance_n_path(&o->item[i].configuration, 1);
+    return sum;
+}
+
+/* A stated budget is met by so many times the fewest paths; that is then the whole of which the progress tells. */
+static void plan_paths(struct descent_run *run)
+{
+    const struct observation_set *o = run->problem->observation;
+    double n = n_rendering(run->problem, run->coordinate), sum = 0.0;
+    double times = floor((double)run->problem->path_budget / (n * least_rendering(o)));
+    for (size_t i = 0; i < o->n; i++) {
+        size_t least = appearance_n_path(&o->item[i].configuration, 1);
+        run->n_path[i] = run->problem->path_budget > 0 ? (size_t)fmax(1.0, times) * least : published_path;
+        sum += (double)run->n_path[i];
+    }
+    run->path_budget = (uint64_t)(n * sum);
+}
+
+static uint64_t least_budget(const struct fit_problem *problem)
+{
+    struct coordinate k[N];
+    for (size_t p = 0; p < problem->n_param; p++)
+        coordinate_init(&k[p], &problem->info[p], problem->param[p].lower, problem->param[p].upper);
+    return (uint64_t)(n_rendering(problem, k) * least_rendering(problem->observation));
+}
+
 static status run_published_sgd(const struct fit_problem *problem, struct fit_result *result, struct error *err)
 {
     struct sgd *g = calloc(1, sizeof *g);
@@ -225,14 +262,8 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
     if (g == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start a fit: out of memory");
     status s = descent_run_init(&g->run, problem, &descent_published_sgd, err);
     if (s != STATUS_OK) goto out;
-    size_t n = problem->observation->n, n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
-    /* renderings of one configuration: the curves (at most one a parameter), the first rate, the runs, settling, the
-     * end */
-    double n_call = RESCALE_POINTS * 5.0 + 2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
-    double paths = (double)g->run.path_budget / (n_call * (double)n);
-    if (problem->path_budget == 0) paths = (double)published_path;
-    for (size_t i = 0; i < n; i++) g->run.n_path[i] = (size_t)fmax(1.0, floor(paths / BLOCK)) * BLOCK;
-    g->run.path_budget = (uint64_t)(n_call * (double)(n * g->run.n_path[0])); /* what is done of it is the progress */
+    size_t n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
+    plan_paths(&g->run);
     struct fit_problem planned = *problem;
     planned.path_budget = g->run.path_budget;
     s = rescale_measure(&planned, g->run.coordinate, g->run.n_path, g->curve, &g->run.n_path_total, &g->run.wall_s, err);
@@ -260,4 +291,5 @@ const struct descent_method descent_published_sgd = {
     .default_max_iteration = N_ITERATION,
     .plain_paths = true,
     .run = run_published_sgd,
+    .least_budget = least_budget,
 };

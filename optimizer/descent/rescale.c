@@ -122,6 +122,22 @@ static status measure_symbol(const struct fit_problem *problem, size_t first, si
     return STATUS_OK;
 }
 
+/* First channel of the same colour with the same bounds, whose curve is also that of parameter i; i when there is none. */
+static size_t owner_of_curve(const struct fit_problem *problem, const struct coordinate *k, size_t i)
+{
+    size_t same = i;
+    while (same > 0 && strcmp(problem->info[same - 1].symbol, problem->info[i].symbol) == 0) same--;
+    while (same < i && (k[same].param_lower != k[i].param_lower || k[same].param_upper != k[i].param_upper)) same++;
+    return same;
+}
+
+size_t rescale_n_curve(const struct fit_problem *problem, const struct coordinate *k)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < problem->n_param; i++) n += owner_of_curve(problem, k, i) == i;
+    return n;
+}
+
 status rescale_measure(const struct fit_problem *problem, const struct coordinate *k, const size_t *n_path,
                        struct rescale_curve *curve, uint64_t *n_path_used, double *wall_s, struct error *err)
 {
@@ -134,8 +150,7 @@ status rescale_measure(const struct fit_problem *problem, const struct coordinat
         for (n_slot = 1; p + n_slot < problem->n_param; n_slot++)
             if (strcmp(problem->info[p + n_slot].symbol, problem->info[p].symbol) != 0) break;
         for (size_t i = p; i < p + n_slot && s == STATUS_OK; i++) {
-            size_t same = p;
-            while (same < i && (k[same].param_lower != k[i].param_lower || k[same].param_upper != k[i].param_upper)) same++;
+            size_t same = owner_of_curve(problem, k, i);
             if (same < i) {
                 curve[i] = curve[same];
                 continue;

@@ -31,6 +31,8 @@ double rescale_forward(const struct rescale_curve *curve, double p);
 double rescale_backward(const struct rescale_curve *curve, double r);
 double rescale_slope(const struct rescale_curve *curve, double p);
 
+/* Curves that rescale_measure renders, of up to RESCALE_POINTS points each. */
+size_t rescale_n_curve(const struct fit_problem *problem, const struct coordinate *k);
 /* curve: n_param of them (channels of one colour with the same bounds share the values). n_path: per configuration of each evaluation.
  * problem->path_budget is that of the whole fit, for its progress. */
 status rescale_measure(const struct fit_problem *problem, const struct coordinate *k, const size_t *n_path,

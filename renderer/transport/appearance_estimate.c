@@ -1,5 +1,6 @@
 #include "renderer/transport/appearance_estimate.h"
 
+#include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/rotation_mean.h"
 #include "renderer/transport/volume_estimate.h"
 
@@ -74,4 +75,12 @@ status appearance_estimate_run(const struct appearance_request *q, struct thread
     if (s != STATUS_OK) return s;
     if (rotation_mean_wanted(q->configuration, q->n_configuration)) return estimate_rotations(q, pool, progress, out, err);
     return estimate_any(q, pool, progress, out, err);
+}
+
+size_t appearance_n_path(const struct configuration *c, size_t n_path)
+{
+    size_t n_cell = (size_t)c->contrast_cells * c->contrast_cells, n_rotation = c->n_rotation > 1 ? c->n_rotation : 1;
+    size_t n_part = n_cell > 0 ? n_cell : n_rotation, part = (n_path + n_part - 1) / n_part;
+    if (n_cell > 0) return n_cell * (part > 4 ? part + part % 2 : 4); /* two sets of two paths at least: contrast_plan_init */
+    return n_rotation * ((part + ESTIMATE_BLOCK_PATHS - 1) / ESTIMATE_BLOCK_PATHS * ESTIMATE_BLOCK_PATHS);
 }

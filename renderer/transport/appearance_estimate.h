@@ -35,4 +35,8 @@ struct appearance_request {
 status appearance_estimate_run(const struct appearance_request *q, struct thread_pool *pool,
                                const struct progress *progress, struct estimate *out, struct error *err);
 
+/* Paths that are traced for a configuration of which n_path (more than 0) are asked: whole blocks, of every rotation; as many
+ * for every part of a contrast. */
+size_t appearance_n_path(const struct configuration *c, size_t n_path);
+
 #endif

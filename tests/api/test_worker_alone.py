@@ -1,6 +1,7 @@
 """The worker without a daemon, on job folders made by hand: what it says about tables, warnings and budgets."""
 import json
 import os
+import re
 import struct
 import subprocess
 import zlib
@@ -62,3 +63,19 @@ def test_many_uneven_photographs_leave_room_for_other_warnings(tmp_path):
     assert len(uneven) == 3 and "57 more photographs are not uniform: the job's log names them" in warnings
     assert (tmp_path / "log.txt").read_text().count("is not uniform") == 60
     assert any("has not converged" in w for w in warnings) and warnings == result(tmp_path)["warnings"]
+
+
+@pytest.mark.parametrize("method,starts", [("gauss_newton.v1", 1), ("gauss_newton.v1", 2), ("published_sgd.v1", 1)])
+def test_a_budget_that_cannot_be_kept_is_said(tmp_path, method, starts):
+    fit = {"method": method, "starts": starts, "max_iterations": 12, "fixed": {"C_R": 0.1, "beta_R": 5}}
+    rows = TABLE + "fit,45,0,45,90,all,0.05,0.03,0.02\n"  # traced at nine rotations
+    for name in ("less", "least"):
+        (tmp_path / name).mkdir()
+    warnings = run(tmp_path / "less", rows, path_budget=1000, **fit)["warnings"]
+    said = [re.search(r"takes up to (\d+) all the same", w) for w in warnings if w.startswith("fit.path_budget: 1000 paths are too few")]
+    assert len(said) == 1
+    least, taken = int(said[0].group(1)), result(tmp_path / "less")["n_path_fit"]
+    assert 0.85 * least < taken <= least  # published_sgd: settling may be left out
+    warnings = run(tmp_path / "least", rows, path_budget=least, **fit)["warnings"]
+    assert not any("fit.path_budget" in w for w in warnings)
+    assert result(tmp_path / "least")["n_path_fit"] <= least

@@ -155,6 +155,28 @@ static void test_progress(void **state)
     }
 }
 
+/* What a method calls its least budget is what it takes when it is given less, and it stays inside when it is given that. */
+static void test_least_budget(void **state)
+{
+    (void)state;
+    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+        for (int bounded = 0; bounded < 2; bounded++) {
+            struct fixture x;
+            struct fit_result r;
+            setup(&x, 1, 1000);
+            if (bounded) x.parameter[1].lower = 1.5 * x.parameter[0].lower; /* a channel with a curve of its own */
+            uint64_t least = (*m)->least_budget(&x.problem);
+            run(&x, *m, &r);
+            print_message("%s: least budget %.0f, takes %.0f of 1000\n", (*m)->id, (double)least, (double)r.n_path);
+            assert_true(r.n_path <= least && (double)r.n_path > 0.9 * (double)least);
+            x.problem.path_budget = least;
+            run(&x, *m, &r);
+            assert_true(r.n_path <= least);
+            observation_set_release(&x.observation);
+        }
+    }
+}
+
 /* A few short runs hold no steps that could be compared: that is not converged, however low the objective. */
 static void test_published_sgd_needs_steps(void **state)
 {
@@ -389,7 +411,7 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_progress),
+        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_progress), cmocka_unit_test(test_least_budget),
         cmocka_unit_test(test_published_sgd_needs_steps), cmocka_unit_test(test_published_sgd_mean_cosine_has_no_start),
         cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
         cmocka_unit_test(test_every_method_repeats),  cmocka_unit_test(test_resume),

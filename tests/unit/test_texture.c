@@ -4,6 +4,7 @@
 #include "optimizer/descent/fit_run.h"
 #include "optimizer/descent/method_names.h"
 #include "optimizer/photographs/photograph_contrast.h"
+#include "renderer/transport/appearance_estimate.h"
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 #include "tests/support/hand_weave.h"
@@ -114,6 +115,7 @@ static void test_unbiased(void **state)
         ask(&b, truth, 4 * CELL, k, e);
         for (size_t i = N_VIEW; i < 2 * N_VIEW; i++, n += 1.0) {
             assert_int_equal(e[i].n_path, 4 * CELL);
+            assert_int_equal(e[i].n_path, appearance_n_path(&b.configuration[i], 4 * CELL));
             sum += e[i].mean[1];
             sum2 += e[i].mean[1] * e[i].mean[1];
             var += e[i].var[1];
