@@ -142,6 +142,8 @@ status job_fit_resolve(const struct param_info *info, size_t n_param, const stru
 
 /* Blocks a side of the crop whose means are compared; texture_block_mm > 0. */
 size_t job_texture_cells(const struct job_document *doc);
+/* Their edge in mm: near to texture_block_mm, which need not divide the crop. */
+double job_texture_cell_mm(const struct job_document *doc);
 
 /* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
 void job_document_visit_files(const struct job_document *doc,

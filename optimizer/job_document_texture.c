@@ -11,6 +11,11 @@ size_t job_texture_cells(const struct job_document *doc)
     return (size_t)lround(10.0 * doc->crop_cm / doc->texture_block_mm);
 }
 
+double job_texture_cell_mm(const struct job_document *doc)
+{
+    return 10.0 * doc->crop_cm / (double)job_texture_cells(doc);
+}
+
 static status check_use(const struct job_document *doc, struct error *err)
 {
     const char *const field = "fit.texture";

@@ -34,7 +34,7 @@ static json_t *texture_json(const struct pipeline_context *c, const struct pipel
     const struct observation *o = &c->contrast.item[i];
     double rendered[3], se[3];
     pipeline_rendered_contrast(m, i, rendered, se);
-    return json_pack("{s:f, s:I, s:o, s:o, s:o, s:o}", "block_mm", c->doc->texture_block_mm, "blocks_a_side",
+    return json_pack("{s:f, s:I, s:o, s:o, s:o, s:o}", "block_mm", job_texture_cell_mm(c->doc), "blocks_a_side",
                      (json_int_t)o->n_cell, "measured", rgb_json(o->mean_rgb), "measured_se", rgb_json(o->se_rgb),
                      "rendered", rgb_json(rendered), "rendered_se", rgb_json(se));
 }
@@ -158,7 +158,7 @@ static void print_textures(const struct pipeline_context *c, const struct pipeli
 {
     if (c->contrast.n == 0) return;
     fprintf(out, "\ntexture: scatter of the means of %.3g mm blocks, per cent of the mean%s\n%-14s %-8s %9s %9s %s\n",
-            c->doc->texture_block_mm, c->doc->texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row", "set",
+            job_texture_cell_mm(c->doc), c->doc->texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row", "set",
             "measured", "rendered", "+-");
     for (size_t i = 0; i < c->contrast.n; i++) {
         const struct observation *o = &c->contrast.item[i];

@@ -79,3 +79,12 @@ def test_a_budget_that_cannot_be_kept_is_said(tmp_path, method, starts):
     warnings = run(tmp_path / "least", rows, path_budget=least, **fit)["warnings"]
     assert not any("fit.path_budget" in w for w in warnings)
     assert result(tmp_path / "least")["n_path_fit"] <= least
+
+
+def test_texture_states_the_blocks_that_were_measured(tmp_path):
+    flat = png(32, 32, lambda x, y: (20 + (x * 7 + y * 3) % 5, 16 + (x * 5 + y) % 4, 10 + (x + y * 3) % 3))
+    angles = [{"light_theta_deg": 20 + 10 * i, "light_phi_deg": 0, "camera_theta_deg": 20, "camera_phi_deg": 180} for i in range(4)]
+    run(tmp_path, photographs=[(flat, a) for a in angles], texture={"block_mm": 0.85, "weight": 0})
+    for row in result(tmp_path)["rows"]:
+        assert row["texture"]["blocks_a_side"] == 12 and row["texture"]["block_mm"] == pytest.approx(10 / 12)
+    assert "means of 0.833 mm blocks" in (tmp_path / "results" / "summary.txt").read_text()

@@ -274,6 +274,9 @@ static void test_texture(void **state)
     struct job_document *d = parse(FIT_OF("{\"texture\":{\"block_mm\":0.5}}"));
     assert_true(d->texture_block_mm == 0.5 && d->texture_weight == 1.0 && job_texture_cells(d) == 20);
     job_document_free(d);
+    d = parse(FIT_OF("{\"texture\":{\"block_mm\":0.85}}")); /* 11.8 blocks of that size, so 12 of another */
+    assert_true(d->texture_block_mm == 0.85 && job_texture_cells(d) == 12 && job_texture_cell_mm(d) == 10.0 / 12);
+    job_document_free(d);
     d = parse(FIT_OF("{\"texture\":{\"block_mm\":5,\"weight\":0},\"method\":\"published_sgd.v1\"}"));
     assert_true(d->texture_block_mm == 5.0 && d->texture_weight == 0.0 && job_texture_cells(d) == 2);
     job_document_free(d);
