@@ -152,5 +152,7 @@ void job_document_visit_files(const struct job_document *doc,
 status job_density_undetermined(bool black_sheet, struct error *err);
 /* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
 bool job_file_name_valid(const char *name);
+/* The like of any text: '_' for what is not allowed, cut to 127 bytes. */
+void job_file_name_make_valid(const char *text, char name[JOB_MAX_NAME_BYTES]);
 
 #endif

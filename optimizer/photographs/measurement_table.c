@@ -156,6 +156,17 @@ static status cell_not_negative(const struct table *t, enum column c, double mis
     return STATUS_OK;
 }
 
+/* The name given, with '_' for what no file name has (pictures are named after rows); else "fit-03". */
+static void row_name(const struct table *t, const struct observation_set *o, struct observation *item)
+{
+    const char *given = t->place[COLUMN_NAME] >= 0 ? t->cell[t->place[COLUMN_NAME]] : "";
+    const char *kind = item->set == JOB_SET_FIT ? "fit" : "held-out";
+    if (given[0] == '\0')
+        snprintf(item->name, sizeof item->name, "%s-%02zu", kind, observation_set_count(o, item->set));
+    else
+        job_file_name_make_valid(given, item->name);
+}
+
 static status count_configurations(struct table *t, uint32_t n_rotation, struct error *err)
 {
     t->n_configuration += n_rotation > 1 ? n_rotation : 1;
@@ -198,10 +209,7 @@ static status read_row(struct table *t, struct observation_set *o, struct error 
     if (s != STATUS_OK) return s;
     item.configuration = observation_configuration(t->doc, light_theta, light_phi, camera_theta, camera_phi, rotation);
     item.configuration.n_rotation = n_rotation;
-    const char *kind = item.set == JOB_SET_FIT ? "fit" : "held-out";
-    snprintf(item.name, sizeof item.name, "%s-%02zu", kind, observation_set_count(o, item.set));
-    if (t->place[COLUMN_NAME] >= 0 && job_file_name_valid(t->cell[t->place[COLUMN_NAME]]))
-        snprintf(item.name, sizeof item.name, "%.120s", t->cell[t->place[COLUMN_NAME]]);
+    row_name(t, o, &item);
     return observation_set_append(o, &item, err);
 }
 

@@ -72,6 +72,34 @@ static void test_rotations(void **state)
     check_error(HEAD "fit,0,20,0,20,180,any,0.1,0.1,0.1\n", STATUS_FORMAT, "column 'cloth_rotation_deg': 'any'");
 }
 
+/* What cannot name a file is made so, and not thrown away. */
+static void test_names(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *given, *kept;
+    } golden[] = {{"a-b_c.9", "a-b_c.9"}, {"warp 45", "warp_45"}, {" blank ", "blank"}, {"", "fit-03"}, {".hidden", "_hidden"},
+                  {"../up", "_._up"},     {"r\xc3\xb6t", "r__t"}};
+    char text[2000] = "name,set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b\n", longer[200];
+    struct observation_set o;
+    struct error err = {0};
+    size_t n = sizeof golden / sizeof golden[0];
+    for (size_t i = 0; i < n; i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, sizeof text - used, "%s,fit,20,0,20,180,0.1,0.1,0.1\n", golden[i].given);
+    }
+    memset(longer, 'x', sizeof longer - 1);
+    longer[sizeof longer - 1] = '\0';
+    size_t used = strlen(text);
+    snprintf(text + used, sizeof text - used, "%s,fit,20,0,20,180,0.1,0.1,0.1\n", longer);
+    observation_set_init(&o);
+    if (measurement_table_parse(text, strlen(text), "t.csv", &set_up, &o, &err) != STATUS_OK) fail_msg("%s", err.text);
+    for (size_t i = 0; i < n; i++) assert_string_equal(o.item[i].name, golden[i].kept);
+    assert_int_equal(strlen(o.item[n].name), JOB_MAX_NAME_BYTES - 1);
+    for (size_t i = 0; i <= n; i++) assert_true(job_file_name_valid(o.item[i].name));
+    observation_set_release(&o);
+}
+
 /* A header, n_all rows over all rotations and n_one rows at one; free(). */
 static char *long_table(size_t n_all, size_t n_one)
 {
@@ -161,7 +189,7 @@ static void test_real_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_rotations),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_rotations), cmocka_unit_test(test_names),
                                        cmocka_unit_test(test_too_many_renderings), cmocka_unit_test(test_errors),
                                        cmocka_unit_test(test_real_tables)};
     return cmocka_run_group_tests(tests, NULL, NULL);
