@@ -194,6 +194,9 @@ static status parse_radius(const struct json_field *f, const struct appearance *
     if (value == NULL) return STATUS_OK;
     if (json_is_boolean(value)) {
         doc->fit_radius = json_is_true(value);
+    } else if (!json_is_object(value)) {
+        return error_set_field(err, STATUS_INVALID, "fit.fit_radius",
+                               "'fit.fit_radius' must be true, false or an object of lower_um and upper_um");
     } else {
         status s = json_field_object(f, "fit_radius", &range, &doc->fit_radius, err);
         if (s == STATUS_OK) s = json_field_check_keys(&range, key, err);

@@ -352,6 +352,17 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
     return STATUS_OK;
 }
 
+/* Of the member of the group that the document speaks of; lower and upper are the leader's. */
+static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o, size_t leader,
+                             const char *field, const double *given, double lower, double upper, struct error *err)
+{
+    size_t p = 0;
+    while (p + 1 < n_param && (o->leader[p] != leader || isnan(given[p]))) p++;
+    return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g%s", field, info[p].name,
+                           given[p], lower * o->ratio[p], upper * o->ratio[p],
+                           is_tied(o, n_param, p) ? ", with those of what 'fit.tied' ties it to" : "");
+}
+
 static status resolve_group(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
                             struct job_fit_parameter *out, struct error *err)
 {
@@ -374,11 +385,9 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     double prior = group_value(o, n_param, o->prior_mean, leader, &ignored);
     const double slack = 1e-9 * (fabs(lower) + fabs(upper));
     double value = !isnan(held) ? held : begin;
-    if (value < lower - slack || value > upper + slack) {
-        const char *field = !isnan(held) ? "fit.fixed" : "fit.start";
-        return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g", field,
-                               info[leader].name, value, lower, upper);
-    }
+    if (value < lower - slack || value > upper + slack)
+        return outside_bounds(info, n_param, o, leader, !isnan(held) ? "fit.fixed" : "fit.start",
+                              !isnan(held) ? given->fixed : given->start, lower, upper, err);
     if (isnan(value)) value = !isnan(prior) ? prior : param_to_file_unit(&info[leader], info[leader].start);
     value = fmin(fmax(value, lower), upper);
     for (size_t p = 0; p < n_param; p++) {

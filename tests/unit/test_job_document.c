@@ -317,6 +317,11 @@ static void test_fit_option_errors(void **state)
     check_error(FIT_OF("{\"bounds\":{\"C_R\":[0.1,0.5],\"C_R.g\":[0.1,0.2]}}"), "fit.bounds.C_R.g", "second time");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"start\":{\"beta_R\":5}}"), "fit.start", "2 and 4");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"fixed\":{\"beta_R\":5}}"), "fit.fixed", "2 and 4");
+    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":10}}"), "fit.fixed",
+                "'gamma_TT' at 10: its bounds are 20 and 45, with those of what 'fit.tied' ties it to");
+    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"start\":{\"beta_TT\":40}}"), "fit.start",
+                "'beta_TT' at 40: its bounds are 10 and 22.5, with");
+    check_error(FIT_OF("{\"fit_radius\":1}"), "fit.fit_radius", "true, false or an object of lower_um and upper_um");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5}}}"), "fit.priors.beta_R.se", "missing");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 10");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":0}}}"), "fit.priors.beta_R.se", "0");
