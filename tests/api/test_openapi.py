@@ -96,6 +96,19 @@ def test_examples_fit_the_description():
     assert len(documents) >= 5
 
 
+def test_iterations_of_several_starts(daemon):
+    """Description and daemon draw the same limit, which the guide names."""
+    validator = OpenApiCheck().validator({"$ref": "#/components/schemas/JobDocument"})
+    for starts, iterations, good in ((1, 501, True), (2, 500, True), (2, 501, False)):
+        document = {"sample": "s", "volume": {"files": ["a.tif"]}, "measurements": {"file": "a.csv"},
+                    "fit": {"starts": starts, "max_iterations": iterations}}
+        assert validator.is_valid(document) == good
+        assert daemon.post("/v1/jobs", json=document).status_code == (201 if good else 422)
+    with open(os.path.join(ROOT, "docs", "sample-preparation.md")) as f:
+        rows = [line for line in f if line.startswith("| `max_iterations` ")]
+    assert len(rows) == 1 and "several `starts` 1..500" in rows[0]
+
+
 EVERYTHING = {
     "sample": "everything", "lamp": {"side_cm": 5}, "camera": {"crop_cm": 2}, "black_sheet": False,
     "volume": {"files": ["a.raw"], "raw": {"shape": [9, 9, 9], "type": "uint8"}, "filter": {"h": 5}, "voxel_size_um": [1, 1, 2], "matrix": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
