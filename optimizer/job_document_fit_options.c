@@ -331,6 +331,9 @@ static status group_bounds(const struct param_info *info, size_t n_param, const 
 }
 
 /* A prior is one of its leader's value: it must lie where the leader's coordinate is defined. */
+/* Stated by keys of its own, density_multiplier_per_cm and fit_density. */
+static bool is_density(const struct param_info *info) { return strcmp(info->name, APPEARANCE_DENSITY_MULTIPLIER) == 0; }
+
 static status check_priors(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
                            bool held, struct error *err)
 {
@@ -341,8 +344,8 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
     for (size_t p = 0; p < n_param; p++) {
         if (o->leader[p] != leader || isnan(o->prior_mean[p])) continue;
         if (held)
-            return error_set_field(err, STATUS_INVALID, "fit.priors",
-                                   "'fit.priors' has '%s', which 'fit.fixed' holds fixed", info[p].name);
+            return error_set_field(err, STATUS_INVALID, "fit.priors", "'fit.priors' has '%s', which %s", info[p].name,
+                                   is_density(&info[p]) ? "is fitted only with 'fit.fit_density'" : "'fit.fixed' holds fixed");
         double mean = o->prior_mean[p] / o->ratio[p];
         if (mean < lower - slack || mean > upper + slack)
             return error_set_field(err, STATUS_INVALID, "fit.priors",
@@ -358,6 +361,10 @@ static status outside_bounds(const struct param_info *info, size_t n_param, cons
 {
     size_t p = 0;
     while (p + 1 < n_param && (o->leader[p] != leader || isnan(given[p]))) p++;
+    if (is_density(&info[p])) /* neither in 'fit.fixed' nor in 'fit.start' */
+        return error_set_field(err, STATUS_INVALID, "fit.density_multiplier_per_cm",
+                               "'fit.density_multiplier_per_cm' is %g%s: 'fit.bounds' has %g and %g", given[p],
+                               strcmp(field, "fit.fixed") == 0 ? ", and held there without 'fit.fit_density'" : "", lower, upper);
     return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g%s", field, info[p].name,
                            given[p], lower * o->ratio[p], upper * o->ratio[p],
                            is_tied(o, n_param, p) ? ", with those of what 'fit.tied' ties it to" : "");

@@ -110,6 +110,8 @@ def test_command_line_prints_the_comparison(real, finished):
     ({"fit_radius": True, "models": ["microflake.v1"]}, "fit.fit_radius", "microflake.v1"),
     ({"models": ["two_lobe.v1"]}, "fit.density_multiplier_per_cm", "volume models"),
     ({"fixed": {"alpha": 0.5, "gamma": 0.2}}, "fit.fixed", "microflake.v1"),
+    ({"bounds": {"density_multiplier": [100, 200]}}, "fit.density_multiplier_per_cm", "100 and 200"),
+    ({"priors": {"density_multiplier": {"mean": 900, "se": 100}}}, "fit.priors", "fit.fit_density"),
 ])
 def test_bad_input(real, fit, field, says):
     reply = real.post("/v1/jobs", json=document(**fit))
