@@ -55,13 +55,36 @@ static void check_dark(const struct observation_set *o, observation_warning warn
     }
 }
 
+/* Unit vector towards theta, phi. */
+static void direction_of(double theta_rad, double phi_rad, double d[3])
+{
+    d[0] = sin(theta_rad) * cos(phi_rad);
+    d[1] = sin(theta_rad) * sin(phi_rad);
+    d[2] = cos(theta_rad);
+}
+
+static bool close_to(const double *a, const double *b)
+{
+    return fmax(fmax(fabs(a[0] - b[0]), fabs(a[1] - b[1])), fabs(a[2] - b[2])) < 1e-6;
+}
+
+/* Where lamp and camera are as seen from the cloth: directions, because angles have many names for one (180 and -180,
+ * any phi at theta 0). Means over rotations know no phi but that between the two. */
 static bool same_configuration(const struct configuration *a, const struct configuration *b)
 {
-    const double close = 1e-6;
-    return fabs(a->light_theta_rad - b->light_theta_rad) < close && fabs(a->light_phi_rad - b->light_phi_rad) < close &&
-           fabs(a->camera_theta_rad - b->camera_theta_rad) < close &&
-           fabs(a->camera_phi_rad - b->camera_phi_rad) < close &&
-           fabs(a->cloth_rotation_rad - b->cloth_rotation_rad) < close && a->n_rotation == b->n_rotation;
+    const struct configuration *of[2] = {a, b};
+    double light[2][3], camera[2][3], between[2][3];
+    if (a->n_rotation != b->n_rotation) return false;
+    for (int i = 0; i < 2; i++) {
+        double turn = of[i]->cloth_rotation_rad;
+        direction_of(of[i]->light_theta_rad, of[i]->light_phi_rad - turn, light[i]);
+        direction_of(of[i]->camera_theta_rad, of[i]->camera_phi_rad - turn, camera[i]);
+        between[i][0] = light[i][0] * camera[i][0] + light[i][1] * camera[i][1];
+        between[i][1] = light[i][0] * camera[i][1] - light[i][1] * camera[i][0];
+        between[i][2] = light[i][2];
+    }
+    if (a->n_rotation > 1) return close_to(between[0], between[1]) && fabs(camera[0][2] - camera[1][2]) < 1e-6;
+    return close_to(light[0], light[1]) && close_to(camera[0], camera[1]);
 }
 
 /* Largest difference of a channel relative to the brightness; 0 when noise explains it. */
@@ -86,7 +109,7 @@ static void check_contradictions(const struct observation_set *o, observation_wa
             double difference = contradiction(a, b);
             if (!(difference > 0.0) || ++n > NAMED) continue;
             snprintf(text, sizeof text,
-                     "rows '%s' and '%s' have the same angles and differ by %.0f %%: no model fits both", a->name,
+                     "rows '%s' and '%s' have the same angles to the cloth and differ by %.0f %%: no model fits both", a->name,
                      b->name, 100.0 * difference);
             warn(context, text);
         }

@@ -6,8 +6,8 @@
 #include "optimizer/photographs/observation.h"
 
 /* Rows that are zero in all channels (a lamp that was off, an empty line), rows far darker than the others, and rows of
- * the same configuration that contradict each other: a channel differs by more than 5 % of the brightness and five
- * standard errors. At most a few of each kind are named, the rest counted. */
+ * the same configuration, however its angles are written, that contradict each other: a channel differs by more than 5 %
+ * of the brightness and five standard errors. At most a few of each kind are named, the rest counted. */
 void observation_set_check(const struct observation_set *o, observation_warning warn, void *context);
 
 #endif

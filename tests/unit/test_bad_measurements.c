@@ -195,9 +195,10 @@ static void test_warnings(void **state)
     struct fixture x;
     struct said s = {0};
     setup(&x, FAKE_N_FIT);
+    struct observation *o = x.observation.item;
+    o[7].configuration.camera_theta_rad = o[15].configuration.camera_theta_rad = 0.1; /* phi counts for the fake at 0 */
     observation_set_check(&x.observation, listen, &s);
     assert_int_equal(s.n, 0);
-    struct observation *o = x.observation.item;
     for (int c = 0; c < 3; c++) {
         o[3].mean_rgb[c] = 0.0;
         o[4].mean_rgb[c] *= 1e-5;
@@ -222,6 +223,60 @@ static void test_warnings(void **state)
     observation_set_release(&x.observation);
 }
 
+/* Two rows that contradict each other: how many warnings? */
+static size_t warnings_of(const struct configuration *a, const struct configuration *b)
+{
+    struct observation item[2] = {{.name = "a", .configuration = *a, .mean_rgb = {0.2, 0.2, 0.2}, .weight = 1},
+                                  {.name = "b", .configuration = *b, .mean_rgb = {0.3, 0.3, 0.3}, .weight = 1}};
+    const struct observation_set o = {.n = 2, .capacity = 2, .item = item};
+    struct said s = {0};
+    observation_set_check(&o, listen, &s);
+    return s.n;
+}
+
+/* One place of lamp and camera above the cloth can be written in many ways. */
+static void test_names_of_one_configuration(void **state)
+{
+    (void)state;
+    static const double deg = M_PI / 180.0;
+    static const struct case_of {
+        double a[5], b[5]; /* degrees: light theta, phi, camera theta, phi, rotation */
+        uint32_t n_rotation;
+        bool same;
+    } cases[] = {
+        {{45, 0, 45, 180, 0}, {45, 0, 45, 180, 0}, 1, true},
+        {{45, 0, 45, 180, 0}, {45, 0, 45, -180, 0}, 1, true},
+        {{45, 0, 45, 180, 0}, {45, 360, 45, 180, 0}, 1, true},
+        {{45, 0, 45, 180, 0}, {45, 0, 45, 180, 360}, 1, true},
+        {{45, 0, 45, 180, 90}, {45, 0, 45, 180, -270}, 1, true},
+        {{45, 0, 0, 180, 0}, {45, 0, 0, 30, 0}, 1, true},
+        {{0, 10, 45, 180, 0}, {0, -90, 45, 180, 0}, 1, true},
+        {{45, 0, 45, 180, 0}, {45, 90, 45, 270, 90}, 1, true}, /* everything turned */
+        {{45, 0, 45, 180, 0}, {45, 0, 45, 180, 90}, 1, false},
+        {{45, 0, 45, 90, 0}, {45, 0, 45, -90, 0}, 1, false},
+        {{45, 0, 45, 180, 0}, {135, 0, 45, 180, 0}, 1, false},
+        {{45, 0, 45, 180, 0}, {45, 0.01, 45, 180, 0}, 1, false},
+        {{45, 0, 45, 180, 0}, {45, 90, 45, 270, 0}, 9, true},
+        {{0, 0, 45, 180, 0}, {0, 0, 45, 30, 0}, 9, true},
+        {{45, 0, 45, 90, 0}, {45, 0, 45, -90, 0}, 9, false},
+        {{0, 0, 45, 180, 0}, {0, 0, 60, 180, 0}, 9, false},
+        {{45, 0, 0, 180, 0}, {60, 0, 0, 180, 0}, 9, false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct configuration c[2];
+        for (int k = 0; k < 2; k++) {
+            const double *v = k == 0 ? cases[i].a : cases[i].b;
+            c[k] = (struct configuration){.light_theta_rad = v[0] * deg,
+                                          .light_phi_rad = v[1] * deg,
+                                          .camera_theta_rad = v[2] * deg,
+                                          .camera_phi_rad = v[3] * deg,
+                                          .cloth_rotation_rad = v[4] * deg,
+                                          .n_rotation = cases[i].n_rotation};
+        }
+        if (warnings_of(&c[0], &c[1]) != (cases[i].same ? 1 : 0)) fail_msg("case %zu", i);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -232,6 +287,7 @@ int main(void)
         cmocka_unit_test(test_no_row_has_weight),
         cmocka_unit_test(test_failing_model),
         cmocka_unit_test(test_warnings),
+        cmocka_unit_test(test_names_of_one_configuration),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
