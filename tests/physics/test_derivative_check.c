@@ -64,13 +64,16 @@ static void every_model(void **state)
     const struct fixture *x = *state;
     struct appearance m;
     for (size_t i = 0; appearance_at(i, &m); i++) {
-        for (int place = 0; place < 3; place++) { /* lower bounds, defaults, upper bounds */
+        for (int place = 0; place < 4; place++) { /* lower bounds, defaults, upper bounds, clear cloth */
             double param[SCATTERING_MAX_PARAM];
             struct derivative_check check;
             struct error err = {0};
             for (size_t p = 0; p < m.n_param; p++)
-                param[p] = place == 0 ? m.param[p].lower : place == 1 ? m.param[p].start : m.param[p].upper;
-            if (place != 1) /* white cloth for ever, or nothing to see: colours stay inside */
+                param[p] = place == 0 ? m.param[p].lower : place == 2 ? m.param[p].upper : m.param[p].start;
+            if (place == 3) /* the first colour at its lower bound beside bright ones: many bounces off nearly 1 - C */
+                for (size_t p = 0; p < m.n_param; p++)
+                    if (m.param[p].channel >= 0) param[p] = p < 3 ? m.param[p].lower : 0.9;
+            if (place == 0 || place == 2) /* white cloth for ever, or nothing to see: colours stay inside */
                 for (size_t p = 0; p < m.n_param; p++)
                     if (m.param[p].channel >= 0) param[p] = place == 0 ? 0.2 : 0.9;
             if (m.kind == APPEARANCE_VOLUME) param[m.n_param - 1] = m.param[m.n_param - 1].start;
