@@ -223,6 +223,52 @@ static void test_warnings(void **state)
     observation_set_release(&x.observation);
 }
 
+/* Five rows, three lit from the front by these lamps and two from behind: the warnings. */
+static void check_rows(const double light_theta_deg[3], const double value[5], const double weight[5], struct said *s)
+{
+    struct observation item[5];
+    const struct observation_set o = {.n = 5, .capacity = 5, .item = item};
+    for (size_t i = 0; i < 5; i++) {
+        double theta_deg = i < 3 ? light_theta_deg[i] : 150.0;
+        item[i] = (struct observation){.configuration = {.light_theta_rad = theta_deg * M_PI / 180.0,
+                                                         .camera_theta_rad = 0.1 * (double)i,
+                                                         .light_distance_m = 0.61,
+                                                         .lamp_side_m = 0.1},
+                                       .mean_rgb = {value[i], value[i], value[i]},
+                                       .weight = weight[i]};
+        snprintf(item[i].name, sizeof item[i].name, "row-%zu", i);
+    }
+    s->n = 0;
+    observation_set_check(&o, listen, s);
+}
+
+static void test_too_dark_and_too_bright(void **state)
+{
+    (void)state;
+    static const double usual[3] = {20, 30, 60}, grazing[3] = {20, 30, 88}, one[5] = {1, 1, 1, 1, 1};
+    struct said s;
+    check_rows(usual, (const double[5]){0.1, 0.12, 0.09, 0.01, 0.002}, one, &s);
+    assert_int_equal(s.n, 0);
+    check_rows(usual, (const double[5]){0.1, 0.0006, 0.09, 0.01, 0.01}, one, &s); /* 0.6 % as bright */
+    assert_int_equal(s.n, 1);
+    assert_non_null(strstr(s.text[0], "'row-1' is dark: its brightness 0.0006 is 0.65 %"));
+    check_rows(usual, (const double[5]){0.1, 0.0006, 0.09, 0.01, 0.01}, (const double[5]){1, 0, 1, 1, 1}, &s);
+    assert_int_equal(s.n, 0); /* nobody asks for it */
+    check_rows(grazing, (const double[5]){0.1, 0.1, 0.003, 0.01, 0.01}, one, &s); /* little light falls on the cloth */
+    assert_int_equal(s.n, 0);
+    check_rows(usual, (const double[5]){0.1, 0.1, 0.1, 0.0001, 0.01}, one, &s); /* a dense cloth beside its gaps */
+    assert_int_equal(s.n, 0);
+    check_rows(usual, (const double[5]){0.1, 0.1, 0.1, 0.000001, 0.01}, one, &s);
+    assert_int_equal(s.n, 1);
+    assert_non_null(strstr(s.text[0], "'row-3' is dark"));
+    check_rows(usual, (const double[5]){0.1, 2.0, 0.1, 0.3, 80}, one, &s); /* a highlight; the lamp through a gap */
+    assert_int_equal(s.n, 0);
+    check_rows(usual, (const double[5]){0.1, 0.1, 999999, 200, 0.3}, one, &s);
+    assert_int_equal(s.n, 2);
+    assert_non_null(strstr(s.text[0], "'row-2' is brighter than any cloth: its radiance is 1e+06"));
+    assert_non_null(strstr(s.text[1], "'row-3' is brighter"));
+}
+
 /* Two rows that contradict each other: how many warnings? */
 static size_t warnings_of(const struct configuration *a, const struct configuration *b)
 {
@@ -287,6 +333,7 @@ int main(void)
         cmocka_unit_test(test_no_row_has_weight),
         cmocka_unit_test(test_failing_model),
         cmocka_unit_test(test_warnings),
+        cmocka_unit_test(test_too_dark_and_too_bright),
         cmocka_unit_test(test_names_of_one_configuration),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
