@@ -192,6 +192,19 @@ static status check_range(struct pipeline_context *c, struct error *err)
     return STATUS_OK;
 }
 
+/* Said before the search, which takes long; the range is what the user asked for. */
+static void warn_of_range(struct pipeline_context *c)
+{
+    const struct pipeline_radius *r = &c->radius;
+    char warning[300];
+    if (r->start_m >= r->lower_m && r->start_m <= r->upper_m) return;
+    snprintf(warning, sizeof warning,
+             "'fit.fit_radius' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, which is "
+             "not in this range",
+             r->lower_m / um, r->upper_m / um, r->start_m / um);
+    worker_status_warn(c->status, warning);
+}
+
 status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err)
 {
     struct search q = {.c = c, .series = series};
@@ -201,6 +214,7 @@ status pipeline_radius_search(struct pipeline_context *c, struct worker_series *
     while (c->model[c->radius.i_model].appearance.kind != APPEARANCE_SURFACE) c->radius.i_model++;
     status s = check_range(c, err);
     if (s != STATUS_OK) return s;
+    warn_of_range(c);
     q.radius_m = malloc(n_bytes);
     if (q.radius_m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for the fiber radius: out of memory");
     memcpy(q.radius_m, c->fiber.radius_m, n_bytes);
@@ -222,6 +236,7 @@ status pipeline_radius_search(struct pipeline_context *c, struct worker_series *
 
 status pipeline_radius_apply(struct pipeline_context *c, struct error *err)
 {
+    warn_of_range(c);
     tell(c);
     return use_radius(c, c->fiber.radius_m, err);
 }

@@ -146,6 +146,16 @@ def test_radius_beyond_the_tile(real):
     assert error["field"] == "fit.fit_radius.upper_um" and "tile" in error["text"], error
 
 
+def test_radius_range_without_the_cloths_own(real):
+    job = real.create(document(fit_radius={"lower_um": 20, "upper_um": 30}, path_budget=1000))
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    real.post(f"/v1/jobs/{job}/start")
+    warnings = real.wait_state(job, "succeeded", timeout_s=120)["warnings"]
+    said = [w for w in warnings if "fit.fit_radius" in w and "20 to 30 um" in w and "radius of 8 um" in w]
+    assert len(said) == 1, warnings
+
+
 def test_density_wants_light_from_behind(real):
     """A table is read by the worker: the same error as for photographs, only later."""
     job = real.create({**document(fit_density=True), "black_sheet": False})
