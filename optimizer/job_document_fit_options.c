@@ -228,15 +228,25 @@ static status parse_nuisance(const struct json_field *fit, struct job_fit_option
     struct json_field f;
     bool present;
     size_t i_gain = 0;
+    double gain_prior = NAN, stray_prior = NAN;
     status s = json_field_object(fit, "nuisance", &f, &present, err);
     if (s != STATUS_OK || !present) return s;
     s = json_field_check_keys(&f, key, err);
     if (s == STATUS_OK) s = json_field_choice(&f, "gain", gain, &i_gain, err);
-    if (s == STATUS_OK) s = json_field_number(&f, "gain_prior_rel", 1e-4, 1.0, &o->gain_prior_rel, err);
+    if (s == STATUS_OK) s = json_field_number(&f, "gain_prior_rel", 1e-4, 1.0, &gain_prior, err);
     if (s == STATUS_OK) s = json_field_bool(&f, "stray_light", &o->stray_light, err);
-    if (s == STATUS_OK) s = json_field_number(&f, "stray_light_prior", 1e-6, 1.0, &o->stray_light_prior, err);
+    if (s == STATUS_OK) s = json_field_number(&f, "stray_light_prior", 1e-6, 1.0, &stray_prior, err);
+    if (s != STATUS_OK) return s;
     o->gain = (enum job_gain)i_gain;
-    return s;
+    if (!isnan(gain_prior) && o->gain == JOB_GAIN_NONE)
+        return error_set_field(err, STATUS_INVALID, "fit.nuisance.gain_prior_rel",
+                               "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
+    if (!isnan(stray_prior) && !o->stray_light)
+        return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
+                               "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is fitted");
+    if (!isnan(gain_prior)) o->gain_prior_rel = gain_prior;
+    if (!isnan(stray_prior)) o->stray_light_prior = stray_prior;
+    return STATUS_OK;
 }
 
 /* The published method knows nothing of priors and nuisance terms. */

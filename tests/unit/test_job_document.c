@@ -335,6 +335,15 @@ static void test_fit_option_errors(void **state)
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"nuisance\":{\"gain\":\"each\"}}"), "fit.nuisance.gain", "per_photograph");
     check_error(FIT_OF("{\"nuisance\":{\"gain_prior_rel\":0}}"), "fit.nuisance.gain_prior_rel", "0.0001");
+    check_error(FIT_OF("{\"nuisance\":{\"gain_prior_rel\":0.1}}"), "fit.nuisance.gain_prior_rel", "no gain");
+    check_error(FIT_OF("{\"nuisance\":{\"gain\":\"none\",\"gain_prior_rel\":0.1}}"), "fit.nuisance.gain_prior_rel",
+                "'fit.nuisance.gain'");
+    check_error(FIT_OF("{\"nuisance\":{\"gain\":\"global\",\"stray_light_prior\":0.1}}"), "fit.nuisance.stray_light_prior",
+                "no stray light");
+    check_error(FIT_OF("{\"nuisance\":{\"stray_light\":false,\"stray_light_prior\":0.1}}"),
+                "fit.nuisance.stray_light_prior", "'fit.nuisance.stray_light'");
+    job_document_free(parse(FIT_OF("{\"nuisance\":{\"gain\":\"global\",\"gain_prior_rel\":0.1,\"stray_light\":true,"
+                                   "\"stray_light_prior\":0.1}}")));
     check_error(FIT_OF("{\"candidates\":[]}"), "fit.candidates", "1 to 1024");
     check_error(FIT_OF("{\"candidates\":{\"gird\":true}}"), "fit.candidates.gird", "unknown field");
     check_error(FIT_OF("{\"candidates\":[{\"light_theta_deg\":95}]}"), "fit.candidates[0].light_theta_deg", "below 90");
