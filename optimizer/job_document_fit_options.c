@@ -340,13 +340,15 @@ static status group_bounds(const struct param_info *info, size_t n_param, const 
                            info[leader].name);
 }
 
-/* A prior is one of its leader's value: it must lie where the leader's coordinate is defined. */
 /* Stated by keys of its own, density_multiplier_per_cm and fit_density. */
 static bool is_density(const struct param_info *info) { return strcmp(info->name, APPEARANCE_DENSITY_MULTIPLIER) == 0; }
 
+/* A prior is one of its leader's value: it must lie where the leader's coordinate is defined, and agree with some value
+ * between the bounds that the group has. */
 static status check_priors(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
-                           bool held, struct error *err)
+                           const double bound[2], bool held, struct error *err)
 {
+    const double most_se = 3.0;
     const struct job_fit_option *o = &given->option;
     double lower = param_to_file_unit(&info[leader], info[leader].lower),
            upper = param_to_file_unit(&info[leader], info[leader].upper);
@@ -361,6 +363,11 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
             return error_set_field(err, STATUS_INVALID, "fit.priors",
                                    "'fit.priors' has '%s' at %g, which 'fit.tied' makes '%s' at %g: allowed are %g and %g",
                                    info[p].name, o->prior_mean[p], info[leader].name, mean, lower, upper);
+        if (fmax(bound[0] - mean, mean - bound[1]) > most_se * o->prior_se[p] / o->ratio[p])
+            return error_set_field(err, STATUS_INVALID, "fit.priors",
+                                   "'fit.priors' has '%s' at %g +- %g, its bounds are %g and %g: no value agrees with both",
+                                   info[p].name, o->prior_mean[p], o->prior_se[p], bound[0] * o->ratio[p],
+                                   bound[1] * o->ratio[p]);
     }
     return STATUS_OK;
 }
@@ -396,7 +403,7 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     if (clash != SIZE_MAX)
         return error_set_field(err, STATUS_INVALID, "fit.start",
                                "'fit.start' starts '%s' at a value that 'fit.tied' does not allow", info[clash].name);
-    s = check_priors(info, n_param, given, leader, !isnan(held), err);
+    s = check_priors(info, n_param, given, leader, (const double[2]){lower, upper}, !isnan(held), err);
     if (s != STATUS_OK) return s;
     size_t ignored;
     double prior = group_value(o, n_param, o->prior_mean, leader, &ignored);

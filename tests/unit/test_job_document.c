@@ -331,6 +331,12 @@ static void test_fit_option_errors(void **state)
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":0.2}],\"priors\":{\"gamma_TT\":{\"mean\":1,\"se\":1}}}"),
                 "fit.priors", "10 and 45");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":9,\"se\":0.01}}}"), "fit.priors",
+                "'beta_R' at 9 +- 0.01, its bounds are 2 and 4");
+    check_error(FIT_OF("{\"bounds\":{\"beta_TT\":[30,40]},\"tied\":[{\"beta_TT\":2,\"gamma_TT\":1}],"
+                       "\"priors\":{\"gamma_TT\":{\"mean\":10,\"se\":1}}}"),
+                "fit.priors", "'gamma_TT' at 10 +- 1, its bounds are 15 and 20");
+    job_document_free(parse(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}}}")));
     check_error(FIT_OF("{\"nuisance\":{\"stray_light\":true},\"method\":\"published_sgd.v1\"}"), "fit.nuisance",
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"nuisance\":{\"gain\":\"each\"}}"), "fit.nuisance.gain", "per_photograph");
