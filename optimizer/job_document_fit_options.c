@@ -243,7 +243,8 @@ static status parse_nuisance(const struct json_field *fit, struct job_fit_option
                                "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
     if (!isnan(stray_prior) && !o->stray_light)
         return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
-                               "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is fitted");
+                               "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
+                               "fitted");
     if (!isnan(gain_prior)) o->gain_prior_rel = gain_prior;
     if (!isnan(stray_prior)) o->stray_light_prior = stray_prior;
     return STATUS_OK;
@@ -365,7 +366,8 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
                                    info[p].name, o->prior_mean[p], info[leader].name, mean, lower, upper);
         if (fmax(bound[0] - mean, mean - bound[1]) > most_se * o->prior_se[p] / o->ratio[p])
             return error_set_field(err, STATUS_INVALID, "fit.priors",
-                                   "'fit.priors' has '%s' at %g +- %g, its bounds are %g and %g: no value agrees with both",
+                                   "'fit.priors' has '%s' at %g +- %g, its bounds are %g and %g: no value agrees with "
+                                   "both",
                                    info[p].name, o->prior_mean[p], o->prior_se[p], bound[0] * o->ratio[p],
                                    bound[1] * o->ratio[p]);
     }

@@ -199,8 +199,8 @@ static void warn_of_range(struct pipeline_context *c)
     char warning[300];
     if (r->start_m >= r->lower_m && r->start_m <= r->upper_m) return;
     snprintf(warning, sizeof warning,
-             "'fit.fit_radius' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, which is "
-             "not in this range",
+             "'fit.fit_radius' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, "
+             "which is not in this range",
              r->lower_m / um, r->upper_m / um, r->start_m / um);
     worker_status_warn(c->status, warning);
 }

@@ -6,9 +6,9 @@
 
 enum { NAMED = 3 };
 
-/* Dark: below this share of the median of the rows lit from the same side, as seen per light that falls on the cloth. From
- * the front, measured cloths have no row below 0.33 of it and black satins none below 0.07; what passes through a dense
- * cloth beside its gaps can be far less. */
+/* Dark: below this share of the median of the rows lit from the same side, as seen per light that falls on the cloth.
+ * From the front, measured cloths have no row below 0.33 of it and black satins none below 0.07; what passes through a
+ * dense cloth beside its gaps can be far less. */
 static const double dark_share_front = 0.04, dark_share_behind = 1e-3;
 static const double least_cos = 0.05; /* a lamp has a size: some of it stays above the horizon */
 /* Too bright: in white diffusers facing the lamp. Highlights of measured cloths reach 2. */
@@ -61,7 +61,8 @@ static void check_dark(const struct observation_set *o, observation_warning warn
         if (++n_dark > NAMED) continue;
         if (a > 0.0)
             snprintf(text, sizeof text,
-                     "row '%s' is dark: its brightness %.2g is %.2g %% of what the others lead to expect under its lamp",
+                     "row '%s' is dark: its brightness %.2g is %.2g %% of what the others lead to expect "
+                     "under its lamp",
                      item->name, brightness(item), 100.0 * a / median[behind]);
         else
             snprintf(text, sizeof text, "row '%s' is zero in all channels: was the lamp on?", item->name);
@@ -91,8 +92,8 @@ static void check_bright(const struct observation_set *o, observation_warning wa
         if (!(item->weight > 0.0) || largest <= brightest_possible(&item->configuration)) continue;
         if (++n_bright > NAMED) continue;
         snprintf(text, sizeof text,
-                 "row '%s' is brighter than any cloth: its radiance is %.3g, that of a perfect white diffuser facing the "
-                 "lamp is 1; is its scale right?",
+                 "row '%s' is brighter than any cloth: its radiance is %.3g, that of a perfect white diffuser facing "
+                 "the lamp is 1; is its scale right?",
                  item->name, largest);
         warn(context, text);
     }
@@ -157,8 +158,8 @@ static void check_contradictions(const struct observation_set *o, observation_wa
             double difference = contradiction(a, b);
             if (!(difference > 0.0) || ++n > NAMED) continue;
             snprintf(text, sizeof text,
-                     "rows '%s' and '%s' have the same angles to the cloth and differ by %.0f %%: no model fits both", a->name,
-                     b->name, 100.0 * difference);
+                     "rows '%s' and '%s' have the same angles to the cloth and differ by %.0f %%: no model fits both",
+                     a->name, b->name, 100.0 * difference);
             warn(context, text);
         }
     }

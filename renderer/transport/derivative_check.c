@@ -14,8 +14,8 @@ enum { N_POINT = 4, MAX_STEP = 32768, MAX_STEP_CONFIGURATION = 4096 };
 /* Relative step: rounding of a path's float factors (1e-6) stays below 1e-3 of the difference. */
 static const double relative_step = 2e-3;
 /* Least scale of a step, of the parameter's range. A small colour counts as 1 - C too, which single precision rounds to
- * 3e-8 whatever C is: steps by C alone made 5 % of that beside the bound 0.001. Above 0.1 the stencil's own error shows in
- * black cloth. */
+ * 3e-8 whatever C is: steps by C alone made 5 % of that beside the bound 0.001. Above 0.1 the stencil's own error shows
+ * in black cloth. */
 static const double least_scale = 1e-3, least_scale_of_colour = 0.1;
 
 /* Values at offset[k] h give the derivative sum coefficient[k] f / h. */

@@ -331,8 +331,8 @@ static void test_fit_option_errors(void **state)
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":0.2}],\"priors\":{\"gamma_TT\":{\"mean\":1,\"se\":1}}}"),
                 "fit.priors", "10 and 45");
-    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":9,\"se\":0.01}}}"), "fit.priors",
-                "'beta_R' at 9 +- 0.01, its bounds are 2 and 4");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":9,\"se\":0.01}}}"),
+                "fit.priors", "'beta_R' at 9 +- 0.01, its bounds are 2 and 4");
     check_error(FIT_OF("{\"bounds\":{\"beta_TT\":[30,40]},\"tied\":[{\"beta_TT\":2,\"gamma_TT\":1}],"
                        "\"priors\":{\"gamma_TT\":{\"mean\":10,\"se\":1}}}"),
                 "fit.priors", "'gamma_TT' at 10 +- 1, its bounds are 15 and 20");
@@ -344,8 +344,8 @@ static void test_fit_option_errors(void **state)
     check_error(FIT_OF("{\"nuisance\":{\"gain_prior_rel\":0.1}}"), "fit.nuisance.gain_prior_rel", "no gain");
     check_error(FIT_OF("{\"nuisance\":{\"gain\":\"none\",\"gain_prior_rel\":0.1}}"), "fit.nuisance.gain_prior_rel",
                 "'fit.nuisance.gain'");
-    check_error(FIT_OF("{\"nuisance\":{\"gain\":\"global\",\"stray_light_prior\":0.1}}"), "fit.nuisance.stray_light_prior",
-                "no stray light");
+    check_error(FIT_OF("{\"nuisance\":{\"gain\":\"global\",\"stray_light_prior\":0.1}}"),
+                "fit.nuisance.stray_light_prior", "no stray light");
     check_error(FIT_OF("{\"nuisance\":{\"stray_light\":false,\"stray_light_prior\":0.1}}"),
                 "fit.nuisance.stray_light_prior", "'fit.nuisance.stray_light'");
     job_document_free(parse(FIT_OF("{\"nuisance\":{\"gain\":\"global\",\"gain_prior_rel\":0.1,\"stray_light\":true,"
