@@ -54,7 +54,7 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
     size_t n = c->observation.n, n_part = 0;
     struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
     observation_set_init(&part);
-    *value = (struct objective_value){.value = NAN, .se = NAN, .rel_rms = NAN, .rel_square = NAN, .rel_square_se = NAN, .rel_rms_se = NAN};
+    *value = (struct objective_value){NAN, NAN, NAN, NAN, NAN, NAN};
     status s = a != NULL ? observation_set_select(&c->observation, set, &part, err)
                          : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
     observation_set_weigh(&part); /* as the fit does */
@@ -129,10 +129,12 @@ static void warn_of_equals(struct pipeline_context *c)
                                      *y = held_out ? &c->model[i].validation.held_out : &c->model[i].validation.fit;
         if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
         if (used == 0)
-            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.1g %%) from", held_out ? "held-out" : "fitted",
-                                    c->model[best].appearance.id, 100.0 * x->rel_rms, 100.0 * x->rel_rms_se);
+            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.1g %%) from",
+                                    held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
+                                    100.0 * x->rel_rms_se);
         n = used < sizeof text ? sizeof text - used : 0;
-        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.2g +- %.1g %%)", c->model[i].appearance.id, 100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
+        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.2g +- %.1g %%)", c->model[i].appearance.id,
+                                 100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
     }
     if (used > 0) worker_status_warn(c->status, text);
 }

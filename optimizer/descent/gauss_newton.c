@@ -320,11 +320,12 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
     char *text = result->reason;
     size_t n = sizeof result->reason;
     if (precise)
-        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %.1g %%", f, se, promised_percent(g));
+        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %.1g %%", f, se,
+                 promised_percent(g));
     else
         snprintf(text, n,
-                 "further steps promise to lower the objective by %.1g %%, and tracing adds %.1f times the photographs' own variance; exact "
-                 "renderings would narrow the errors by some %.0f %%",
+                 "further steps promise to lower the objective by %.1g %%, and tracing adds %.1f times the photographs' own "
+                 "variance; exact renderings would narrow the errors by some %.0f %%",
                  promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
 
@@ -344,8 +345,10 @@ static void explain_early_end(const struct gauss_newton *g, const char *used, bo
     else if (arrived)
         snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used, g->history.n_step);
     else
-        snprintf(text, n, "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about %.0f %%", used,
-                 f, se, promised_percent(g));
+        snprintf(text, n,
+                 "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about "
+                 "%.0f %%",
+                 used, f, se, promised_percent(g));
 }
 
 /* The pull ends with enough paths, or with half of what may be spent; where no row says anything there is none. */

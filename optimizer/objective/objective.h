@@ -12,8 +12,8 @@
  * an upper estimate, too large by at most a factor sqrt(3).
  *
  * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out.
- * Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product, so nothing is subtracted and the figure does not fall when fewer
- * paths are used.
+ * Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product, so nothing
+ * is subtracted and the figure does not fall when fewer paths are used.
  */
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H
 #define SELVEDGE_OPTIMIZER_OBJECTIVE_H

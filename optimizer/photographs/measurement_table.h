@@ -8,8 +8,8 @@
  * is no file name (job_document.h) gets '_' for every byte that is not allowed; a row without one is "fit-03". Errors are
  * STATUS_FORMAT or STATUS_INVALID with err->field "measurements.file" and a text that names file, line and column: a
  * missing or unknown column, a wrong number of cells, what is no number, NaN or negative radiance, an angle of 90
- * degrees or more from the normal (lamp behind the cloth: only without a black sheet), no row of the set "fit". STATUS_TOO_LARGE: more renderings than
- * CONFIGURATION_MAX_COUNT, where a mean over rotations takes one a rotation.
+ * degrees or more from the normal (lamp behind the cloth: only without a black sheet), no row of the set "fit".
+ * STATUS_TOO_LARGE: more renderings than CONFIGURATION_MAX_COUNT, where a mean over rotations takes one a rotation.
  */
 #ifndef SELVEDGE_OPTIMIZER_MEASUREMENT_TABLE_H
 #define SELVEDGE_OPTIMIZER_MEASUREMENT_TABLE_H

@@ -146,10 +146,13 @@ static void test_errors_where_a_width_ends_at_its_bound(void **state)
             double z = (r.param[p] - truth[p]) / r.uncertainty.se_param[p];
             square += z * z;
             n += 1.0;
-            if (fabs(z) > 4.0) fail_msg("seed %d, %s: %.4f +- %.4f for %.4f", (int)seed, fake_param[p].name, r.param[p], r.uncertainty.se_param[p], truth[p]);
+            if (fabs(z) > 4.0)
+                fail_msg("seed %d, %s: %.4f +- %.4f for %.4f", (int)seed, fake_param[p].name, r.param[p],
+                         r.uncertainty.se_param[p], truth[p]);
         }
     }
-    print_message("%zu of %d fits end at the bound; C_TT is off by %.2f standard errors (RMS of %.0f)\n", n_at_bound, FITS, sqrt(square / n), n);
+    print_message("%zu of %d fits end at the bound; C_TT is off by %.2f standard errors (RMS of %.0f)\n", n_at_bound, FITS,
+                  sqrt(square / n), n);
     assert_true(n_at_bound >= 1);
     /* channels share their paths, so some 40 free numbers: 1 +- 0.11, and errors that are a little too large are allowed */
     assert_true(sqrt(square / n) > 0.6 && sqrt(square / n) < 1.33);
