@@ -320,11 +320,11 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
     char *text = result->reason;
     size_t n = sizeof result->reason;
     if (precise)
-        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %.1g %%", f, se,
+        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %.2g %%", f, se,
                  promised_percent(g));
     else
         snprintf(text, n,
-                 "further steps promise to lower the objective by %.1g %%, and tracing adds %.1f times the photographs' own "
+                 "further steps promise to lower the objective by %.2g %%, and tracing adds %.1f times the photographs' own "
                  "variance; exact renderings would narrow the errors by some %.0f %%",
                  promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
@@ -337,7 +337,7 @@ static void explain_early_end(const struct gauss_newton *g, const char *used, bo
     size_t n = sizeof result->reason;
     if (result->converged)
         snprintf(text, n,
-                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %.1g %%; more paths "
+                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %.2g %%; more paths "
                  "would narrow the errors",
                  used, f, se, promised_percent(g));
     else if (failed)
