@@ -129,11 +129,11 @@ static void warn_of_equals(struct pipeline_context *c)
                                      *y = held_out ? &c->model[i].validation.held_out : &c->model[i].validation.fit;
         if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
         if (used == 0)
-            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.1g %%) from",
+            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.2g %%) from",
                                     held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
                                     100.0 * x->rel_rms_se);
         n = used < sizeof text ? sizeof text - used : 0;
-        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.2g +- %.1g %%)", c->model[i].appearance.id,
+        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.2g +- %.2g %%)", c->model[i].appearance.id,
                                  100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
     }
     if (used > 0) worker_status_warn(c->status, text);

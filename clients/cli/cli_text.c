@@ -1,6 +1,8 @@
 #include "clients/cli/cli_text.h"
+#include "base/utf8.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -65,24 +67,20 @@ void text_with_error(double value, double standard_error, char out[CLI_SHORT_TEX
     }
 }
 
-/* Length of the UTF-8 sequence at p, 0 when it is broken or a control character (C0, DEL, C1). */
-static size_t utf8_printable(const unsigned char *p)
+/* Bytes of the UTF-8 sequence at p, 0 when it is broken or a control character (C0, DEL, C1). */
+static size_t printable_bytes(const char *p)
 {
-    if (p[0] < 0x80) return p[0] >= 0x20 && p[0] != 0x7f;
-    size_t n = p[0] >= 0xf0 && p[0] < 0xf5 ? 4 : p[0] >= 0xe0 ? 3 : p[0] >= 0xc2 ? 2 : 0;
-    if (p[0] >= 0xf5) n = 0;
-    for (size_t i = 1; i < n; i++)
-        if ((p[i] & 0xc0) != 0x80) return 0;
-    if (n == 2 && p[0] == 0xc2 && p[1] < 0xa0) return 0;
-    return n;
+    const unsigned char a = (unsigned char)p[0], b = (unsigned char)(a != 0 ? p[1] : 0);
+    bool control = a < 0x20 || a == 0x7f || (a == 0xc2 && b < 0xa0);
+    return control ? 0 : utf8_sequence_bytes(p);
 }
 
 void text_clean(const char *in, char *out, size_t n_out)
 {
     size_t at = 0;
-    const unsigned char *p = (const unsigned char *)in;
+    const char *p = in;
     while (*p != '\0' && n_out > 0) {
-        size_t n = utf8_printable(p);
+        size_t n = printable_bytes(p);
         if (at + (n == 0 ? 1 : n) >= n_out) break;
         if (n == 0) {
             out[at++] = '?';

@@ -4,8 +4,9 @@
  *  "parameters":[{"name":"C_R.r","unit":""|"deg","value","standard_error","lower","upper","start","at_bound":null|"lower"|"upper","determined":bool,
  *                 "fixed":bool,"tied_to":null|name,"ratio":null|number,"prior":null|{"mean","se"}}],                     file units; standard_error includes photograph noise, Monte-Carlo
  * noise and misfit "correlation":[[...]],                             in fit coordinates; 0 for parameters that are
- * fixed or at a bound "objective", "objective_se", "fit_rel_rms",       fresh paths at the result, fitted rows
- * (objective.h defines all three) "fit_rel_rms_se", "heldout_rel_rms":number|null, "heldout_rel_rms_se":number|null (both by tracing alone), "misfit_rel_rms",  misfit: per residual, what no noise
+ * fixed "objective", "objective_se", "fit_rel_rms",       fresh paths at the result, fitted rows
+ * (objective.h defines all three) "fit_rel_rms_se", "heldout_rel_rms":number|null,
+ * "heldout_rel_rms_se":number|null (both by tracing alone), "misfit_rel_rms",  misfit: per residual, what no noise
  * explains "validation_worst_rel_se",                         largest standard error of a rendered mean, relative to
  * the row's brightness
  *  "rows":[{"name","set":"fit"|"held-out","light_theta_deg","light_phi_deg","camera_theta_deg","camera_phi_deg","cloth_rotation_deg","all_rotations",

@@ -2,6 +2,7 @@
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
 #include "optimizer/worker_status.h"
+#include "tests/support/scratch_folder.h"
 
 #include <jansson.h>
 #include <setjmp.h>
@@ -15,23 +16,22 @@
 #include <cmocka.h>
 
 struct desk {
-    char folder[64];
+    const char *folder;
     struct worker_folder hold;
     struct log *log;
     struct worker_status *status;
 };
 
-static void start(struct desk *d)
+static void start(struct desk *d, void **state)
 {
     struct error err = {0};
-    char path[128];
+    char path[512];
     sigset_t set;
     sigemptyset(&set);
     sigaddset(&set, SIGTERM);
     sigaddset(&set, SIGINT);
     sigprocmask(SIG_BLOCK, &set, NULL);
-    snprintf(d->folder, sizeof d->folder, "/tmp/selvedge-status-XXXXXX");
-    assert_non_null(mkdtemp(d->folder));
+    d->folder = *state;
     assert_int_equal(worker_folder_open(&d->hold, d->folder, &err), STATUS_OK);
     snprintf(path, sizeof path, "%s/log.txt", d->folder);
     assert_int_equal(log_open(path, NULL, LOG_LEVEL_INFO, &d->log, &err), STATUS_OK);
@@ -42,7 +42,7 @@ static void start(struct desk *d)
 static json_t *finish(struct desk *d, const struct error *error)
 {
     struct error err = {0};
-    char path[128];
+    char path[512];
     assert_int_equal(worker_status_finish(d->status, "failed", error, &err), STATUS_OK);
     snprintf(path, sizeof path, "%s/%s", d->folder, JOB_FILE_STATUS);
     json_t *json = json_load_file(path, 0, NULL);
@@ -50,17 +50,14 @@ static json_t *finish(struct desk *d, const struct error *error)
     worker_status_free(d->status);
     log_close(d->log);
     worker_folder_close(&d->hold);
-    snprintf(path, sizeof path, "rm -rf '%s'", d->folder);
-    assert_int_equal(system(path), 0);
     return json;
 }
 
 static void test_warnings_beyond_the_list_are_counted(void **state)
 {
-    (void)state;
     struct desk d = {0};
     char text[64];
-    start(&d);
+    start(&d, state);
     for (int i = 0; i < 60; i++) {
         snprintf(text, sizeof text, "warning %d", i);
         worker_status_warn(d.status, text);
@@ -77,10 +74,9 @@ static void test_warnings_beyond_the_list_are_counted(void **state)
 
 static void test_texts_that_are_no_utf8(void **state)
 {
-    (void)state;
     struct desk d = {0};
     char longer[600];
-    start(&d);
+    start(&d, state);
     memset(longer, 'x', sizeof longer);
     for (size_t i = 1; i + 2 < sizeof longer; i += 2) memcpy(longer + i, "\xc3\xa4", 2);
     longer[599] = '\0';
@@ -98,7 +94,8 @@ static void test_texts_that_are_no_utf8(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_warnings_beyond_the_list_are_counted),
-                                       cmocka_unit_test(test_texts_that_are_no_utf8)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_warnings_beyond_the_list_are_counted, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_texts_that_are_no_utf8, scratch_folder_setup, scratch_folder_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
