@@ -42,7 +42,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
+.PHONY: all deps deps-test build-tests test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -96,15 +96,16 @@ $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_
 deps:              ## install what is missing (Debian packages, as root or through sudo)
 	@./config/install-dependencies build
 
+deps-test:
+	@./config/install-dependencies test
+
 build-tests: $(TEST_BINS)
 
-check: | deps      ## quick inner loop: unit tests and layer rules (< 2 minutes)
-	@./config/install-dependencies test
+check: | deps-test ## quick inner loop: unit tests and layer rules (< 2 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build $(BUILD)
 
-test: | deps       ## everything; ends with "N passed, N failed"
-	@./config/install-dependencies test
+test: | deps-test  ## everything; ends with "N passed, N failed"
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
 
@@ -112,42 +113,42 @@ demo: | deps       ## the main job, end to end, against a daemon started here
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@./clients/demo.sh
 
-bench: | deps      ## every figure, one JSON object a line
+bench: | deps-test ## every figure, one JSON object a line
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BENCH_BINS) >&2
 	@/usr/bin/python3 tests/bench/run_bench.py --build $(BUILD)
 
-bench-transport: | deps ## the renderer's figures (paths a second, time to a given standard error, memory)
+bench-transport: | deps-test ## the renderer's figures (paths a second, time to a given standard error, memory)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
 
-bench-geometry: | deps ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
+bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2
 	@for b in $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)); do $$b || exit 1; done
 
 # FIT: some of the figures only, such as FIT="gabardine seeds"
-bench-fit: | deps  ## recovery of known parameters, errors, seeds, real tables (3 hours; photographs are kept in build)
+bench-fit: | deps-test ## recovery of known parameters, errors, seeds, real tables (3 hours; photographs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
 
 # FABRIC: one of tests/support/fit_fabrics.c
 bench-published: FABRIC ?= microflake
-bench-published: | deps ## the published method with its own budget, 3.3e9 paths, on FABRIC (microflake: 80 minutes on 2 cores; gabardine: 8 hours; continues when stopped)
+bench-published: | deps-test ## the published method with its own budget, 3.3e9 paths, on FABRIC (microflake: 80 minutes on 2 cores; gabardine: 8 hours; continues when stopped)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@nice -n 19 $(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --fabric $(FABRIC) --journal $(BUILD)/bench-fit/published-$(FABRIC).journal published
 
-docs-fit-curve:    ## draw docs/images/fit-curve.svg anew: error against paths of both methods, analytic cloth (seconds)
+docs-fit-curve: | deps-test ## draw docs/images/fit-curve.svg anew: error against paths of both methods, analytic cloth (seconds)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@mkdir -p $(BUILD)/bench-fit docs/images
 	@$(BUILD)/tests/bench/bench_fit analytic > $(BUILD)/bench-fit/analytic.json
 	@/usr/bin/python3 tests/bench/plot_fit_curve.py $(BUILD)/bench-fit/analytic.json docs/images/fit-curve.svg
 
-docs-grazing:      ## draw docs/images/microflake-grazing.svg anew: what each model makes of grazing highlights (minutes)
+docs-grazing: | deps-test ## draw docs/images/microflake-grazing.svg anew: what each model makes of grazing highlights (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@mkdir -p $(BUILD)/bench-fit docs/images
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --photograph-paths 100000 --score-paths 20000 --path-budget 2000000 grazing > $(BUILD)/bench-fit/grazing.json
 	@/usr/bin/python3 tests/bench/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
 
-docs-pictures:     ## render docs/images/{twill,derivatives}.png anew (minutes)
+docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures
 	@mkdir -p docs/images
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
@@ -156,11 +157,11 @@ docs-pictures:     ## render docs/images/{twill,derivatives}.png anew (minutes)
 layers:            ## includes go one way: base <- geometry <- renderer <- optimizer
 	@/usr/bin/python3 tests/check_layers.py
 
-asan:              ## unit and physics tests under the address and undefined-behaviour sanitizers
+asan: | deps-test ## unit and physics tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build build/asan
 
-asan-physics:      ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
+asan-physics: | deps-test ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \
 		$(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER))
 	@for t in $(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER)); do \

@@ -31,16 +31,24 @@ void linear_model_release(struct linear_model *m)
     *m = (struct linear_model){0};
 }
 
+double linear_model_part(const struct linear_model *m, size_t i, double *se)
+{
+    double value = 0.0, sd = 0.0;
+    for (size_t row = 3 * i; row < 3 * i + 3; row++) {
+        double ra = m->r[0][row], rb = m->r[1][row], va = m->r_var[0][row], vb = m->r_var[1][row];
+        value += ra * rb;
+        sd += sqrt(fmax(ra * ra * vb + rb * rb * va - va * vb, va * vb));
+    }
+    *se = sd;
+    return value;
+}
+
 double linear_model_objective(const struct linear_model *m, double *se)
 {
     double value = 0.0, var = 0.0;
     for (size_t i = 0; i < m->n_row / 3; i++) {
-        double sd = 0.0;
-        for (size_t row = 3 * i; row < 3 * i + 3; row++) {
-            double ra = m->r[0][row], rb = m->r[1][row], va = m->r_var[0][row], vb = m->r_var[1][row];
-            value += ra * rb;
-            sd += sqrt(fmax(ra * ra * vb + rb * rb * va - va * vb, va * vb));
-        }
+        double sd;
+        value += linear_model_part(m, i, &sd);
         var += sd * sd;
     }
     if (se != NULL) *se = sqrt(var);

@@ -90,6 +90,8 @@ void linear_model_weigh(struct linear_model *m, size_t n_free);
 double linear_model_penalty(const struct linear_model *m, const double *x);
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);
+/* Configuration i's part of it. */
+double linear_model_part(const struct linear_model *m, size_t i, double *se);
 /* 2 x mirrored average of J' r: the gradient of f by coordinates; priors included, here and in the Hessian. */
 void linear_model_gradient(const struct linear_model *m, double *g);
 /* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged

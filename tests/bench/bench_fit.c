@@ -1,7 +1,7 @@
 /* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
  *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
  *             [--sgd-budget N] [--curve-paths N] [--fabric NAME] [--journal FILE] [--model M] [--yarn FILE|none] [--flatness F] [--row-paths N]
- * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "real_all_rotations", "grazing"; nothing: all. "published": the published method
+ * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "grazing"; nothing: all these. "real_all_rotations"; "published": the published method
  * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped; it and "curve" take --fabric (gabardine).
  * --prepare renders photographs only.
  * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 200,000 a held-out mean of the truth, 2 x 50,000
@@ -345,7 +345,7 @@ static bool take_option(struct bench *b, const char *name, const char *value)
 
 int main(int argc, char **argv)
 {
-    static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "real", "real_all_rotations", "grazing"};
+    static const char *const more[] = {"coverage", "seeds", "curve", "analytic", "grazing", "real"};
     struct bench b = {
         .folder = "build/bench-fit",
         .fabric = "gabardine",

@@ -13,7 +13,7 @@
 /* Paths of a fit and, at most, of a replica's mean when it is scored. Rows state no errors and the models are off by several percent:
  * more paths do not pay. */
 enum { MAX_REAL = 32, REAL_BUDGET = 2000000, MOST_SCORE_PATHS = 400000 };
-static const double score_se = 0.01;
+#define SCORE_SE 0.01
 
 struct real {
     const struct bench *bench;
@@ -70,23 +70,13 @@ static void read_table(const struct real *real, const char *path, struct real_ro
     free(text);
 }
 
-/* With four times as many paths until it is known: narrow lobes and white cloth need them. */
-static struct fit_score score_rows(const struct bench *b, const struct fit_phantom *f, enum job_set set, const double *param)
-{
-    size_t n_path = b->score_paths / 2;
-    for (;;) {
-        const struct fit_score s = fit_phantom_score(f, set, NULL, 0, param, n_path);
-        if (s.se <= score_se || 4 * n_path > MOST_SCORE_PATHS) return s;
-        n_path *= 4;
-    }
-}
-
 /* Both errors by fresh paths: the fit's own objective is at its lowest partly by the luck of the paths that it was fitted to. */
 static void score_table(const struct real *real, const struct fit_phantom *f, const double *param, size_t k, struct real_row *row)
 {
+    const struct fit_score_goal goal = {SCORE_SE, real->bench->score_paths / 2, MOST_SCORE_PATHS};
     for (int held_out = 0; held_out < 2; held_out++) {
         char what[160];
-        const struct fit_score s = score_rows(real->bench, f, held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT, param);
+        const struct fit_score s = fit_phantom_score_to(f, held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT, param, &goal);
         row->error[k][held_out] = s.rel_rms;
         fprintf(stderr, "  %s %.3f +- %.3f\n", held_out ? "held out" : "fitted", s.rel_rms, s.se);
         snprintf(what, sizeof what, "%s.%s.%s", row->sample, bench_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");

@@ -160,12 +160,10 @@ struct kept_call {
     bool want_jacobian, plain_paths;
 };
 
-static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
-                         struct estimate *out)
+static void run_counts(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, const size_t *count,
+                       struct estimate *out)
 {
     struct error err = {0};
-    size_t count[FIT_MAX_OBSERVATION];
-    for (size_t i = 0; i < c->n_configuration; i++) count[i] = n_path;
     const struct appearance_request q = {.scene = {.fibers = f->cloth.scene,
                                                    .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
                                          .model = &f->model,
@@ -179,6 +177,14 @@ static void run_estimate(const struct fit_phantom *f, const struct kept_call *c,
                                          .want_jacobian = c->want_jacobian,
                                          .no_probes = c->plain_paths};
     fit_check(appearance_estimate_run(&q, f->pool, NULL, out, &err), &err);
+}
+
+static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
+                         struct estimate *out)
+{
+    size_t count[FIT_MAX_OBSERVATION];
+    for (size_t i = 0; i < c->n_configuration; i++) count[i] = n_path;
+    run_counts(f, c, iteration, count, out);
 }
 
 void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out)
@@ -367,11 +373,18 @@ static void pool_at(struct scorer *s, const struct fit_phantom *f, const double 
     fit_check(linear_model_pool(&s->model, &s->history, x, &err), &err);
 }
 
+static struct fit_score score_of(const struct linear_model *m)
+{
+    double se, value = fmax(linear_model_objective(m, &se), 0.0), n_row = (double)m->n_row;
+    struct fit_score score = {.rel_rms = sqrt(value / n_row)};
+    score.se = fmin(0.5 * se / (n_row * score.rel_rms), sqrt(se / n_row));
+    return score;
+}
+
 struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
                                    const double *param, size_t n_path)
 {
     struct scorer s;
-    double se;
     scorer_start(&s, f, set);
     if (at != NULL) append_kept(&s, f, at, n_kept);
     if (n_path > 0) {
@@ -381,11 +394,56 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
         append_here(&s, f, param);
     }
     pool_at(&s, f, param);
-    double value = fmax(linear_model_objective(&s.model, &se), 0.0), n_row = (double)s.model.n_row;
-    struct fit_score score = {.rel_rms = sqrt(value / n_row)};
-    score.se = fmin(0.5 * se / (n_row * score.rel_rms), sqrt(se / n_row));
+    struct fit_score score = score_of(&s.model);
     scorer_release(&s);
     return score;
+}
+
+/* What score_of makes of the squared error's se, the other way. */
+static double squared_se(const struct linear_model *m, double rel_rms, double se)
+{
+    return fmax(2.0 * rel_rms, se) * se * (double)m->n_row;
+}
+
+/* Counts of the next round: configuration i's part of f is known to se_i with count[i] paths, so counts as se_i sqrt(count[i]) reach a
+ * given se with the fewest. False: there is nothing left to spend. */
+static bool spread(const struct linear_model *m, const struct fit_score *now, const struct fit_score_goal *goal, size_t *count)
+{
+    const double reserve = 1.2; /* the errors are themselves estimates */
+    size_t n = m->n_row / 3;
+    double work[FIT_MAX_OBSERVATION], sum = 0.0, spent = 0.0;
+    double most = (double)(goal->most * n), se = squared_se(m, now->rel_rms, goal->se);
+    for (size_t i = 0; i < n; i++) {
+        double part;
+        linear_model_part(m, i, &part);
+        work[i] = part * sqrt((double)count[i]);
+        sum += work[i];
+        spent += (double)count[i];
+    }
+    if (spent >= 0.9 * most) return false;
+    double total = fmin(fmax(reserve * sum * sum / (se * se), 1.5 * spent), most);
+    for (size_t i = 0; i < n; i++) count[i] = (size_t)fmax((double)goal->first, total * work[i] / sum);
+    return true;
+}
+
+struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set set, const double *param,
+                                      const struct fit_score_goal *goal)
+{
+    size_t count[FIT_MAX_OBSERVATION];
+    for (size_t i = 0; i < FIT_MAX_OBSERVATION; i++) count[i] = goal->first;
+    for (uint32_t round = 0;; round++) {
+        struct scorer s;
+        scorer_start(&s, f, set);
+        for (uint32_t q = 0; q < 2; q++)
+            run_counts(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, false}, round, count,
+                       s.replica[q]);
+        append_here(&s, f, param);
+        pool_at(&s, f, param);
+        const struct fit_score score = score_of(&s.model);
+        bool last = score.se <= goal->se || !spread(&s.model, &score, goal, count);
+        scorer_release(&s);
+        if (last) return score;
+    }
 }
 
 /* trace(M J'J) / n_row on one set, J from the kept estimates at the truth. */

@@ -88,6 +88,18 @@ struct fit_score {
 struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
                                    const double *param, size_t n_path);
 
+/* Paths a configuration and replica: `first` to learn how noisy each is, `most` on average. */
+struct fit_score_goal {
+    double se;
+    size_t first, most;
+};
+
+/* With paths at param only, traced as fits do (with probes), spread over the configurations so that se is reached with the fewest:
+ * each round's paths are fresh and as many as the round before asks for, so that neither their number nor their spread depends on
+ * what they came to. se may be larger than the goal's where `most` does not reach it. */
+struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set set, const double *param,
+                                      const struct fit_score_goal *goal);
+
 /* What errors of the fit with covariance cov (n_param x n_param, fit coordinates) add to the squared relative RMS error of one set,
  * to first order and from the kept estimates at the truth alone: mean over rows of J cov J', J's own noise left out. */
 double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov);
