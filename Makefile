@@ -101,7 +101,7 @@ deps-test:
 
 build-tests: $(TEST_BINS)
 
-check: | deps-test ## quick inner loop: unit tests and layer rules (< 2 minutes)
+check: | deps-test ## quick inner loop: unit tests, quick API tests and layer rules (< 2 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build $(BUILD)
 
@@ -157,7 +157,7 @@ docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (m
 layers:            ## includes go one way: base <- geometry <- renderer <- optimizer
 	@/usr/bin/python3 tests/check_layers.py
 
-asan: | deps-test ## unit and physics tests under the address and undefined-behaviour sanitizers
+asan: | deps-test ## unit and quick API tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build build/asan
 

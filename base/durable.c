@@ -49,6 +49,26 @@ status durable_sync_folder_of(const char *path, struct error *err)
     return s;
 }
 
+static status sync_file(const char *path, struct error *err)
+{
+    status s = STATUS_OK;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0 || fsync(fd) != 0) s = error_set_errno(err, "cannot sync '%s'", path);
+    if (fd >= 0) close(fd);
+    return s;
+}
+
+status durable_rename(const char *temporary, const char *path, struct error *err)
+{
+    status s = sync_file(temporary, err);
+    if (s == STATUS_OK && rename(temporary, path) != 0) s = error_set_errno(err, "cannot write '%s'", path);
+    if (s != STATUS_OK) {
+        unlink(temporary);
+        return s;
+    }
+    return durable_sync_folder_of(path, err);
+}
+
 static status replace(const char *path, const void *data, size_t n_bytes, bool sync, struct error *err)
 {
     char temporary[4096];

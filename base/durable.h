@@ -15,6 +15,9 @@ status durable_replace(const char *path, const void *data, size_t n_bytes, struc
 status durable_replace_volatile(const char *path, const void *data, size_t n_bytes, struct error *err);
 /* fsync the folder that holds path (after creating, renaming or unlinking an entry). STATUS_INVALID for paths over 4 kB, STATUS_IO. */
 status durable_sync_folder_of(const char *path, struct error *err);
+/* A file that somebody has written and closed, to its final name: its bytes, then the name, then the folder are on disk. On failure
+ * `temporary` is removed. STATUS_IO, STATUS_DISK_FULL. */
+status durable_rename(const char *temporary, const char *path, struct error *err);
 /* mkdir -p with mode 0700; existing folders are fine. STATUS_EXISTS when something else has the name, STATUS_INVALID for "" and paths over
  * 4 kB, STATUS_IO. New folders are not synced: durable_sync_folder_of does that. */
 status durable_make_folder(const char *path, struct error *err);

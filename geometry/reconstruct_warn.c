@@ -89,7 +89,7 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
         say(&w, "fibers: a mean radius of %.3g um is not that of a textile fiber (2 to 100 um): check volume.voxel_size_um, or the unit of the fiber file",
             radius * 1e6);
     if (r->fiber_diameter_voxel > 0.0 && r->fiber_diameter_voxel < 4.0)
-        say(&w, "fibers: they are only %.1f voxels thick; single fibers are told apart reliably from 4 voxels on", r->fiber_diameter_voxel);
+        say(&w, "fibers: they are only %.1f voxels thick; where they touch, fibers are told apart reliably from 7 voxels on, and hardly below 4", r->fiber_diameter_voxel);
     if (r->n[0] > 0 && r->dice > 0.0 && r->dice < 0.5)
         say(&w, "fibers: they explain little of the material (Dice %.2f, 1 is all of it): look at the slices", r->dice);
 }

@@ -144,7 +144,7 @@ static status parse_filter(const struct json_field *f, struct job_document *doc,
     s = json_field_check_keys(&filter, key, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "s", 1e-4, 100.0, &doc->filter_s, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "t", 1e-4, 100.0, &doc->filter_t, err);
-    if (s == STATUS_OK) s = json_field_size(&filter, "h", 3, 64, &doc->filter_h, err);
+    if (s == STATUS_OK) s = json_field_size(&filter, "h", 3, 63, &doc->filter_h, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "eps_d", 0.0, 1.0, &doc->filter_eps_d, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "eps_J", -1e6, 0.0, &doc->filter_eps_j, err);
     return s;

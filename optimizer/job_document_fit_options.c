@@ -374,12 +374,19 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
     return STATUS_OK;
 }
 
+/* The first member of a group that has a value; the last parameter when none has. */
+static size_t stated_member(const struct job_fit_option *o, size_t n_param, const double *value, size_t leader)
+{
+    size_t p = 0;
+    while (p + 1 < n_param && (o->leader[p] != leader || isnan(value[p]))) p++;
+    return p;
+}
+
 /* Of the member of the group that the document speaks of; lower and upper are the leader's. */
 static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o, size_t leader,
                              const char *field, const double *given, double lower, double upper, struct error *err)
 {
-    size_t p = 0;
-    while (p + 1 < n_param && (o->leader[p] != leader || isnan(given[p]))) p++;
+    size_t p = stated_member(o, n_param, given, leader);
     if (is_density(&info[p])) /* neither in 'fit.fixed' nor in 'fit.start' */
         return error_set_field(err, STATUS_INVALID, "fit.density_multiplier_per_cm",
                                "'fit.density_multiplier_per_cm' is %g%s: 'fit.bounds' has %g and %g", given[p],
@@ -405,6 +412,10 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     if (clash != SIZE_MAX)
         return error_set_field(err, STATUS_INVALID, "fit.start",
                                "'fit.start' starts '%s' at a value that 'fit.tied' does not allow", info[clash].name);
+    if (!isnan(held) && !isnan(begin) && !is_density(&info[leader]))
+        return error_set_field(err, STATUS_INVALID, "fit.start",
+                               "'fit.start' has '%s', which 'fit.fixed' holds fixed by what 'fit.tied' ties it to",
+                               info[stated_member(o, n_param, given->start, leader)].name);
     s = check_priors(info, n_param, given, leader, (const double[2]){lower, upper}, !isnan(held), err);
     if (s != STATUS_OK) return s;
     size_t ignored;

@@ -29,6 +29,7 @@ struct validation {
     struct estimate *replica[2];
     struct estimate *contrast[2]; /* of pipeline_context.contrast, as many as observations; unused without one */
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
+    struct objective_value fit_with_gains, held_out_with_gains; /* each row with its own gain; NaN unless the job asks for that */
     double
         worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
 };
@@ -132,7 +133,9 @@ status pipeline_model_path(const struct pipeline_context *c, const char *stage, 
 struct appearance_scene pipeline_scene(const struct pipeline_context *c);
 /* Unknowns of a model's fit: parameters that are neither fixed nor follow another. */
 size_t pipeline_n_free(const struct pipeline_model *m);
-/* The model with the lowest squared error (rel_square) over the held-out rows (the fitted rows when there are none). After validation. */
+/* After validation: the error by which a model is judged, that over the held-out rows (the fitted ones when there are none), each
+ * with its own gain where the job says that photographs have one; and the model for which it is lowest (rel_square). */
+const struct objective_value *pipeline_judged_error(const struct pipeline_model *m);
 size_t pipeline_best_model(const struct pipeline_context *c);
 
 #endif

@@ -33,7 +33,8 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
 {
     double total = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
-        total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
+        if (c->observation.item[i].weight > 0.0)
+            total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
     double least = c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
     double budget = fmax(validation_share * (double)m->fit.n_path, least);
     double shrink = fmin(1.0, budget / fmax(total, 1.0));
@@ -41,15 +42,24 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
         double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
                    (validation_rel_se * validation_rel_se);
         n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
+        if (!(c->observation.item[i].weight > 0.0)) n = (double)pilot[i].n_path; /* shown, and counts nowhere */
         n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
     }
 }
 
+/* What row i's photograph would show by one replica. */
+static void show_row(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, int replica, bool own_gain,
+                     struct estimate *out)
+{
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[replica][i], out);
+    if (own_gain)
+        nuisance_apply_own_gain(&c->observation.item[i], out, m->option->gain_prior_rel, m->fit.uncertainty.misfit_var, out);
+}
+
 /* NaN when the set has no rows. */
-static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
+static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set, bool own_gains,
                            struct objective_value *value, struct error *err)
 {
-    const struct validation *v = &m->validation;
     struct observation_set part;
     size_t n = c->observation.n, n_part = 0;
     struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
@@ -60,8 +70,8 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
     observation_set_weigh(&part); /* as the fit does */
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
         if (c->observation.item[i].set != set || !(c->observation.item[i].weight > 0.0)) continue;
-        nuisance_show(&m->fit.nuisance, &v->replica[0][i], &a[n_part]);
-        nuisance_show(&m->fit.nuisance, &v->replica[1][i], &b[n_part++]);
+        show_row(c, m, i, 0, own_gains, &a[n_part]);
+        show_row(c, m, i, 1, own_gains, &b[n_part++]);
     }
     if (s == STATUS_OK && part.n > 0) objective_evaluate(&part, a, b, value);
     observation_set_release(&part);
@@ -72,8 +82,13 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
 static status score_validation(const struct pipeline_context *c, struct pipeline_model *m, struct error *err)
 {
     struct validation *v = &m->validation;
-    status s = evaluate_set(c, m, JOB_SET_FIT, &v->fit, err);
-    if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, &v->held_out, err);
+    status s = evaluate_set(c, m, JOB_SET_FIT, false, &v->fit, err);
+    if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, false, &v->held_out, err);
+    v->fit_with_gains = v->held_out_with_gains = (struct objective_value){NAN, NAN, NAN, NAN, NAN, NAN};
+    if (s == STATUS_OK && m->option->gain == JOB_GAIN_PER_PHOTOGRAPH) {
+        s = evaluate_set(c, m, JOB_SET_FIT, true, &v->fit_with_gains, err);
+        if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, true, &v->held_out_with_gains, err);
+    }
     v->worst_rel_se = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         for (int k = 0; k < 3; k++)
@@ -121,12 +136,10 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
 static void warn_of_equals(struct pipeline_context *c)
 {
     size_t best = pipeline_best_model(c), used = 0, n;
-    const struct validation *b = &c->model[best].validation;
-    const bool held_out = isfinite(b->held_out.rel_rms);
+    const bool held_out = isfinite(c->model[best].validation.held_out.rel_rms);
     char text[600];
     for (size_t i = 0; i < c->n_model && used < sizeof text; i++) {
-        const struct objective_value *x = held_out ? &b->held_out : &b->fit,
-                                     *y = held_out ? &c->model[i].validation.held_out : &c->model[i].validation.fit;
+        const struct objective_value *x = pipeline_judged_error(&c->model[best]), *y = pipeline_judged_error(&c->model[i]);
         if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
         if (used == 0)
             used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.2g %%) from",
@@ -166,6 +179,7 @@ out:
     return s;
 }
 
+_Static_assert(4 * JOB_MAX_MODEL <= WORK_FILE_MAX_SECTION, "a checkpoint has room for the estimates of all models");
 static void estimate_sections(struct pipeline_context *c, struct work_section section[4 * JOB_MAX_MODEL])
 {
     for (size_t i = 0; i < 4 * c->n_model; i++) {

@@ -35,12 +35,19 @@ static size_t chunk(const struct work_section *s, size_t at)
     return left < CHUNK ? left : CHUNK;
 }
 
+static status too_many(const char *path, size_t n_section, struct error *err)
+{
+    return error_set(err, STATUS_INTERNAL, "checkpoint '%s' would have %zu sections: there is room for %d", path, n_section,
+                     WORK_FILE_MAX_SECTION);
+}
+
 status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section,
                        struct error *err)
 {
     struct work_header h = {.n_section = n_section};
     char temporary[4096];
     status s = STATUS_OK;
+    if (n_section > WORK_FILE_MAX_SECTION) return too_many(path, n_section, err);
     memcpy(h.magic, magic, sizeof magic);
     snprintf(h.tag, sizeof h.tag, "%s", tag);
     for (size_t i = 0; i < n_section; i++) h.n_bytes[i] = section[i].n_bytes;
@@ -63,29 +70,54 @@ status work_file_write(const char *path, const char *tag, const struct work_sect
     return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
 }
 
-static status read_sections(FILE *f, const char *path, const struct work_header *h, struct work_section *section,
-                            bool *mine, struct error *err)
+/* Memory for what is read: the section's own, or a copy aside of what the caller has (such sections are small), which is to
+ * stay as it is when the checksum is wrong. */
+static status open_section(const char *path, const struct work_section *section, size_t n_bytes, struct work_section *read,
+                           struct error *err)
+{
+    *read = *section;
+    read->n_bytes = n_bytes;
+    if (section->data == NULL) return scratch_new(section->space, n_bytes, "a checkpoint", &read->data, err);
+    if (section->n_bytes != n_bytes)
+        return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another program version", path);
+    read->space = NULL;
+    read->data = malloc(n_bytes > 0 ? n_bytes : 1);
+    return read->data != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read checkpoint '%s': out of memory", path);
+}
+
+static status read_sections(FILE *f, const char *path, const struct work_header *h, const struct work_section *section,
+                            struct work_section *read, struct error *err)
 {
     uint32_t sum = checksum(0, h, sizeof *h), stored;
     for (size_t i = 0; i < h->n_section; i++) {
-        if (section[i].data == NULL) {
-            status s = scratch_new(section[i].space, h->n_bytes[i], "a checkpoint", &section[i].data, err);
-            if (s != STATUS_OK) return s;
-            section[i].n_bytes = h->n_bytes[i];
-            mine[i] = true;
+        status s = open_section(path, &section[i], h->n_bytes[i], &read[i], err);
+        if (s != STATUS_OK) {
+            read[i].data = NULL;
+            return s;
         }
-        if (section[i].n_bytes != h->n_bytes[i])
-            return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another program version", path);
         for (size_t at = 0, n; at < h->n_bytes[i]; at += n) {
-            n = chunk(&section[i], at);
-            if (fread((char *)section[i].data + at, n, 1, f) != 1)
+            n = chunk(&read[i], at);
+            if (fread((char *)read[i].data + at, n, 1, f) != 1)
                 return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is truncated", path);
-            sum = checksum(sum, (char *)section[i].data + at, n);
+            sum = checksum(sum, (char *)read[i].data + at, n);
         }
     }
     if (fread(&stored, sizeof stored, 1, f) != 1 || stored != sum)
         return error_set(err, STATUS_CHECKSUM, "cannot read checkpoint '%s': its checksum is wrong", path);
     return STATUS_OK;
+}
+
+/* Of a section that was read: handed over, copied, or dropped. */
+static void close_section(bool good, struct work_section *section, struct work_section *read)
+{
+    if (section->data != NULL) {
+        if (good) memcpy(section->data, read->data, section->n_bytes);
+        free(read->data);
+    } else if (good) {
+        *section = *read;
+    } else if (read->data != NULL) {
+        scratch_release(section->space, read->data);
+    }
 }
 
 /* Sizes that cannot be true must not reach malloc. */
@@ -114,7 +146,8 @@ status work_file_read(const char *path, const char *tag, struct work_section *se
                       struct error *err)
 {
     struct work_header h;
-    bool mine[WORK_FILE_MAX_SECTION] = {false};
+    struct work_section read[WORK_FILE_MAX_SECTION] = {0};
+    if (n_section > WORK_FILE_MAX_SECTION) return too_many(path, n_section, err);
     FILE *f = fopen(path, "rbe");
     if (f == NULL && errno == ENOENT) return error_set(err, STATUS_NOT_FOUND, "there is no checkpoint '%s'", path);
     if (f == NULL) return error_set_errno(err, "cannot read checkpoint '%s'", path);
@@ -122,12 +155,8 @@ status work_file_read(const char *path, const char *tag, struct work_section *se
     if (fread(&h, sizeof h, 1, f) != 1)
         s = error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is truncated", path);
     if (s == STATUS_OK) s = check_header(f, path, &h, tag, n_section, err);
-    if (s == STATUS_OK) s = read_sections(f, path, &h, section, mine, err);
+    if (s == STATUS_OK) s = read_sections(f, path, &h, section, read, err);
     fclose(f);
-    for (size_t i = 0; s != STATUS_OK && i < n_section && i < WORK_FILE_MAX_SECTION; i++) {
-        if (!mine[i]) continue;
-        scratch_release(section[i].space, section[i].data);
-        section[i].data = NULL;
-    }
+    for (size_t i = 0; i < n_section; i++) close_section(s == STATUS_OK, &section[i], &read[i]);
     return s;
 }

@@ -47,7 +47,7 @@ static const struct setting table[] = {
     TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside this program"),
     NUMBER("jobs", "nice", nice, 10, 0, 19, "scheduling priority of workers"),
     NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2, "address space of a worker (files that it maps count, see volume_memory_bytes); 0: not limited"),
-    NUMBER("jobs", "volume_memory_bytes", volume_memory_bytes, 2 * GIB, 256 * MIB, INT64_MAX / 2, "resident memory for scans; what is larger is worked on in files under the job's folder, some 20 bytes a voxel"),
+    NUMBER("jobs", "volume_memory_bytes", volume_memory_bytes, 2 * GIB, 256 * MIB, INT64_MAX / 2, "resident memory for scans; what is larger is worked on in files under the job's folder, some 22 bytes a voxel"),
     NUMBER("jobs", "cancel_grace_s", cancel_grace_s, 10, 0, 3600, "from SIGTERM to SIGKILL when a worker has to stop"),
     NUMBER("jobs", "max_lost_attempts", max_lost_attempts, 3, 1, 100, "a job whose worker died this often has failed"),
     NUMBER("jobs", "heartbeat_timeout_s", heartbeat_timeout_s, 300, 2, 86400, "a worker that is silent this long is killed (a lost attempt)"),

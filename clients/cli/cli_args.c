@@ -28,7 +28,7 @@ static const struct cli_command {
                      "files that are already whole are not fetched again.\n", OPT_OUT},
     [CLI_LOG] = {"log", "ID", "print the job's log", "", OPT_FOLLOW},
     [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "", OPT_JSON},
-    [CLI_DELETE] = {"delete", "ID", "remove a job and its files", "A running job must be cancelled first.\n", 0},
+    [CLI_DELETE] = {"delete", "ID", "remove a job and its files", "A running job is stopped; nothing of it is kept.\n", 0},
 };
 
 static const struct cli_option {
@@ -46,8 +46,8 @@ static const struct cli_option {
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
     {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")"},
-    {OPT_TOKEN, 0, "token", "TOKEN", "access token (default: SELVEDGE_TOKEN; visible to other users in the\n"
-                                     "                      process list, so prefer the variable)"},
+    {OPT_TOKEN, 0, "token", "TOKEN", "access token for a proxy in front of the daemon (default: SELVEDGE_TOKEN;\n"
+                                     "                      visible to other users in the process list, so prefer the variable)"},
     {OPT_HELP, 'h', "help", NULL, "show this text"},
     {OPT_VERSION, 'V', "version", NULL, "show the version"},
 };

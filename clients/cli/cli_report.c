@@ -1,6 +1,7 @@
 #include "clients/cli/cli_report.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -144,19 +145,20 @@ static void print_models(const json_t *models, FILE *out)
     size_t i;
     const json_t *m;
     if (json_array_size(models) < 2) return;
+    const bool gains = !isnan(member_number(json_array_get(models, 0), "fit_rel_rms_with_gains"));
     fprintf(out, "%-24s %16s %16s %12s %8s\n", "model (rel. RMS error)", "fitted", "held out", "paths", "time");
     json_array_foreach(models, i, m)
     {
         char id[64], fitted[48], held_out[48], time[CLI_SHORT_TEXT];
         text_clean(member_text(m, "id"), id, sizeof id);
-        percent(m, "fit_rel_rms", fitted, sizeof fitted);
-        percent(m, "heldout_rel_rms", held_out, sizeof held_out);
+        percent(m, gains ? "fit_rel_rms_with_gains" : "fit_rel_rms", fitted, sizeof fitted);
+        percent(m, gains ? "heldout_rel_rms_with_gains" : "heldout_rel_rms", held_out, sizeof held_out);
         text_duration(member_number(m, "fit_wall_s"), time);
         fprintf(out, "  %-22s %16s %16s %12.3g %8s  %s%s\n", id, fitted, held_out,
                 member_number(m, "n_path_fit"), time, json_is_true(json_object_get(m, "best")) ? "best " : "",
                 json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
     }
-    fprintf(out, "of the best model:\n");
+    fprintf(out, "%sof the best model:\n", gains ? "(errors: each photograph with its own gain)\n" : "");
 }
 
 static void print_radius(const json_t *radius, FILE *out)

@@ -20,7 +20,8 @@ function gains(result) {
   const rows = (result.rows ?? []).filter((r) => isNumber(r.gain));
   if (!rows.length) return null;
   return el("div", {}, el("h3", {}, "Gain of each photograph"),
-    el("p", { class: "hint" }, `With them the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}.`),
+    el("p", { class: "hint" }, `With them the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}` +
+      (result.heldout_rel_rms_with_gains == null ? "." : `, over the held-out rows ${percent(result.heldout_rel_rms_with_gains, 2)}.`)),
     table("gains", ["Photograph", "#Gain ± standard error", ""], rows.map((r) => el("tr", {}, el("td", { class: "mono" }, r.name), number(withError(r.gain, r.gain_se)),
       el("td", {}, Math.abs(r.gain - 1) > 3 * r.gain_se && Math.abs(r.gain - 1) > 0.05 ? tag("differs from the others") : "")))));
 }

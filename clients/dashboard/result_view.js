@@ -22,11 +22,16 @@ export function describedParameters(model, job, n) {
   return Array.from({ length: n }, (_, i) => ({ name: `parameter ${i + 1}`, unit: "" }));
 }
 
-// Every model of the job: [{id, title, best, converged, fit, held, paths, seconds, parameters}]
+// What models are compared by: where each photograph has a gain of its own, the errors with these.
+function comparedErrors(m) {
+  if (!isNumber(m.fit_rel_rms_with_gains)) return { fit: m.fit_rel_rms, fitSe: m.fit_rel_rms_se, held: m.heldout_rel_rms, heldSe: m.heldout_rel_rms_se, withGains: false };
+  return { fit: m.fit_rel_rms_with_gains, fitSe: m.fit_rel_rms_with_gains_se, held: m.heldout_rel_rms_with_gains, heldSe: m.heldout_rel_rms_with_gains_se, withGains: true };
+}
+
+// Every model of the job: [{id, title, best, converged, fit, held, withGains, paths, seconds, parameters}]
 export function models(job) {
   return (job.result?.models ?? []).map((m) => ({
-    id: m.id, title: m.title, best: m.best, converged: m.converged, fit: m.fit_rel_rms, fitSe: m.fit_rel_rms_se, held: m.heldout_rel_rms, heldSe: m.heldout_rel_rms_se, paths: m.n_path_fit, seconds: m.fit_wall_s,
-    parameters: fitted(m),
+    id: m.id, title: m.title, best: m.best, converged: m.converged, paths: m.n_path_fit, seconds: m.fit_wall_s, parameters: fitted(m), ...comparedErrors(m),
   }));
 }
 

@@ -48,7 +48,7 @@ status bounded_quadratic(const double *hessian, const double *g, const double *l
 {
     struct quadratic q = {hessian, g, n};
     double value;
-    memset(y, 0, n * sizeof *y);
+    for (size_t i = 0; i < n; i++) y[i] = fmin(fmax(0.0, lower[i]), upper[i]); /* by rounding 0 may lie outside */
     nlopt_opt opt = nlopt_create(NLOPT_LD_SLSQP, (unsigned)n);
     if (opt == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot solve for a step: out of memory");
     nlopt_set_min_objective(opt, evaluate, &q);

@@ -38,6 +38,7 @@ enum {
     FIRST_PATH = 2048,
     PATH_PER_CELL = 16, /* of a contrast, at least: its noise falls with the square of these */
     MAX_ITERATION = 80,
+    LEAST_ITERATION = 12,
     DEFAULT_BUDGET = 6000000
 };
 
@@ -439,6 +440,8 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     g.n_free = free_index(&g, index);
     for (size_t p = 0; p < problem->n_param; p++)
         g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->param[p].start);
+    if (problem->path_budget == 0) /* many rows: enough for so many of the smallest iterations */
+        g.run.path_budget = (uint64_t)fmax((double)g.run.path_budget, LEAST_ITERATION * (double)least_budget(problem));
     /* small budgets start smaller, so that there are iterations to speak of */
     double first = (double)g.run.path_budget / (40.0 * 2.0 * (double)problem->observation->n);
     g.n_path_mean = fmax(MIN_PATH, fmin(FIRST_PATH, first));

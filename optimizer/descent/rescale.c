@@ -97,8 +97,9 @@ static struct progress_part part_of_budget(const struct fit_problem *problem, co
         .outer = problem->progress, .from = from, .share = budget > 0.0 ? fmin(1.0 - from, call / budget) : 0.0};
 }
 
-/* One curve: all slots of the same symbol move together, beyond bounds of their own where these are tighter. */
-static status measure_symbol(const struct fit_problem *problem, size_t first, size_t n_slot, const size_t *n_path,
+/* One curve: all slots of the same symbol move together, each as far as its own bounds go (beyond those of a tied parameter
+ * the ones that follow it would leave the model's). */
+static status measure_symbol(const struct fit_problem *problem, const struct coordinate *k, size_t first, size_t n_slot, const size_t *n_path,
                              struct rescale_curve *curve, struct estimate *buffer[2], uint64_t *n_path_used,
                              double *wall_s, struct error *err)
 {
@@ -106,7 +107,7 @@ static status measure_symbol(const struct fit_problem *problem, size_t first, si
     const struct estimator *e = problem->estimator;
     for (size_t p = 0; p < problem->n_param; p++) param[p] = problem->param[p].start;
     for (size_t j = 0; j < curve->n; j++) {
-        for (size_t s = 0; s < n_slot; s++) param[first + s] = curve->c[j];
+        for (size_t p = first; p < first + n_slot; p++) param[p] = fmin(fmax(curve->c[j], k[p].param_lower), k[p].param_upper);
         struct estimator_call call = {param, n_path, 0, REPLICA_RESCALE, false, true};
         double seconds = 0.0;
         struct progress_part part = part_of_budget(problem, n_path, *n_path_used);
@@ -156,7 +157,7 @@ status rescale_measure(const struct fit_problem *problem, const struct coordinat
                 continue;
             }
             rescale_points(&problem->info[i], &k[i], &curve[i]);
-            s = measure_symbol(problem, p, n_slot, n_path, &curve[i], buffer, n_path_used, wall_s, err);
+            s = measure_symbol(problem, k, p, n_slot, n_path, &curve[i], buffer, n_path_used, wall_s, err);
         }
     }
     free(buffer[0]);

@@ -36,12 +36,12 @@ static void add_parameter_prior(struct fit_layout *l, size_t k, double mean, dou
     l->has_prior = true;
 }
 
-/* A prior of a colour whose channels are tied is one statement, not three. */
+/* A prior of a colour whose channels are tied as equals is one statement, not three. */
 static bool said_before(const struct fit_layout *l, const struct param_info *info, const struct fit_option *o, size_t p)
 {
     for (size_t q = 0; q < p; q++)
         if (l->owner[q] == l->owner[p] && strcmp(info[q].symbol, info[p].symbol) == 0 &&
-            o->prior_mean[q] == o->prior_mean[p] && o->prior_se[q] == o->prior_se[p])
+            o->ratio[q] == o->ratio[p] && o->prior_mean[q] == o->prior_mean[p] && o->prior_se[q] == o->prior_se[p])
             return true;
     return false;
 }

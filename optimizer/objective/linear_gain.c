@@ -20,15 +20,20 @@ static double gain_share(const struct linear_model *m, const struct observation 
     return 1.0 - 1.0 / sqrt(1.0 + m->gain_sd * m->gain_sd * length2 / (misfit + noise));
 }
 
-static double absorbed_objective(const struct linear_model *m, const struct observation_set *o, double misfit)
+/* What is left of a residual's square on average, over the means: contrasts, which no gain changes and whose misfits are of
+ * another size, say nothing about what is left of those. */
+static double absorbed_misfit(const struct linear_model *m, const struct observation_set *o, double misfit, bool absorb)
 {
-    double sum = 0.0;
+    double sum = 0.0, n = 0.0;
     for (size_t i = 0; i < o->n; i++) {
-        double unit[3], share = gain_share(m, &o->item[i], i, misfit, unit);
+        double unit[3], share = absorb ? gain_share(m, &o->item[i], i, misfit, unit) : 0.0;
         const double *a = m->r[0] + 3 * i, *b = m->r[1] + 3 * i;
-        sum += dot3(a, b) + (share * share - 2.0 * share) * dot3(a, unit) * dot3(b, unit);
+        if (observation_is_contrast(&o->item[i])) continue;
+        sum += dot3(a, b);
+        if (share > 0.0) sum += (share * share - 2.0 * share) * dot3(a, unit) * dot3(b, unit);
+        n += 3.0;
     }
-    return sum;
+    return fmax(sum / fmax(n, 1.0), 1e-8);
 }
 
 /* v <- v - share unit (unit . v), for three values `stride` apart. */
@@ -56,9 +61,8 @@ static void take_out_var(double *v, size_t stride, const double unit[3], double 
 void linear_gain_absorb(struct linear_model *m, const struct observation_set *o)
 {
     enum { ROUND = 6 };
-    double misfit = fmax(linear_model_objective(m, NULL) / (double)m->n_row, 1e-8);
-    for (int round = 0; round < ROUND; round++)
-        misfit = fmax(absorbed_objective(m, o, misfit) / (double)m->n_row, 1e-8);
+    double misfit = absorbed_misfit(m, o, 0.0, false);
+    for (int round = 0; round < ROUND; round++) misfit = absorbed_misfit(m, o, misfit, true);
     for (size_t i = 0; i < o->n; i++) {
         double unit[3], share = gain_share(m, &o->item[i], i, misfit, unit);
         for (int q = 0; q < 2; q++) {

@@ -8,7 +8,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
 {
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
-    double *block = calloc(2 * per_replica + 3 * n_row, sizeof *block);
+    double *block = calloc(2 * per_replica + 4 * n_row, sizeof *block);
     if (block == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot hold a model of %zu residuals: out of memory", n_row);
     for (size_t q = 0; q < 2; q++) {
@@ -21,6 +21,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
     m->weight = block + 2 * per_replica;
     m->photograph_var = m->weight + n_row;
     m->extra = m->photograph_var + n_row;
+    m->contrast = m->extra + n_row;
     for (size_t row = 0; row < n_row; row++) m->weight[row] = m->extra[row] = 1.0;
     return STATUS_OK;
 }
@@ -73,16 +74,29 @@ static double known_variance(const struct linear_model *m, size_t row)
     return (linear_model_row_noise(m, row) + m->photograph_var[row]) / m->extra[row];
 }
 
-double linear_model_misfit(const struct linear_model *m, size_t n_free)
+enum row_kind { ROWS_OF_MEANS, ROWS_OF_CONTRASTS, ROWS_OF_BOTH };
+
+static bool counts(const struct linear_model *m, size_t row, enum row_kind kind)
+{
+    return m->extra[row] > 0.0 && (kind == ROWS_OF_BOTH || (m->contrast[row] > 0.0) == (kind == ROWS_OF_CONTRASTS));
+}
+
+/* freedom: degrees of freedom a row. */
+static double misfit_of(const struct linear_model *m, double freedom, enum row_kind kind)
 {
     enum { ROUND = 8 };
-    double n = 0.0, misfit = fmax(linear_model_objective(m, NULL), 0.0) / (double)m->n_row;
-    for (size_t row = 0; row < m->n_row; row++) n += m->extra[row] > 0.0;
-    double freedom = fmax(1.0, n - (double)n_free) / fmax(1.0, n);
+    double misfit = 0.0, n = 0.0;
+    for (size_t i = 0; i < m->n_row / 3; i++) {
+        double se;
+        if (!counts(m, 3 * i, kind)) continue;
+        misfit += linear_model_part(m, i, &se);
+        n += 3.0;
+    }
+    misfit = fmax(misfit, 0.0) / fmax(n, 1.0);
     for (int round = 0; round < ROUND; round++) {
         double sum = 0.0, square = 0.0, photograph = 0.0;
         for (size_t row = 0; row < m->n_row; row++) {
-            if (!(m->extra[row] > 0.0)) continue;
+            if (!counts(m, row, kind)) continue;
             double var = misfit + known_variance(m, row) + 1e-12, weight = 1.0 / (var * var);
             square += weight * m->r[0][row] * m->r[1][row] / m->extra[row];
             photograph += weight * m->photograph_var[row] / m->extra[row];
@@ -91,6 +105,25 @@ double linear_model_misfit(const struct linear_model *m, size_t n_free)
         misfit = sum > 0.0 ? fmax(0.0, (square / freedom - photograph) / sum) : 0.0;
     }
     return misfit;
+}
+
+static double freedom_of_row(const struct linear_model *m, size_t n_free)
+{
+    double n = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) n += m->extra[row] > 0.0;
+    return fmax(1.0, n - (double)n_free) / fmax(1.0, n);
+}
+
+double linear_model_misfit(const struct linear_model *m, size_t n_free)
+{
+    return misfit_of(m, freedom_of_row(m, n_free), ROWS_OF_BOTH);
+}
+
+void linear_model_misfits(const struct linear_model *m, size_t n_free, double misfit[2])
+{
+    double freedom = freedom_of_row(m, n_free);
+    misfit[0] = misfit_of(m, freedom, ROWS_OF_MEANS);
+    misfit[1] = misfit_of(m, freedom, ROWS_OF_CONTRASTS);
 }
 
 void linear_model_weigh(struct linear_model *m, size_t n_free)

@@ -46,6 +46,7 @@ struct linear_model {
     double *j[2], *j_var[2]; /* n_row x n_param */
     double *photograph_var; /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
     double *extra;      /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
+    double *contrast;   /* n_row: 1 for a row of a contrast (texture), 0 for one of a mean; set by linear_model_pool */
     double *weight;     /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
     double row_var;     /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
     const struct gaussian_prior *prior; /* n_param, NULL: none; the caller's */
@@ -80,6 +81,9 @@ double linear_model_row_noise(const struct linear_model *m, size_t row);
  * freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their variance)^2, found by
  * iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows of weight 0 are left out. */
 double linear_model_misfit(const struct linear_model *m, size_t n_free);
+/* The same over the rows of means ([0]) and of contrasts ([1], 0 without any) alone: models that are right in brightness to 1 %
+ * may be off by half in texture. */
+void linear_model_misfits(const struct linear_model *m, size_t n_free, double misfit[2]);
 /* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without extra
  * weights, which act as they are. While noise rules, rows that are known well count more (bright channels have the longest
  * paths and the most noise); where the model does not fit, or photographs state no errors and paths add up, all weights go

@@ -271,6 +271,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     for (size_t row = 0; row < m->n_row; row++) {
         m->photograph_var[row] = objective_photograph_variance(&h->observation->item[row / 3], row % 3);
         m->extra[row] = h->observation->item[row / 3].weight;
+        m->contrast[row] = observation_is_contrast(&h->observation->item[row / 3]) ? 1.0 : 0.0;
     }
     m->n_effective /= (double)h->observation->n;
     if (m->gain_sd > 0.0) linear_gain_absorb(m, h->observation);

@@ -15,9 +15,9 @@ static const double log_determined = 0.69;
 static const double photograph_in_common = 0.5;
 
 /* The part of V of one row that goes with no other row. */
-static double own_variance(const struct linear_model *m, size_t row, double misfit)
+static double own_variance(const struct linear_model *m, size_t row, const double misfit[2])
 {
-    return (1.0 - photograph_in_common) * m->photograph_var[row] + misfit * m->extra[row];
+    return (1.0 - photograph_in_common) * m->photograph_var[row] + misfit[m->contrast[row] > 0.0] * m->extra[row];
 }
 
 static double path_variance(const struct linear_model *m, size_t row) { return linear_model_row_noise(m, row); }
@@ -45,7 +45,7 @@ static void add_common_noise(const struct linear_model *m, size_t i, double (*va
 
 /* H and B of the parameters index[0..n-1]. */
 static void normal_matrices(const struct linear_model *m, const size_t *index,
-                            size_t n, double misfit, double *h, double *b, double *mean_variance)
+                            size_t n, const double misfit[2], double *h, double *b, double *mean_variance)
 {
     memset(h, 0, n * n * sizeof *h);
     memset(b, 0, n * n * sizeof *b);
@@ -73,7 +73,7 @@ static void normal_matrices(const struct linear_model *m, const size_t *index,
 
 /* Covariance of the parameters index[0..n-1], all others held. */
 static void covariance(const struct linear_model *m, const struct coordinate *k,
-                       const size_t *index, size_t n, double misfit, double *cov)
+                       const size_t *index, size_t n, const double misfit[2], double *cov)
 {
     double h[N * N], b[N * N], inverse[N * N], half[N * N], s2, scale[N];
     normal_matrices(m, index, n, misfit, h, b, &s2);
@@ -116,12 +116,12 @@ bool uncertainty_determined(const struct coordinate *k, double sd, double se_par
            se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
 }
 
-/* Of a residual of extra weight 1, over the rows that count. */
+/* Of a mean's residual of extra weight 1, over the rows that count. */
 static void mean_variances(const struct linear_model *m, struct uncertainty *u)
 {
     double n = 0.0;
     for (size_t row = 0; row < m->n_row; row++) {
-        if (!(m->extra[row] > 0.0)) continue;
+        if (!(m->extra[row] > 0.0) || m->contrast[row] > 0.0) continue;
         u->noise_var += linear_model_row_noise(m, row) / m->extra[row];
         u->photograph_var += m->photograph_var[row] / m->extra[row];
         n += 1.0;
@@ -130,23 +130,34 @@ static void mean_variances(const struct linear_model *m, struct uncertainty *u)
     u->photograph_var /= fmax(n, 1.0);
 }
 
+/* Within a thousandth of the range; what spans decades is judged in the logarithm. */
+static bool at_bound(const struct coordinate *k, double x)
+{
+    if (k->kind == COORDINATE_LOG) {
+        double margin = 1e-3 * (k->upper - k->lower);
+        return x <= k->lower + margin || x >= k->upper - margin;
+    }
+    double value = coordinate_to_param(k, x), margin = 1e-3 * (k->param_upper - k->param_lower);
+    return value <= k->param_lower + margin || value >= k->param_upper - margin;
+}
+
 void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
                          const bool *fixed, struct uncertainty *u)
 {
     size_t n = m->n_param, moving[N], n_moving = 0, n_inner = 0;
-    double cov[N * N];
+    double cov[N * N], misfit[2];
     memset(u, 0, sizeof *u);
     u->n_param = n;
     for (size_t p = 0; p < n; p++) {
-        double value = coordinate_to_param(&k[p], m->x_ref[p]), margin = 1e-3 * (k[p].param_upper - k[p].param_lower);
-        u->at_bound[p] = !fixed[p] && (value <= k[p].param_lower + margin || value >= k[p].param_upper - margin);
+        u->at_bound[p] = !fixed[p] && at_bound(&k[p], m->x_ref[p]);
         if (!fixed[p]) moving[n_moving++] = p;
         n_inner += !fixed[p] && !u->at_bound[p];
     }
-    u->misfit_var = linear_model_misfit(m, n_inner);
+    linear_model_misfits(m, n_inner, misfit);
+    u->misfit_var = misfit[0];
     mean_variances(m, u);
     if (n_moving > 0) {
-        covariance(m, k, moving, n_moving, u->misfit_var, cov);
+        covariance(m, k, moving, n_moving, misfit, cov);
         scatter(cov, moving, n_moving, n, u->cov);
     }
     for (size_t p = 0; p < n; p++) {

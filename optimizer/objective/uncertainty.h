@@ -27,8 +27,8 @@ struct uncertainty {
     double se_param[SCATTERING_MAX_PARAM];    /* internal unit; 0 for fixed parameters */
     bool at_bound[SCATTERING_MAX_PARAM];
     bool determined[SCATTERING_MAX_PARAM]; /* uncertainty_determined; true for fixed ones */
-    double misfit_var; /* per residual, in units of the objective: about the squared relative error that the model
-                          leaves */
+    double misfit_var; /* per residual of a mean (contrasts of a texture have a misfit of their own), in units of the objective:
+                          about the squared relative error that the model leaves */
     double noise_var;  /* mean Monte-Carlo variance per residual of the pooled mean; this and the next without extra weights */
     double photograph_var; /* mean variance per residual by the photographs' stated errors */
 };

@@ -67,11 +67,16 @@ void observation_set_weigh(struct observation_set *o)
 
 bool observation_is_contrast(const struct observation *o) { return o->configuration.contrast_cells > 0; }
 
+static bool contrast_is_known(const struct observation *o)
+{
+    return o->contrast_se_rgb[0] < 1.0 && o->contrast_se_rgb[1] < 1.0 && o->contrast_se_rgb[2] < 1.0;
+}
+
 struct observation observation_of_contrast(const struct observation *o, double weight)
 {
     struct observation row = *o;
     row.configuration.contrast_cells = (uint32_t)o->n_cell;
-    row.weight = weight * o->weight;
+    row.weight = contrast_is_known(o) ? weight * o->weight : 0.0;
     memcpy(row.mean_rgb, o->contrast_rgb, sizeof row.mean_rgb);
     memcpy(row.se_rgb, o->contrast_se_rgb, sizeof row.se_rgb);
     return row;
@@ -145,6 +150,13 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
         if (s != STATUS_OK) {
             if (err != NULL) snprintf(err->field, sizeof err->field, "fit.texture.block_mm");
             return s;
+        }
+        if (!contrast_is_known(&item) && doc->texture_weight > 0.0 && warn != NULL) {
+            char text[400];
+            snprintf(text, sizeof text,
+                     "photographs[%zu] ('%s') is black in one of its channels, so its texture is not compared with the rendering's",
+                     i, p->file);
+            warn(context, text);
         }
     }
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);

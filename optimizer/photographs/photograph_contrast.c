@@ -29,7 +29,8 @@ status image_contrast(const struct image *im, size_t channel, size_t n_cell, dou
 {
     size_t n = n_cell * n_cell;
     double *part = malloc((n + 1) * sizeof *part), mean = 0.0, scatter = 0.0;
-    *contrast = *se = 0.0;
+    *contrast = 0.0;
+    *se = 1.0; /* of a black channel nothing is known */
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure contrast: out of memory");
     for (size_t i = 0; i < n; i++) {
         part[i] = part_mean(im, channel, n_cell, i % n_cell, i / n_cell);

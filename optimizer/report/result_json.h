@@ -15,7 +15,7 @@
  *           "texture":null|{"block_mm","blocks_a_side","measured":[3],"measured_se":[3],"rendered":[3],"rendered_se":[3]}}],  contrasts
  *  "next_photograph":[{"candidate","light_theta_deg",...,"information_nats","standard_error_after":[...],"determines":[names]}],  best first
  *  "certificate":{"worst_rel_error","worst_rel_error_se","worst_parameter","n_path","parameters":[{"name","rel_error","rel_error_se"}]},
- *  "prior_penalty", "nuisance":[{"name","value","standard_error","at_bound":bool}], "fit_rel_rms_with_gains":number|null,
+ *  "prior_penalty", "nuisance":[{"name","value","standard_error","at_bound":bool}], "fit_rel_rms_with_gains":number|null, "heldout_rel_rms_with_gains":number|null,
  *  "starts":[{"start":[...],"value":[...],"objective","objective_se","prior_penalty","converged","kept","elsewhere","n_path"}],
  *  "models":[{"id","title","kind":"surface"|"volume","best":bool, all of "converged" to "validation_worst_rel_se" and
  *             "n_path_fit" to "n_path_validation", "rows":[{"rendered":[3],"rendered_se":[3]}] in the order of "rows"}],

@@ -48,28 +48,6 @@ void result_row_options(const struct pipeline_context *c, const struct pipeline_
     json_object_set_new(row, "texture", c->contrast.n > 0 ? texture_json(c, m, i) : json_null());
 }
 
-/* Relative RMS error of the fitted rows after each has had its gain. */
-static double rel_rms_with_gains(const struct pipeline_context *c, const struct pipeline_model *m)
-{
-    double sum = 0.0;
-    size_t n = 0;
-    if (m->option->gain != JOB_GAIN_PER_PHOTOGRAPH) return NAN;
-    for (size_t i = 0; i < c->observation.n; i++) {
-        const struct observation *o = &c->observation.item[i];
-        struct estimate a, b;
-        double gain, se;
-        if (o->set != JOB_SET_FIT) continue;
-        row_gain(c, m, i, &gain, &se);
-        nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
-        nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
-        for (int k = 0; k < 3; k++)
-            sum += objective_relative_weight(o) * (gain * a.mean[k] - o->mean_rgb[k]) *
-                   (gain * b.mean[k] - o->mean_rgb[k]);
-        n += 3;
-    }
-    return n > 0 ? sqrt(fmax(0.0, sum) / (double)n) : NAN;
-}
-
 static json_t *nuisance_json(const struct fit_nuisance *n)
 {
     json_t *list = json_array();
@@ -145,7 +123,11 @@ void result_fit_options(const struct pipeline_context *c, const struct pipeline_
     json_object_set_new(result, "starts", starts_json(m));
     json_object_set_new(result, "next_photograph", candidates_json(c, m));
     json_object_set_new(result, "certificate", certificate_json(m));
-    json_object_set_new(result, "fit_rel_rms_with_gains", json_number(rel_rms_with_gains(c, m)));
+    const struct validation *v = &m->validation;
+    json_object_set_new(result, "fit_rel_rms_with_gains", json_number(v->fit_with_gains.rel_rms));
+    json_object_set_new(result, "fit_rel_rms_with_gains_se", json_number(v->fit_with_gains.rel_rms_se));
+    json_object_set_new(result, "heldout_rel_rms_with_gains", json_number(v->held_out_with_gains.rel_rms));
+    json_object_set_new(result, "heldout_rel_rms_with_gains_se", json_number(v->held_out_with_gains.rel_rms_se));
 }
 
 /* Scatter of blocks about their mean, in per cent of it, mean over channels. */
@@ -175,7 +157,7 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
 {
     const struct fit_nuisance *n = &m->fit.nuisance;
     const struct derivative_check *check = &m->certificate;
-    double with_gains = rel_rms_with_gains(c, m);
+    const struct validation *v = &m->validation;
     fprintf(out, "gradient certificate: the derivatives on this cloth are right to %.1g (+- %.1g), worst by %s\n",
             check->error[check->worst], check->error_se[check->worst], m->appearance.param[check->worst].name);
     if (m->candidate != NULL) {
@@ -190,9 +172,11 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
         fprintf(out, "%-12s %10.5f %10.5f  nuisance term%s\n", n->name[i], n->value[i], n->se[i],
                 n->at_bound[i] ? ", at a bound" : "");
     print_textures(c, m, out);
-    if (isfinite(with_gains))
+    if (isfinite(v->fit_with_gains.rel_rms))
         fprintf(out, "one gain for each photograph: relative RMS error over the fitted rows with them %.2f %%\n",
-                100.0 * with_gains);
+                100.0 * v->fit_with_gains.rel_rms);
+    if (isfinite(v->held_out_with_gains.rel_rms))
+        fprintf(out, "                              over the held-out rows %.2f %%\n", 100.0 * v->held_out_with_gains.rel_rms);
     for (size_t k = 0; k < m->fit.n_start; k++) {
         const struct fit_start *s = &m->fit.start[k];
         fprintf(out, "start %-2zu objective %.5g +- %.2g%s%s%s\n", k + 1, s->objective, s->objective_se,

@@ -11,7 +11,7 @@ void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *
 /* Adds "gain" and "gain_se" to row i: numbers with a gain for each photograph, null otherwise; and "texture": null
  * unless asked for. */
 void result_row_options(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, json_t *row);
-/* Adds "prior_penalty", "nuisance", "starts", "fit_rel_rms_with_gains" "next_photograph" and "certificate" to the result. */
+/* Adds "prior_penalty", "nuisance", "starts", "fit_rel_rms_with_gains", "heldout_rel_rms_with_gains" (each with "..._se"), "next_photograph" and "certificate" to the result. */
 void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result);
 /* The same for people. */
 void result_summary_options(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out);

@@ -28,8 +28,8 @@ static status put_in_place(const struct pipeline_context *c, status written, con
                            struct error *err)
 {
     status s = written == STATUS_OK ? worker_folder_check(c->folder, err) : written;
-    if (s == STATUS_OK && rename(temporary, path) != 0) s = error_set_errno(err, "cannot write '%s'", path);
-    if (s != STATUS_OK) unlink(temporary);
+    if (s == STATUS_OK) return durable_rename(temporary, path, err);
+    unlink(temporary);
     return s;
 }
 

@@ -61,16 +61,17 @@ static void percent(const struct objective_value *v, char *text, size_t n)
 /* All models side by side, when there are several. */
 static void print_comparison(const struct pipeline_context *c, FILE *out)
 {
+    const bool gains = c->model[0].option->gain == JOB_GAIN_PER_PHOTOGRAPH;
     fprintf(out, "%-24s %16s %16s %9s %9s  %s\n", "model", "fitted", "held out", "paths", "time", "");
     for (size_t i = 0; i < c->n_model; i++) {
         const struct pipeline_model *m = &c->model[i];
         char fitted[48], held_out[48];
-        percent(&m->validation.fit, fitted, sizeof fitted);
-        percent(&m->validation.held_out, held_out, sizeof held_out);
+        percent(gains ? &m->validation.fit_with_gains : &m->validation.fit, fitted, sizeof fitted);
+        percent(gains ? &m->validation.held_out_with_gains : &m->validation.held_out, held_out, sizeof held_out);
         fprintf(out, "%-24s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, held_out, (double)m->fit.n_path, m->fit.wall_s,
                 i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
     }
-    fprintf(out, "relative RMS errors; what follows is of the best model\n\n");
+    fprintf(out, "relative RMS errors%s; what follows is of the best model\n\n", gains ? ", each photograph with its own gain" : "");
 }
 
 static void print_summary(struct pipeline_context *c, FILE *out)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from daemon_under_test import Daemon, program
-from small_cloth import TABLE, hair
+from small_cloth import start_small_job
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), "clients", "python"))
 import selvedge  # noqa: E402
@@ -27,10 +27,7 @@ def real(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def finished(real):
-    job = real.create(document())
-    real.upload(job, "cloth.hair", hair(), "fibers")
-    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
-    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    job = start_small_job(real, document())
     return job, real.wait_state(job, "succeeded", timeout_s=120)
 
 
@@ -121,10 +118,7 @@ def test_bad_input(real, fit, field, says):
 
 def test_fiber_radius(real):
     """The search goes before the fits, leaves its curve in the result, and all that follows uses what it found."""
-    job = real.create(document(fit_radius={"lower_um": 5, "upper_um": 12}, path_budget=60000))
-    real.upload(job, "cloth.hair", hair(), "fibers")
-    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
-    real.post(f"/v1/jobs/{job}/start")
+    job = start_small_job(real, document(fit_radius={"lower_um": 5, "upper_um": 12}, path_budget=60000))
     result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
     radius = result["radius"]
     assert radius["model"] == "two_lobe.v1" and abs(radius["start_um"] - 8) < 1e-3 and 8 <= len(radius["curve"]) <= 11
@@ -138,19 +132,13 @@ def test_fiber_radius(real):
 
 
 def test_radius_beyond_the_tile(real):
-    job = real.create(document(fit_radius={"lower_um": 5, "upper_um": 500}))
-    real.upload(job, "cloth.hair", hair(), "fibers")
-    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
-    real.post(f"/v1/jobs/{job}/start")
+    job = start_small_job(real, document(fit_radius={"lower_um": 5, "upper_um": 500}))
     error = real.wait_state(job, "failed", timeout_s=60)["error"]
     assert error["field"] == "fit.fit_radius.upper_um" and "tile" in error["text"], error
 
 
 def test_radius_range_without_the_cloths_own(real):
-    job = real.create(document(fit_radius={"lower_um": 20, "upper_um": 30}, path_budget=1000))
-    real.upload(job, "cloth.hair", hair(), "fibers")
-    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
-    real.post(f"/v1/jobs/{job}/start")
+    job = start_small_job(real, document(fit_radius={"lower_um": 20, "upper_um": 30}, path_budget=1000))
     warnings = real.wait_state(job, "succeeded", timeout_s=120)["warnings"]
     said = [w for w in warnings if "fit.fit_radius" in w and "20 to 30 um" in w and "radius of 8 um" in w]
     assert len(said) == 1, warnings
@@ -158,18 +146,12 @@ def test_radius_range_without_the_cloths_own(real):
 
 def test_density_wants_light_from_behind(real):
     """A table is read by the worker: the same error as for photographs, only later."""
-    job = real.create({**document(fit_density=True), "black_sheet": False})
-    real.upload(job, "cloth.hair", hair(), "fibers")
-    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
-    real.post(f"/v1/jobs/{job}/start")
+    job = start_small_job(real, {**document(fit_density=True), "black_sheet": False})
     error = real.wait_state(job, "failed", timeout_s=60)["error"]
     assert error["field"] == "fit.fit_density" and "behind the cloth" in error["text"], error
 
 
 def test_voxels_that_need_too_much(real):
-    job = real.create({**document(), "fibers": {"file": "cloth.hair", "voxel_um": 0.05}})
-    real.upload(job, "cloth.hair", hair(), "fibers")
-    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
-    real.post(f"/v1/jobs/{job}/start")
+    job = start_small_job(real, {**document(), "fibers": {"file": "cloth.hair", "voxel_um": 0.05}})
     error = real.wait_state(job, "failed", timeout_s=60)["error"]
     assert error["field"] == "fibers.voxel_um" and "limit" in error["text"], error

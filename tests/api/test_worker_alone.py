@@ -27,6 +27,10 @@ def run(folder, table=TABLE, expect=0, photographs=(), **fit):
         document["measurements"] = {"file": "rows.csv"}
         (folder / "input" / "rows.csv").write_bytes(table if isinstance(table, bytes) else table.encode())
     (folder / "job.json").write_text(json.dumps(document))
+    return run_again(folder, expect)
+
+
+def run_again(folder, expect=0):
     p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
     log = (folder / "log.txt").read_text()
     assert p.returncode == expect, log
@@ -88,3 +92,42 @@ def test_texture_states_the_blocks_that_were_measured(tmp_path):
     for row in result(tmp_path)["rows"]:
         assert row["texture"]["blocks_a_side"] == 12 and row["texture"]["block_mm"] == pytest.approx(10 / 12)
     assert "means of 0.833 mm blocks" in (tmp_path / "results" / "summary.txt").read_text()
+
+
+def test_as_many_models_as_a_job_takes(tmp_path):
+    """And a run after one that got as far as their validation: that is loaded, not made again."""
+    models = ["two_lobe.v1", "two_lobe_balanced.v1", "kajiya_kay.v1", "marschner.v1", "isotropic.v1", "phase_two_lobe.v1", "microflake.v1", "phase_isotropic.v1"]
+    run(tmp_path, models=models, path_budget=20000)
+    first = result(tmp_path)
+    assert [m["id"] for m in first["models"]] == models and sum(m["best"] for m in first["models"]) == 1
+    assert (tmp_path / "log.txt").read_text().count("validation of ") == 8
+    os.remove(tmp_path / "work" / "report.done")
+    os.remove(tmp_path / "results" / "result.json")
+    run_again(tmp_path)
+    again = result(tmp_path)
+    assert again["models"] == first["models"]
+    assert (tmp_path / "log.txt").read_text().count("validation of ") == 8
+
+
+def test_a_gain_for_each_photograph(tmp_path):
+    """Rows that are the cloth's own radiances times known gains: the gains are found, errors are told with and without them, and a
+    bad row of weight 0 is in neither."""
+    known = {"fixed": {"C_R": 0.1, "C_TT": 0.85, "beta_TT": 10, "gamma_TT": 10}, "bounds": {"beta_R": [4.99, 5.01]}, "path_budget": 400000}
+    gains = [1.1, 0.92, 1.05, 0.9, 1.08, 0.93]
+    for name in ("own", "told"):
+        (tmp_path / name).mkdir()
+    run(tmp_path / "own", **known)
+    lines = TABLE.splitlines()
+    for i, (row, gain) in enumerate(zip(result(tmp_path / "own")["rows"], gains)):
+        lines[2 + i] = ",".join(lines[2 + i].split(",")[:6] + [f"{gain * v:.6f}" for v in row["rendered"]]) + ",1"
+    lines[1] += ",weight"
+    lines.append("fit,20,0,30,90,0,0.9,0.9,0.9,0")
+    run(tmp_path / "told", "\n".join(lines) + "\n", nuisance={"gain": "per_photograph", "gain_prior_rel": 0.1}, **known)
+    told = result(tmp_path / "told")
+    for row, gain in zip(told["rows"], gains):
+        assert abs(row["gain"] - gain) < 4 * row["gain_se"] + 0.005, (row["gain"], row["gain_se"], gain)
+        assert 0 < row["gain_se"] < 0.06
+    assert 0.06 < told["fit_rel_rms"] < 0.11 and 0.05 < told["heldout_rel_rms"] < 0.1
+    for key in ("fit_rel_rms_with_gains", "heldout_rel_rms_with_gains"):
+        assert told[key] < 0.02 + 4 * told[key + "_se"], (key, told[key], told[key + "_se"])
+    assert "with them" in (tmp_path / "told" / "results" / "summary.txt").read_text()

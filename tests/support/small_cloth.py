@@ -30,3 +30,13 @@ def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
     head = b"HAIR" + struct.pack("<IIIIfffff", strands, strands * points, 2 | 4, points - 1, 2 * radius_mm, 0.0, 1.0, 1.0, 1.0) + text
     assert len(head) == 128
     return head + struct.pack(f"<{len(xyz)}f", *xyz) + struct.pack(f"<{len(thickness)}f", *thickness)
+
+
+def start_small_job(daemon, document):
+    """A job of this document, which names cloth.hair and rows.csv, uploaded and started."""
+    job = daemon.create(document)
+    daemon.upload(job, "cloth.hair", hair(), "fibers")
+    daemon.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    reply = daemon.post(f"/v1/jobs/{job}/start")
+    assert reply.status_code == 202, reply.text
+    return job

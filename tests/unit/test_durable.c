@@ -328,6 +328,27 @@ static void test_seek(void **state)
     assert_int_equal(from, 0);
 }
 
+/* A file that another writer made: on disk before it has its name, the name on disk before the call returns. */
+static void test_rename(void **state)
+{
+    char temporary[4096];
+    struct error err;
+    snprintf(temporary, sizeof temporary, "%s", scratch_path(state, "picture.part"));
+    const char *path = scratch_path(state, "picture.png");
+    scratch_write(temporary, "pixels", 6);
+    watch = (struct watched_syncs){0};
+    assert_int_equal(durable_rename(temporary, path, NULL), STATUS_OK);
+    assert_true(watch.n_data == 1 && watch.n_folder == 1);
+    assert_true(access(temporary, F_OK) != 0 && access(path, F_OK) == 0);
+    assert_int_equal(durable_rename(temporary, path, &err), STATUS_NOT_FOUND); /* nothing to rename; what is there stays */
+    assert_int_equal(access(path, F_OK), 0);
+    scratch_write(temporary, "pixels", 6);
+    watch = (struct watched_syncs){.fail_with = EIO};
+    assert_int_equal(durable_rename(temporary, path, &err), STATUS_IO);
+    watch = (struct watched_syncs){0};
+    assert_true(access(temporary, F_OK) != 0 && access(path, F_OK) == 0 && strstr(err.text, "picture") != NULL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -344,6 +365,7 @@ int main(void)
         cmocka_unit_test(test_name_without_folders),
         cmocka_unit_test(test_full_disk_is_told),
         cmocka_unit_test(test_seek),
+        cmocka_unit_test(test_rename),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

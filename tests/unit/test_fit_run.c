@@ -283,6 +283,69 @@ static void test_photograph_gain_estimate(void **state)
     assert_true(fabs(gain - 1.0) < 1e-4 && fabs(se / 1e-3 - 1.0) < 1e-3);
 }
 
+/* Noise that the channels share, a gain that the prior hardly holds: by the gain of both replicas together the product of the
+ * residuals would be too small by the variance of their mean; each by its own, it is right. */
+static void test_own_gains_leave_no_bias(void **state)
+{
+    (void)state;
+    enum { ROUND = 20000 };
+    const double noise = 0.02, mean[3] = {0.3, 0.4, 0.5}, off[3] = {0.01, 0.0, -0.01}; /* what no gain mends, relative */
+    double sum = 0.0, square = 0.0, exact = 0.0;
+    struct observation o = {.weight = 1.0};
+    struct rng rng;
+    rng_start(&rng, &(struct rng_key){.seed = 12}, 0, 0);
+    for (int c = 0; c < 3; c++) o.mean_rgb[c] = 1.1 * mean[c] * (1.0 + off[c]);
+    for (int round = -1; round < ROUND; round++) { /* the first without noise */
+        struct estimate e[2];
+        double normal[2], product = 0.0;
+        rng_normal_pair(&rng, normal);
+        for (int q = 0; q < 2; q++) {
+            for (int c = 0; c < 3; c++) {
+                e[q].mean[c] = mean[c] * (1.0 + (round < 0 ? 0.0 : noise * normal[q]));
+                e[q].var[c] = noise * noise * mean[c] * mean[c];
+            }
+            nuisance_apply_own_gain(&o, &e[q], 1.0, 1e-4, &e[q]);
+        }
+        for (int c = 0; c < 3; c++) product += (e[0].mean[c] - o.mean_rgb[c]) * (e[1].mean[c] - o.mean_rgb[c]);
+        if (round < 0) exact = product;
+        else sum += product / ROUND, square += product * product / ROUND;
+    }
+    double se = sqrt((square - sum * sum) / ROUND);
+    print_message("squared error with own gains %.3g +- %.1g, without noise %.3g\n", sum, se, exact);
+    assert_true(exact > 1e-5 && fabs(sum - exact) < 4.0 * se + 0.02 * exact);
+    assert_true(4.0 * se < 0.1 * exact);
+}
+
+/* Two channels tied in proportion, each with a prior of its own: two statements about the leader, although their numbers are the
+ * same; tied as equals they are one. */
+static void test_priors_of_tied_channels(void **state)
+{
+    (void)state;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct fit_option o;
+    double precision[3];
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
+    for (int kind = 0; kind < 3; kind++) {
+        struct fit_layout l;
+        fit_option_init(&o);
+        o.prior_mean[0] = 0.2;
+        o.prior_se[0] = 0.02;
+        if (kind > 0) {
+            o.leader[1] = 0;
+            o.ratio[1] = kind == 1 ? 1.0 : 0.5;
+            o.prior_mean[1] = 0.2;
+            o.prior_se[1] = 0.02;
+        }
+        assert_int_equal(fit_layout_init(&l, fake_param, parameter, FAKE_N_PARAM, &o, NULL), STATUS_OK);
+        precision[kind] = l.prior[0].precision;
+        double mean = 1.0 / (1.0 + exp(-l.prior[0].mean));
+        if (kind < 2) assert_true(fabs(mean - 0.2) < 1e-9);
+        else assert_true(mean > 0.21 && mean < 0.35); /* 0.2 +- 0.02 and 0.4 +- 0.04 together */
+    }
+    assert_true(precision[1] == precision[0] && precision[2] > 1.1 * precision[0]);
+}
+
 /* Starts lie inside the bounds, differ, and the best is kept; all are listed. */
 static void test_starts(void **state)
 {
@@ -502,6 +565,8 @@ int main(void)
         cmocka_unit_test(test_global_gain_and_stray_light),
         cmocka_unit_test(test_gain_of_each_photograph),
         cmocka_unit_test(test_photograph_gain_estimate),
+        cmocka_unit_test(test_own_gains_leave_no_bias),
+        cmocka_unit_test(test_priors_of_tied_channels),
         cmocka_unit_test(test_starts),
         cmocka_unit_test(test_resume),
         cmocka_unit_test(test_too_many_unknowns),

@@ -140,6 +140,7 @@ static void test_volume(void **state)
     check_error(VOLUME_OF("\"density_low\":5,\"density_high\":5"), "volume.density_high", "above");
     check_error(VOLUME_OF("\"filter\":{\"eps_d\":2}"), "volume.filter.eps_d", "0 to 1");
     check_error(VOLUME_OF("\"filter\":{\"h\":1.5}"), "volume.filter.h", "whole number");
+    check_error(VOLUME_OF("\"filter\":{\"h\":64}"), "volume.filter.h", "3 to 63");
     check_error(VOLUME_OF("\"filter\":{\"epsd\":1}"), "volume.filter.epsd", "unknown field");
     check_error(VOLUME_OF("\"density_low\":1e999"), "", "not valid JSON");
 }
@@ -321,6 +322,8 @@ static void test_fit_option_errors(void **state)
                 "'gamma_TT' at 10: its bounds are 20 and 45, with those of what 'fit.tied' ties it to");
     check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"start\":{\"beta_TT\":40}}"), "fit.start",
                 "'beta_TT' at 40: its bounds are 10 and 22.5, with");
+    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":30},\"start\":{\"beta_TT\":20}}"),
+                "fit.start", "'beta_TT', which 'fit.fixed' holds fixed");
     check_error(FIT_OF("{\"fit_radius\":1}"), "fit.fit_radius", "true, false or an object of lower_um and upper_um");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5}}}"), "fit.priors.beta_R.se", "missing");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 10");

@@ -216,6 +216,50 @@ static void test_uncertainty(void **state)
     linear_model_release(&m);
 }
 
+/* Means that are off by 1 % and contrasts that are off by 30 %: each kind has its own misfit, and what is told of a photograph's
+ * means (misfit, noise, stated error) is of the means alone. */
+static void test_contrasts_have_a_misfit_of_their_own(void **state)
+{
+    (void)state;
+    enum { ROWS = 600 };
+    struct linear_model m;
+    struct uncertainty u;
+    struct coordinate k;
+    struct rng rng;
+    double misfit[2], se_means_alone = 0.0;
+    const bool fixed = false;
+    rng_start(&rng, &(struct rng_key){.seed = 6}, 0, 0);
+    assert_int_equal(linear_model_init(&m, ROWS, 1, NULL), STATUS_OK);
+    coordinate_init(&k, &fake_param[6], fake_param[6].lower, fake_param[6].upper);
+    m.x_ref[0] = log(fake_param[6].start);
+    for (int with_contrasts = 0; with_contrasts < 2; with_contrasts++) {
+        for (size_t row = 0; row < ROWS; row++) {
+            double normal[4], left = row < ROWS / 2 ? 0.01 : 0.3, noise = row < ROWS / 2 ? 0.002 : 0.05;
+            rng_normal_pair(&rng, normal);
+            rng_normal_pair(&rng, normal + 2);
+            m.contrast[row] = row >= ROWS / 2;
+            m.extra[row] = row < ROWS / 2 || with_contrasts ? 1.0 : 0.0;
+            m.photograph_var[row] = m.extra[row] * noise * noise;
+            for (int q = 0; q < 2; q++) {
+                m.r[q][row] = m.extra[row] * (left * normal[0] + noise * normal[1 + q]);
+                m.r_var[q][row] = m.extra[row] * noise * noise;
+                m.j[q][row] = row < ROWS / 2 ? 0.5 : 0.0; /* contrasts say nothing about this parameter */
+            }
+        }
+        linear_model_misfits(&m, 1, misfit);
+        assert_true(fabs(misfit[0] / 1e-4 - 1.0) < 0.3); /* 300 squared normals: to 8 % */
+        assert_true(with_contrasts ? fabs(misfit[1] / 0.09 - 1.0) < 0.3 : misfit[1] == 0.0);
+        uncertainty_compute(&m, &k, &fixed, &u);
+        assert_true(u.misfit_var == misfit[0]);
+        assert_true(fabs(u.noise_var / (0.5 * 0.002 * 0.002) - 1.0) < 1e-9 && fabs(u.photograph_var / (0.002 * 0.002) - 1.0) < 1e-9);
+        if (with_contrasts)
+            assert_true(fabs(u.se_param[0] / se_means_alone - 1.0) < 0.2);
+        else
+            se_means_alone = u.se_param[0];
+    }
+    linear_model_release(&m);
+}
+
 /* Residuals of 1 % that nothing explains in rows known to 0.2 %, among rows known to 5 %: the misfit is found in spite of
  * those, none is where the stated errors explain it, and weights follow; an extra weight changes neither. */
 static void test_misfit_and_weights(void **state)
@@ -299,7 +343,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_by_hand),     cmocka_unit_test(test_unbiased), cmocka_unit_test(test_gradient),
         cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices),
-        cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights), cmocka_unit_test(test_weighted_objective),
+        cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights),
+        cmocka_unit_test(test_contrasts_have_a_misfit_of_their_own), cmocka_unit_test(test_weighted_objective),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -44,10 +44,29 @@ static void test_work_file(void **state)
         assert_int_not_equal(work_file_read(path, "t.1", damaged, 3, NULL), STATUS_OK);
         assert_null(damaged[1].data);
     }
+    assert_true(back == fixed); /* what the caller has stays as it was */
     scratch_write(path, bytes, n);
     struct work_section other[] = {{&back, sizeof back}, {NULL, 0}, {NULL, 0}};
     assert_int_equal(work_file_read(path, "t.2", other, 3, NULL), STATUS_FORMAT);
     free(bytes);
+}
+
+/* As many sections as a job of the most models has, and not one more. */
+static void test_work_file_of_many_sections(void **state)
+{
+    const char *path = scratch_path(state, "many.bin");
+    size_t in[WORK_FILE_MAX_SECTION], out[WORK_FILE_MAX_SECTION + 1];
+    struct work_section to[WORK_FILE_MAX_SECTION + 1], from[WORK_FILE_MAX_SECTION];
+    for (size_t i = 0; i <= WORK_FILE_MAX_SECTION; i++) {
+        out[i] = 100 + i;
+        to[i] = (struct work_section){&out[i], sizeof out[i]};
+        if (i < WORK_FILE_MAX_SECTION) from[i] = (struct work_section){&in[i], sizeof in[i]};
+    }
+    assert_int_equal(work_file_write(path, "m.1", to, WORK_FILE_MAX_SECTION, NULL), STATUS_OK);
+    assert_int_equal(work_file_read(path, "m.1", from, WORK_FILE_MAX_SECTION, NULL), STATUS_OK);
+    for (size_t i = 0; i < WORK_FILE_MAX_SECTION; i++) assert_int_equal(in[i], out[i]);
+    assert_int_equal(work_file_write(path, "m.1", to, WORK_FILE_MAX_SECTION + 1, NULL), STATUS_INTERNAL);
+    assert_int_equal(work_file_read(path, "m.1", to, WORK_FILE_MAX_SECTION + 1, NULL), STATUS_INTERNAL);
 }
 
 static void test_folder(void **state)
@@ -172,7 +191,8 @@ static void test_inputs(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_folder),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_work_file_of_many_sections),
+                                       cmocka_unit_test(test_folder),
                                        cmocka_unit_test(test_series), cmocka_unit_test(test_inputs)};
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -99,6 +99,53 @@ static void test_bounds_of_one_channel(void **state)
     observation_set_release(&o);
 }
 
+/* An estimator that a fit may not ask for anything beyond the bounds of its parameters. */
+struct strict {
+    struct estimator inner;
+    const struct coordinate *k;
+};
+
+static status run_strict(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
+                         double *wall_s, struct error *err)
+{
+    const struct strict *s = context;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) assert_true(call->param[p] >= s->k[p].param_lower && call->param[p] <= s->k[p].param_upper);
+    return s->inner.run(s->inner.context, call, progress, out, wall_s, err);
+}
+
+/* The leader of a tie in proportion may not go as far as the channels beside it: what follows it would leave the model's range. */
+static void test_channels_stay_within_their_own_bounds(void **state)
+{
+    (void)state;
+    struct fake_cloth f;
+    struct observation_set o;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct coordinate k[FAKE_N_PARAM];
+    struct rescale_curve curve[FAKE_N_PARAM];
+    size_t n_path[FAKE_N_FIT];
+    double start[FAKE_N_PARAM], wall_s = 0.0;
+    uint64_t used = 0;
+    fake_cloth_init(&f, 1, FAKE_N_FIT);
+    struct strict strict = {fake_estimator(&f), k};
+    struct estimator e = strict.inner;
+    e.context = &strict;
+    e.run = run_strict;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+        double upper = p == 0 ? 0.4995 : fake_param[p].upper;
+        start[p] = fake_param[p].start;
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, upper, start[p], false};
+        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, upper);
+    }
+    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
+    observation_set_init(&o);
+    assert_int_equal(fake_observe(&f, start, 0.0, 1, &o), STATUS_OK);
+    const struct fit_problem problem = {
+        .n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
+    assert_int_equal(rescale_measure(&problem, k, n_path, curve, &used, &wall_s, NULL), STATUS_OK);
+    assert_true(curve[1].c[curve[1].n - 1] == fake_param[1].upper && curve[0].c[curve[0].n - 1] == 0.4995);
+    observation_set_release(&o);
+}
+
 /* Without noise the measured curve is eq. 5.14 word for word, and colours get a third of it. */
 static void test_measured_curve(void **state)
 {
@@ -153,6 +200,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_published_table),
                                        cmocka_unit_test(test_points_within_bounds), cmocka_unit_test(test_map),
                                        cmocka_unit_test(test_bounds_of_one_channel),
+        cmocka_unit_test(test_channels_stay_within_their_own_bounds),
                                        cmocka_unit_test(test_measured_curve)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,8 @@
 #include "optimizer/descent/estimate_journal.h"
 #include "optimizer/descent/fit_run.h"
 #include "optimizer/descent/method_names.h"
+#include "optimizer/objective/linear_gain.h"
+#include "optimizer/objective/objective.h"
 #include "optimizer/photographs/photograph_contrast.h"
 #include "renderer/transport/appearance_estimate.h"
 #include "renderer/transport/estimate_blocks.h"
@@ -294,6 +296,41 @@ static void test_photograph(void **state)
     assert_non_null(strstr(err.text, "board.exr"));
 }
 
+/* Blocks that scatter at random: the stated error of a contrast is the scatter of contrasts of such photographs. A channel that is
+ * black has no contrast, and the photograph's row does not count. */
+static void test_photograph_error(void **state)
+{
+    (void)state;
+    enum { PX = 2 * SIDE, ROUND = 1000 };
+    double sum = 0.0, sum2 = 0.0, contrast, se, stated = 0.0;
+    struct image im;
+    assert_int_equal(image_init(&im, PX, PX, 3, NULL), STATUS_OK);
+    for (uint32_t k = 0; k < ROUND; k++) {
+        const struct rng_key key = {.seed = 9, .iteration = k};
+        for (size_t i = 0; i < PX * PX; i++) {
+            struct rng r;
+            double z[2];
+            rng_start(&r, &key, (uint32_t)(i / PX / 2 * SIDE + i % PX / 2), 0); /* of its block */
+            rng_normal_pair(&r, z);
+            im.pixel[3 * i] = im.pixel[3 * i + 1] = (float)(1.0 + 0.2 * z[0]);
+        }
+        assert_int_equal(image_contrast(&im, 0, SIDE, &contrast, &se, NULL), STATUS_OK);
+        sum += contrast / ROUND;
+        sum2 += contrast * contrast / ROUND;
+        stated += se * se / ROUND;
+    }
+    double ratio = sqrt(stated / (sum2 - sum * sum));
+    print_message("stated error of a contrast over its scatter: %.3f\n", ratio);
+    assert_true(fabs(ratio - 1.0) < 0.15); /* 1000 rounds: 3 % */
+    assert_int_equal(image_contrast(&im, 2, SIDE, &contrast, &se, NULL), STATUS_OK);
+    assert_true(contrast == 0.0 && se == 1.0);
+    image_release(&im);
+    struct observation o = {.weight = 2.0, .n_cell = SIDE, .contrast_rgb = {0.04, 0.04, 0.0}, .contrast_se_rgb = {0.01, 0.01, 1.0}};
+    assert_true(observation_of_contrast(&o, 3.0).weight == 0.0);
+    o.contrast_se_rgb[2] = 0.01;
+    assert_true(observation_of_contrast(&o, 3.0).weight == 6.0);
+}
+
 struct fixture {
     struct board board;
     struct estimator estimator;
@@ -394,6 +431,36 @@ static void test_gain(void **state)
     }
 }
 
+/* Photographs that are 5 % too bright or too dark each, and contrasts that the model misses by far: the gains are taken out as
+ * if there were no contrasts. */
+static void test_gains_beside_contrasts_that_do_not_fit(void **state)
+{
+    (void)state;
+    enum { N = 16 };
+    struct observation_set o;
+    struct linear_model m;
+    observation_set_init(&o);
+    for (size_t i = 0; i < 2 * N; i++) {
+        struct observation item = {.weight = 1.0, .mean_rgb = {0.3, 0.2, 0.4}};
+        if (i >= N) item.configuration.contrast_cells = SIDE;
+        assert_int_equal(observation_set_append(&o, &item, NULL), STATUS_OK);
+    }
+    assert_int_equal(linear_model_init(&m, 6 * N, 1, NULL), STATUS_OK);
+    m.gain_sd = 0.05;
+    for (size_t row = 0; row < m.n_row; row++) {
+        const struct observation *item = &o.item[row / 3];
+        double gain = row / 3 % 2 == 0 ? 0.05 : -0.05;
+        for (int q = 0; q < 2; q++) m.r[q][row] = row < 3 * N ? sqrt(objective_weight(item)) * item->mean_rgb[row % 3] * gain : 0.15;
+    }
+    linear_gain_absorb(&m, &o);
+    for (size_t row = 0; row < m.n_row; row++) {
+        double before = row < 3 * N ? 0.05 * sqrt(objective_weight(&o.item[0])) * o.item[0].mean_rgb[row % 3] : 0.15;
+        assert_true(row < 3 * N ? fabs(m.r[0][row]) < 0.1 * before : m.r[0][row] == before);
+    }
+    linear_model_release(&m);
+    observation_set_release(&o);
+}
+
 static void test_resume(void **state)
 {
     struct fixture x;
@@ -428,8 +495,16 @@ static void test_resume(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_unbiased),   cmocka_unit_test(test_derivative), cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_against_picture), cmocka_unit_test(test_photograph), cmocka_unit_test(test_recovery),
-        cmocka_unit_test(test_gain),       cmocka_unit_test(test_resume)};
+        cmocka_unit_test(test_unbiased),
+        cmocka_unit_test(test_derivative),
+        cmocka_unit_test(test_same_bits),
+        cmocka_unit_test(test_against_picture),
+        cmocka_unit_test(test_photograph),
+        cmocka_unit_test(test_photograph_error),
+        cmocka_unit_test(test_recovery),
+        cmocka_unit_test(test_gain),
+        cmocka_unit_test(test_gains_beside_contrasts_that_do_not_fit),
+        cmocka_unit_test(test_resume),
+    };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
