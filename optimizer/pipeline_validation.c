@@ -142,11 +142,11 @@ static void warn_of_equals(struct pipeline_context *c)
         const struct objective_value *x = pipeline_judged_error(&c->model[best]), *y = pipeline_judged_error(&c->model[i]);
         if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
         if (used == 0)
-            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.2g +- %.2g %%) from",
+            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.3g +- %.2g %%) from",
                                     held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
                                     100.0 * x->rel_rms_se);
         n = used < sizeof text ? sizeof text - used : 0;
-        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.2g +- %.2g %%)", c->model[i].appearance.id,
+        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.3g +- %.2g %%)", c->model[i].appearance.id,
                                  100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
     }
     if (used > 0) worker_status_warn(c->status, text);

@@ -309,11 +309,14 @@ static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_obse
     return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
 }
 
-/* What further steps could gain of the objective as the fit weighs rows, in percent. It is told to first order: not more than all. */
+/* What further steps could gain of the objective as the fit weighs rows, in percent, rounded to two digits ("%g" tells 100 as such).
+ * It is told to first order: not more than all. */
 static double promised_percent(const struct gauss_newton *g)
 {
     double weighted = linear_model_weighted_objective(&g->model);
-    return weighted > 0.0 ? fmin(100.0, 100.0 * g->far_gain / weighted) : 100.0;
+    double percent = weighted > 0.0 ? fmin(100.0, 100.0 * g->far_gain / weighted) : 100.0;
+    double digit = percent > 0.0 ? pow(10.0, floor(log10(percent)) - 1.0) : 1.0;
+    return digit * round(percent / digit);
 }
 
 static void explain_end(const struct gauss_newton *g, bool precise, double f, double se, struct fit_result *result)
@@ -321,11 +324,11 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
     char *text = result->reason;
     size_t n = sizeof result->reason;
     if (precise)
-        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %.2g %%", f, se,
+        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %g %%", f, se,
                  promised_percent(g));
     else
         snprintf(text, n,
-                 "further steps promise to lower the objective by %.2g %%, and tracing adds %.1f times the photographs' own "
+                 "further steps promise to lower the objective by %g %%, and tracing adds %.1f times the photographs' own "
                  "variance; exact renderings would narrow the errors by some %.0f %%",
                  promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
@@ -338,7 +341,7 @@ static void explain_early_end(const struct gauss_newton *g, const char *used, bo
     size_t n = sizeof result->reason;
     if (result->converged)
         snprintf(text, n,
-                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %.2g %%; more paths "
+                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %g %%; more paths "
                  "would narrow the errors",
                  used, f, se, promised_percent(g));
     else if (failed)
