@@ -5,6 +5,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/phantom_view_table.h"
 #include "optimizer/photographs/observation.h"
+#include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 
 #include <jansson.h>
@@ -125,20 +126,40 @@ static status finish_picture(const struct phantom_photograph_option *o, const st
     return st;
 }
 
+static struct configuration view_configuration(const struct phantom_photograph_option *o, const struct job_photograph *v)
+{
+    const struct job_document set_up = {.lamp_side_cm = o->lamp_side_cm, .lamp_distance_cm = o->lamp_distance_cm,
+                                        .camera_distance_cm = o->camera_distance_cm, .crop_cm = o->crop_cm};
+    return observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg, v->camera_phi_deg,
+                                     v->cloth_rotation_deg);
+}
+
+static status check_view(const struct phantom_photograph_option *o, const struct job_photograph *v, struct error *err)
+{
+    const struct configuration c = view_configuration(o, v);
+    if (estimate_check_configurations(&c, 1, 0, 0, NULL) != STATUS_OK || !(v->light_theta_deg >= 0.0 && v->light_theta_deg <= 180.0))
+        return error_set(err, STATUS_INVALID,
+                         "photograph '%s' makes no sense: camera_theta_deg must be 0 to below 90, light_theta_deg 0 to 180, and "
+                         "distances, lamp and crop above 0",
+                         v->file);
+    if (o->black_sheet && v->light_theta_deg >= 90.0)
+        return error_set(err, STATUS_INVALID,
+                         "photograph '%s' would be black: the lamp at %g degrees is behind the black sheet (--no-black-sheet)", v->file,
+                         v->light_theta_deg);
+    return STATUS_OK;
+}
+
 static status make_photograph(const struct phantom_photograph_option *o, const struct scene *scene, const struct job_photograph *v,
                               size_t number, struct thread_pool *pool, const struct progress *progress, json_t *photographs,
                               json_t *truth_rows, struct error *err)
 {
     char path[4096];
     struct image im = {0};
-    const struct job_document set_up = {.lamp_side_cm = o->lamp_side_cm, .lamp_distance_cm = o->lamp_distance_cm,
-                                        .camera_distance_cm = o->camera_distance_cm, .crop_cm = o->crop_cm};
-    const struct configuration c = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
-                                                             v->camera_phi_deg, v->cloth_rotation_deg);
-    const size_t n_pixel = o->px * o->px;
+    const struct configuration c = view_configuration(o, v);
+    const size_t n_pixel = o->px * o->px, n_sample = (size_t)((o->n_path + n_pixel - 1) / n_pixel);
     const struct render_request q = {.scene = scene, .model = o->model, .param = o->param, .configuration = &c, .width = o->px,
-                                     .height = o->px, .n_sample = (size_t)((o->n_path + n_pixel - 1) / n_pixel), .seed = o->seed,
-                                     .stream = (uint32_t)number};
+                                     .height = o->px, .n_sample = n_sample > 2 ? n_sample : 2, /* one has no error */
+                                     .seed = o->seed, .stream = (uint32_t)number};
     status st = render_run(&q, pool, progress, &im, err);
     if (st != STATUS_OK) return st;
     json_t *row = json_pack("{s:s,s:s,s:f,s:f,s:f,s:f,s:f,s:f}", "file", v->file, "set", v->set == JOB_SET_FIT ? "fit" : "held-out",
@@ -184,6 +205,7 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
     }
     if (o->table_file == NULL) phantom_view_table_builtin(t);
     else st = phantom_view_table_read(t, o->table_file, err);
+    for (size_t i = 0; i < t->n && st == STATUS_OK; i++) st = check_view(o, &t->view[i], err);
     if (st == STATUS_OK) st = durable_make_folder(o->folder, err);
     if (st == STATUS_OK) st = load_scene(o, &scene, truth, err);
     const struct progress quiet = progress_silent(progress);

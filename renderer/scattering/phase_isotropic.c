@@ -11,9 +11,9 @@ struct phase_state {
 };
 
 static const struct param_info param_table[3] = {
-    {"alpha.r", "alpha", "", 0, 0.001, 1, 0.85},
-    {"alpha.g", "alpha", "", 1, 0.001, 1, 0.85},
-    {"alpha.b", "alpha", "", 2, 0.001, 1, 0.85},
+    {"alpha.r", "alpha", "", 0, 0.001, 0.999, 0.85}, /* at 1 paths end only where they leave, and long ones are cut */
+    {"alpha.g", "alpha", "", 1, 0.001, 0.999, 0.85},
+    {"alpha.b", "alpha", "", 2, 0.001, 0.999, 0.85},
 };
 
 static status prepare(const double *param, struct phase_state **state, struct error *err)

@@ -7,7 +7,8 @@ void camera_init(struct camera *m, const struct configuration *c)
     double theta = c->camera_theta_rad, phi = c->camera_phi_rad - c->cloth_rotation_rad;
     double crop = 1e3 * c->crop_m, aspect = c->crop_aspect > 0 ? c->crop_aspect : 1;
     m->far_field = c->camera == CAMERA_FAR_FIELD;
-    double distance = m->far_field ? 1e3 : 1e3 * c->camera_distance_m; /* far-field: any */
+    /* far-field: any, as long as all of the crop's rays start above the cloth */
+    double distance = m->far_field ? 1e3 + 0.5 * crop / aspect * tan(theta) : 1e3 * c->camera_distance_m;
     double back[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
     double up[3] = {-cos(theta) * cos(phi), -cos(theta) * sin(phi), sin(theta)};
     double right[3] = {up[1] * back[2] - up[2] * back[1], up[2] * back[0] - up[0] * back[2],

@@ -1,6 +1,7 @@
 #include "renderer/transport/render.h"
 
 #include "renderer/transport/camera.h"
+#include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/path_tracer.h"
 #include "renderer/transport/render_pixels.h"
 
@@ -54,6 +55,7 @@ status render_run(const struct render_request *q, struct thread_pool *pool, cons
                               .context = &r};
     memset(im, 0, sizeof *im);
     status st = render_pixels_check(&p, err);
+    if (st == STATUS_OK) st = estimate_check_configurations(q->configuration, 1, 0, 0, err);
     if (st != STATUS_OK) return st;
     st = parameter_sets_init(&sets, q->scene, q->model, q->param, q->n_set, err);
     if (st == STATUS_OK) {

@@ -238,6 +238,31 @@ static void lights_add_up(void **state)
     environment_free(e);
 }
 
+/* A slab of many layers that nothing gets through: steps as short as a rounding of the height must not carry camera rays out of it at
+ * the face where they came in (1 in 200 at 80 degrees here, if they start on the face itself). */
+static void no_ray_leaves_where_it_enters(void **state)
+{
+    (void)state;
+    const size_t n[3] = {4, 4, 500}, n_path = 400000;
+    const float along[3] = {0, 1, 0};
+    const double dark[3] = {0.001, 0.001, 0.001};
+    struct direction_volume thick;
+    struct volume_scene scene;
+    const struct configuration c = {.light = LIGHT_NO_LAMP, .camera_theta_rad = 80 * M_PI / 180, .camera_distance_m = 1, .crop_m = 1e-3,
+                                    .environment_rgb = {1, 1, 1}};
+    struct estimate e;
+    struct error err = {0};
+    hand_volume_uniform(&thick, n, 5e-6, 255, along);
+    if (volume_scene_init(&scene, &thick, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK) fail_msg("%s", err.text);
+    const struct volume_estimate_request q = {.scene = &scene, .model = phase_find("phase_isotropic.v1"), .param = dark, .configuration = &c,
+                                              .multiplier_per_m = 1e7, .n_configuration = 1, .n_path = &n_path, .seed = 7};
+    if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (!(e.mean[0] <= 1.01 * dark[0] + 4 * sqrt(e.var[0])) || !(sqrt(e.var[0]) < 0.1 * dark[0]))
+        fail_msg("mean radiance %g +- %g of a slab with albedo %g", e.mean[0], sqrt(e.var[0]), dark[0]);
+    volume_scene_release(&scene);
+    direction_volume_release(&thick);
+}
+
 /* A path that gives up inside of the cloth brings no light from beyond it: a column of full voxels and a large multiplier make the steps so short
  * that no ray through the empty voxels beside it gets across within its look-ups. */
 static void a_lost_path_brings_nothing(void **state)
@@ -274,6 +299,7 @@ int main(void)
         cmocka_unit_test(picture_on_the_slab),
         cmocka_unit_test(lights_add_up),
         cmocka_unit_test(a_lost_path_brings_nothing),
+        cmocka_unit_test(no_ray_leaves_where_it_enters),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -110,7 +110,7 @@ static void variances_are_honest(void **state)
 static void agrees_without_avx512(void **state)
 {
     (void)state;
-    const size_t n_path[2] = {4096, 4096};
+    const size_t n_path[2] = {65536, 65536};
     struct fiber_set f;
     struct error err = {0};
     struct scene *plain = NULL;
@@ -125,7 +125,7 @@ static void agrees_without_avx512(void **state)
     for (int i = 0; i < 2; i++)
         for (int c = 0; c < 3; c++) {
             double se = sqrt(with[i].var[c]), off = fabs(with[i].mean[c] - without[i].mean[c]);
-            if (!(off < se)) fail_msg("configuration %d, channel %d: %g, without %g", i, c, with[i].mean[c], without[i].mean[c]);
+            if (!(off < 0.3 * se)) fail_msg("configuration %d, channel %d: %g, without %g", i, c, with[i].mean[c], without[i].mean[c]);
         }
     scene_free(plain);
     fiber_set_release(&f);

@@ -157,6 +157,23 @@ static void test_what_is_written(void **state)
     o.px = 0;
     assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
     o.px = 8;
+    static const char *const bad[][2] = {{"fit,45,0,95,180,0\n", "fit-00.exr' makes no sense"},
+                                         {"fit,45,0,45,180,0\nfit,120,0,0,0,0\n", "fit-01.exr' would be black"}};
+    for (size_t i = 0; i < 3; i++) {
+        char text[300];
+        snprintf(text, sizeof text, "%.*s%s", (int)(strchr(table, '\n') + 1 - table), table, i < 2 ? bad[i][0] : "fit,45,0,45,180,0\n");
+        scratch_write(csv, text, strlen(text));
+        o.crop_cm = i < 2 ? 1.0 : -1.0;
+        assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
+        assert_non_null(strstr(err.text, i < 2 ? bad[i][1] : "fit-00.exr' makes no sense"));
+    }
+    o.crop_cm = 1.0;
+    o.n_path = 1; /* one path a pixel at most, and an error all the same */
+    if (phantom_photographs_make(&o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
+    truth = json_load_file(scratch_path(state, "photographs/truth.json"), 0, NULL);
+    const json_t *first = json_array_get(json_object_get(truth, "photographs"), 0);
+    assert_true(json_real_value(json_array_get(json_object_get(first, "mean_rgb_se"), 0)) > 0.0);
+    json_decref(truth);
     o.fiber_file = "absent.hair";
     assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_NOT_FOUND);
 }
