@@ -145,7 +145,7 @@ docs-fit-curve: | deps-test ## draw docs/images/fit-curve.svg anew: error agains
 docs-grazing: | deps-test ## draw docs/images/microflake-grazing.svg anew: what each model makes of grazing highlights (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@mkdir -p $(BUILD)/bench-fit docs/images
-	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --photograph-paths 100000 --score-paths 20000 --path-budget 2000000 grazing > $(BUILD)/bench-fit/grazing.json
+	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit grazing > $(BUILD)/bench-fit/grazing.json
 	@/usr/bin/python3 tests/bench/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
 
 docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (minutes)
