@@ -46,17 +46,39 @@ static double distance(const float *p, const float *q)
     return sqrt(x * x + y * y + z * z);
 }
 
-static size_t n_piece(const float *p, const float *q, float radius_m)
+/* As a double: a length in a wrong unit gives more than an integer holds. */
+static double n_piece(const float *p, const float *q, float radius_m)
 {
-    double n = ceil(distance(p, q) / (longest_segment_radii * (double)radius_m));
-    return n > 1 ? (size_t)n : 1;
+    return fmax(1, ceil(distance(p, q) / (longest_segment_radii * (double)radius_m)));
 }
 
-/* Room that copying needs; STATUS_INVALID for a fiber too thin for its tile. */
+static status too_far(const double mm[2], int axis, double tile_mm, struct error *err)
+{
+    return error_set(err, STATUS_INVALID,
+                     "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm", mm[0],
+                     mm[1], axis == 0 ? "x" : "y", tile_mm);
+}
+
+/* Axes that reach farther than the widest block (choose_block), before their segments are cut into pieces. */
+static status check_reach(const struct fiber_set *f, struct error *err)
+{
+    for (int a = 0; a < 2; a++) {
+        double mm[2] = {INFINITY, -INFINITY}, tile_mm = f->tile_size_m[a] * MM_PER_M;
+        for (size_t v = 0; v < f->n_vertex; v++) {
+            double x_mm = (double)f->position_m[3 * v + (size_t)a] * MM_PER_M;
+            mm[0] = fmin(mm[0], x_mm);
+            mm[1] = fmax(mm[1], x_mm);
+        }
+        if (mm[0] < -SCENE_MAX_HALF_BLOCK * tile_mm || mm[1] > (SCENE_MAX_HALF_BLOCK + 1) * tile_mm)
+            return too_far(mm, a, tile_mm, err);
+    }
+    return STATUS_OK;
+}
+
+/* Room that copying needs; STATUS_INVALID for a fiber too thin for its tile, STATUS_TOO_LARGE. */
 static status count_vertices(const struct fiber_set *f, size_t *n, struct error *err)
 {
-    double tile_m = fmax(f->tile_size_m[0], f->tile_size_m[1]);
-    *n = f->n_vertex;
+    double tile_m = fmax(f->tile_size_m[0], f->tile_size_m[1]), sum = (double)f->n_vertex;
     for (size_t i = 0; i < f->n_fiber; i++) {
         if ((double)f->radius_m[i] < smallest_radius_of_tile * tile_m)
             return error_set_field(err, STATUS_INVALID, "radius_m",
@@ -64,11 +86,12 @@ static status count_vertices(const struct fiber_set *f, size_t *n, struct error 
                                    "least 1/%.0f of it",
                                    i, (double)f->radius_m[i], tile_m, 1 / smallest_radius_of_tile);
         for (size_t v = f->first_vertex[i]; v + 1 < f->first_vertex[i + 1]; v++)
-            *n += n_piece(f->position_m + 3 * v, f->position_m + 3 * (v + 1), f->radius_m[i]) - 1;
+            sum += n_piece(f->position_m + 3 * v, f->position_m + 3 * (v + 1), f->radius_m[i]) - 1;
     }
-    if (*n > UINT32_MAX)
-        return error_set(err, STATUS_TOO_LARGE, "cannot build scene: %zu vertices, at most %u can be numbered", *n,
+    if (!(sum <= UINT32_MAX))
+        return error_set(err, STATUS_TOO_LARGE, "cannot build scene: %.4g vertices, at most %u can be numbered", sum,
                          UINT32_MAX);
+    *n = (size_t)sum;
     return STATUS_OK;
 }
 
@@ -102,8 +125,9 @@ static void add_segments(struct scene *s, size_t first, size_t i_fiber)
 static status copy_fibers(struct scene *s, const struct fiber_set *f, struct error *err)
 {
     double z_min_m, z_max_m;
-    size_t n;
-    status st = count_vertices(f, &n, err);
+    size_t n = 0;
+    status st = check_reach(f, err);
+    if (st == STATUS_OK) st = count_vertices(f, &n, err);
     if (st != STATUS_OK) return st;
     fiber_set_z_range_m(f, &z_min_m, &z_max_m);
     s->bottom_mm = (float)((z_min_m - z_max_m) * MM_PER_M);
@@ -119,7 +143,7 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
         add_vertex(s, first, f->position_m + 3 * v, f->position_m + 3 * v, 0, z_max_m, radius);
         for (; v + 1 < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v, *q = p + 3;
-            size_t pieces = n_piece(p, q, f->radius_m[i]);
+            size_t pieces = (size_t)n_piece(p, q, f->radius_m[i]);
             for (size_t k = 1; k <= pieces; k++) add_vertex(s, first, p, q, (double)k / (double)pieces, z_max_m, radius);
         }
         if (s->n_vertex - first < 2)
@@ -175,10 +199,7 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
         s->inset_low_mm[a] = (float)((double)hi[a] - (h + 1) * tile);
         s->inset_high_mm[a] = (float)((double)lo[a] + (h + 1) * tile);
         if (s->inset_low_mm[a] > -0.25f * (float)tile || s->inset_high_mm[a] < 1.25f * (float)tile)
-            return error_set(
-                err, STATUS_INVALID,
-                "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm",
-                (double)lo[a], (double)hi[a], a == 0 ? "x" : "y", tile);
+            return too_far((const double[2]){(double)lo[a], (double)hi[a]}, a, tile, err);
     }
     return STATUS_OK;
 }

@@ -9,8 +9,10 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -194,6 +196,41 @@ static void too_thin_fibers_are_refused(void **state)
     fiber_set_release(&f);
 }
 
+/* Two segments of 2^63 pieces each: as integers their sum wraps to one vertex. Along x such a fiber leaves the widest block,
+ * along z nothing else limits it. Read from both kinds of file, as a job would. */
+static void segments_beyond_all_numbers_are_refused(void **state)
+{
+    (void)state;
+    static const char *const text[2] = {"0 0 0 9.5367431640625e-4\n1.7592186044416e18 0 0 9.5367431640625e-4\n"
+                                        "0 0 0 9.5367431640625e-4\n",
+                                        "0 0 0 9.5367431640625e-4\n0 0 1.7592186044416e18 9.5367431640625e-4\n"
+                                        "0 0 0 9.5367431640625e-4\n"};
+    static const status want[2] = {STATUS_INVALID, STATUS_TOO_LARGE};
+    char txt[64], hair[64];
+    snprintf(txt, sizeof txt, "/tmp/selvedge-scene-%ld.txt", (long)getpid());
+    snprintf(hair, sizeof hair, "/tmp/selvedge-scene-%ld.hair", (long)getpid());
+    for (int k = 0; k < 2; k++) {
+        struct fiber_set f;
+        struct scene *s = NULL;
+        struct error err = {0};
+        FILE *file = fopen(txt, "we");
+        assert_non_null(file);
+        fputs(text[k], file);
+        fclose(file);
+        fiber_set_init(&f);
+        for (int kind = 0; kind < 2; kind++) {
+            assert_int_equal(kind == 0 ? fiber_set_read_text(&f, txt, &err) : fiber_set_read_hair(&f, hair, &err), STATUS_OK);
+            f.tile_size_m[0] = f.tile_size_m[1] = 1e-3;
+            assert_int_equal(scene_new(&f, &(struct scene_option){true}, &s, &err), want[k]);
+            assert_non_null(strstr(err.text, k == 0 ? "too far beyond the tile" : "1.845e+19 vertices"));
+            if (kind == 0) assert_int_equal(fiber_set_write_hair(&f, hair, &err), STATUS_OK);
+        }
+        fiber_set_release(&f);
+    }
+    unlink(txt);
+    unlink(hair);
+}
+
 static void camera_looks_at_the_orbit_centre(void **state)
 {
     (void)state;
@@ -268,6 +305,7 @@ int main(void)
         cmocka_unit_test(bad_fibers_are_refused),
         cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
         cmocka_unit_test(too_thin_fibers_are_refused),
+        cmocka_unit_test(segments_beyond_all_numbers_are_refused),
         cmocka_unit_test(camera_looks_at_the_orbit_centre),
         cmocka_unit_test(lamp_is_calibrated),
     };
