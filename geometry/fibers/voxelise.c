@@ -44,9 +44,12 @@ static bool capsule_init(struct capsule *c, const struct job *job, size_t i_fibe
     }
     c->length = sqrt(c->length2);
     c->width_m = cbrt(size[0] * size[1] * size[2]);
-    double ramp2 = fmax(0.0, r * r - c->width_m * c->width_m / 12.0);
-    c->ramp_m = sqrt(ramp2);
-    c->scale = r * r / (ramp2 + c->width_m * c->width_m / 12.0);
+    c->ramp_m = sqrt(fmax(0.0, r * r - c->width_m * c->width_m / 12.0));
+    c->scale = 1.0;
+    if (c->ramp_m < 0.5 * c->width_m) { /* the ramp would not end before the axis: a cone */
+        c->ramp_m = 0.5 * c->width_m;
+        c->scale = 3.0 * r * r / (c->width_m * c->width_m);
+    }
     c->is_first = i_vertex == f->first_vertex[i_fiber];
     c->is_last = i_vertex + 2 == f->first_vertex[i_fiber + 1];
     c->fiber = (uint32_t)i_fiber + 1;
@@ -64,9 +67,25 @@ static double axis_distance(const struct capsule *c, const double p[3])
     return sqrt(sum);
 }
 
-static void add_share(struct slab *s, size_t at, const struct capsule *c, double distance)
+static double share_at(const struct capsule *c, double distance)
 {
-    float share = (float)(c->scale * fmin(0.5 + (c->ramp_m - distance) / c->width_m, 1.0)), away = (float)distance;
+    if (distance < 0.0) return 0.0; /* behind an end */
+    return c->scale * fmin(fmax(0.0, 0.5 + (c->ramp_m - distance) / c->width_m), 1.0);
+}
+
+/* What a cone has beyond the first and the last slice, where the grid ends with the cloth, belongs to that slice. */
+static double share_beyond(const struct job *job, const struct capsule *c, const double p[3], long k)
+{
+    const double step = job->v->voxel_size_m[2];
+    double share = 0.0;
+    if (k == 0) share += share_at(c, axis_distance(c, (const double[3]){p[0], p[1], p[2] - step}));
+    if (k + 1 == (long)job->v->n[2]) share += share_at(c, axis_distance(c, (const double[3]){p[0], p[1], p[2] + step}));
+    return share;
+}
+
+static void add_share(struct slab *s, size_t at, const struct capsule *c, double distance, double beyond)
+{
+    float share = (float)(share_at(c, distance) + beyond), away = (float)distance;
     if (s->owner[at] != c->fiber) {
         s->owner[at] = c->fiber;
         s->share[at] = 0.0f;
@@ -101,7 +120,8 @@ static void draw_capsule(const struct job *job, struct slab *s, const struct cap
                 double distance = axis_distance(c, p);
                 if (distance < 0.0 || distance >= reach) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
-                add_share(s, volume_index(v->n, x, y, (size_t)(k - z_from)), c, distance);
+                add_share(s, volume_index(v->n, x, y, (size_t)(k - z_from)), c, distance,
+                          share_beyond(job, c, p, k));
             }
 }
 

@@ -1,8 +1,10 @@
 /* Fibers as a density and direction volume: what a volume model of appearance sees of a cloth that was given as fibers.
  *
  * Density of a voxel: the share of it inside fibers, taken as clamp(1/2 + (r' - d) / w) of the distance d of its centre
- * from a fiber's axis, w its width; r'^2 = r^2 - w^2 / 12 keeps the area of the section, and fibers thinner than that
- * are drawn as wide as the ramp and as much thinner. Shares of different fibers add, up to 1. Ends are flat. Direction:
+ * from a fiber's axis, w its width; r'^2 = r^2 - w^2 / 12 keeps the area of the section, pi (r'^2 + w^2 / 12), as long as
+ * the ramp ends before the axis (r' >= w / 2). Thinner fibers are drawn as wide as that, as cones of the fiber's area:
+ * 3 r^2 / w^2 (1 - d / w). Narrower ones would slip between the centres of voxels; what is wider than the cloth is thick
+ * goes to its first and last slice. Shares of different fibers add, up to 1. Ends are flat. Direction:
  * the tangent of the fiber whose axis is nearest, as in the direction transfer of the fabric thesis (5.6.7).
  *
  * The grid has a whole number of voxels in a tile, so it is periodic in x and y; its top is the

@@ -2,7 +2,8 @@
  *
  * A voxel's share inside one fiber is taken as clamp(1/2 + (r' - d) / w), d the distance of its centre to the axis, w its width. A
  * ramp of width w has the second moment of a box of width w in any direction, and r'^2 = r^2 - w^2/12 keeps the area of the section:
- * integral of 2 pi d clamp(...) = pi (r'^2 + w^2/12). Shares of different fibers add, up to 1.
+ * integral of 2 pi d clamp(...) = pi (r'^2 + w^2/12), as long as the ramp ends before the axis (r' >= w/2, r >= 0.58 w). Thinner fibers
+ * are cones 3 r^2 / w^2 (1 - d/w), which have their area, too. Shares of different fibers add, up to 1.
  *
  * Slices are drawn, blurred along x and y, and kept in a ring until the blur along z has passed; only the result is as large as the
  * volume. Noise is a function of the voxel's index. So nothing depends on how many slices are worked on together.
@@ -40,7 +41,7 @@ struct scan {
 
 struct capsule {
     double a[3], d[3], length2; /* voxels */
-    double r, r_ramp;
+    double r, r_ramp, scale;    /* scale: below 1 for fibers thinner than the ramp */
     double end[2][3], outward[2][3]; /* of the fiber: its ends are flat, so that what goes on in the next tile joins without a bulge */
 };
 
@@ -106,7 +107,7 @@ static void draw_capsule(struct scan *s, const struct capsule *c, uint32_t fiber
                 double share = 0.5 + c->r_ramp - axis_distance(c, p);
                 if (!(share > 0.0) || behind_an_end(c, p)) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
-                add_share(s, volume_index(s->v->n, x, y, (size_t)k - s->first), fiber, (float)fmin(share, 1.0));
+                add_share(s, volume_index(s->v->n, x, y, (size_t)k - s->first), fiber, (float)(c->scale * fmin(share, 1.0)));
             }
 }
 
@@ -122,7 +123,11 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     memset(s->owner + at, 0, (end - at) * sizeof *s->owner);
     for (size_t i = 0; i < f->n_fiber; i++) {
         double r = (double)f->radius_m[i] * per_m;
-        struct capsule c = {.r = r, .r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0))};
+        struct capsule c = {.r = r, .r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0)), .scale = 1.0};
+        if (c.r_ramp < 0.5) {
+            c.r_ramp = 0.5;
+            c.scale = 3.0 * r * r;
+        }
         fiber_ends(&c, f, i, per_m);
         for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
             const float *p = f->position_m + 3 * k;

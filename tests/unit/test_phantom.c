@@ -182,8 +182,8 @@ static void test_volume_holds_the_material(void **state)
 {
     (void)state;
     const size_t n[3] = {40, 40, 30};
-    const double radius_voxel[] = {1.0, 1.7, 3.5, 6.0};
-    for (size_t i = 0; i < 4; i++)
+    const double radius_voxel[] = {0.1, 0.3, 0.5, 1.0, 1.7, 3.5, 6.0};
+    for (size_t i = 0; i < sizeof radius_voxel / sizeof radius_voxel[0]; i++)
         for (int blurred = 0; blurred < 2; blurred++) {
             struct fiber_set f = oblique_fiber(2e-6 * radius_voxel[i]);
             struct phantom_scan_option o;

@@ -45,7 +45,7 @@ static void slanted(struct fiber_set *f, size_t n, double tile_m, double radius_
         for (size_t k = 0; k < 3; k++) {
             float *p = f->position_m + 3 * (3 * i + k);
             p[0] = (float)(0.5 * tile_m * (double)k);
-            p[1] = 0.37f * p[0];
+            p[1] = 0.37f * p[0] + 0.618f * (float)(tile_m * (double)i);
             p[2] = (float)(0.1 * tile_m * (double)k + 3.3 * radius_m * (double)i);
         }
     }
@@ -56,13 +56,14 @@ static void test_volume_is_kept(void **unused)
     (void)unused;
     const double tile = 300 * um, radius = 10 * um, length = tile * sqrt(1.0 + 0.37 * 0.37 + 0.04), want = M_PI * radius * radius * length;
     /* edges against the radius; the tolerance is that of cutting to voxels at the ends and of bytes for coarse ones */
-    static const double edge[] = {0.3, 0.5, 1.0, 2.0};
+    static const double edge[] = {0.3, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0};
+    enum { N = 25 }; /* many, at all places between the centers of coarse voxels */
     struct fiber_set f;
-    slanted(&f, 3, tile, radius);
+    slanted(&f, N, tile, radius);
     for (size_t i = 0; i < sizeof edge / sizeof edge[0]; i++) {
         struct direction_volume v;
         voxelise(&f, edge[i] * radius, 2, &v);
-        double got = volume_of(&v) / (3.0 * want);
+        double got = volume_of(&v) / (N * want);
         print_message("voxel %.1f r: volume %.4f of the truth\n", edge[i], got);
         assert_true(fabs(got - 1.0) < 0.02);
         direction_volume_release(&v);
