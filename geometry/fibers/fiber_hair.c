@@ -52,27 +52,33 @@ static float get_f32(const uint8_t *from)
     return v;
 }
 
-static status check_writable(const struct fiber_set *f, const char *path, struct error *err)
+/* Strands that a fiber of n vertices is written as: the format counts a strand's segments in 16 bits. */
+static size_t n_strand_of(size_t n) { return (n - 2) / HAIR_MAX_SEGMENT + 1; }
+
+/* What the file will have; the vertex between two strands of a fiber is in both. */
+static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point, struct error *err)
 {
-    if (f->n_fiber > UINT32_MAX || f->n_vertex > UINT32_MAX)
-        return error_set(err, STATUS_TOO_LARGE, "cannot write fibers '%s': %zu vertices, the format ends at %u", path,
-                         f->n_vertex, UINT32_MAX);
+    *n_strand = 0;
     for (size_t i = 0; i < f->n_fiber; i++) {
         size_t n = f->first_vertex[i + 1] - f->first_vertex[i];
-        if (n < 2 || n > HAIR_MAX_SEGMENT + 1)
-            return error_set(err, n < 2 ? STATUS_INVALID : STATUS_TOO_LARGE,
-                             "cannot write fibers '%s': fiber %zu has %zu vertices, the format takes 2 to %d", path, i, n,
-                             HAIR_MAX_SEGMENT + 1);
+        if (n < 2)
+            return error_set(err, STATUS_INVALID, "cannot write fibers '%s': fiber %zu has %zu vertices, at least 2 make a fiber",
+                             name, i, n);
+        *n_strand += n_strand_of(n);
     }
+    *n_point = f->n_vertex + (*n_strand - f->n_fiber);
+    if (*n_point > UINT32_MAX) /* strands are fewer */
+        return error_set(err, STATUS_TOO_LARGE, "cannot write fibers '%s': %zu vertices, the format ends at %u", name, *n_point,
+                         UINT32_MAX);
     return STATUS_OK;
 }
 
-static void put_header(uint8_t *to, const struct fiber_set *f)
+static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point)
 {
     memset(to, 0, HAIR_HEADER_BYTES);
     memcpy(to, "HAIR", 4);
-    put_u32(to + 4, (uint32_t)f->n_fiber);
-    put_u32(to + 8, (uint32_t)f->n_vertex);
+    put_u32(to + 4, (uint32_t)n_strand);
+    put_u32(to + 8, (uint32_t)n_point);
     put_u32(to + 12, HAIR_SEGMENTS | HAIR_POINTS | HAIR_THICKNESS);
     put_f32(to + 20, f->n_fiber > 0 ? 2000.0f * f->radius_m[0] : 0.0f);
     for (size_t c = 0; c < 3; c++) put_f32(to + 28 + 4 * c, 1.0f);
@@ -83,18 +89,26 @@ static void put_header(uint8_t *to, const struct fiber_set *f)
 
 status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err)
 {
-    status s = check_writable(f, path, err);
+    const char *name = path_file_name(path);
+    size_t n_strand = 0, n_point = 0;
+    status s = count_strands(f, name, &n_strand, &n_point, err);
     if (s != STATUS_OK) return s;
-    size_t n_bytes = HAIR_HEADER_BYTES + 2 * f->n_fiber + 16 * f->n_vertex;
+    size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + 16 * n_point;
     uint8_t *data = malloc(n_bytes);
-    if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", path);
-    put_header(data, f);
-    uint8_t *segments = data + HAIR_HEADER_BYTES, *points = segments + 2 * f->n_fiber, *thickness = points + 12 * f->n_vertex;
-    for (size_t i = 0; i < f->n_fiber; i++) {
-        put_u16(segments + 2 * i, (uint32_t)(f->first_vertex[i + 1] - f->first_vertex[i] - 1));
-        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) put_f32(thickness + 4 * k, 2000.0f * f->radius_m[i]);
-    }
-    for (size_t k = 0; k < 3 * f->n_vertex; k++) put_f32(points + 4 * k, 1000.0f * f->position_m[k]);
+    if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
+    put_header(data, f, n_strand, n_point);
+    uint8_t *segments = data + HAIR_HEADER_BYTES, *points = segments + 2 * n_strand, *thickness = points + 12 * n_point;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t from = f->first_vertex[i], last = f->first_vertex[i + 1] - 1; from < last;) {
+            size_t n = last - from < HAIR_MAX_SEGMENT ? last - from : HAIR_MAX_SEGMENT;
+            put_u16(segments, (uint32_t)n);
+            for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
+                for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);
+                put_f32(thickness, 2000.0f * f->radius_m[i]);
+            }
+            segments += 2;
+            from += n;
+        }
     s = durable_replace(path, data, n_bytes, err);
     free(data);
     return s;

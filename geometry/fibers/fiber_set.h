@@ -41,8 +41,9 @@ void fiber_set_classify(struct fiber_set *f);
  * found again from the directions. Reading checks the header against the file's length before it allocates.
  * A fiber's radius is half the mean thickness of its points; default segments and thickness of other programs' files are honoured.
  * Without that text the tile size is 0 and the caller must set it. Reading replaces f's content, or leaves it as it was.
- * Errors of reading name the file without its folder. STATUS_FORMAT (not a .hair file, counts that contradict each other or the length, no thickness, not finite),
- * STATUS_TOO_LARGE when a fiber to write has more than 65,536 vertices (the text names it); STATUS_NOT_FOUND, STATUS_IO, STATUS_DISK_FULL,
+ * A fiber of more than 65,536 vertices is written as several strands that share a vertex, and is several fibers when read back.
+ * Errors name the file without its folder. STATUS_FORMAT (not a .hair file, counts that contradict each other or the length, no thickness, not finite),
+ * STATUS_TOO_LARGE for more vertices to write than the header can count (2^32); STATUS_NOT_FOUND, STATUS_IO, STATUS_DISK_FULL,
  * STATUS_NO_MEMORY. */
 status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err);
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err);

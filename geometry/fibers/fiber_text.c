@@ -13,7 +13,8 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
     char *text = NULL;
     size_t n_bytes = 0;
     FILE *out = open_memstream(&text, &n_bytes);
-    if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", path);
+    const char *name = path_file_name(path);
+    if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
     for (size_t i = 0; i < f->n_fiber; i++) {
         if (i > 0) fputc('\n', out);
         for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
@@ -24,7 +25,7 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
     }
     bool failed = ferror(out) != 0;
     failed = fclose(out) != 0 || failed;
-    status s = failed ? error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", path)
+    status s = failed ? error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name)
                       : durable_replace(path, text, n_bytes, err);
     free(text);
     return s;
