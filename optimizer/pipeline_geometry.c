@@ -187,6 +187,20 @@ status stage_directions_load(struct pipeline_context *c, struct error *err)
 
 /* ---- fibers ---- */
 
+/* No cloth has a fiber as wide as its tile. A length in a wrong unit makes such fibers, all of which meet across the faces:
+ * the pairs of their ends are more than can be counted. */
+static status check_radii(const struct fiber_set *f, const char *name, struct error *err)
+{
+    double most_m = 0.5 * fmin(f->tile_size_m[0], f->tile_size_m[1]);
+    for (size_t i = 0; i < f->n_fiber; i++)
+        if ((double)f->radius_m[i] > most_m)
+            return error_set_field(err, STATUS_INVALID, "fibers.file",
+                                   "cannot use fibers '%s': fiber %zu has a radius of %g mm, the tile is %g x %g mm: the unit may "
+                                   "be wrong, lengths are millimetres",
+                                   name, i, (double)f->radius_m[i] / mm, f->tile_size_m[0] / mm, f->tile_size_m[1] / mm);
+    return STATUS_OK;
+}
+
 static status read_fiber_file(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -207,7 +221,7 @@ static status read_fiber_file(struct pipeline_context *c, struct error *err)
     fiber_set_classify(&c->fiber);
     s = fiber_set_validate(&c->fiber, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, "fibers.file");
-    return s;
+    return s == STATUS_OK ? check_radii(&c->fiber, name, err) : s;
 }
 
 status stage_fibers(struct pipeline_context *c, struct error *err)

@@ -189,10 +189,43 @@ static void test_inputs(void **state)
                       "photographs[0].file");
 }
 
+/* Radii as if in micrometres: refused before the ends on the faces are paired, each with each. */
+static void test_fibers_wider_than_the_tile(void **state)
+{
+    static const char document[] = "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.txt\",\"tile_mm\":[1,2]},"
+                                   "\"measurements\":{\"file\":\"a.csv\"}}";
+    static const char rows[] = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b\n"
+                               "fit,20,0,20,180,.1,.1,.1\nfit,30,0,20,180,.1,.1,.1\nfit,40,0,20,180,.1,.1,.1\n"
+                               "fit,50,0,20,180,.1,.1,.1\nfit,60,0,20,180,.1,.1,.1\nfit,70,0,20,180,.1,.1,.1\n";
+    static const char *const fibers[2] = {"0 0.5 0 0.499\n1 0.5 0 0.499\n",
+                                          "0 0.5 0 0.01\n1 0.5 0 0.01\n\n0 0.5 0 0.501\n1 0.5 0 0.501\n"};
+    assert_int_equal(durable_make_folder(scratch_path(state, "wide/input"), NULL), STATUS_OK);
+    scratch_write(scratch_path(state, "wide/job.json"), document, sizeof document - 1);
+    scratch_write(scratch_path(state, "wide/input/a.csv"), rows, sizeof rows - 1);
+    for (int i = 0; i < 2; i++) {
+        struct worker_folder f;
+        struct pipeline_context c;
+        struct error err = {0};
+        scratch_write(scratch_path(state, "wide/input/a.txt"), fibers[i], strlen(fibers[i]));
+        assert_int_equal(worker_folder_open(&f, scratch_path(state, "wide"), NULL), STATUS_OK);
+        pipeline_context_init(&c);
+        c.folder = &f;
+        if (pipeline_read_inputs(&c, &err) != STATUS_OK) fail_msg("%s", err.text);
+        assert_int_equal(stage_fibers(&c, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
+        if (i == 1) {
+            assert_string_equal(err.field, "fibers.file");
+            assert_non_null(strstr(err.text, "'a.txt': fiber 1 has a radius of 0.501 mm, the tile is 1 x 2 mm: the unit may be wrong"));
+        }
+        pipeline_context_release(&c);
+        worker_folder_close(&f);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_work_file_of_many_sections),
                                        cmocka_unit_test(test_folder),
-                                       cmocka_unit_test(test_series), cmocka_unit_test(test_inputs)};
+                                       cmocka_unit_test(test_series), cmocka_unit_test(test_inputs),
+                                       cmocka_unit_test(test_fibers_wider_than_the_tile)};
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
