@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <tiffio.h>
 
-enum { MAX_PAGE = 1 << 20, MAX_EDGE = 1 << 20, MAX_EXPANSION = 4096 }; /* deflate cannot expand more than 1032-fold; others less or so */
+enum { MAX_PAGE = 1 << 20, MAX_EDGE = 1 << 20 };
 
 struct page {
     size_t i_path;
@@ -107,8 +107,21 @@ static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
     return false;
 }
 
+/* How many bytes one stored byte can stand for. Constant slices come near: 1032 with deflate, 7000 with LZMA, 32768 with zstd
+ * (blocks of 128 KiB in four bytes); LERC stores one block of 90 bytes whatever the slice's size. The others stay far below. */
+static uint64_t most_expansion(uint16_t compression)
+{
+    switch (compression) {
+    case COMPRESSION_NONE: return 1;
+    case COMPRESSION_LZMA: return 1 << 14;
+    case COMPRESSION_ZSTD: return 1 << 16;
+    case COMPRESSION_LERC: return 1 << 20;
+    default: return 1 << 12;
+    }
+}
+
 /* The stored bytes of a page must lie in the file and be enough for what the header promises, before we allocate. */
-static bool page_fits_file(TIFF *tiff, uint64_t page_bytes, uint64_t file_bytes)
+static bool page_fits_file(TIFF *tiff, uint16_t compression, uint64_t page_bytes, uint64_t file_bytes)
 {
     uint32_t n_block = TIFFIsTiled(tiff) ? TIFFNumberOfTiles(tiff) : TIFFNumberOfStrips(tiff);
     if (n_block == 0 || n_block > file_bytes) return false;
@@ -119,9 +132,8 @@ static bool page_fits_file(TIFF *tiff, uint64_t page_bytes, uint64_t file_bytes)
         stored += n;
         if (stored > file_bytes * 2) return false;
     }
-    uint16_t compression = COMPRESSION_NONE;
-    TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &compression);
-    return page_bytes <= stored * (compression == COMPRESSION_NONE ? 1 : MAX_EXPANSION);
+    uint64_t most = most_expansion(compression);
+    return (page_bytes + most - 1) / most <= stored;
 }
 
 /* Reads the header of the current page: all must be alike. i_page counts from 0. */
@@ -129,13 +141,14 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
 {
     const char *name = path_file_name(h->path[h->i_open]);
     uint32_t width = 0, height = 0;
-    uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK;
+    uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK, compression = COMPRESSION_NONE;
     TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
     TIFFGetField(h->tiff, TIFFTAG_IMAGELENGTH, &height);
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_BITSPERSAMPLE, &bits);
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_SAMPLEFORMAT, &format);
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_SAMPLESPERPIXEL, &per_pixel);
     TIFFGetField(h->tiff, TIFFTAG_PHOTOMETRIC, &photometric);
+    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_COMPRESSION, &compression);
     if (width == 0 || height == 0)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu has no pixels", name,
                                i_page + 1);
@@ -168,7 +181,11 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
                                "cannot read volume '%s': page %zu is %s, page 1 is %s", name, i_page + 1, sample_name(t),
                                sample_name(h->sample));
     h->message[0] = '\0';
-    if (!page_fits_file(h->tiff, (uint64_t)width * height * sample_bytes(t), file_bytes))
+    uint64_t page_bytes = (uint64_t)width * height * sample_bytes(t);
+    if (compression != COMPRESSION_NONE && page_bytes > UINT32_MAX) /* as in voxel_stream.c */
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': page %zu is compressed and over 4 GiB",
+                               name, i_page + 1);
+    if (!page_fits_file(h->tiff, compression, page_bytes, file_bytes))
         return error_set_field(err, STATUS_FORMAT, "volume.files",
                                "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them",
                                name, i_page + 1, width, height);

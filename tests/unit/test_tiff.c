@@ -308,6 +308,54 @@ static void test_enormous_pages(void **state)
     }
 }
 
+/* A slice without material is a few bytes in these codecs. */
+static void test_constant_slices(void **state)
+{
+    (void)state;
+    enum { EDGE = 1024 };
+    static const uint16_t compression[] = {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_LZMA, COMPRESSION_ZSTD, COMPRESSION_LERC};
+    static uint16_t pixel[EDGE * EDGE];
+    static float value[EDGE * EDGE];
+    char path[128];
+    const char *list[1] = {path};
+    path_of(path, "constant.tif");
+    for (size_t i = 0; i < EDGE * EDGE; i++) pixel[i] = 513;
+    for (size_t c = 0; c < sizeof compression / sizeof compression[0]; c++) {
+        struct error err = {0};
+        struct volume_source *s = NULL;
+        if (!TIFFIsCODECConfigured(compression[c])) continue;
+        TIFF *t = TIFFOpen(path, "w");
+        TIFFSetField(t, TIFFTAG_IMAGEWIDTH, EDGE);
+        TIFFSetField(t, TIFFTAG_IMAGELENGTH, EDGE);
+        TIFFSetField(t, TIFFTAG_BITSPERSAMPLE, 16);
+        TIFFSetField(t, TIFFTAG_SAMPLESPERPIXEL, 1);
+        TIFFSetField(t, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+        TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, EDGE); /* one strip */
+        TIFFSetField(t, TIFFTAG_COMPRESSION, compression[c]);
+        assert_int_equal(TIFFWriteEncodedStrip(t, 0, pixel, sizeof pixel), sizeof pixel);
+        TIFFClose(t);
+        if (volume_source_open(list, 1, &s, &err) != STATUS_OK) fail_msg("compression %u: %s", compression[c], err.text);
+        assert_int_equal(volume_source_read(s, 0, 1, value, &err), STATUS_OK);
+        for (size_t i = 0; i < EDGE * EDGE; i++) assert_true(value[i] == 513.0f);
+        volume_source_close(s);
+    }
+}
+
+/* A compressed page of 2^40 bytes that a file of a MiB might hold. */
+static void test_compressed_pages_have_a_limit(void **state)
+{
+    (void)state;
+    static uint8_t data[1 << 16];
+    char path[128];
+    path_of(path, "bomb.tif");
+    write_stack(path, 8, 1, COMPRESSION_ZSTD, TEST_STRIPS);
+    size_t n = read_file(path, data, sizeof data);
+    patch_tag(data, TIFFTAG_IMAGEWIDTH, 1 << 20);
+    patch_tag(data, TIFFTAG_IMAGELENGTH, 1 << 20);
+    test_write_bytes(path, data, n);
+    expect_open_error(path, STATUS_TOO_LARGE, "page 1 is compressed and over 4 GiB");
+}
+
 static status read_whole(const char *path, struct reconstruct_option *o, struct error *err)
 {
     struct volume v;
@@ -374,7 +422,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sample_types),  cmocka_unit_test(test_kinds),         cmocka_unit_test(test_slices),     cmocka_unit_test(test_unlike_pages),
         cmocka_unit_test(test_truncated),     cmocka_unit_test(test_damaged),    cmocka_unit_test(test_lying_header),
-        cmocka_unit_test(test_enormous_pages),
+        cmocka_unit_test(test_enormous_pages), cmocka_unit_test(test_constant_slices), cmocka_unit_test(test_compressed_pages_have_a_limit),
         cmocka_unit_test(test_bad_values),    cmocka_unit_test(test_missing),
     };
     return cmocka_run_group_tests(tests, make_folder, NULL);
