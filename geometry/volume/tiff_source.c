@@ -158,6 +158,11 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
     if (per_pixel != 1 || photometric == PHOTOMETRIC_PALETTE)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is a color image", name,
                                i_page + 1);
+    if (photometric == PHOTOMETRIC_MINISWHITE) /* programs disagree whether the values or only their display are turned round */
+        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+                               "cannot read volume '%s': page %zu has PhotometricInterpretation 0 (white is zero): save the stack with black as "
+                               "zero, so that denser material has higher values",
+                               name, i_page + 1);
     enum sample_type t;
     if (!page_sample(bits, format, &t))
         return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",

@@ -356,6 +356,20 @@ static void test_compressed_pages_have_a_limit(void **state)
     expect_open_error(path, STATUS_TOO_LARGE, "page 1 is compressed and over 4 GiB");
 }
 
+/* Its values fall with density: neither taken as they are, nor turned round in silence. */
+static void test_white_is_zero(void **state)
+{
+    (void)state;
+    static uint8_t data[1 << 16];
+    char path[128];
+    path_of(path, "white.tif");
+    write_stack(path, 16, 1, COMPRESSION_NONE, TEST_STRIPS);
+    size_t n = read_file(path, data, sizeof data);
+    patch_tag(data, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+    test_write_bytes(path, data, n);
+    expect_open_error(path, STATUS_UNSUPPORTED, "page 1 has PhotometricInterpretation 0 (white is zero): save the stack with black as zero");
+}
+
 static status read_whole(const char *path, struct reconstruct_option *o, struct error *err)
 {
     struct volume v;
@@ -423,7 +437,7 @@ int main(void)
         cmocka_unit_test(test_sample_types),  cmocka_unit_test(test_kinds),         cmocka_unit_test(test_slices),     cmocka_unit_test(test_unlike_pages),
         cmocka_unit_test(test_truncated),     cmocka_unit_test(test_damaged),    cmocka_unit_test(test_lying_header),
         cmocka_unit_test(test_enormous_pages), cmocka_unit_test(test_constant_slices), cmocka_unit_test(test_compressed_pages_have_a_limit),
-        cmocka_unit_test(test_bad_values),    cmocka_unit_test(test_missing),
+        cmocka_unit_test(test_white_is_zero), cmocka_unit_test(test_bad_values),    cmocka_unit_test(test_missing),
     };
     return cmocka_run_group_tests(tests, make_folder, NULL);
 }
