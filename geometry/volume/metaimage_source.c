@@ -1,5 +1,5 @@
 /* MetaImage: a text header "Key = value" (.mhd) with the data in a file beside it, or header and data
- * in one file (.mha, ElementDataFile = LOCAL). Lengths are in millimetres. Compressed data is zlib's.
+ * in one file (.mha, ElementDataFile = LOCAL). Lengths are in DistanceUnits, else millimetres. Compressed data is zlib's.
  * Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
 #include "base/durable.h"
 #include "geometry/volume/voxel_stream.h"
@@ -17,7 +17,7 @@ struct metaimage {
     char *name;      /* of the header, for errors */
     char *data_path;
     struct voxel_layout layout;
-    double spacing_mm[3];
+    double spacing[3], unit_m; /* of one unit of spacing */
     bool is_local, has_type, has_size, has_data;
     struct voxel_stream *stream;
 };
@@ -67,12 +67,27 @@ static status parse_spacing(struct metaimage *m, const char *value, struct error
     const char *p = value;
     for (int a = 0; a < 3; a++) {
         char *end;
-        m->spacing_mm[a] = strtod(p, &end);
-        if (end == p || !(m->spacing_mm[a] > 0.0) || !isfinite(m->spacing_mm[a]))
+        m->spacing[a] = strtod(p, &end);
+        if (end == p || !(m->spacing[a] > 0.0) || !isfinite(m->spacing[a]))
             return bad(m, err, "ElementSpacing is not three positive numbers:", value);
         p = end;
     }
     return STATUS_OK;
+}
+
+/* MetaIO knows these four; "?" is its default. */
+static status parse_unit(struct metaimage *m, const char *value, struct error *err)
+{
+    static const struct {
+        const char *name;
+        double metre;
+    } unit[] = {{"?", 1e-3}, {"um", 1e-6}, {"mm", 1e-3}, {"cm", 1e-2}};
+    for (size_t i = 0; i < sizeof unit / sizeof *unit; i++)
+        if (strcasecmp(value, unit[i].name) == 0) {
+            m->unit_m = unit[i].metre;
+            return STATUS_OK;
+        }
+    return bad(m, err, "DistanceUnits must be um, mm or cm, not", value);
 }
 
 static status parse_data_file(struct metaimage *m, const char *header_path, const char *value, struct error *err)
@@ -101,7 +116,8 @@ static status parse_line(struct metaimage *m, const char *header_path, const cha
     if (strcmp(key, "DimSize") == 0) return parse_size(m, value, err);
     if (strcmp(key, "ElementType") == 0) return parse_element(m, value, err);
     if (strcmp(key, "ElementSpacing") == 0) return parse_spacing(m, value, err);
-    if (strcmp(key, "ElementSize") == 0) return isnan(m->spacing_mm[0]) ? parse_spacing(m, value, err) : STATUS_OK;
+    if (strcmp(key, "ElementSize") == 0) return isnan(m->spacing[0]) ? parse_spacing(m, value, err) : STATUS_OK;
+    if (strcmp(key, "DistanceUnits") == 0) return parse_unit(m, value, err);
     if (strcmp(key, "ElementByteOrderMSB") == 0 || strcmp(key, "BinaryDataByteOrderMSB") == 0) {
         m->layout.swap = is_true(value) != (BYTE_ORDER == BIG_ENDIAN);
         return STATUS_OK;
@@ -163,7 +179,8 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
         s = error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
         goto fail;
     }
-    m->spacing_mm[0] = m->spacing_mm[1] = m->spacing_mm[2] = NAN;
+    m->spacing[0] = m->spacing[1] = m->spacing[2] = NAN;
+    m->unit_m = 1e-3;
     FILE *header = fopen(path[0], "rbe");
     if (header == NULL) {
         s = error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
@@ -181,7 +198,7 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
     if (s != STATUS_OK) goto fail;
     *info = (struct volume_source_info){.sample = sample_name(m->layout.sample)};
     memcpy(info->n, m->layout.n, sizeof info->n);
-    for (int a = 0; a < 3; a++) info->voxel_size_m[a] = m->spacing_mm[a] * 1e-3;
+    for (int a = 0; a < 3; a++) info->voxel_size_m[a] = m->spacing[a] * m->unit_m;
     *handle = m;
     return STATUS_OK;
 fail:

@@ -280,6 +280,30 @@ static void test_metaimage(void **state)
     check_values(&path, 1, NULL, n, mm, want);
 }
 
+static void test_metaimage_units(void **state)
+{
+    static const struct {
+        const char *line;
+        double mm;
+    } unit[] = {{"", 2.0}, {"DistanceUnits = ?\n", 2.0}, {"DistanceUnits = mm\n", 2.0}, {"DistanceUnits = um\n", 0.002}, {"DistanceUnits = cm\n", 20.0}};
+    static const size_t n[3] = {2, 1, 2};
+    static const float want[4] = {1, 2, 3, 4};
+    static const uint8_t data[4] = {1, 2, 3, 4};
+    uint8_t file[1024];
+    char header[512];
+    const char *path = scratch_path(state, "u.mha");
+    for (size_t i = 0; i < sizeof unit / sizeof unit[0]; i++)
+        for (int after = 0; after < 2; after++) { /* lines have no order */
+            snprintf(header, sizeof header, "NDims = 3\nDimSize = 2 1 2\n%sElementSpacing = 2 2 2\n%sElementType = MET_UCHAR\nElementDataFile = LOCAL\n",
+                     after ? "" : unit[i].line, after ? unit[i].line : "");
+            scratch_write(path, file, join(file, header, data, sizeof data));
+            check_values(&path, 1, NULL, n, (const double[3]){unit[i].mm, unit[i].mm, unit[i].mm}, want);
+        }
+    snprintf(header, sizeof header, "NDims = 3\nDimSize = 2 1 2\nDistanceUnits = inch\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n");
+    scratch_write(path, file, join(file, header, data, sizeof data));
+    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "DistanceUnits must be um, mm or cm, not 'inch'");
+}
+
 static void test_vol(void **state)
 {
     static const uint8_t golden[] = {0x56, 0x4f, 0x4c, 3, 1, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -350,7 +374,7 @@ int main(void)
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_nrrd_types_and_orders), cmocka_unit_test(test_nrrd_gzip_and_skips), cmocka_unit_test(test_nrrd_detached),
         cmocka_unit_test(test_nrrd_refused),          cmocka_unit_test(test_raw),                 cmocka_unit_test(test_wrong_byte_order),
-        cmocka_unit_test(test_metaimage),             cmocka_unit_test(test_vol),
+        cmocka_unit_test(test_metaimage),             cmocka_unit_test(test_metaimage_units),     cmocka_unit_test(test_vol),
         cmocka_unit_test(test_raw_in_a_job),          cmocka_unit_test(test_registry),
     };
     return cmocka_run_group_tests(test, scratch_folder_setup, scratch_folder_teardown);
