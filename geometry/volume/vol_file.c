@@ -233,10 +233,11 @@ status vol_read_header(FILE *file, const char *name, struct vol_header *h, struc
     h->n_channel = n_channel;
     h->bytes_per_voxel = encoding == VOL_FLOAT32 ? 4 * n_channel : encoding == VOL_QUANTISED ? 2 : 1;
     if (fstat(fileno(file), &st) != 0) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
-    if ((uint64_t)st.st_size - HEADER_BYTES < n_voxel * h->bytes_per_voxel)
+    uint64_t have = (uint64_t)st.st_size - HEADER_BYTES, want = n_voxel * h->bytes_per_voxel;
+    if (have < want || have - want >= h->n[0] * h->bytes_per_voxel) /* longer by a row: the header is of another file */
         return error_set_field(err, STATUS_FORMAT, "volume.files",
                                "cannot read volume '%s': %zu x %zu x %zu voxels need %llu bytes, the file has %lld", name,
-                               h->n[0], h->n[1], h->n[2], (unsigned long long)(n_voxel * h->bytes_per_voxel + HEADER_BYTES),
+                               h->n[0], h->n[1], h->n[2], (unsigned long long)(want + HEADER_BYTES),
                                (long long)st.st_size);
     return STATUS_OK;
 }

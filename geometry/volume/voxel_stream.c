@@ -194,6 +194,18 @@ static status next_inflated(struct voxel_stream *v, size_t i_slice, struct error
     return s;
 }
 
+/* After the last slice, with which v->slice is done: compressed data has no length that could be compared before. Another row
+ * is more than a writer's padding; that the stream ends, or what follows is none, is as it should be. */
+static status check_end(struct voxel_stream *v, struct error *err)
+{
+    const struct voxel_layout *l = &v->layout;
+    size_t row_bytes = l->n[0] * sample_bytes(l->sample);
+    if (inflate_bytes(v, l->n[2], v->slice, row_bytes, NULL) != STATUS_OK) return STATUS_OK;
+    return error_set_field(err, STATUS_FORMAT, "volume.files",
+                           "cannot read volume '%s': '%s' goes on behind the %zu x %zu x %zu %s voxels of its header", v->name,
+                           path_file_name(v->data_path), l->n[0], l->n[1], l->n[2], sample_name(l->sample));
+}
+
 static status next_plain(struct voxel_stream *v, size_t i_slice, struct error *err)
 {
     off_t at = v->layout.offset_bytes + v->layout.skip_bytes + (off_t)(i_slice * v->slice_bytes);
@@ -209,6 +221,8 @@ status voxel_stream_read(struct voxel_stream *v, size_t i_slice, size_t n_slice,
         status s = v->layout.compressed ? next_inflated(v, i, err) : next_plain(v, i, err);
         if (s != STATUS_OK) return s;
         sample_to_float(v->layout.sample, v->layout.swap, n_sample, v->slice, value);
+        if (v->layout.compressed && i + 1 == v->layout.n[2]) s = check_end(v, err);
+        if (s != STATUS_OK) return s;
     }
     return STATUS_OK;
 }

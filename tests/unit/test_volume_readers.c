@@ -137,6 +137,19 @@ static void test_nrrd_gzip_and_skips(void **state)
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "ends or is damaged in slice 2");
     scratch_write(path, file, join(file, HEAD "uchar\ndimension: 3\nsizes: 999 999 999\nencoding: gzip\n\n", packed, n_packed));
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "too short");
+    static const char head[] = HEAD "uchar" SIZES "encoding: gzip\n\n"; /* a row too much shows when the last slice is read, one byte is padding */
+    for (size_t more = 0; more <= 2; more++) {
+        n_packed = gzip(data + 2, 4 + more, packed, sizeof packed);
+        scratch_write(path, file, join(file, head, packed, n_packed));
+        if (more < 2) check_values(&path, 1, NULL, n, (const double[3]){0}, want);
+        else check_refused(path, NULL, STATUS_FORMAT, "volume.files", "'z.nrrd' goes on behind the 2 x 1 x 2 uint8 voxels of its header");
+    }
+    n_packed = gzip(data + 2, 4, packed, sizeof packed); /* a second member is part of the data, zeros behind the first are none */
+    scratch_write(path, file, join(file, head, packed, n_packed + gzip(data, 2, packed + n_packed, sizeof packed - n_packed)));
+    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "goes on behind");
+    memset(packed + n_packed, 0, 100);
+    scratch_write(path, file, join(file, head, packed, n_packed + 100));
+    check_values(&path, 1, NULL, n, (const double[3]){0}, want);
 }
 
 static void test_nrrd_detached(void **state)
@@ -278,6 +291,9 @@ static void test_metaimage(void **state)
     snprintf(header, sizeof header, "%sCompressedData = True\nElementDataFile = LOCAL\n", head);
     scratch_write(path, file, join(file, header, packed, gzip(data, sizeof data, packed, sizeof packed)));
     check_values(&path, 1, NULL, n, mm, want);
+    const uint8_t longer[12] = {1, 0, 0, 1, 255, 255, 2, 1};
+    scratch_write(path, file, join(file, header, packed, gzip(longer, sizeof longer, packed, sizeof packed)));
+    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "goes on behind");
 }
 
 static void test_metaimage_units(void **state)
@@ -314,7 +330,7 @@ static void test_vol(void **state)
     static const double mm[3] = {0.5, 1, 1};
     static const float want[2] = {0, 1};
     const char *path = scratch_path(state, "g.vol");
-    uint8_t bad[sizeof golden];
+    uint8_t bad[sizeof golden], longer[sizeof golden + 8];
     scratch_write(path, golden, sizeof golden);
     check_values(&path, 1, NULL, n, mm, want);
     struct volume v;
@@ -328,6 +344,12 @@ static void test_vol(void **state)
     free(bytes);
     scratch_write(path, golden, sizeof golden - 1);
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "need 56 bytes, the file has 55");
+    memset(longer, 0, sizeof longer);
+    memcpy(longer, golden, sizeof golden);
+    scratch_write(path, longer, sizeof golden + 7);
+    check_values(&path, 1, NULL, n, mm, want);
+    scratch_write(path, longer, sizeof golden + 8); /* a row more */
+    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "need 56 bytes, the file has 64");
     memcpy(bad, golden, sizeof bad);
     bad[11] = 0x7f;
     scratch_write(path, bad, sizeof bad);
