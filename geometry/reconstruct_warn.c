@@ -47,13 +47,13 @@ static void warn_alignment(const struct warner *w, const struct reconstruct_opti
             u[0], u[1], u[2], m->n == 2 ? " and another direction" : "");
     if (r->aligned && r->align.se_deg > 1.0)
         say(w, "volume.align: the directions of warp and weft are uncertain by %.1f degrees", r->align.se_deg);
-    const size_t *valid = r->tile.valid;
+    const size_t *valid = r->tile.valid, *box = o->crop_voxel; /* valid is of what the box has left */
     double share = (double)(valid[2] - valid[0]) * (double)(valid[3] - valid[1]) / ((double)r->n[0] * (double)r->n[1]);
     if (!o->crop && valid[2] > 0 && share < 0.98)
         say(w,
             "volume.crop_voxel: the matrix brings corners from outside of the scan into the tile, only %.0f %% of it is whole: crop to x "
             "%zu..%zu, y %zu..%zu, or give volume.crop \"auto\"",
-            100.0 * share, valid[0], valid[2], valid[1], valid[3]);
+            100.0 * share, box[0] + valid[0], box[0] + valid[2], box[1] + valid[1], box[1] + valid[3]);
     for (int a = 0; a < 2; a++)
         if (o->crop && r->tile.mismatch[a] > TILE_MOST_MISMATCH)
             say(w, "volume.crop: no two places of the scan match across %c (mismatch %.2f, 0 is a repeat and 1 is chance): nothing was cut, the tile has a seam",

@@ -182,6 +182,45 @@ static void test_choices_are_reported_and_overridable(void **state)
     release(&x);
 }
 
+struct advice {
+    int n_said;
+    size_t x0, x1, y0, y1;
+};
+
+static void take_advice(void *context, const char *text)
+{
+    struct advice *a = context;
+    const char *at = strstr(text, "crop to x ");
+    if (at != NULL && sscanf(at, "crop to x %zu..%zu, y %zu..%zu", &a->x0, &a->x1, &a->y0, &a->y1) == 4) a->n_said++;
+}
+
+/* The box that a warning names is of the whole volume, as the job takes it, also when the job has cropped it: given, the warning goes. */
+static void test_advice_to_crop_can_be_followed(void **state)
+{
+    (void)state;
+    struct advice advice[2] = {0};
+    struct reconstruct_option o;
+    for (int i = 0; i < 2; i++) {
+        struct volume v;
+        struct reconstruct_report r = {0};
+        struct error err = {0};
+        const char *file = path;
+        const double turned[9] = {0.985, -0.174, 0.0, 0.174, 0.985, 0.0, 0.0, 0.0, 1.0};
+        const size_t box[6] = {30, 2, 0, NX, NY - 2, NZ};
+        reconstruct_option_default(&o);
+        for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
+        memcpy(o.matrix, turned, sizeof o.matrix);
+        memcpy(o.crop_voxel, box, sizeof o.crop_voxel);
+        if (i == 1) memcpy(o.crop_voxel, (const size_t[6]){advice[0].x0, advice[0].y0, 0, advice[0].x1, advice[0].y1, NZ}, sizeof o.crop_voxel);
+        if (reconstruct_read(&file, 1, &o, NULL, NULL, NULL, &v, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+        reconstruct_warn_volume(&o, &r, take_advice, &advice[i]);
+        volume_release(&v);
+    }
+    assert_int_equal(advice[0].n_said, 1);
+    assert_true(advice[0].x0 >= 30 && advice[0].x1 > 55 && advice[0].x1 <= NX && advice[0].y0 >= 2 && advice[0].y1 <= NY - 2);
+    assert_int_equal(advice[1].n_said, 0);
+}
+
 static void assert_same(const struct result *a, const struct result *b)
 {
     size_t n = (size_t)NX * NY * NZ;
@@ -311,7 +350,8 @@ static void test_first_error_is_the_one_told(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_choices_are_reported_and_overridable), cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_choices_are_reported_and_overridable), cmocka_unit_test(test_advice_to_crop_can_be_followed),
+                                       cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
                                        cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_first_error_is_the_one_told)};
     return cmocka_run_group_tests(tests, make_scan, NULL);
 }
