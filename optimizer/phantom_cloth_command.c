@@ -70,20 +70,6 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
 {
     const char *weave_name = "twill";
     enum phantom_weave weave;
-    bool plied = false;
-    for (int i = 1; i + 1 < argc; i++) { /* weave and yarn set the other defaults */
-        if (strcmp(argv[i], "--weave") == 0) weave_name = argv[i + 1];
-        if (strcmp(argv[i], "--yarn") == 0) plied = true;
-    }
-    status st = phantom_weave_find(weave_name, &weave, err);
-    if (st != STATUS_OK) return st;
-    phantom_option_default(&c->phantom, weave);
-    if (plied) {
-        c->phantom.packing = 0.5;
-        c->phantom.flatness = 1.0;
-    }
-    phantom_scan_option_default(&c->scan);
-    phantom_file_option_default(&c->file);
     double voxel_um = 2.0, diameter[3] = {7.0, 7.0, 7.0}, pile_um = 200.0, felt_um[2] = {320.0, 120.0};
     size_t bits = 16;
     c->memory_mib = 2048;
@@ -118,9 +104,19 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "seed", .kind = OPTION_U64, .to = &c->phantom.seed},
         {.name = "threads", .kind = OPTION_COUNT, .to = &c->n_thread},
     };
-    st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
+    /* read twice: weave and yarn set the defaults of the others */
+    status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
+    if (st == STATUS_OK) st = phantom_weave_find(weave_name, &weave, err);
     if (st != STATUS_OK) return st;
-    if (c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
+    phantom_option_default(&c->phantom, weave);
+    if (c->yarn != NULL) {
+        c->phantom.packing = 0.5;
+        c->phantom.flatness = 1.0;
+    }
+    phantom_scan_option_default(&c->scan);
+    phantom_file_option_default(&c->file);
+    st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
+    if (st == STATUS_OK && c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
     if (st != STATUS_OK) return st;
     if (c->out == NULL) return error_set(err, STATUS_INVALID, "--out is missing");
     if (bits != 8 && bits != 16) return error_set(err, STATUS_INVALID, "option --bits takes 8 or 16");
