@@ -320,6 +320,14 @@ static void choose_parameters(struct reconstruct_option *o, const struct volume 
     if (isnan(o->eps_j)) o->eps_j = EPS_J_SHARE * solid_j(o->s, o->t, o->h);
 }
 
+/* J of solid material is only below that of void, 0, for t > s / 2. A job may give one of the two, the other is chosen here. */
+static status check_parameters(const struct reconstruct_option *o, struct error *err)
+{
+    if (o->t > 0.5 * o->s) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "volume.filter.t",
+                           "cannot find fibers: the direction filter's t, %g, must be above half of its s, %g", o->t, o->s);
+}
+
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
                       size_t n_thread, struct error *err)
 {
@@ -405,6 +413,8 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     status s = fiber_diameter_measure(v, pool, &inner, &report->fiber_diameter_voxel, err);
     if (s != STATUS_OK) return s;
     choose_parameters(option, v, report->fiber_diameter_voxel);
+    s = check_parameters(option, err);
+    if (s != STATUS_OK) return s;
     s = prepare(&o, option, report->fiber_diameter_voxel, thread_pool_n_thread(pool), err);
     if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
     if (s != STATUS_OK) goto out;

@@ -147,6 +147,10 @@ static status parse_filter(const struct json_field *f, struct job_document *doc,
     if (s == STATUS_OK) s = json_field_size(&filter, "h", 3, 63, &doc->filter_h, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "eps_d", 0.0, 1.0, &doc->filter_eps_d, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "eps_J", -1e6, 0.0, &doc->filter_eps_j, err);
+    if (s == STATUS_OK && doc->filter_t <= 0.5 * doc->filter_s) /* false where one is NaN: left to the data */
+        s = error_set_field(err, STATUS_INVALID, "volume.filter.t",
+                            "'volume.filter.t' is %g: it must be above half of s (%g), or no direction answers to fibers", doc->filter_t,
+                            doc->filter_s);
     return s;
 }
 

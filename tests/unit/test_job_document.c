@@ -139,6 +139,7 @@ static void test_volume(void **state)
     check_error(VOLUME_OF("\"crop_voxel\":[5,0,0,5,9,9]"), "volume.crop_voxel", "empty along x");
     check_error(VOLUME_OF("\"density_low\":5,\"density_high\":5"), "volume.density_high", "above");
     check_error(VOLUME_OF("\"filter\":{\"eps_d\":2}"), "volume.filter.eps_d", "0 to 1");
+    check_error(VOLUME_OF("\"filter\":{\"s\":2,\"t\":1}"), "volume.filter.t", "above half of s (2)");
     check_error(VOLUME_OF("\"filter\":{\"h\":1.5}"), "volume.filter.h", "whole number");
     check_error(VOLUME_OF("\"filter\":{\"h\":64}"), "volume.filter.h", "3 to 63");
     check_error(VOLUME_OF("\"filter\":{\"epsd\":1}"), "volume.filter.epsd", "unknown field");

@@ -221,6 +221,27 @@ static void test_advice_to_crop_can_be_followed(void **state)
     assert_int_equal(advice[1].n_said, 0);
 }
 
+/* A t that goes with no s that the data lead to: named, before anything is filtered. */
+static void test_filter_that_finds_nothing(void **state)
+{
+    (void)state;
+    struct volume v;
+    struct direction_volume d;
+    struct reconstruct_option o;
+    struct reconstruct_report r = {0};
+    struct error err = {0};
+    const char *file = path;
+    reconstruct_option_default(&o);
+    for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
+    o.t = 0.01;
+    assert_int_equal(reconstruct_read(&file, 1, &o, NULL, NULL, NULL, &v, &r, &err), STATUS_OK);
+    assert_int_equal(reconstruct_orientation(&v, &o, NULL, NULL, &d, &r, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "volume.filter.t");
+    assert_non_null(strstr(err.text, "t, 0.01, must be above half of its s"));
+    assert_null(d.density);
+    volume_release(&v);
+}
+
 static void assert_same(const struct result *a, const struct result *b)
 {
     size_t n = (size_t)NX * NY * NZ;
@@ -351,6 +372,7 @@ static void test_first_error_is_the_one_told(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_choices_are_reported_and_overridable), cmocka_unit_test(test_advice_to_crop_can_be_followed),
+                                       cmocka_unit_test(test_filter_that_finds_nothing),
                                        cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
                                        cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_first_error_is_the_one_told)};
     return cmocka_run_group_tests(tests, make_scan, NULL);
