@@ -401,7 +401,29 @@ static void test_plied_yarns(void **state)
     }
 }
 
-/* The four measured yarns, true to the file's lengths or scaled, have the designed share of fiber. */
+/* Mean squared distance of the warp's fibers from the middle of their yarn, where they are cut by the face at y = 0. */
+static double spread_m2(const struct fiber_set *f, double spacing_m)
+{
+    enum { YARN = 2 };
+    double sum[YARN][2] = {{0}}, square = 0.0, count[YARN] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t i = 0; i < f->n_fiber; i++)
+            for (int e = 0; e < 2; e++) {
+                const float *p = f->position_m + 3 * (e == 0 ? f->first_vertex[i] : f->first_vertex[i + 1] - 1);
+                if (f->axis_class[i] != 1 || fabs((double)p[1]) > 1e-9) continue;
+                size_t yarn = (double)p[0] < spacing_m ? 0u : 1u;
+                double at[2] = {(double)p[0], (double)p[2]};
+                count[yarn] += pass == 0 ? 1.0 : 0.0;
+                for (size_t a = 0; a < 2; a++) {
+                    if (pass == 0) sum[yarn][a] += at[a];
+                    else square += pow(at[a] - sum[yarn][a] / count[yarn], 2.0);
+                }
+            }
+    return square / (count[0] + count[1]);
+}
+
+/* The four measured yarns, true to the file's lengths or scaled, have the designed share of fiber: that of a ply's section, in the
+ * material of the tile and in how far its fibers lie apart. As designed, before fibers push each other apart. */
 static void test_real_yarn_files(void **state)
 {
     static const char *const name[] = {"cotton1", "polyester1", "rayon1", "silk1"};
@@ -411,6 +433,7 @@ static void test_real_yarn_files(void **state)
         char path[1024];
         struct phantom_yarn_law y;
         struct error err = {0};
+        double packed[2];
         snprintf(path, sizeof path, "%s/yarns/%s.txt", data != NULL ? data : "../shared/data", name[i]);
         status s = phantom_yarn_read(path, &y, &err);
         if (s == STATUS_IO || s == STATUS_NOT_FOUND) {
@@ -419,6 +442,35 @@ static void test_real_yarn_files(void **state)
         }
         if (s != STATUS_OK) fail_msg("%s", err.text);
         assert_true(y.n_ply >= 2 && y.n_fiber >= 33 && y.hair_per_m > 0.0);
+        y.hair_per_m = y.loop_per_m = 0.0;
+        for (int true_size = 0; true_size < 2; true_size++) {
+            struct phantom_option o;
+            struct phantom_report r;
+            struct fiber_set f;
+            const double radius_m = 14e-6;
+            phantom_option_default(&o, PHANTOM_PLAIN);
+            for (int a = 0; a < 3; a++) o.fiber_radius_m[a] = radius_m;
+            o.flatness = 1.0;
+            o.packing = 0.5;
+            o.n_relax = 0;
+            o.vertex_spacing_m = 6e-5;
+            o.yarn = y;
+            o.yarn_true_size = true_size == 1;
+            make(&o, 2, &f, &r);
+            double section_m2 = M_PI * y.ellipse_m[0] * y.ellipse_m[1] * r.plied.scale * r.plied.scale, fiber_m2 = M_PI * radius_m * radius_m;
+            double design = true_size ? (double)y.n_fiber * fiber_m2 / section_m2 : o.packing, plies_m = 0.0;
+            for (int a = 0; a < 2; a++) plies_m += 2.0 * (double)y.n_ply * r.plied.wanted_ply_turns[a] * y.ply_pitch_m * r.plied.scale;
+            double share = fiber_m2 * fiber_set_length_m(&f) / (plies_m * section_m2);
+            packed[true_size] = (double)(y.n_ply * y.n_fiber) * fiber_m2 / (M_PI * spread_m2(&f, r.yarn_spacing_m[0])) / design;
+            print_message("%s%s: %.3f of a ply is fiber, designed %.3f; packed %.3f\n", name[i], true_size ? ", true size" : "", share,
+                          design, packed[true_size]);
+            assert_true(true_size ? r.plied.scale == 1.0 : r.plied.scale < 0.8);
+            double winding = hypot(1.0, 2.0 * M_PI * y.ply_distance_m / y.ply_pitch_m * r.plied.ply_turns[0] / r.plied.wanted_ply_turns[0]);
+            double excess = share / (design * winding); /* fibers are longer than their ply, which is longer than the yarn */
+            assert_true(excess > 1.0 && excess < 1.15);
+            fiber_set_release(&f);
+        }
+        assert_true(fabs(packed[1] / packed[0] - 1.0) < 0.1); /* fibers that keep a diameter from each other spread a little more */
     }
 }
 
