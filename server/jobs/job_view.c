@@ -97,7 +97,13 @@ status job_view_files(struct job_service *v, const struct job_row *row, json_t *
     size_t n = 0;
     json_t *missing = NULL;
     status s = store_file_list(v->store, row->id, &file, &n, err);
-    if (s == STATUS_OK) s = job_missing_files(v, row, &missing, err);
+    if (s != STATUS_OK) goto out;
+    s = job_missing_files(v, row, &missing, err);
+    if (s == STATUS_INVALID || s == STATUS_TOO_LARGE) {
+        /* a document that was taken when the rules were laxer: its job can still be seen, only not be started again */
+        missing = json_array();
+        s = STATUS_OK;
+    }
     if (s != STATUS_OK) goto out;
     json_t *list = json_array();
     for (size_t i = 0; i < n; i++) {

@@ -1,6 +1,8 @@
 """Jobs: creating, editing, listing, starting, cancelling, deleting."""
 import json
+import os
 import socket
+import sqlite3
 
 import pytest
 from daemon_under_test import DOCUMENT, FILES, document, problem, wait_until
@@ -246,3 +248,27 @@ def test_restart_keeps_everything(daemon_maker):
     assert d.offset(half) == 5
     assert d.patch(half, 5, b"56789").status_code == 204
     assert d.get(f"/v1/jobs/{draft}/files/scan.tif").content == b"0123456789"
+
+
+def test_a_stored_document_that_is_refused_today_can_still_be_read(daemon_maker):
+    d = daemon_maker()
+    done, draft = d.start_job(), d.create()
+    d.wait_state(done, "succeeded")
+    d.stop()
+    old = {**DOCUMENT, "fit": {"fixed": {"beta_Q": 1}}}
+    with sqlite3.connect(os.path.join(d.data, "selvedge.db")) as db:
+        assert db.execute("UPDATE job SET document = ?", [json.dumps(old)]).rowcount == 2
+    db.close()
+    d.start()
+    for job in (done, draft):
+        seen = d.job(job)
+        assert seen["document"] == old and seen["missing_files"] == []
+        files = d.get(f"/v1/jobs/{job}/files")
+        assert files.status_code == 200 and files.json()["missing_files"] == []
+    assert seen["state"] == "draft" and d.job(done)["result"]["run"] == 1
+    problem(d.post(f"/v1/jobs/{draft}/start"), 422, "invalid", "fit.fixed.beta_Q")
+    problem(d.put(f"/v1/jobs/{draft}/document", json=old), 422, "invalid", "fit.fixed.beta_Q")
+    # the tag of such a job is good for the edit that mends it
+    tag = d.get(f"/v1/jobs/{draft}").headers["ETag"]
+    assert d.put(f"/v1/jobs/{draft}/document", json=DOCUMENT, headers={"If-Match": tag}).status_code == 200
+    assert d.job(draft)["missing_files"] == ["scan.tif", "rows.csv"]
