@@ -4,7 +4,6 @@
 #include "optimizer/job_folder.h"
 #include "server/jobs/job_paths.h"
 
-#include <math.h>
 #include <signal.h>
 #include <sodium.h>
 #include <stdio.h>
@@ -83,18 +82,18 @@ status attempt_prepare(struct job_service *v, const char *job_id, struct error *
     return s;
 }
 
-void attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish)
+bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish)
 {
     struct job_row row;
-    *wish = (struct attempt_wish){.heartbeat_age_s = INFINITY};
-    if (store_job_get(v->store, job_id, &row, NULL) != STATUS_OK) return;
+    *wish = (struct attempt_wish){0};
+    if (store_job_get(v->store, job_id, &row, NULL) != STATUS_OK) return false;
     wish->cancel = row.cancel_requested;
     wish->deleted = row.deleted;
     json_t *j = attempt_read_status(v, job_id);
-    if (json_integer_value(json_object_get(j, "attempt")) == row.attempt)
-        wish->heartbeat_age_s = clock_wall_s() - json_number_value(json_object_get(j, "heartbeat_unix_s"));
+    if (json_integer_value(json_object_get(j, "attempt")) == row.attempt) wish->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
     json_decref(j);
     job_row_release(&row);
+    return true;
 }
 
 static void set_error(struct job_row *row, const char *code, const char *field, const char *text)

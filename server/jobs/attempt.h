@@ -15,14 +15,15 @@ struct attempt_verdict {
 
 struct attempt_wish {
     bool cancel, deleted;
-    double heartbeat_age_s; /* infinity: no heartbeat of this attempt yet */
+    double heartbeat_unix_s; /* the worker's own clock; 0: no heartbeat of this attempt, or it cannot be read */
 };
 
 /* queued -> running: new number and token, job.json, attempt.json, and a clean folder after an edit.
  * STATUS_CONFLICT when the job is not queued any more. */
 status attempt_prepare(struct job_service *v, const char *job_id, struct error *err);
-/* What the running job's owner wants by now. Nothing is wished for when the database cannot be read. */
-void attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish);
+/* What the running job's owner wants by now, and whether its worker lives. False when the database cannot be read: then nothing is
+ * known, and nothing is wished for. */
+bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish);
 /* running -> succeeded, failed, cancelled, paused or queued. */
 status attempt_settle(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
                       struct attempt_verdict *verdict, struct error *err);

@@ -20,7 +20,8 @@ struct slot {
     char job_id[STORE_ID_BYTES];
     pid_t pid;
     enum attempt_stop stop;   /* why it was asked to stop */
-    double started_s, asked_s; /* monotonic; asked_s 0: not asked */
+    double beat_unix_s, beat_s; /* the last heartbeat seen, and when it was new (monotonic; at first the start) */
+    double asked_s;             /* monotonic; 0: not asked */
     bool killed, ended;
     struct worker_end end;
 };
@@ -103,11 +104,16 @@ static void watch(struct supervisor *u, struct slot *slot)
     }
     double now = clock_monotonic_s();
     struct attempt_wish wish;
-    attempt_look(u->v, slot->job_id, &wish);
+    bool known = attempt_look(u->v, slot->job_id, &wish);
     if (wish.deleted) kill_now(slot, STOP_CANCEL);
     else if (wish.cancel) ask_to_stop(slot, STOP_CANCEL);
     else if (u->below_floor) ask_to_stop(slot, STOP_PAUSE);
-    double silent_s = wish.heartbeat_age_s < now - slot->started_s ? wish.heartbeat_age_s : now - slot->started_s;
+    /* by our own clock, from beat to beat: the wall clock may be set while a worker computes, and one failed read is no silence */
+    if (wish.heartbeat_unix_s > 0 && wish.heartbeat_unix_s != slot->beat_unix_s) {
+        slot->beat_unix_s = wish.heartbeat_unix_s;
+        slot->beat_s = now;
+    }
+    double silent_s = known ? now - slot->beat_s : 0;
     if (silent_s > (double)u->v->settings->heartbeat_timeout_s && !slot->killed) {
         log_warning(u->v->log, "job %s: the worker was silent for %.0f s and is killed", slot->job_id, silent_s);
         kill_now(slot, STOP_SILENT);
@@ -158,7 +164,7 @@ static void launch(struct supervisor *u, const char *job_id)
         waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
         return;
     }
-    *slot = (struct slot){.used = true, .pid = pid, .started_s = clock_monotonic_s()};
+    *slot = (struct slot){.used = true, .pid = pid, .beat_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     log_info(u->v->log, "job %s: worker %d started", job_id, (int)pid);
 }

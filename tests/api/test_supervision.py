@@ -96,6 +96,13 @@ def test_a_silent_worker_is_killed_and_resumed(daemon_maker):
     assert "silent" in d.log_text()
 
 
+@pytest.mark.parametrize("behaviour", ["clock_set", "unreadable"])
+def test_a_worker_that_beats_is_not_silent(daemon_maker, behaviour):
+    d = daemon_maker(options={"jobs.heartbeat_timeout_s": 2})
+    done = d.wait_state(d.start_job(f"{behaviour} 2.3"), "succeeded")
+    assert done["lost_attempts"] == 0 and "silent" not in d.log_text()
+
+
 def test_at_most_so_many_workers(daemon_maker):
     d = daemon_maker(options={"jobs.workers": 2})
     jobs = [d.start_job("work") for _ in range(4)]

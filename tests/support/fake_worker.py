@@ -35,10 +35,10 @@ def put(path, text):
     os.rename(temporary, os.path.join(job, path))
 
 
-def say(state, fraction, error=None):
+def say(state, fraction, error=None, clock_s=0):
     put("status.json", json.dumps({
         "state": state, "attempt": attempt, "stage": "fit", "i_stage": 5, "n_stage": 8, "stage_fraction": fraction,
-        "fraction": fraction, "eta_s": 10 * (1 - fraction), "heartbeat_unix_s": time.time(), "started_unix_s": time.time(),
+        "fraction": fraction, "eta_s": 10 * (1 - fraction), "heartbeat_unix_s": time.time() + clock_s, "started_unix_s": time.time(),
         "message": f"run {run}", "objective": 1 - fraction, "objective_se": 0.01, "step": int(10 * fraction),
         "warnings": ["a warning"] if fraction > 0 else [], "error": error, "peak_rss_bytes": 1000000}))
 
@@ -70,10 +70,10 @@ def cancelled(*unused):
     sys.exit(3)
 
 
-def work(seconds):
+def work(seconds, clock_s=0):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        say("running", 0.5)
+        say("running", 0.5, clock_s=clock_s)
         time.sleep(0.05)
 
 
@@ -99,6 +99,14 @@ elif behaviour == "work":
 elif behaviour == "work_once":  # until it is ended; the next run succeeds
     if run == 1:
         work(3600)
+    finish()
+elif behaviour == "clock_set":  # the daemon's wall clock was set forward while this one works
+    work(float(argument), clock_s=-1e6)
+    finish()
+elif behaviour == "unreadable":  # works for so long, then its status cannot be read for a moment
+    work(float(argument))
+    put("status.json", "{")
+    time.sleep(0.3)
     finish()
 elif behaviour == "ignore_term":
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
