@@ -2,6 +2,7 @@
 #include "base/durable.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
+#include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/supervisor.h"
 #include "server/version.h"
@@ -117,19 +118,31 @@ static void raise_descriptor_limit(const struct settings *s)
     setrlimit(RLIMIT_NOFILE, &now);
 }
 
-/* For clients on this machine: {"url","pid"}. */
-static status announce(const struct settings *s, unsigned port, struct log *log, struct error *err)
+/* For clients on this machine: {"url","pid"}. Without it they can still be told where to ask, so that a full disk is no reason to end. */
+static void announce(const struct settings *s, unsigned port, struct log *log)
 {
+    struct error err = {0};
     char path[PATH_BYTES], text[256], url[160];
     bool v6 = strchr(s->listen, ':') != NULL;
     snprintf(url, sizeof url, "http://%s%.100s%s:%u", v6 ? "[" : "", s->listen, v6 ? "]" : "", port);
     int n = snprintf(text, sizeof text, "{\"url\":\"%s\",\"pid\":%d}\n", url, (int)getpid());
     path_join(path, s->data, "daemon.json", NULL);
-    status r = durable_replace_volatile(path, text, (size_t)n, err);
+    if (durable_replace_volatile(path, text, (size_t)n, &err) != STATUS_OK) {
+        log_warning(log, "%s", err.text);
+        unlink(path); /* an old one would name another port */
+    }
     log_info(log, "selvedged %s listens on %s", SELVEDGE_VERSION, url);
     printf("selvedged listens on %s\n", url);
     fflush(stdout);
-    return r;
+}
+
+/* On a full disk the database may not even open: the ballast is given up for it, so that something can be deleted. */
+static status open_service(const struct settings *s, struct log *log, struct job_service **service, struct error *err)
+{
+    status r = job_service_open(s, log, service, err);
+    if ((r != STATUS_DISK_FULL && r != STATUS_IO) || !ballast_release(s->data)) return r;
+    log_warning(log, "%s; the ballast file is given up and it is tried once more", err->text);
+    return job_service_open(s, log, service, err);
 }
 
 static void wait_for_signal(const sigset_t *signals, struct http_server *server, struct log *log)
@@ -154,12 +167,14 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     unsigned port = 0;
     worker_path(s, worker);
     status r = static_files_new(s->web, s->openapi, log, &files, err);
-    if (r == STATUS_OK) r = job_service_open(s, log, &service, err);
+    if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
     r = supervisor_start(service, worker, &supervisor, err);
     if (r == STATUS_OK) r = http_server_start(service, files, &server, &port, err);
-    if (r == STATUS_OK) r = announce(s, port, log, err);
-    if (r == STATUS_OK) wait_for_signal(signals, server, log);
+    if (r == STATUS_OK) {
+        announce(s, port, log);
+        wait_for_signal(signals, server, log);
+    }
     if (service != NULL) atomic_store(&service->stopping, true);
 out:
     http_server_stop(server); /* first: its threads wake the supervisor */

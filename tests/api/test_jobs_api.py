@@ -272,3 +272,12 @@ def test_a_stored_document_that_is_refused_today_can_still_be_read(daemon_maker)
     tag = d.get(f"/v1/jobs/{draft}").headers["ETag"]
     assert d.put(f"/v1/jobs/{draft}/document", json=DOCUMENT, headers={"If-Match": tag}).status_code == 200
     assert d.job(draft)["missing_files"] == ["scan.tif", "rows.csv"]
+
+
+def test_a_daemon_that_cannot_announce_itself_runs(daemon_maker):
+    d = daemon_maker()
+    d.stop()
+    os.remove(os.path.join(d.data, "daemon.json"))
+    os.mkdir(os.path.join(d.data, "daemon.json"))
+    d.start()
+    assert d.get("/livez").status_code == 200 and "daemon.json" in d.log_text()

@@ -21,6 +21,13 @@ def small_disk(tmp_path):
     libc.umount2(str(folder).encode(), 2)
 
 
+def fill(folder):
+    with open(folder / "filler", "wb", buffering=0) as f, pytest.raises(OSError):
+        while f.write(b"x" * 4096) == 4096:
+            pass
+        raise OSError
+
+
 def declare(d, job, name, size):
     return d.post(f"/v1/jobs/{job}/files", json={"name": name, "role": "volume", "size": size})
 
@@ -57,12 +64,24 @@ def test_delete_works_on_a_full_disk(small_disk):
     with Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}) as d:
         job = d.ready_job()
         d.upload(job, "more.tif", b"z" * (2 << 20))
-        with open(small_disk / "filler", "wb", buffering=0) as f, pytest.raises(OSError):
-            while f.write(b"x" * 4096) == 4096:
-                pass
-            raise OSError
+        fill(small_disk)
         r = d.delete(f"/v1/jobs/{job}")
         assert r.status_code == 204, r.text
+        wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
+        assert d.post("/v1/jobs", json=document("succeed")).status_code == 201
+
+
+def test_a_daemon_that_starts_on_a_full_disk_can_delete(small_disk):
+    d = Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}).start()
+    job, other = d.ready_job(), d.start_job("work")
+    wait_until(lambda: d.job(other)["fraction"] == 0.5 and os.path.exists(os.path.join(d.data, "ballast")))
+    d.kill()
+    fill(small_disk)
+    with d:
+        assert not os.path.exists(os.path.join(d.data, "ballast"))
+        assert d.job(job)["state"] == "draft" and d.job(other)["state"] in ("queued", "running", "failed")
+        for j in (job, other):
+            assert d.delete(f"/v1/jobs/{j}").status_code == 204
         wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
         assert d.post("/v1/jobs", json=document("succeed")).status_code == 201
 
