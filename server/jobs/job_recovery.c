@@ -1,4 +1,5 @@
-/* Opening and closing the service: what a stopped or killed daemon left behind is brought into a known state. */
+/* Opening and closing the service: what a stopped or killed daemon left behind is brought into a known state.
+ * An entry that resists is told in the log and left alone: one bad folder must not keep all other jobs from their users. */
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
@@ -30,18 +31,17 @@ static status sweep_unknown(struct job_service *v, struct error *err)
     path_join(path, v->settings->data, "jobs", NULL);
     DIR *d = opendir(path);
     if (d == NULL) return error_set_errno(err, "cannot list '%s'", path);
-    status s = STATUS_OK;
-    for (struct dirent *e; s == STATUS_OK && (e = readdir(d)) != NULL;) {
+    for (struct dirent *e; (e = readdir(d)) != NULL;) {
         if (strcmp(e->d_name, ".") == 0 || strcmp(e->d_name, "..") == 0) continue;
         struct job_row row = {0};
         struct error why = {0};
         status found = id_valid(e->d_name) ? store_job_get(v->store, e->d_name, &row, &why) : STATUS_NOT_FOUND;
-        if (found == STATUS_NOT_FOUND) s = quarantine(v, e->d_name, err);
-        else if (found != STATUS_OK) s = error_set(err, found, "%s", why.text);
+        if (found == STATUS_NOT_FOUND) found = quarantine(v, e->d_name, &why);
+        if (found != STATUS_OK) log_warning(v->log, "%s", why.text);
         job_row_release(&row);
     }
     closedir(d);
-    return s;
+    return STATUS_OK;
 }
 
 /* Tombstones whose folder is still there. */
@@ -53,9 +53,11 @@ static status bury(struct job_service *v, struct error *err)
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         char path[PATH_BYTES];
+        struct error why = {0};
         path_join(path, v->settings->data, "jobs", row[i].id, NULL);
-        s = path_remove_tree(path, err);
-        if (s == STATUS_OK) s = store_job_erase(v->store, row[i].id, err);
+        status removed = path_remove_tree(path, &why);
+        if (removed == STATUS_OK) removed = store_job_erase(v->store, row[i].id, &why);
+        if (removed != STATUS_OK) log_warning(v->log, "job %s is deleted, but not all of it is gone: %s", row[i].id, why.text);
     }
     job_rows_free(row, n);
     return s;
@@ -104,10 +106,11 @@ static status restore_folders(struct job_service *v, struct error *err)
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
-        for (size_t k = 0; s == STATUS_OK && k < 2; k++) {
+        for (size_t k = 0; k < 2; k++) {
             char path[PATH_BYTES];
+            struct error why = {0};
             path_join(path, v->settings->data, "jobs", row[i].id, part[k], NULL);
-            s = durable_make_folder(path, err);
+            if (durable_make_folder(path, &why) != STATUS_OK) log_warning(v->log, "job %s: %s", row[i].id, why.text);
         }
         sweep_parts(v, row[i].id);
     }

@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { MAX_WORKER = 64, MAX_WAITING = 256 };
+enum { MAX_WORKER = 64, MAX_WAITING = 256, BURY_AGAIN_S = 60 };
 
 struct slot {
     bool used;
@@ -26,7 +26,8 @@ struct slot {
     struct worker_end end;
 };
 
-/* A job that is queued but must not start before a time (after a lost attempt, or while another process holds its folder). */
+/* A job that is queued but must not start before a time (after a lost attempt, or while another process holds its folder), or a deleted
+ * one whose folder could not be removed. */
 struct waiting {
     char job_id[STORE_ID_BYTES];
     double until_s;
@@ -43,7 +44,7 @@ struct supervisor {
     struct slot slot[MAX_WORKER];
     struct waiting waiting[MAX_WAITING];
     bool below_floor;
-    double disk_seen_s, trash_seen_s;
+    double disk_seen_s;
 };
 
 static struct waiting *waiting_of(struct supervisor *u, const char *job_id, bool make)
@@ -193,13 +194,16 @@ static void bury(struct supervisor *u)
     struct job_query q = {.state = -1, .deleted = true, .limit = 64};
     if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
     for (size_t i = 0; i < n; i++) {
-        if (is_running(u, row[i].id)) continue;
+        const struct waiting *w = waiting_of(u, row[i].id, false);
+        if (is_running(u, row[i].id) || (w != NULL && w->until_s > clock_monotonic_s())) continue;
         char path[PATH_BYTES];
         struct error err = {0};
         path_join(path, u->v->settings->data, "jobs", row[i].id, NULL);
         status s = path_remove_tree(path, &err);
         if (s == STATUS_OK) s = store_job_erase(u->v->store, row[i].id, &err);
-        if (s != STATUS_OK) log_warning(u->v->log, "job %s: %s", row[i].id, err.text);
+        if (s == STATUS_OK) continue;
+        log_warning(u->v->log, "job %s is deleted, but not all of it is gone, next try in %d s: %s", row[i].id, BURY_AGAIN_S, err.text);
+        waiting_of(u, row[i].id, true)->until_s = clock_monotonic_s() + BURY_AGAIN_S;
     }
     job_rows_free(row, n);
 }

@@ -1,6 +1,7 @@
 """Workers that crash, hang, refuse to stop; how many run; what a restart does to them."""
 import os
 import re
+import shutil
 import signal
 import time
 
@@ -174,6 +175,33 @@ def test_unknown_folders_are_quarantined(daemon_maker):
     for name in kept:
         with open(os.path.join(d.data, "quarantine", name, "precious.txt")) as f:
             assert name.startswith(f.read())
+
+
+def test_folders_that_resist_do_not_keep_the_daemon_from_starting(daemon_maker):
+    d = daemon_maker()
+    deleted, broken, good = d.create(), d.create(), d.ready_job()
+    jobs = os.path.join(d.data, "jobs")
+    deep = os.path.join(jobs, deleted, *["x"] * 70)  # deeper than what is removed
+    os.makedirs(deep)
+    assert d.delete(f"/v1/jobs/{deleted}").status_code == 204
+    warned = f"job {deleted} is deleted, but not all of it is gone"
+    wait_until(lambda: warned in d.log_text())
+    for _ in range(3):  # each makes the supervisor look again
+        d.delete(f"/v1/jobs/{d.create()}")
+    wait_until(lambda: len(os.listdir(jobs)) == 3)
+    assert d.log_text().count(warned) == 1, "the log is flooded"
+    d.stop()
+    stranger = "s" * 250  # its name in the quarantine would be too long
+    os.mkdir(os.path.join(jobs, stranger))
+    shutil.rmtree(os.path.join(jobs, broken))
+    with open(os.path.join(jobs, broken), "w"):
+        pass
+    d.start()
+    assert {j["id"] for j in d.get("/v1/jobs").json()["jobs"]} == {broken, good}
+    assert d.post(f"/v1/jobs/{good}/start").status_code == 202
+    d.wait_state(good, "succeeded")
+    assert all(text in d.log_text() for text in (f"cannot move unknown '{jobs}/{stranger}'", f"job {broken}: "))
+    assert sorted(os.listdir(jobs)) == sorted([deleted, broken, good, stranger])
 
 
 def test_a_worker_that_vanishes_from_disk(daemon_maker, tmp_path):
