@@ -215,9 +215,38 @@ class Job:
                 raise ValueError(f"the server lists an unusable name: {entry['path']!r}")
             path = os.path.join(folder, *parts)
             os.makedirs(os.path.dirname(path), exist_ok=True)
-            with self.server.request("GET", entry["url"], stream=True) as answer, open(path + ".part", "wb") as f:
-                for chunk in answer.iter_content(1 << 20):
-                    f.write(chunk)
+            self._fetch(entry["url"], path + ".part")
             os.replace(path + ".part", path)
             paths.append(path)
         return paths
+
+    def _fetch(self, url, path):
+        """One file, whole: goes on by range after a broken connection, from the start when the file has changed since."""
+        failures, n, tag = 0, 0, None
+        with open(path, "wb") as f:
+            while True:
+                header = {"Accept-Encoding": "identity"}  # bytes as they are stored, so that they can be counted
+                if n and tag:
+                    header.update({"Range": f"bytes={n}-", "If-Range": tag})
+                try:
+                    with self.server.request("GET", url, stream=True, headers=header) as answer:
+                        continued = answer.status_code == 206
+                        if not continued:
+                            n, tag = 0, answer.headers.get("ETag")
+                            f.seek(0)
+                            f.truncate()
+                        # for `requests` a reply that is cut off has just ended: only its length tells
+                        length = answer.headers.get("Content-Length")
+                        end = None if length is None else n + int(length)
+                        for chunk in answer.iter_content(1 << 20):
+                            f.write(chunk)
+                            n += len(chunk)
+                            failures = 0 if continued else failures
+                    if end is None or n == end:
+                        return
+                    raise requests.ConnectionError(f"'{url}' was cut off after {n} of {end} bytes")
+                except (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError):
+                    failures += 1
+                    if failures > 6:
+                        raise
+                    time.sleep(0.1 * 2 ** failures)

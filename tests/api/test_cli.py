@@ -37,10 +37,10 @@ class Daemon:
 
 
 class CuttingProxy:
-    """Forwards to a port; the connections whose number is in `cuts` are broken after that many bytes from the client."""
+    """Forwards to a port; the connections whose number is in `cuts` are broken after that many bytes from the client, or to it."""
 
-    def __init__(self, port, cuts):
-        self.port, self.cuts, self.n = port, list(cuts), 0
+    def __init__(self, port, cuts, replies=False):
+        self.port, self.cuts, self.replies, self.n = port, list(cuts), replies, 0
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.url = f"http://127.0.0.1:{self.listener.getsockname()[1]}"
         threading.Thread(target=self.accept, daemon=True).start()
@@ -64,8 +64,9 @@ class CuttingProxy:
                     data = end.recv(65536)
                     if not data:
                         return
-                    if end is client:
+                    if (end is server) == self.replies:
                         n += len(data)
+                    if end is client:
                         data = data.replace(f"Host: {self.url[7:]}".encode(), f"Host: 127.0.0.1:{self.port}".encode())
                     (server if end is client else client).sendall(data)
                     if limit is not None and n > limit:
@@ -301,6 +302,21 @@ def test_python_client(daemon, sample, tmp_path):
     with pytest.raises(selvedge.JobFailed, match="page 2 is 8-bit"):
         server.submit(str(sample / "job.json")).wait(interval_s=0.1)
     shutil.rmtree(tmp_path / "out")
+
+
+def test_python_client_notices_a_download_that_is_cut_off(daemon, sample, tmp_path):
+    job_id = run(daemon.url, "submit", sample / "job.json", "--watch").stdout.split()[0]
+    data = os.urandom(3_000_000)
+    with open(os.path.join(daemon.folder, "jobs", job_id, "results", "large.bin"), "wb") as f:
+        f.write(data)
+    proxy = CuttingProxy(daemon.port, [1_000_000, 900_000], replies=True)
+    try:
+        paths = selvedge.Server(proxy.url).job(job_id).download(str(tmp_path / "out"))
+    finally:
+        proxy.stop()
+    assert proxy.n >= 3, "nothing was cut off"
+    assert (tmp_path / "out" / "large.bin").read_bytes() == data
+    assert all(os.path.getsize(p) > 0 for p in paths) and not [p for p in os.listdir(tmp_path / "out") if p.endswith(".part")]
 
 
 def test_example_documents_are_accepted(daemon):
