@@ -361,6 +361,7 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
         bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
                     (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
         if (!same) s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first", row->name);
+        else if (before.sha256[0] == '\0' && row->sha256[0] != '\0') s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
         else *row = before;
         *existed = true;
         goto out;

@@ -84,6 +84,34 @@ def test_sha256_is_computed_when_not_declared(daemon):
     assert daemon.job(job)["files"][0]["sha256"] == sha256(b"abc")
 
 
+def test_a_checksum_that_comes_later_is_checked(daemon):
+    """Half of one file, then a client that has another one and says so: no mixture of both is accepted."""
+    job, first, second = daemon.create(), b"a" * 1000, b"b" * 1000
+    url = daemon.declare(job, "scan.tif", first, checked=False)["upload_url"]
+    assert daemon.patch(url, 0, first[:500]).status_code == 204
+    again = daemon.declare(job, "scan.tif", second)
+    assert again["sha256"] == sha256(second) and again["offset"] == 500 and again["upload_url"] == url
+    problem(daemon.post(f"/v1/jobs/{job}/files", json=declaration(size=1000, sha256=sha256(first))), 409, "exists", "name")
+    problem(daemon.patch(url, 500, second[500:]), 422, "checksum", "scan.tif")
+    assert daemon.offset(url) == 0
+    assert daemon.patch(url, 0, second).status_code == 204
+    assert daemon.declare(job, "scan.tif", second)["state"] == "complete"
+    problem(daemon.post(f"/v1/jobs/{job}/files", json=declaration(size=1000, sha256=sha256(first))), 409, "exists", "name")
+
+
+def test_a_checksum_that_comes_while_a_piece_is_on_its_way(daemon):
+    job, data = daemon.create(), os.urandom(100_000)
+    url = daemon.declare(job, "scan.tif", data, checked=False)["upload_url"]
+    with socket.create_connection(("127.0.0.1", daemon.port)) as s:
+        s.sendall((f"PATCH {url} HTTP/1.1\r\nHost: localhost\r\nTus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\n"
+                   f"Content-Type: application/offset+octet-stream\r\nContent-Length: {len(data)}\r\n\r\n").encode() + data[:60_000])
+        wait_until(lambda: daemon.get(f"/v1/jobs/{job}/files").json()["files"][0]["offset"] == 60_000)
+        assert daemon.declare(job, "scan.tif", b"c" * len(data))["offset"] == 60_000
+        s.sendall(data[60_000:])
+        assert s.recv(4096).startswith(b"HTTP/1.1 422 ")
+    assert daemon.offset(url) == 0
+
+
 def test_checksum_mismatch_starts_again(daemon):
     job = daemon.create()
     url = daemon.declare(job, "scan.tif", b"right")["upload_url"]
