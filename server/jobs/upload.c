@@ -255,14 +255,12 @@ static status commit(struct upload *u, struct error *err)
     if (u->row.state == FILE_COMPLETE) return STATUS_OK;
     if (u->offset_bytes != u->row.offset_bytes) {
         if (u->fd >= 0 && fdatasync(u->fd) != 0) return roll_back(u, err);
-        int64_t before = u->row.offset_bytes;
-        u->row.offset_bytes = u->offset_bytes;
-        memcpy(u->row.hash_state, &u->hash, sizeof u->hash);
-        status s = store_file_update(u->set->store, &u->row, err);
-        if (s != STATUS_OK) {
-            u->row.offset_bytes = before;
-            return s;
-        }
+        struct file_row next = u->row;
+        next.offset_bytes = u->offset_bytes;
+        memcpy(next.hash_state, &u->hash, sizeof u->hash);
+        status s = store_file_update(u->set->store, &next, err);
+        if (s != STATUS_OK) return s;
+        u->row = next;
     }
     return u->offset_bytes == u->row.size_bytes ? finish(u, err) : STATUS_OK;
 }
@@ -354,13 +352,19 @@ uint64_t upload_bytes_total(const struct upload_set *set) { return atomic_load(&
 
 static status recover_one(struct upload_set *set, struct file_row *row, struct error *err)
 {
-    char path[PATH_BYTES];
+    char part[PATH_BYTES], input[PATH_BYTES];
     struct stat st;
-    if (row->state == FILE_VERIFIED && settle(set, row, NULL) == STATUS_OK) return STATUS_OK;
-    part_path(set, row, path);
-    if (row->state == FILE_UPLOADING && stat(path, &st) == 0) return STATUS_OK;
+    bool verified = row->state == FILE_VERIFIED;
+    status s = verified ? settle(set, row, err) : STATUS_OK;
+    part_path(set, row, part);
+    input_path(set, row, input);
+    if (verified && s == STATUS_OK) return s;
+    /* only what is really gone begins anew: room made for a file that is there would one day replace it with zeros */
+    if (stat(part, &st) == 0) return s;
+    if (errno != ENOENT) return error_set_errno(err, "cannot look at its upload");
+    if (verified && (stat(input, &st) == 0 || errno != ENOENT)) return s;
     log_warning(set->log, "file '%s' of job %s has lost its bytes: it has to be sent again", row->name, row->job_id);
-    status s = upload_reserve(set, row, err);
+    s = upload_reserve(set, row, err);
     if (s == STATUS_OK) s = store_file_update(set->store, row, err);
     return s;
 }

@@ -1,6 +1,8 @@
 """Declaring files and the tus protocol."""
+import contextlib
 import os
 import socket
+import sqlite3
 import threading
 import time
 
@@ -166,6 +168,48 @@ def test_terminate(daemon):
     assert daemon.request("HEAD", url, headers=TUS).status_code == 404
     folder = os.path.join(daemon.data, "jobs", job)
     assert os.listdir(os.path.join(folder, "upload")) == [] and os.listdir(os.path.join(folder, "input")) == []
+
+
+@contextlib.contextmanager
+def file_rows_locked(data, what="UPDATE"):
+    """For a while no row of a file can be written."""
+    with contextlib.closing(sqlite3.connect(os.path.join(data, "selvedge.db"))) as db:
+        db.execute(f"CREATE TRIGGER refuse BEFORE {what} ON file BEGIN SELECT RAISE(ABORT, 'for a test'); END")
+        yield
+        db.execute("DROP TRIGGER refuse")
+
+
+def test_a_verified_file_that_cannot_be_settled_at_the_start_is_not_given_up(daemon_maker):
+    d = daemon_maker()
+    job, data = d.create(), b"precious" * 1000
+    d.upload(job, "scan.tif", data)
+    d.stop()
+    with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db, db:
+        db.execute("UPDATE file SET state = 1")  # verified, not yet called complete: as a crash leaves it
+    with file_rows_locked(d.data):
+        d.start()
+        assert "lost its bytes" not in d.log_text() and "for a test" in d.log_text()
+    d.stop()
+    d.start()
+    assert d.get(f"/v1/jobs/{job}/files/scan.tif").content == data
+
+
+def test_an_offset_that_cannot_be_committed_keeps_its_checksum(daemon_maker):
+    """The database holds the offset and the sum up to it: never one without the other."""
+    d = daemon_maker()
+    job, data = d.create(), os.urandom(100_000)
+    url = d.declare(job, "scan.tif", data, checked=False)["upload_url"]
+    with socket.create_connection(("127.0.0.1", d.port)) as s:
+        s.sendall((f"PATCH {url} HTTP/1.1\r\nHost: localhost\r\nTus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\n"
+                   f"Content-Type: application/offset+octet-stream\r\nContent-Length: {len(data)}\r\n\r\n").encode() + data[:60_000])
+        wait_until(lambda: d.get(f"/v1/jobs/{job}/files").json()["files"][0]["offset"] == 60_000)
+        with file_rows_locked(d.data):
+            assert not d.session.head(d.url + url, headers=TUS).ok
+        d.declare(job, "scan.tif", data)
+        d.kill()
+    d.start()
+    offset = d.offset(url)
+    assert d.patch(url, offset, data[offset:]).status_code == 204
 
 
 def test_space_is_reserved(daemon):
