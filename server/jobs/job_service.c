@@ -148,14 +148,17 @@ static bool active(const struct job_row *row)
     return row->state == JOB_QUEUED || row->state == JOB_RUNNING || row->state == JOB_PAUSED;
 }
 
-/* An edit of a job that has run: back to draft, and the next start begins afresh. */
-static status edit(struct job_service *v, struct job_row *row, struct error *err)
+static status check_editable(const struct job_row *row, struct error *err)
 {
-    if (active(row))
-        return error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first", job_state_name(row->state));
+    return active(row) ? error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first", job_state_name(row->state)) : STATUS_OK;
+}
+
+/* An edit of a job that has run: back to draft, and the next start begins afresh. The row is written together with what was edited, so
+ * that a job whose edit fails is what it was. */
+static void edited(struct job_row *row)
+{
     row->state = JOB_DRAFT;
     row->dirty = row->dirty || row->attempt > 0;
-    return job_update_surely(v, row, err);
 }
 
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
@@ -166,6 +169,7 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     status s = job_get(v, id, &row, err);
     if (s == STATUS_OK && may_edit != NULL) s = may_edit(context, &row, err);
     if (s == STATUS_OK) s = check_document(document, n_bytes, row.sample, err);
+    if (s == STATUS_OK) s = check_editable(&row, err);
     if (s != STATUS_OK) goto out;
     char *text = strndup(document, n_bytes);
     if (text == NULL) {
@@ -174,7 +178,8 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     }
     free(row.document);
     row.document = text;
-    s = edit(v, &row, err);
+    edited(&row);
+    s = job_update_surely(v, &row, err);
 out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);
@@ -373,13 +378,14 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
         s = error_set(err, STATUS_TOO_LARGE, "a job takes at most %lld files", (long long)v->settings->max_files_per_job);
         goto out;
     }
-    s = job_disk_check(v, row->size_bytes, err);
-    if (s == STATUS_OK) s = edit(v, &job, err);
+    s = check_editable(&job, err);
+    if (s == STATUS_OK) s = job_disk_check(v, row->size_bytes, err);
     if (s != STATUS_OK) goto out;
     new_id(row->id);
     s = upload_reserve(v->upload, row, err);
     if (s != STATUS_OK) goto out;
-    s = store_file_insert(v->store, row, err);
+    edited(&job);
+    s = store_file_insert(v->store, row, &job, err);
     if (s != STATUS_OK) upload_discard(v->upload, row);
 out:
     free(all);
@@ -406,11 +412,14 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     pthread_mutex_lock(&v->change);
     status s = job_get(v, id, &job, err);
     if (s == STATUS_OK) s = store_file_find(v->store, id, name, &file, err);
-    if (s == STATUS_OK) s = edit(v, &job, err);
+    if (s == STATUS_OK) s = check_editable(&job, err);
+    if (s != STATUS_OK) goto out;
+    edited(&job);
     /* the row first: bytes without a row are swept away, a row without bytes would be a lie */
-    if (s == STATUS_OK) s = store_file_erase(v->store, file.id, err);
-    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, err);
+    s = store_file_erase(v->store, file.id, &job, err);
+    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_OK) upload_discard(v->upload, &file);
+out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&job);
     return s;

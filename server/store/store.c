@@ -100,6 +100,15 @@ status store_run(struct store *store, int *n_changed, struct error *err, const c
     return s;
 }
 
+status store_begin(struct store *store, struct error *err) { return store_run(store, NULL, err, "BEGIN IMMEDIATE", ""); }
+
+status store_end(struct store *store, status so_far, struct error *err)
+{
+    if (so_far == STATUS_OK) so_far = store_run(store, NULL, err, "COMMIT", "");
+    if (so_far != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
+    return so_far;
+}
+
 void store_text(sqlite3_stmt *statement, int column, char *out, size_t n_out)
 {
     const unsigned char *text = sqlite3_column_text(statement, column);

@@ -86,12 +86,14 @@ void job_rows_free(struct job_row *row, size_t n);
 /* Jobs in each state, without tombstones. */
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err);
 
-status store_file_insert(struct store *store, const struct file_row *row, struct error *err);
+/* With its job's row (store_job_update; NULL: without) in one transaction: both are written, or neither. */
+status store_file_insert(struct store *store, const struct file_row *row, struct job_row *job, struct error *err);
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err);
 status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row, struct error *err);
 /* Offset, hash state, sha256, state. STATUS_NOT_FOUND when the row is gone. */
 status store_file_update(struct store *store, const struct file_row *row, struct error *err);
-status store_file_erase(struct store *store, const char *id, struct error *err);
+/* With its job's row as above. */
+status store_file_erase(struct store *store, const char *id, struct job_row *job, struct error *err);
 /* In the order of declaration; free(*row). job_id NULL: of all jobs, those that are not complete. */
 status store_file_list(struct store *store, const char *job_id, struct file_row **row, size_t *n, struct error *err);
 

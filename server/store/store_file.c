@@ -21,11 +21,20 @@ static void read_row(sqlite3_stmt *q, struct file_row *row)
     if (blob != NULL && n == STORE_HASH_STATE_BYTES) memcpy(row->hash_state, blob, STORE_HASH_STATE_BYTES);
 }
 
-status store_file_insert(struct store *store, const struct file_row *r, struct error *err)
+static status insert(struct store *store, const struct file_row *r, struct job_row *job, struct error *err)
+{
+    status s = store_begin(store, err);
+    if (s != STATUS_OK) return s;
+    s = store_run(store, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)", "ssssiisib", r->id, r->job_id, r->name, r->role, r->size_bytes,
+                  r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES);
+    if (s == STATUS_OK && job != NULL) s = store_job_write(store, job, err);
+    return store_end(store, s, err);
+}
+
+status store_file_insert(struct store *store, const struct file_row *row, struct job_row *job, struct error *err)
 {
     pthread_mutex_lock(&store->lock);
-    status s = store_run(store, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)", "ssssiisib", r->id, r->job_id, r->name, r->role,
-                         r->size_bytes, r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES);
+    status s = insert(store, row, job, err);
     pthread_mutex_unlock(&store->lock);
     return s;
 }
@@ -73,10 +82,19 @@ status store_file_update(struct store *store, const struct file_row *r, struct e
     return s;
 }
 
-status store_file_erase(struct store *store, const char *id, struct error *err)
+static status erase(struct store *store, const char *id, struct job_row *job, struct error *err)
+{
+    status s = store_begin(store, err);
+    if (s != STATUS_OK) return s;
+    s = store_run(store, NULL, err, "DELETE FROM file WHERE id = ?", "s", id);
+    if (s == STATUS_OK && job != NULL) s = store_job_write(store, job, err);
+    return store_end(store, s, err);
+}
+
+status store_file_erase(struct store *store, const char *id, struct job_row *job, struct error *err)
 {
     pthread_mutex_lock(&store->lock);
-    status s = store_run(store, NULL, err, "DELETE FROM file WHERE id = ?", "s", id);
+    status s = erase(store, id, job, err);
     pthread_mutex_unlock(&store->lock);
     return s;
 }

@@ -51,7 +51,7 @@ static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
 
 static status insert(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
 {
-    status s = store_run(store, NULL, err, "BEGIN IMMEDIATE", "");
+    status s = store_begin(store, err);
     if (s != STATUS_OK) return s;
     s = store_run(store, NULL, err,
                   "INSERT INTO job (id, sample, document, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, token, created, "
@@ -61,9 +61,7 @@ static status insert(struct store *store, struct job_row *r, const char *key, co
     if (s == STATUS_OK && key != NULL)
         s = store_run(store, NULL, err, "INSERT OR REPLACE INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd", key, r->id, body_hash,
                       r->created_unix_s);
-    if (s == STATUS_OK) s = store_run(store, NULL, err, "COMMIT", "");
-    if (s != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
-    return s;
+    return store_end(store, s, err);
 }
 
 status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash, struct error *err)
@@ -108,32 +106,36 @@ out:
     return s;
 }
 
-status store_job_update(struct store *store, struct job_row *r, struct error *err)
+status store_job_write(struct store *store, struct job_row *r, struct error *err)
 {
     int n = 0;
     r->updated_unix_s = clock_wall_s();
-    pthread_mutex_lock(&store->lock);
     status s = store_run(store, &n, err,
                          "UPDATE job SET sample=?, document=?, state=?, cancel_requested=?, dirty=?, deleted=?, attempt=?, lost_attempts=?, "
                          "generation=?, token=?, updated=?, queued=?, started=?, finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
                          "ssiiiiiiisddddsssis", r->sample, r->document, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
                          (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
                          r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes, r->id);
-    pthread_mutex_unlock(&store->lock);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
+    return s;
+}
+
+status store_job_update(struct store *store, struct job_row *row, struct error *err)
+{
+    pthread_mutex_lock(&store->lock);
+    status s = store_job_write(store, row, err);
+    pthread_mutex_unlock(&store->lock);
     return s;
 }
 
 static status erase(struct store *store, const char *id, struct error *err)
 {
-    status s = store_run(store, NULL, err, "BEGIN IMMEDIATE", "");
+    status s = store_begin(store, err);
     if (s != STATUS_OK) return s;
     s = store_run(store, NULL, err, "DELETE FROM file WHERE job_id = ?", "s", id);
     if (s == STATUS_OK) s = store_run(store, NULL, err, "DELETE FROM idempotency WHERE job_id = ?", "s", id);
     if (s == STATUS_OK) s = store_run(store, NULL, err, "DELETE FROM job WHERE id = ?", "s", id);
-    if (s == STATUS_OK) s = store_run(store, NULL, err, "COMMIT", "");
-    if (s != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
-    return s;
+    return store_end(store, s, err);
 }
 
 status store_job_erase(struct store *store, const char *id, struct error *err)

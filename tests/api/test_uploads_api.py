@@ -212,6 +212,24 @@ def test_an_offset_that_cannot_be_committed_keeps_its_checksum(daemon_maker):
     assert d.patch(url, offset, data[offset:]).status_code == 204
 
 
+def test_a_job_whose_edit_fails_is_what_it_was(daemon_maker):
+    d = daemon_maker()
+    job = d.start_job()
+    done = d.wait_state(job, "succeeded")
+    with file_rows_locked(d.data, "INSERT"):
+        assert not d.post(f"/v1/jobs/{job}/files", json=declaration(name="more.tif")).ok
+    with file_rows_locked(d.data, "DELETE"):
+        assert not d.delete(f"/v1/jobs/{job}/files/scan.tif").ok
+    uploads = os.path.join(d.data, "jobs", job, "upload")
+    assert os.listdir(uploads) == [], "room is still kept for what was refused"
+    os.rmdir(uploads)
+    assert not d.post(f"/v1/jobs/{job}/files", json=declaration(name="more.tif")).ok
+    assert d.job(job) == done
+    assert d.delete(f"/v1/jobs/{job}/files/scan.tif").status_code == 204
+    edited = d.job(job)
+    assert edited["state"] == "draft" and edited["missing_files"] == ["scan.tif"]
+
+
 def test_space_is_reserved(daemon):
     job = daemon.create()
     daemon.post(f"/v1/jobs/{job}/files", json=declaration(size=50_000_000))
