@@ -86,7 +86,7 @@ bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish
 {
     struct job_row row;
     *wish = (struct attempt_wish){0};
-    if (store_job_get(v->store, job_id, &row, NULL) != STATUS_OK) return false;
+    if (store_job_look(v->store, job_id, &row, NULL) != STATUS_OK) return false;
     wish->cancel = row.cancel_requested;
     wish->deleted = row.deleted;
     json_t *j = attempt_read_status(v, job_id);
@@ -188,7 +188,7 @@ status attempt_settle(struct job_service *v, const char *job_id, const struct wo
 {
     struct job_row row;
     pthread_mutex_lock(&v->change);
-    status s = store_job_get(v->store, job_id, &row, err);
+    status s = store_job_look(v->store, job_id, &row, err);
     if (s != STATUS_OK) goto out;
     judge(v, &row, end, stop, verdict);
     if (end->peak_rss_bytes > row.peak_rss_bytes) row.peak_rss_bytes = end->peak_rss_bytes;

@@ -35,7 +35,7 @@ static status sweep_unknown(struct job_service *v, struct error *err)
         if (strcmp(e->d_name, ".") == 0 || strcmp(e->d_name, "..") == 0) continue;
         struct job_row row = {0};
         struct error why = {0};
-        status found = id_valid(e->d_name) ? store_job_get(v->store, e->d_name, &row, &why) : STATUS_NOT_FOUND;
+        status found = id_valid(e->d_name) ? store_job_look(v->store, e->d_name, &row, &why) : STATUS_NOT_FOUND;
         if (found == STATUS_NOT_FOUND) found = quarantine(v, e->d_name, &why);
         if (found != STATUS_OK) log_warning(v->log, "%s", why.text);
         job_row_release(&row);

@@ -29,7 +29,7 @@ struct job_row {
     int64_t serial; /* given by the store, rises with every job */
     char id[STORE_ID_BYTES];
     char sample[256];
-    char *document; /* JSON text, owned: job_row_release */
+    char *document; /* JSON text, owned: job_row_release. NULL where it was not read */
     enum job_state state;
     bool cancel_requested;
     bool dirty;   /* edited after an attempt: the next start begins afresh */
@@ -68,7 +68,9 @@ status store_idempotency_find(struct store *store, const char *key, char job_id[
                               char body_hash[STORE_HASH_TEXT_BYTES], struct error *err);
 /* Tombstones are found too (row->deleted). STATUS_NOT_FOUND. Release the row. */
 status store_job_get(struct store *store, const char *id, struct job_row *row, struct error *err);
-/* Everything but serial, id and created; sets updated. */
+/* The same without the document, which may be large. */
+status store_job_look(struct store *store, const char *id, struct job_row *row, struct error *err);
+/* Everything but serial, id and created; sets updated. A document that was not read stays as it is. */
 status store_job_update(struct store *store, struct job_row *row, struct error *err);
 /* The row, its files and its idempotency keys. */
 status store_job_erase(struct store *store, const char *id, struct error *err);
@@ -80,7 +82,7 @@ struct job_query {
     bool queue_order;      /* by queued_unix_s, oldest first */
     size_t limit;
 };
-/* *row is an array of *n rows (documents included): job_rows_free. */
+/* *row is an array of *n rows, without their documents: job_rows_free. */
 status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n, struct error *err);
 void job_rows_free(struct job_row *row, size_t n);
 /* Jobs in each state, without tombstones. */

@@ -1,11 +1,12 @@
 """Jobs: creating, editing, listing, starting, cancelling, deleting."""
+import contextlib
 import json
 import os
 import socket
 import sqlite3
 
 import pytest
-from daemon_under_test import DOCUMENT, FILES, document, problem, wait_until
+from daemon_under_test import BUILD, DOCUMENT, FILES, document, problem, wait_until
 
 
 def test_create_answers_with_the_job(daemon):
@@ -281,3 +282,23 @@ def test_a_daemon_that_cannot_announce_itself_runs(daemon_maker):
     os.mkdir(os.path.join(d.data, "daemon.json"))
     d.start()
     assert d.get("/livez").status_code == 200 and "daemon.json" in d.log_text()
+
+
+@pytest.mark.skipif("asan" in BUILD, reason="the sanitizer keeps what was freed")
+def test_lists_and_the_start_do_without_documents(daemon_maker):
+    """Documents may have a megabyte each: what shows many jobs does not read them, and what writes such rows back keeps them."""
+    d = daemon_maker()
+    running, jobs = d.start_job("work_once"), [d.create() for _ in range(60)]
+    d.wait_state(running, "running")
+    d.kill()
+    with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db, db:
+        db.execute("UPDATE job SET document = document || ?", [" " * 1_000_000])
+    d.start()
+    assert len(d.get("/v1/jobs?limit=500").json()["jobs"]) == 61
+    d.wait_state(running, "succeeded")
+    with open(f"/proc/{d.process.pid}/status") as f:
+        peak_kib = next(int(line.split()[1]) for line in f if line.startswith("VmHWM"))
+    assert d.wrapper or peak_kib < 45_000
+    with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db:
+        assert {n for n, in db.execute("SELECT length(document) > 1000000 FROM job")} == {1}
+    assert d.job(jobs[0])["document"] == DOCUMENT
