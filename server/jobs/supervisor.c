@@ -23,6 +23,7 @@ struct slot {
     double beat_unix_s, beat_s; /* the last heartbeat seen, and when it was new (monotonic; at first the start) */
     double asked_s;             /* monotonic; 0: not asked */
     bool killed, ended;
+    double settle_s; /* monotonic: not before this is its end written to the database again */
     struct worker_end end;
 };
 
@@ -62,6 +63,7 @@ static struct waiting *waiting_of(struct supervisor *u, const char *job_id, bool
 
 static void ask_to_stop(struct slot *slot, enum attempt_stop why)
 {
+    if (slot->ended) return; /* its end is known, and its number may be another process's by now */
     if (slot->stop == STOP_NONE || why < slot->stop) slot->stop = why;
     if (slot->asked_s > 0) return;
     slot->asked_s = clock_monotonic_s();
@@ -83,6 +85,7 @@ static void end_of(struct supervisor *u, struct slot *slot)
     if (attempt_settle(u->v, slot->job_id, &slot->end, slot->stop, &verdict, &err) != STATUS_OK) {
         /* the row still says running: the database could not be written. Keep the slot and try again. */
         log_error(u->v->log, "job %s: %s", slot->job_id, err.text);
+        slot->settle_s = clock_monotonic_s() + 1;
         return;
     }
     slot->used = false;
@@ -99,11 +102,11 @@ static void end_of(struct supervisor *u, struct slot *slot)
 static void watch(struct supervisor *u, struct slot *slot)
 {
     if (!slot->ended) slot->ended = worker_ended(slot->pid, &slot->end);
+    double now = clock_monotonic_s();
     if (slot->ended) {
-        end_of(u, slot);
+        if (now >= slot->settle_s) end_of(u, slot);
         return;
     }
-    double now = clock_monotonic_s();
     struct attempt_wish wish;
     bool known = attempt_look(u->v, slot->job_id, &wish);
     if (wish.deleted) kill_now(slot, STOP_CANCEL);
@@ -154,20 +157,20 @@ static void launch(struct supervisor *u, const char *job_id)
     }
     struct slot *slot = u->slot;
     while (slot->used) slot++;
-    pid_t pid = 0;
+    *slot = (struct slot){.used = true, .beat_s = clock_monotonic_s()};
+    snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes, u->v->settings->volume_memory_bytes};
-    s = worker_launch(u->worker, folder, console, &limits, &pid, &err);
-    if (s != STATUS_OK) {
-        log_error(u->v->log, "job %s: %s", job_id, err.text);
-        struct attempt_verdict verdict = {0};
-        struct worker_end end = {.by_signal = false, .code = 127};
-        attempt_settle(u->v, job_id, &end, STOP_NONE, &verdict, NULL);
-        waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
+    s = worker_launch(u->worker, folder, console, &limits, &slot->pid, &err);
+    if (s == STATUS_OK) {
+        log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
         return;
     }
-    *slot = (struct slot){.used = true, .pid = pid, .beat_s = clock_monotonic_s()};
-    snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
-    log_info(u->v->log, "job %s: worker %d started", job_id, (int)pid);
+    /* the row says running already: the slot stays, as that of a worker that has ended, until the database has taken that back */
+    log_error(u->v->log, "job %s: %s", job_id, err.text);
+    slot->ended = true;
+    slot->end = (struct worker_end){.by_signal = false, .code = 127};
+    end_of(u, slot);
+    waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
 }
 
 static void fill_slots(struct supervisor *u)

@@ -1,8 +1,10 @@
 """Workers that crash, hang, refuse to stop; how many run; what a restart does to them."""
+import contextlib
 import os
 import re
 import shutil
 import signal
+import sqlite3
 import time
 
 import pytest
@@ -212,6 +214,38 @@ def test_a_worker_that_vanishes_from_disk(daemon_maker, tmp_path):
     worker.unlink()
     error = d.wait_state(d.start_job(), "failed")["error"]
     assert "cannot be executed" in error["text"] or "could not be started" in error["text"]
+
+
+def test_a_job_whose_worker_cannot_be_started_nor_that_be_written_does_not_stay_running(daemon_maker):
+    d = daemon_maker()
+    job = d.ready_job()
+    console = os.path.join(d.data, "jobs", job, "console.txt")
+    os.mkdir(console)  # no worker can be started
+    with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db:
+        db.execute("CREATE TRIGGER refuse BEFORE UPDATE ON job WHEN OLD.state = 2 BEGIN SELECT RAISE(ABORT, 'for a test'); END")
+        d.post(f"/v1/jobs/{job}/start")
+        wait_until(lambda: "for a test" in d.log_text())
+        assert d.job(job)["state"] == "running"
+        os.rmdir(console)
+        db.execute("DROP TRIGGER refuse")
+    done = d.wait_state(job, "succeeded")
+    assert done["attempt"] == 2 and done["lost_attempts"] == 1
+
+
+def test_a_daemon_that_cannot_write_a_lost_start_still_stops(daemon_maker):
+    d = daemon_maker()
+    job = d.ready_job()
+    os.mkdir(os.path.join(d.data, "jobs", job, "console.txt"))
+    with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db:
+        db.execute("CREATE TRIGGER refuse BEFORE UPDATE ON job WHEN OLD.state = 2 BEGIN SELECT RAISE(ABORT, 'for a test'); END")
+        d.post(f"/v1/jobs/{job}/start")
+        wait_until(lambda: "for a test" in d.log_text())
+        d.process.send_signal(signal.SIGTERM)
+        wait_until(lambda: "stopping" in d.log_text())
+        db.execute("DROP TRIGGER refuse")
+    d.stop()
+    d.start()
+    assert d.job(job)["state"] in ("queued", "running")
 
 
 def test_signals_to_a_worker_from_outside(daemon):
