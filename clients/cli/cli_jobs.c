@@ -26,7 +26,7 @@ static status job_call(struct cli *cli, const char *method, const char *tail, js
 
 static void print_json(const json_t *value, FILE *out)
 {
-    json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(17)); /* for programs: what the server said, to the last digit */
     fputc('\n', out);
 }
 

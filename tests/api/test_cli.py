@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 
 import pytest
 
@@ -127,6 +128,8 @@ def test_from_submit_to_results(daemon, sample, tmp_path):
     assert json.loads(run(daemon.url, "status", job_id, "--json").stdout)["state"] == "succeeded"
     assert run(daemon.url, "log", job_id).stdout.count("stage ") == 8
     assert run(daemon.url, "log", job_id, "-f").stdout.count("stage ") == 8
+    with urllib.request.urlopen(f"{daemon.url}/v1/jobs/{job_id}") as answer:
+        assert json.loads(run(daemon.url, "status", job_id, "--json").stdout) == json.load(answer), "digits are lost"
     rows = run(daemon.url, "series", job_id).stdout.splitlines()
     assert len(rows) == 11 and rows[0].startswith("step\t")
     assert len(json.loads(run(daemon.url, "series", job_id, "--json").stdout)) == 10
