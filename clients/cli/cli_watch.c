@@ -105,6 +105,9 @@ static bool may_wait(struct watch *w, const struct error *err)
     return now - w->lost_s < GONE_S;
 }
 
+/* answers of a server that is on its way up or down, or of a proxy in front of one that is away */
+static bool unavailable(long code) { return code == 429 || code == 502 || code == 503 || code == 504; }
+
 static status poll_once(struct watch *w, struct error *err)
 {
     char line[200];
@@ -117,9 +120,10 @@ static status poll_once(struct watch *w, struct error *err)
     }
     status s = http_call(w->cli->http, "GET", w->path, header, NULL, 0, &reply, &local);
     if (s == STATUS_OK) {
-        w->lost_s = 0.0;
+        bool away = unavailable(reply.code);
+        if (!away) w->lost_s = 0.0;
         s = take_answer(w, &reply, &local);
-        if (reply.code == 503 || reply.code == 429) s = may_wait(w, &local) ? STATUS_OK : s;
+        if (away && may_wait(w, &local)) s = STATUS_OK;
     } else if (reply.cut_off && may_wait(w, &local)) {
         s = STATUS_OK;
     }
