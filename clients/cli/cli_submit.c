@@ -179,6 +179,7 @@ static status send_files(struct submit *u, struct error *err)
 {
     status s = STATUS_OK;
     size_t n_sent = 0;
+    uint64_t piece_bytes = cli_piece_bytes(u->cli);
     u->verb = "uploading";
     u->started_s = clock_monotonic_s();
     u->n_before = u->n_now = 0;
@@ -194,9 +195,9 @@ static status send_files(struct submit *u, struct error *err)
         if (s == STATUS_OK && !complete && url == NULL)
             s = error_set(err, STATUS_FORMAT, "the server gives no address to upload '%s' to", file->name);
         if (s == STATUS_OK && !complete) {
-            s = cli_upload_file(u->cli, file, url, uploaded, u, err);
+            s = cli_upload_file(u->cli, file, url, piece_bytes, uploaded, u, err);
             if (s == STATUS_CHECKSUM) /* damaged on its way: once more from the start */
-                s = cli_upload_file(u->cli, file, url, uploaded, u, err);
+                s = cli_upload_file(u->cli, file, url, piece_bytes, uploaded, u, err);
             n_sent += s == STATUS_OK;
         }
         u->n_before += file->n_bytes;

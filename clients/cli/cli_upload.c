@@ -14,7 +14,7 @@ struct upload {
     const struct cli_file *file;
     const char *url;
     int fd;
-    uint64_t offset, sending;
+    uint64_t piece_bytes, offset, sending;
     void (*changed)(void *context, uint64_t offset);
     void *context;
 };
@@ -46,7 +46,7 @@ static status send_piece(struct upload *u, struct http_reply *reply, struct erro
     char offset_line[64];
     const char *const header[] = {"Tus-Resumable: 1.0.0", "Content-Type: application/offset+octet-stream", offset_line, NULL};
     uint64_t left = u->file->n_bytes - u->offset;
-    struct http_source source = {.fd = u->fd, .n_bytes = left < PIECE_BYTES ? left : PIECE_BYTES, .sent = sent, .context = u};
+    struct http_source source = {.fd = u->fd, .n_bytes = left < u->piece_bytes ? left : u->piece_bytes, .sent = sent, .context = u};
     snprintf(offset_line, sizeof offset_line, "Upload-Offset: %llu", (unsigned long long)u->offset);
     if (lseek(u->fd, (off_t)u->offset, SEEK_SET) < 0) return error_set_errno(err, "cannot read '%s'", u->file->path);
     u->sending = u->offset;
@@ -82,10 +82,21 @@ static status step(struct upload *u, bool *known, bool *again, struct error *err
     return s;
 }
 
-status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url,
+uint64_t cli_piece_bytes(struct cli *cli)
+{
+    json_t *about = NULL;
+    /* a server that does not say takes what it always took, and one that does not answer will be noticed soon enough */
+    json_int_t limit = http_json(cli->http, "GET", "/v1/about", NULL, NULL, &about, NULL) != STATUS_OK
+                           ? 0
+                           : json_integer_value(json_object_get(json_object_get(about, "limits"), "max_patch_bytes"));
+    json_decref(about);
+    return limit > 0 && limit < PIECE_BYTES ? (uint64_t)limit : PIECE_BYTES;
+}
+
+status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url, uint64_t piece_bytes,
                        void (*changed)(void *context, uint64_t offset), void *context, struct error *err)
 {
-    struct upload u = {.cli = cli, .file = file, .url = upload_url, .changed = changed, .context = context};
+    struct upload u = {.cli = cli, .file = file, .url = upload_url, .piece_bytes = piece_bytes, .changed = changed, .context = context};
     bool known = false;
     int n_fruitless = 0;
     status s = STATUS_OK;

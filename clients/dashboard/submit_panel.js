@@ -1,6 +1,6 @@
 // Drag and drop: a job document (*.json) and the files that it names. Uploads go through tus and continue after a broken connection.
 import { el, size } from "./page_parts.js";
-import { raw, sendJson } from "./server_link.js";
+import { getJson, raw, sendJson } from "./server_link.js";
 
 const PIECE = 8 << 20, MAX_HASHED = 512 << 20, MAX_TRY = 6;
 
@@ -21,7 +21,12 @@ async function sha256(file) {
   return [...new Uint8Array(digest)].map((b) => b.toString(16).padStart(2, "0")).join("");
 }
 
-async function upload(file, url, progress) {
+async function pieceBytes() {
+  const limit = (await getJson("/v1/about")).limits?.max_patch_bytes;
+  return limit > 0 ? Math.min(PIECE, limit) : PIECE;
+}
+
+async function upload(file, url, piece, progress) {
   const tus = { "Tus-Resumable": "1.0.0" };
   let offset = null, tries = 0;
   while (offset === null || offset < file.size) {
@@ -29,7 +34,7 @@ async function upload(file, url, progress) {
       if (offset === null) offset = Number((await raw("HEAD", url, { header: tus })).headers.get("Upload-Offset"));
       else {
         const answer = await raw("PATCH", url, {
-          body: file.slice(offset, offset + PIECE),
+          body: file.slice(offset, offset + piece),
           header: { ...tus, "Upload-Offset": String(offset), "Content-Type": "application/offset+octet-stream" },
         });
         offset = Number(answer.headers.get("Upload-Offset"));
@@ -78,12 +83,13 @@ export function submitPanel() {
     try {
       const key = [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
       const job = await sendJson("POST", "/v1/jobs", doc, { "Idempotency-Key": key });
+      const piece = await pieceBytes();
       for (const [i, f] of wanted().entries()) {
         const file = dropped.get(f.name);
         const label = (n) => say(`${i + 1} of ${wanted().length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
         label(0);
         const state = await sendJson("POST", `/v1/jobs/${job.id}/files`, { name: f.name, role: f.role, size: file.size, sha256: await sha256(file) });
-        if (state.state !== "complete") await upload(file, state.upload_url, label);
+        if (state.state !== "complete") await upload(file, state.upload_url, piece, label);
       }
       await sendJson("POST", `/v1/jobs/${job.id}/start`);
       location.hash = job.id;

@@ -59,6 +59,7 @@ class Server:
         self.timeout_s = timeout_s
         self.session = requests.Session()
         self.session.trust_env = False
+        self._piece = None
         token = token or os.environ.get("SELVEDGE_TOKEN")
         if token:
             self.session.headers["Authorization"] = f"Bearer {token}"
@@ -73,6 +74,13 @@ class Server:
                 body = {}
             raise Problem(answer.status_code, body)
         return answer
+
+    def piece_bytes(self):
+        """What one request of an upload carries: 16 MiB, or the server's limit where that is less. Asked once."""
+        if self._piece is None:
+            limits = self.request("GET", "/v1/about").json().get("limits", {})
+            self._piece = min(PIECE, limits.get("max_patch_bytes", PIECE))
+        return self._piece
 
     def jobs(self):
         """Summaries of all jobs, newest first."""
@@ -138,7 +146,7 @@ class Job:
                 else:
                     f.seek(offset)
                     header = dict(tus, **{"Upload-Offset": str(offset), "Content-Type": "application/offset+octet-stream"})
-                    answer = self.server.request("PATCH", url, headers=header, data=f.read(PIECE))
+                    answer = self.server.request("PATCH", url, headers=header, data=f.read(self.server.piece_bytes()))
                     failures = 0
                 offset = int(answer.headers["Upload-Offset"])
             except (requests.ConnectionError, requests.Timeout, Problem) as problem:

@@ -22,10 +22,10 @@ import selvedge  # noqa: E402
 
 
 class Daemon:
-    def __init__(self, folder):
+    def __init__(self, folder, *more):
         self.folder = str(folder)
         self.process = subprocess.Popen([os.path.join(BUILD, "bin", "selvedged"), "--data", str(folder), "--port", "0", "--worker", STUB,
-                                         "--set", "disk.floor_bytes=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+                                         "--set", "disk.floor_bytes=0", *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         line = self.process.stdout.readline()
         assert "listens on http://" in line, line
         self.url = line.split()[-1]
@@ -211,6 +211,15 @@ def test_upload_goes_on_after_broken_connections(daemon, sample):
         proxy.stop()
     assert proxy.n >= 5
     assert "2 uploaded now" in done.stderr and "succeeded" in done.stderr
+
+
+def test_pieces_are_no_larger_than_the_server_takes(sample, tmp_path):
+    d = Daemon(tmp_path / "small-pieces", "--set", f"upload.max_patch_bytes={1 << 20}")
+    try:
+        assert "2 uploaded now" in run(d.url, "submit", sample / "job.json").stderr
+        assert selvedge.Server(d.url).submit(str(sample / "job.json")).state()["files"][0]["state"] == "complete"
+    finally:
+        d.stop()
 
 
 def test_interrupted_submit_is_continued(daemon, sample):

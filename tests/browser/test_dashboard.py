@@ -219,6 +219,29 @@ def test_submit_by_choosing_files(stub, browser):
     assert complaints(browser) == []
 
 
+def drop_in(browser, *paths):
+    """Files into the submit panel; waits until it is ready."""
+    chooser = browser.find_element(By.CSS_SELECTOR, ".drop input")
+    browser.execute_script("arguments[0].style.display = 'block'", chooser)
+    chooser.send_keys("\n".join(map(str, paths)))
+    wait_for(browser, "!document.querySelector('.drop button').disabled")
+
+
+def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
+    process, url = start_daemon(tmp_path / "data", "--worker", os.path.join(ROOT, "tests", "support", "client_stub_worker.py"),
+                                "--set", f"upload.max_patch_bytes={1 << 20}")
+    try:
+        _, sample = submit(url, tmp_path, "large twill")
+        (sample / "scan.tif").write_bytes(os.urandom(2_500_000))
+        browser.get(url + "/")
+        drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
+        browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+        wait_for(browser, "document.querySelector('.state.succeeded')")
+        assert complaints(browser) == []
+    finally:
+        stop_daemon(process)
+
+
 def test_long_log_does_not_freeze(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "chatty twill")
