@@ -50,17 +50,33 @@ async function upload(file, url, piece, progress) {
   }
 }
 
+const newKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+
+function removeFile(job, name) {
+  return raw("DELETE", `/v1/jobs/${job}/files/${name}`).catch((error) => { if (error.status !== 404) throw error; });
+}
+
+async function declare(job, f, file) {
+  const url = `/v1/jobs/${job}/files`, ask = { name: f.name, role: f.role, size: file.size, sha256: await sha256(file) };
+  try { return await sendJson("POST", url, ask); } catch (error) { if (error.body?.code !== "exists") throw error; }
+  await removeFile(job, f.name); // the file was changed since an earlier try
+  return sendJson("POST", url, ask);
+}
+
 export function submitPanel() {
   const dropped = new Map();
-  let doc = null;
+  let doc = null, source = null, busy = false;
+  let key = null, sent = new Map(); // as long as the document is the same: what a broken submit has made, the next one goes on with
   const list = el("ul"), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
   const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
   const wanted = () => (doc ? filesOf(doc) : []);
+  const allow = () => { go.disabled = busy || doc === null || wanted().some((f) => !dropped.has(f.name)); };
   const show = () => {
     const missing = wanted().filter((f) => !dropped.has(f.name));
     list.replaceChildren(...wanted().map((f) => el("li", {}, el("span", { class: "mono" }, f.name),
       el("span", {}, dropped.has(f.name) ? size(dropped.get(f.name).size) : el("span", { class: "tag warn" }, "still missing")))));
-    go.disabled = doc === null || missing.length > 0;
+    allow();
+    if (busy) return;
     if (doc && missing.length) say(`${missing.length} of ${wanted().length} files still missing: drop them here.`);
     else if (doc) say("Ready.");
   };
@@ -68,7 +84,10 @@ export function submitPanel() {
     for (const file of files) {
       dropped.set(file.name, file);
       if (!file.name.endsWith(".json")) continue;
-      try { doc = JSON.parse(await file.text()); } catch (error) { doc = null; say(`${file.name}: ${error.message}`, true); return; }
+      const now = await file.text();
+      if (now !== source) { key = newKey(); sent = new Map(); }
+      source = now;
+      try { doc = JSON.parse(source); } catch (error) { doc = null; say(`${file.name}: ${error.message}`, true); return; }
     }
     if (!doc) say("Drop the job document (.json) as well.");
     show();
@@ -79,24 +98,31 @@ export function submitPanel() {
   drop.addEventListener("dragleave", () => drop.classList.remove("over"));
   drop.addEventListener("drop", (e) => { e.preventDefault(); drop.classList.remove("over"); take(e.dataTransfer.files); });
   go.addEventListener("click", async () => {
-    go.disabled = true;
+    busy = true;
+    allow();
+    const files = wanted(), known = sent;
     try {
-      const key = [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
       const job = await sendJson("POST", "/v1/jobs", doc, { "Idempotency-Key": key });
       const piece = await pieceBytes();
-      for (const [i, f] of wanted().entries()) {
-        const file = dropped.get(f.name);
-        const label = (n) => say(`${i + 1} of ${wanted().length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
+      for (const [i, f] of files.entries()) {
+        const file = dropped.get(f.name), mark = `${job.id} ${file.size} ${file.lastModified}`;
+        const label = (n) => say(`${i + 1} of ${files.length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
         label(0);
-        const state = await sendJson("POST", `/v1/jobs/${job.id}/files`, { name: f.name, role: f.role, size: file.size, sha256: await sha256(file) });
+        // another file of the same name: the bytes of the first must not be continued with its own
+        if (known.has(f.name) && known.get(f.name) !== mark) await removeFile(job.id, f.name);
+        known.set(f.name, mark);
+        const state = await declare(job.id, f, file);
         if (state.state !== "complete") await upload(file, state.upload_url, piece, label);
       }
       await sendJson("POST", `/v1/jobs/${job.id}/start`);
+      key = newKey(); // the same document once more is another job
+      sent = new Map();
       location.hash = job.id;
     } catch (error) {
       say(error.message, true);
-      go.disabled = false;
     }
+    busy = false;
+    allow();
   });
   return el("section", { class: "card", id: "submit" }, el("h2", {}, "New job"), drop);
 }

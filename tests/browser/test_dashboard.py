@@ -242,6 +242,33 @@ def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
         stop_daemon(process)
 
 
+def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_path):
+    url, folder = stub
+    _, sample = submit(url, folder, "broken twill")
+    jobs = lambda: [j["id"] for j in selvedge.Server(url).jobs()]
+    before = jobs()
+    browser.get(url + "/")
+    drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
+    button = browser.find_element(By.CSS_SELECTOR, ".drop button")
+    browser.execute_script("""
+        window.realFetch = fetch;
+        window.fetch = (u, o) => o.method === "PATCH" ? Promise.resolve(new Response("{}", {status: 500})) : realFetch(u, o);""")
+    button.click()
+    wait_for(browser, "document.querySelector('.drop .note.bad') && !document.querySelector('.drop button').disabled")
+    (job_id,) = set(jobs()) - set(before)
+    # the scan is mended and dropped again: it replaces the one that was declared
+    mended = tmp_path / "scan.tif"
+    mended.write_bytes(b"mended scan")
+    browser.execute_script("window.fetch = realFetch")
+    drop_in(browser, sample / "job.json", mended)
+    button.click()
+    wait_for(browser, f"location.hash === '#{job_id}'")
+    wait_for(browser, "document.querySelector('.state.succeeded')", 60)
+    assert set(jobs()) - set(before) == {job_id}
+    assert {f["name"]: f["size"] for f in selvedge.Server(url).job(job_id).state()["files"]} == {"scan.tif": 11, "cloth.csv": 4}
+    assert complaints(browser) == []
+
+
 def test_long_log_does_not_freeze(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "chatty twill")
