@@ -269,6 +269,21 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     assert complaints(browser) == []
 
 
+def test_the_document_is_sent_as_it_was_written(stub, browser):
+    """JavaScript's numbers end at 2^53, seeds do not."""
+    url, folder = stub
+    _, sample = submit(url, folder, "seeded twill")
+    document = json.loads((sample / "job.json").read_text())
+    document["fit"] = {"seed": 9007199254740993}
+    (sample / "job.json").write_text(json.dumps(document))
+    browser.get(url + "/")
+    drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
+    browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+    wait_for(browser, "location.hash.length > 10")
+    job = selvedge.Server(url).job(browser.execute_script("return location.hash.slice(1)"))
+    assert job.state()["document"] == document
+
+
 def test_long_log_does_not_freeze(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "chatty twill")
