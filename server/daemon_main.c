@@ -118,7 +118,8 @@ static void raise_descriptor_limit(const struct settings *s)
     setrlimit(RLIMIT_NOFILE, &now);
 }
 
-/* For clients on this machine: {"url","pid"}. Without it they can still be told where to ask, so that a full disk is no reason to end. */
+/* For clients on this machine: {"url","pid"}. Without it they can still be told where to ask: no reason to end on a
+ * full disk. */
 static void announce(const struct settings *s, unsigned port, struct log *log)
 {
     struct error err = {0};

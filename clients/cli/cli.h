@@ -35,8 +35,8 @@ status cli_job_path(const char *id, const char *tail, char *path, size_t n_path,
 /* Width of the terminal behind `note`, 80 when it cannot be told. */
 size_t cli_columns(const struct cli *cli);
 
-/* tus: send file->path to upload_url from wherever it stands, in pieces of piece_bytes; retries. changed is called with the offset
- * reached. */
+/* tus: send file->path to upload_url from wherever it stands, in pieces of piece_bytes; retries. changed is called with
+ * the offset reached. */
 struct cli_file;
 status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url, uint64_t piece_bytes,
                        void (*changed)(void *context, uint64_t offset), void *context, struct error *err);

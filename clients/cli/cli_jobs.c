@@ -26,7 +26,8 @@ static status job_call(struct cli *cli, const char *method, const char *tail, js
 
 static void print_json(const json_t *value, FILE *out)
 {
-    json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(17)); /* for programs: what the server said, to the last digit */
+    /* for programs: what the server said, to the last digit */
+    json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
     fputc('\n', out);
 }
 

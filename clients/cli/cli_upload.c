@@ -46,7 +46,8 @@ static status send_piece(struct upload *u, struct http_reply *reply, struct erro
     char offset_line[64];
     const char *const header[] = {"Tus-Resumable: 1.0.0", "Content-Type: application/offset+octet-stream", offset_line, NULL};
     uint64_t left = u->file->n_bytes - u->offset;
-    struct http_source source = {.fd = u->fd, .n_bytes = left < u->piece_bytes ? left : u->piece_bytes, .sent = sent, .context = u};
+    uint64_t n_bytes = left < u->piece_bytes ? left : u->piece_bytes;
+    struct http_source source = {.fd = u->fd, .n_bytes = n_bytes, .sent = sent, .context = u};
     snprintf(offset_line, sizeof offset_line, "Upload-Offset: %llu", (unsigned long long)u->offset);
     if (lseek(u->fd, (off_t)u->offset, SEEK_SET) < 0) return error_set_errno(err, "cannot read '%s'", u->file->path);
     u->sending = u->offset;
@@ -96,7 +97,8 @@ uint64_t cli_piece_bytes(struct cli *cli)
 status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url, uint64_t piece_bytes,
                        void (*changed)(void *context, uint64_t offset), void *context, struct error *err)
 {
-    struct upload u = {.cli = cli, .file = file, .url = upload_url, .piece_bytes = piece_bytes, .changed = changed, .context = context};
+    struct upload u = {.cli = cli, .file = file, .url = upload_url, .changed = changed, .context = context};
+    u.piece_bytes = piece_bytes;
     bool known = false;
     int n_fruitless = 0;
     status s = STATUS_OK;

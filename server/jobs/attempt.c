@@ -90,7 +90,8 @@ bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish
     wish->cancel = row.cancel_requested;
     wish->deleted = row.deleted;
     json_t *j = attempt_read_status(v, job_id);
-    if (json_integer_value(json_object_get(j, "attempt")) == row.attempt) wish->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
+    if (json_integer_value(json_object_get(j, "attempt")) == row.attempt)
+        wish->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
     json_decref(j);
     job_row_release(&row);
     return true;

@@ -21,8 +21,8 @@ struct attempt_wish {
 /* queued -> running: new number and token, job.json, attempt.json, and a clean folder after an edit.
  * STATUS_CONFLICT when the job is not queued any more. */
 status attempt_prepare(struct job_service *v, const char *job_id, struct error *err);
-/* What the running job's owner wants by now, and whether its worker lives. False when the database cannot be read: then nothing is
- * known, and nothing is wished for. */
+/* What the running job's owner wants by now, and whether its worker lives. False when the database cannot be read: then
+ * nothing is known, and nothing is wished for. */
 bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish);
 /* running -> succeeded, failed, cancelled, paused or queued. */
 status attempt_settle(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,

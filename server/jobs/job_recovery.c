@@ -1,5 +1,6 @@
 /* Opening and closing the service: what a stopped or killed daemon left behind is brought into a known state.
- * An entry that resists is told in the log and left alone: one bad folder must not keep all other jobs from their users. */
+ * An entry that resists is told in the log and left alone: one bad folder must not keep all other jobs from their
+ * users. */
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job_folder.h"
@@ -57,7 +58,8 @@ static status bury(struct job_service *v, struct error *err)
         path_join(path, v->settings->data, "jobs", row[i].id, NULL);
         status removed = path_remove_tree(path, &why);
         if (removed == STATUS_OK) removed = store_job_erase(v->store, row[i].id, &why);
-        if (removed != STATUS_OK) log_warning(v->log, "job %s is deleted, but not all of it is gone: %s", row[i].id, why.text);
+        if (removed != STATUS_OK)
+            log_warning(v->log, "job %s is deleted, but not all of it is gone: %s", row[i].id, why.text);
     }
     job_rows_free(row, n);
     return s;

@@ -150,11 +150,13 @@ static bool active(const struct job_row *row)
 
 static status check_editable(const struct job_row *row, struct error *err)
 {
-    return active(row) ? error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first", job_state_name(row->state)) : STATUS_OK;
+    if (!active(row)) return STATUS_OK;
+    return error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first",
+                     job_state_name(row->state));
 }
 
-/* An edit of a job that has run: back to draft, and the next start begins afresh. The row is written together with what was edited, so
- * that a job whose edit fails is what it was. */
+/* An edit of a job that has run: back to draft, and the next start begins afresh. The row is written together with what
+ * was edited, so that a job whose edit fails is what it was. */
 static void edited(struct job_row *row)
 {
     row->state = JOB_DRAFT;
@@ -366,7 +368,8 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
         bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
                     (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
         if (!same) s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first", row->name);
-        else if (before.sha256[0] == '\0' && row->sha256[0] != '\0') s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
+        else if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
+            s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
         else *row = before;
         *existed = true;
         goto out;

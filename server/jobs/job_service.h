@@ -61,8 +61,8 @@ status job_declare_file(struct job_service *v, const char *id, struct file_row *
 status job_delete_file(struct job_service *v, const char *id, const char *name, struct error *err);
 status job_delete_upload(struct job_service *v, const char *upload_id, struct error *err);
 
-/* Names that the document uses and that are not complete; *missing is a JSON array. STATUS_INVALID, STATUS_TOO_LARGE: the stored
- * document is one that is refused today. */
+/* Names that the document uses and that are not complete; *missing is a JSON array. STATUS_INVALID, STATUS_TOO_LARGE:
+ * the stored document is one that is refused today. */
 status job_missing_files(struct job_service *v, const struct job_row *row, json_t **missing, struct error *err);
 /* STATUS_DISK_FULL when less than the floor (plus n_bytes) is free. */
 status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err);

@@ -27,8 +27,8 @@ struct slot {
     struct worker_end end;
 };
 
-/* A job that is queued but must not start before a time (after a lost attempt, or while another process holds its folder), or a deleted
- * one whose folder could not be removed. */
+/* A job that is queued but must not start before a time (after a lost attempt, or while another process holds its
+ * folder), or a deleted one whose folder could not be removed. */
 struct waiting {
     char job_id[STORE_ID_BYTES];
     double until_s;
@@ -112,7 +112,7 @@ static void watch(struct supervisor *u, struct slot *slot)
     if (wish.deleted) kill_now(slot, STOP_CANCEL);
     else if (wish.cancel) ask_to_stop(slot, STOP_CANCEL);
     else if (u->below_floor) ask_to_stop(slot, STOP_PAUSE);
-    /* by our own clock, from beat to beat: the wall clock may be set while a worker computes, and one failed read is no silence */
+    /* by our own clock, from beat to beat: the wall clock may be set meanwhile, and one failed read is no silence */
     if (wish.heartbeat_unix_s > 0 && wish.heartbeat_unix_s != slot->beat_unix_s) {
         slot->beat_unix_s = wish.heartbeat_unix_s;
         slot->beat_s = now;
@@ -165,7 +165,7 @@ static void launch(struct supervisor *u, const char *job_id)
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
         return;
     }
-    /* the row says running already: the slot stays, as that of a worker that has ended, until the database has taken that back */
+    /* the row says running already: the slot stays, as an ended worker's, until the database has taken that back */
     log_error(u->v->log, "job %s: %s", job_id, err.text);
     slot->ended = true;
     slot->end = (struct worker_end){.by_signal = false, .code = 127};
@@ -205,7 +205,8 @@ static void bury(struct supervisor *u)
         status s = path_remove_tree(path, &err);
         if (s == STATUS_OK) s = store_job_erase(u->v->store, row[i].id, &err);
         if (s == STATUS_OK) continue;
-        log_warning(u->v->log, "job %s is deleted, but not all of it is gone, next try in %d s: %s", row[i].id, BURY_AGAIN_S, err.text);
+        log_warning(u->v->log, "job %s is deleted, but not all of it is gone, next try in %d s: %s", row[i].id,
+                    BURY_AGAIN_S, err.text);
         waiting_of(u, row[i].id, true)->until_s = clock_monotonic_s() + BURY_AGAIN_S;
     }
     job_rows_free(row, n);

@@ -322,10 +322,11 @@ status upload_commit(struct upload *u, uint64_t ticket, struct file_row *row, st
     return s;
 }
 
-status upload_set_checksum(struct upload_set *set, const char *id, const char *sha256, struct file_row *row, struct error *err)
+status upload_set_checksum(struct upload_set *set, const char *id, const char *sha256, struct file_row *row,
+                           struct error *err)
 {
     struct upload *u = NULL;
-    status s = upload_hold(set, id, &u, err); /* what a writer holds in memory is written to the database later: it has to know */
+    status s = upload_hold(set, id, &u, err); /* a writer that has it in memory writes its row later: it has to know */
     if (s != STATUS_OK) return s;
     pthread_mutex_lock(&u->lock);
     if (u->row.state == FILE_UPLOADING && u->row.sha256[0] == '\0') {
@@ -333,7 +334,8 @@ status upload_set_checksum(struct upload_set *set, const char *id, const char *s
         s = store_file_update(set->store, &u->row, err);
         if (s != STATUS_OK) u->row.sha256[0] = '\0';
     } else if (strcmp(u->row.sha256, sha256) != 0)
-        s = error_set_field(err, STATUS_EXISTS, "sha256", "file '%s' has another checksum already: delete it first", u->row.name);
+        s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first",
+                            u->row.name);
     *row = u->row;
     pthread_mutex_unlock(&u->lock);
     upload_release(set, u);

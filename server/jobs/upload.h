@@ -40,7 +40,8 @@ status upload_commit(struct upload *upload, uint64_t ticket, struct file_row *ro
 
 /* A checksum for an upload that was declared without one: the end of the upload compares it. *row is the present state.
  * STATUS_EXISTS when the file has another checksum by now, declared or computed. */
-status upload_set_checksum(struct upload_set *set, const char *id, const char *sha256, struct file_row *row, struct error *err);
+status upload_set_checksum(struct upload_set *set, const char *id, const char *sha256, struct file_row *row,
+                           struct error *err);
 
 /* At the start of the daemon: finish what was verified but not moved, and start afresh what has lost its bytes. */
 status upload_recover(struct upload_set *set, struct error *err);

@@ -100,7 +100,10 @@ status store_run(struct store *store, int *n_changed, struct error *err, const c
     return s;
 }
 
-status store_begin(struct store *store, struct error *err) { return store_run(store, NULL, err, "BEGIN IMMEDIATE", ""); }
+status store_begin(struct store *store, struct error *err)
+{
+    return store_run(store, NULL, err, "BEGIN IMMEDIATE", "");
+}
 
 status store_end(struct store *store, status so_far, struct error *err)
 {

@@ -25,8 +25,9 @@ static status insert(struct store *store, const struct file_row *r, struct job_r
 {
     status s = store_begin(store, err);
     if (s != STATUS_OK) return s;
-    s = store_run(store, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)", "ssssiisib", r->id, r->job_id, r->name, r->role, r->size_bytes,
-                  r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES);
+    s = store_run(store, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)", "ssssiisib", r->id,
+                  r->job_id, r->name, r->role, r->size_bytes, r->offset_bytes, r->sha256, (int64_t)r->state,
+                  r->hash_state, (int)STORE_HASH_STATE_BYTES);
     if (s == STATUS_OK && job != NULL) s = store_job_write(store, job, err);
     return store_end(store, s, err);
 }

@@ -6,7 +6,7 @@
 
 /* document: "document", or "NULL" where it is not needed: it may have a megabyte */
 #define COLUMNS(document)                                                                                              \
-    "serial, id, sample, " document ", state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "      \
+    "serial, id, sample, " document ", state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "  \
     "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss"
 
 void job_row_release(struct job_row *row)
@@ -29,7 +29,8 @@ static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
     store_text(q, 2, row->sample, sizeof row->sample);
     const char *document = (const char *)sqlite3_column_text(q, 3);
     if (document != NULL) row->document = strdup(document);
-    if (row->document == NULL && sqlite3_column_type(q, 3) != SQLITE_NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read job: out of memory");
+    if (row->document == NULL && sqlite3_column_type(q, 3) != SQLITE_NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot read job: out of memory");
     row->state = (enum job_state)sqlite3_column_int(q, 4);
     row->cancel_requested = sqlite3_column_int(q, 5) != 0;
     row->dirty = sqlite3_column_int(q, 6) != 0;
@@ -122,8 +123,9 @@ status store_job_write(struct store *store, struct job_row *r, struct error *err
     int n = 0;
     r->updated_unix_s = clock_wall_s();
     status s = store_run(store, &n, err,
-                         "UPDATE job SET sample=?, document=coalesce(?, document), state=?, cancel_requested=?, dirty=?, deleted=?, attempt=?, lost_attempts=?, "
-                         "generation=?, token=?, updated=?, queued=?, started=?, finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
+                         "UPDATE job SET sample=?, document=coalesce(?, document), state=?, cancel_requested=?, dirty=?, "
+                         "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
+                         "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
                          "ssiiiiiiisddddsssis", r->sample, r->document, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
                          (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
                          r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes, r->id);
@@ -170,10 +172,11 @@ static status grow(struct job_row **row, size_t n, size_t *capacity, struct erro
 
 status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out, struct error *err)
 {
-    const char *sql = query->queue_order ? "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
-                                           "ORDER BY queued, serial LIMIT ?4"
-                                         : "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
-                                           "ORDER BY serial DESC LIMIT ?4";
+#define WANTED                                                                                                         \
+    "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
+    const char *sql = query->queue_order ? WANTED "ORDER BY queued, serial LIMIT ?4"
+                                         : WANTED "ORDER BY serial DESC LIMIT ?4";
+#undef WANTED
     sqlite3_stmt *q = NULL;
     struct job_row *row = NULL;
     size_t n = 0, capacity = 0;

@@ -16,8 +16,8 @@ enum { CUT_OFF = -1, RUNNING = 200, SUCCEEDED = 201 };
 static const int *script;
 static size_t n_script, i_script;
 
-status http_call(struct http *http, const char *method, const char *path, const char *const *header, const void *body, size_t n_body,
-                 struct http_reply *reply, struct error *err)
+status http_call(struct http *http, const char *method, const char *path, const char *const *header, const void *body,
+                 size_t n_body, struct http_reply *reply, struct error *err)
 {
     (void)http, (void)method, (void)path, (void)header, (void)body, (void)n_body;
     int now = script[i_script];
@@ -34,7 +34,10 @@ status http_call(struct http *http, const char *method, const char *path, const 
     return STATUS_OK;
 }
 
-status http_problem(const struct http_reply *reply, struct error *err) { return error_set(err, STATUS_IO, "HTTP status %ld", reply->code); }
+status http_problem(const struct http_reply *reply, struct error *err)
+{
+    return error_set(err, STATUS_IO, "HTTP status %ld", reply->code);
+}
 void http_reply_release(struct http_reply *reply) { free(reply->body); }
 const char *http_server(const struct http *http) { return (void)http, "http://server"; }
 bool http_stopped(const struct http *http) { return (void)http, false; }
@@ -51,8 +54,12 @@ void report_view(const json_t *job, struct job_view *view)
     snprintf(view->state, sizeof view->state, "%s", json_string_value(json_object_get(job, "state")));
 }
 void report_result(const json_t *job, FILE *out) { (void)job, (void)out; }
-void text_progress(const struct job_view *v, size_t n_column, char *out, size_t n_out) { (void)n_column, snprintf(out, n_out, "%s", v->state); }
 void text_progress_plain(const struct job_view *v, char *out, size_t n_out) { snprintf(out, n_out, "%s", v->state); }
+void text_progress(const struct job_view *v, size_t n_column, char *out, size_t n_out)
+{
+    (void)n_column;
+    text_progress_plain(v, out, n_out);
+}
 void text_clean(const char *in, char *out, size_t n_out) { snprintf(out, n_out, "%s", in); }
 
 /* Watches through a script; the text that it said is the caller's. */
@@ -124,7 +131,10 @@ static void test_other_answers_end_it(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest test[] = {cmocka_unit_test(test_a_server_that_comes_back), cmocka_unit_test(test_a_server_that_stays_away),
-                                      cmocka_unit_test(test_other_answers_end_it)};
+    const struct CMUnitTest test[] = {
+        cmocka_unit_test(test_a_server_that_comes_back),
+        cmocka_unit_test(test_a_server_that_stays_away),
+        cmocka_unit_test(test_other_answers_end_it),
+    };
     return cmocka_run_group_tests(test, NULL, NULL);
 }
