@@ -126,7 +126,7 @@ bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and 
 	@for b in $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)); do $$b || exit 1; done
 
 # FIT: some of the figures only, such as FIT="gabardine seeds"
-bench-fit: | deps-test ## recovery of known parameters, errors, seeds, real tables (3 hours; photographs are kept in build)
+bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing highlights, real tables (1 h 45 min on 2 quiet cores; photographs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
 

@@ -406,30 +406,31 @@ static double squared_se(const struct linear_model *m, double rel_rms, double se
 }
 
 /* Counts of the next round: configuration i's part of f is known to se_i with count[i] paths, so counts as se_i sqrt(count[i]) reach a
- * given se with the fewest. False: there is nothing left to spend. */
-static bool spread(const struct linear_model *m, const struct fit_score *now, const struct fit_score_goal *goal, size_t *count)
+ * given se with the fewest. Where few paths bring most of the light a round may see none of them: the largest of what all rounds
+ * saw counts, and no configuration gets less than a quarter of the mean. */
+static void spread(const struct linear_model *m, const struct fit_score *now, const struct fit_score_goal *goal,
+                   double work[FIT_MAX_OBSERVATION], size_t *count)
 {
     const double reserve = 1.2; /* the errors are themselves estimates */
     size_t n = m->n_row / 3;
-    double work[FIT_MAX_OBSERVATION], sum = 0.0, spent = 0.0;
-    double most = (double)(goal->most * n), se = squared_se(m, now->rel_rms, goal->se);
+    double sum = 0.0, spent = 0.0, most = (double)(goal->most * n), se = squared_se(m, now->rel_rms, goal->se);
     for (size_t i = 0; i < n; i++) {
         double part;
         linear_model_part(m, i, &part);
-        work[i] = part * sqrt((double)count[i]);
+        work[i] = fmax(work[i], part * sqrt((double)count[i]));
         sum += work[i];
         spent += (double)count[i];
     }
-    if (spent >= 0.9 * most) return false;
     double total = fmin(fmax(reserve * sum * sum / (se * se), 1.5 * spent), most);
-    for (size_t i = 0; i < n; i++) count[i] = (size_t)fmax((double)goal->first, total * work[i] / sum);
-    return true;
+    for (size_t i = 0; i < n; i++) count[i] = (size_t)(total * fmax(work[i] / sum, 0.25 / (double)n));
 }
 
 struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set set, const double *param,
                                       const struct fit_score_goal *goal)
 {
+    enum { ROUND = 4 };
     size_t count[FIT_MAX_OBSERVATION];
+    double work[FIT_MAX_OBSERVATION] = {0};
     for (size_t i = 0; i < FIT_MAX_OBSERVATION; i++) count[i] = goal->first;
     for (uint32_t round = 0;; round++) {
         struct scorer s;
@@ -440,7 +441,8 @@ struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set 
         append_here(&s, f, param);
         pool_at(&s, f, param);
         const struct fit_score score = score_of(&s.model);
-        bool last = score.se <= goal->se || !spread(&s.model, &score, goal, count);
+        bool last = score.se <= goal->se || round + 1 == ROUND;
+        if (!last) spread(&s.model, &score, goal, work, count);
         scorer_release(&s);
         if (last) return score;
     }

@@ -96,7 +96,7 @@ struct fit_score_goal {
 
 /* With paths at param only, traced as fits do (with probes), spread over the configurations so that se is reached with the fewest:
  * each round's paths are fresh and as many as the round before asks for, so that neither their number nor their spread depends on
- * what they came to. se may be larger than the goal's where `most` does not reach it. */
+ * what they came to; four rounds at most. se may be larger than the goal's where `most` does not reach it. */
 struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set set, const double *param,
                                       const struct fit_score_goal *goal);
 
