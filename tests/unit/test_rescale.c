@@ -65,134 +65,111 @@ static void test_map(void **state)
         assert_true(fabs(rescale_backward(&curve, rescale_forward(&curve, p)) - p) < 1e-12);
 }
 
+/* The analytic cloth, seen at the models' starts, and the curves measured on it. */
+struct fixture {
+    struct fake_cloth cloth;
+    struct estimator estimator;
+    struct observation_set observation;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct coordinate k[FAKE_N_PARAM];
+    struct rescale_curve curve[FAKE_N_PARAM];
+    double start[FAKE_N_PARAM], wall_s;
+    uint64_t n_path;
+};
+
+/* tight: a parameter that ends at `upper`, below its model's bound. */
+static void setup(struct fixture *x, size_t tight, double upper)
+{
+    memset(x, 0, sizeof *x);
+    fake_cloth_init(&x->cloth, 1, FAKE_N_FIT);
+    x->estimator = fake_estimator(&x->cloth);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
+        x->start[p] = fake_param[p].start;
+        x->parameter[p] = (struct fit_parameter){fake_param[p].lower, p == tight ? upper : fake_param[p].upper, x->start[p], false};
+        coordinate_init(&x->k[p], &fake_param[p], x->parameter[p].lower, x->parameter[p].upper);
+    }
+    observation_set_init(&x->observation);
+    assert_int_equal(fake_observe(&x->cloth, x->start, 0.0, 1, &x->observation), STATUS_OK);
+}
+
+static void measure(struct fixture *x, const struct estimator *e)
+{
+    size_t n_path[FAKE_N_FIT];
+    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
+    const struct fit_problem problem = {
+        .n_param = FAKE_N_PARAM, .info = fake_param, .param = x->parameter, .observation = &x->observation, .estimator = e};
+    assert_int_equal(rescale_measure(&problem, x->k, n_path, x->curve, &x->n_path, &x->wall_s, NULL), STATUS_OK);
+}
+
 /* Channels of one colour with bounds of their own are not held to those of the first. */
 static void test_bounds_of_one_channel(void **state)
 {
     (void)state;
-    struct fake_cloth f;
-    struct observation_set o;
-    struct fit_parameter parameter[FAKE_N_PARAM];
-    struct coordinate k[FAKE_N_PARAM];
-    struct rescale_curve curve[FAKE_N_PARAM];
-    size_t n_path[FAKE_N_FIT];
-    double start[FAKE_N_PARAM], wall_s = 0.0;
-    uint64_t used = 0;
-    fake_cloth_init(&f, 1, FAKE_N_FIT);
-    struct estimator e = fake_estimator(&f);
+    struct fixture x;
+    setup(&x, 3, 0.86);
+    measure(&x, &x.estimator);
     for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-        double upper = p == 3 ? 0.86 : fake_param[p].upper;
-        start[p] = fake_param[p].start;
-        parameter[p] = (struct fit_parameter){fake_param[p].lower, upper, start[p], false};
-        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, upper);
+        assert_true(x.curve[p].c[x.curve[p].n - 1] == x.parameter[p].upper);
+        assert_true(rescale_backward(&x.curve[p], 1e9) == x.parameter[p].upper);
     }
-    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
-    observation_set_init(&o);
-    assert_int_equal(fake_observe(&f, start, 0.0, 1, &o), STATUS_OK);
-    struct fit_problem problem = {
-        .n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
-    assert_int_equal(rescale_measure(&problem, k, n_path, curve, &used, &wall_s, NULL), STATUS_OK);
-    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-        assert_true(curve[p].c[curve[p].n - 1] == parameter[p].upper);
-        assert_true(rescale_backward(&curve[p], 1e9) == parameter[p].upper);
-    }
-    assert_true(curve[3].r[1] == curve[4].r[1] && curve[4].r[1] == curve[5].r[1]); /* a third of the colour's each */
-    observation_set_release(&o);
+    assert_true(x.curve[3].r[1] == x.curve[4].r[1] && x.curve[4].r[1] == x.curve[5].r[1]); /* a third of the colour's each */
+    observation_set_release(&x.observation);
 }
 
-/* An estimator that a fit may not ask for anything beyond the bounds of its parameters. */
-struct strict {
-    struct estimator inner;
-    const struct coordinate *k;
-};
-
+/* An estimator that may not be asked for anything beyond the bounds of the fit's parameters. */
 static status run_strict(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
                          double *wall_s, struct error *err)
 {
-    const struct strict *s = context;
-    for (size_t p = 0; p < FAKE_N_PARAM; p++) assert_true(call->param[p] >= s->k[p].param_lower && call->param[p] <= s->k[p].param_upper);
-    return s->inner.run(s->inner.context, call, progress, out, wall_s, err);
+    const struct fixture *x = context;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        assert_true(call->param[p] >= x->k[p].param_lower && call->param[p] <= x->k[p].param_upper);
+    return x->estimator.run(x->estimator.context, call, progress, out, wall_s, err);
 }
 
 /* The leader of a tie in proportion may not go as far as the channels beside it: what follows it would leave the model's range. */
 static void test_channels_stay_within_their_own_bounds(void **state)
 {
     (void)state;
-    struct fake_cloth f;
-    struct observation_set o;
-    struct fit_parameter parameter[FAKE_N_PARAM];
-    struct coordinate k[FAKE_N_PARAM];
-    struct rescale_curve curve[FAKE_N_PARAM];
-    size_t n_path[FAKE_N_FIT];
-    double start[FAKE_N_PARAM], wall_s = 0.0;
-    uint64_t used = 0;
-    fake_cloth_init(&f, 1, FAKE_N_FIT);
-    struct strict strict = {fake_estimator(&f), k};
-    struct estimator e = strict.inner;
-    e.context = &strict;
-    e.run = run_strict;
-    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-        double upper = p == 0 ? 0.4995 : fake_param[p].upper;
-        start[p] = fake_param[p].start;
-        parameter[p] = (struct fit_parameter){fake_param[p].lower, upper, start[p], false};
-        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, upper);
-    }
-    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
-    observation_set_init(&o);
-    assert_int_equal(fake_observe(&f, start, 0.0, 1, &o), STATUS_OK);
-    const struct fit_problem problem = {
-        .n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
-    assert_int_equal(rescale_measure(&problem, k, n_path, curve, &used, &wall_s, NULL), STATUS_OK);
-    assert_true(curve[1].c[curve[1].n - 1] == fake_param[1].upper && curve[0].c[curve[0].n - 1] == 0.4995);
-    observation_set_release(&o);
+    struct fixture x;
+    setup(&x, 0, 0.4995);
+    struct estimator strict = x.estimator;
+    strict.context = &x;
+    strict.run = run_strict;
+    measure(&x, &strict);
+    assert_true(x.curve[1].c[x.curve[1].n - 1] == fake_param[1].upper && x.curve[0].c[x.curve[0].n - 1] == 0.4995);
+    observation_set_release(&x.observation);
 }
 
 /* Without noise the measured curve is eq. 5.14 word for word, and colours get a third of it. */
 static void test_measured_curve(void **state)
 {
     (void)state;
-    struct fake_cloth f;
-    struct observation_set o;
-    struct fit_parameter parameter[FAKE_N_PARAM];
-    struct coordinate k[FAKE_N_PARAM];
-    struct rescale_curve curve[FAKE_N_PARAM];
-    size_t n_path[FAKE_N_FIT];
-    double truth[FAKE_N_PARAM] = {0}, wall_s = 0.0;
-    uint64_t used = 0;
-    fake_cloth_init(&f, 1, FAKE_N_FIT);
-    f.noise = 0.0;
-    struct estimator e = fake_estimator(&f);
-    for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-        truth[p] = fake_param[p].start;
-        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
-        coordinate_init(&k[p], &fake_param[p], fake_param[p].lower, fake_param[p].upper);
-    }
-    for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
-    observation_set_init(&o);
-    assert_int_equal(fake_observe(&f, truth, 0.0, 1, &o), STATUS_OK);
-    struct fit_problem problem = {
-        .n_param = FAKE_N_PARAM, .info = fake_param, .param = parameter, .observation = &o, .estimator = &e};
-    assert_int_equal(rescale_measure(&problem, k, n_path, curve, &used, &wall_s, NULL), STATUS_OK);
+    struct fixture x;
+    setup(&x, FAKE_N_PARAM, 0.0);
+    x.cloth.noise = 0.0;
+    measure(&x, &x.estimator);
     for (size_t p = 0; p < FAKE_N_PARAM; p += p < 6 ? 3 : 1) {
+        const struct rescale_curve *curve = &x.curve[p];
         double r = 0.0, low[FAKE_N_PARAM], high[FAKE_N_PARAM];
-        for (size_t j = 0; j + 1 < curve[p].n; j++) {
-            memcpy(low, truth, sizeof low);
-            memcpy(high, truth, sizeof high);
+        for (size_t j = 0; j + 1 < curve->n; j++) {
+            memcpy(low, x.start, sizeof low);
+            memcpy(high, x.start, sizeof high);
             for (size_t s = 0; s < (p < 6 ? 3u : 1u); s++) {
-                low[p + s] = curve[p].c[j];
-                high[p + s] = curve[p].c[j + 1];
+                low[p + s] = curve->c[j];
+                high[p + s] = curve->c[j + 1];
             }
-            for (size_t i = 0; i < o.n; i++) {
-                double x[3], y[3];
-                fake_radiance(&f.configuration[i], low, x, NULL);
-                fake_radiance(&f.configuration[i], high, y, NULL);
-                r += objective_weight(&o.item[i]) * sqrt(objective_image_difference(x, y));
+            for (size_t i = 0; i < x.observation.n; i++) {
+                double from[3], to[3];
+                fake_radiance(&x.cloth.configuration[i], low, from, NULL);
+                fake_radiance(&x.cloth.configuration[i], high, to, NULL);
+                r += objective_weight(&x.observation.item[i]) * sqrt(objective_image_difference(from, to));
             }
-            assert_true(fabs(curve[p].r[j + 1] - r / (p < 6 ? 3.0 : 1.0)) < 1e-6 * r + 1e-6);
+            assert_true(fabs(curve->r[j + 1] - r / (p < 6 ? 3.0 : 1.0)) < 1e-6 * r + 1e-6);
         }
-        if (p < 6) assert_memory_equal(&curve[p], &curve[p + 2], sizeof curve[p]);
+        if (p < 6) assert_memory_equal(curve, &x.curve[p + 2], sizeof *curve);
     }
-    assert_true(used > 0 && wall_s > 0.0);
-    observation_set_release(&o);
+    assert_true(x.n_path > 0 && x.wall_s > 0.0);
+    observation_set_release(&x.observation);
 }
 
 int main(void)
