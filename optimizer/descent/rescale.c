@@ -99,9 +99,9 @@ static struct progress_part part_of_budget(const struct fit_problem *problem, co
 
 /* One curve: all slots of the same symbol move together, each as far as its own bounds go (beyond those of a tied parameter
  * the ones that follow it would leave the model's). */
-static status measure_symbol(const struct fit_problem *problem, const struct coordinate *k, size_t first, size_t n_slot, const size_t *n_path,
-                             struct rescale_curve *curve, struct estimate *buffer[2], uint64_t *n_path_used,
-                             double *wall_s, struct error *err)
+static status measure_symbol(const struct fit_problem *problem, const struct coordinate *k, size_t first, size_t n_slot,
+                             const size_t *n_path, struct rescale_curve *curve, struct estimate *buffer[2],
+                             uint64_t *n_path_used, double *wall_s, struct error *err)
 {
     double param[SCATTERING_MAX_PARAM];
     const struct estimator *e = problem->estimator;

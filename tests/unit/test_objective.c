@@ -216,6 +216,29 @@ static void test_uncertainty(void **state)
     linear_model_release(&m);
 }
 
+/* What spans decades is at its bound in the logarithm: a thousandth of the whole range would be ten times the lower bound. */
+static void test_bound_of_a_wide_range(void **state)
+{
+    (void)state;
+    const struct param_info density = {"density_multiplier", "density_multiplier", "1/cm", -1, 10.0, 100000.0, 4000.0};
+    const struct {
+        double value;
+        bool at_bound;
+    } want[] = {{10.0, true}, {10.05, true}, {10.5, false}, {105.0, false}, {4000.0, false}, {98000.0, false}, {99500.0, true}, {100000.0, true}};
+    struct coordinate k;
+    struct linear_model m;
+    const bool fixed = false;
+    coordinate_init(&k, &density, density.lower, density.upper);
+    assert_int_equal(linear_model_init(&m, 3, 1, NULL), STATUS_OK);
+    for (size_t i = 0; i < sizeof want / sizeof want[0]; i++) {
+        struct uncertainty u;
+        m.x_ref[0] = coordinate_from_param(&k, want[i].value);
+        uncertainty_compute(&m, &k, &fixed, &u);
+        if (u.at_bound[0] != want[i].at_bound) fail_msg("%g of 10 to 100000", want[i].value);
+    }
+    linear_model_release(&m);
+}
+
 /* Means that are off by 1 % and contrasts that are off by 30 %: each kind has its own misfit, and what is told of a photograph's
  * means (misfit, noise, stated error) is of the means alone. */
 static void test_contrasts_have_a_misfit_of_their_own(void **state)
@@ -344,6 +367,7 @@ int main(void)
         cmocka_unit_test(test_by_hand),     cmocka_unit_test(test_unbiased), cmocka_unit_test(test_gradient),
         cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices),
         cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights),
+        cmocka_unit_test(test_bound_of_a_wide_range),
         cmocka_unit_test(test_contrasts_have_a_misfit_of_their_own), cmocka_unit_test(test_weighted_objective),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
