@@ -32,7 +32,13 @@ CXXFLAGS_ALL := -std=c++17 -pthread $(COMMON) $(WARN) $(CXXFLAGS)
 MAINS := $(shell find base geometry renderer optimizer server clients -name '*_main.c' 2>/dev/null)
 srcs = $(filter-out %_main.c,$(shell find $(1) -name '*.c' -o -name '*.cpp' 2>/dev/null | sort))
 objs = $(patsubst %,$(BUILD)/obj/%.o,$(1))
-PARTS := base geometry renderer optimizer server
+PARTS := base geometry renderer job optimizer server
+folder_base := base
+folder_geometry := geometry
+folder_renderer := renderer
+folder_job := optimizer/job
+folder_optimizer := optimizer/fit optimizer/worker optimizer/phantom
+folder_server := server
 LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 
 PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom
@@ -49,7 +55,7 @@ help:              ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 20
 
 define part_rule
-$(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$(1)))
+$(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$$(folder_$(1))))
 	@mkdir -p $$(@D)
 	@rm -f $$@
 	@ar rcs $$@ $$^
@@ -66,13 +72,13 @@ $(BUILD)/obj/%.cpp.o: %.cpp
 	@$(CXX) $(CXXFLAGS_ALL) -MMD -MP -c $< -o $@
 
 L = $(BUILD)/lib/lib
-$(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker_main.c.o $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker/worker_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
-$(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom_main.c.o $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom/phantom_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
-$(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)optimizer.a $(L)renderer.a $(L)base.a
+$(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)job.a $(L)renderer.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
 $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/null)) $(L)base.a
@@ -85,7 +91,7 @@ TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
 PHYSICS_RENDERER := $(filter-out %reconstruct_phantom %reconstruct_real %fit_density,$(filter $(BUILD)/tests/physics/%,$(TEST_BINS)))
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
-$(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	@echo "  LINK $@"
 	@$(CC) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lcmocka $(LINK_SERVER) $(LINK_OPTIMIZER)
@@ -130,7 +136,7 @@ bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing h
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
 
-# FABRIC: one of tests/support/fit_fabrics.c
+# FABRIC: one of tests/support/cloth/fit_fabrics.c
 bench-published: FABRIC ?= microflake
 bench-published: | deps-test ## the published method with its own budget, 3.3e9 paths, on FABRIC (microflake: 80 minutes on 2 cores; gabardine: 8 hours; continues when stopped)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
@@ -172,7 +178,7 @@ FUZZ_SECONDS ?= 600
 FUZZ ?=
 FUZZ_C := $(filter-out tests/fuzz/fuzz_input.c,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_BINS := $(patsubst %.c,$(BUILD)/%,$(FUZZ_C))
-FUZZ_LIBS := $(L)optimizer.a $(L)renderer.a $(L)geometry.a $(L)base.a
+FUZZ_LIBS := $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 $(FUZZ_BINS): $(BUILD)/%: $(BUILD)/obj/%.c.o $(BUILD)/obj/tests/fuzz/fuzz_input.c.o $(FUZZ_LIBS)
 	@mkdir -p $(@D)
 	@echo "  LINK $@"

@@ -11,7 +11,7 @@
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
-#include "geometry/fibers/radius.h"
+#include "geometry/fibers/shape/radius.h"
 #include "geometry/orientation/main_directions.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"

@@ -1,16 +1,16 @@
 /* Step "fibers": subvolumes, centers, chains, joins, smoothing, radius. */
 #include "geometry/reconstruct.h"
 
-#include "geometry/fibers/axis_fit.h"
-#include "geometry/fibers/centers.h"
-#include "geometry/fibers/disagreement.h"
-#include "geometry/fibers/growing.h"
-#include "geometry/fibers/joining.h"
-#include "geometry/fibers/kinks.h"
-#include "geometry/fibers/linking.h"
-#include "geometry/fibers/radius.h"
-#include "geometry/fibers/relax.h"
-#include "geometry/fibers/smoothing.h"
+#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/slices/centers.h"
+#include "geometry/fibers/lines/disagreement.h"
+#include "geometry/fibers/lines/growing.h"
+#include "geometry/fibers/lines/joining.h"
+#include "geometry/fibers/lines/kinks.h"
+#include "geometry/fibers/lines/linking.h"
+#include "geometry/fibers/shape/radius.h"
+#include "geometry/fibers/shape/relax.h"
+#include "geometry/fibers/shape/smoothing.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Slices of the density volume with the recovered fibers drawn where they cross. */
 #include "geometry/reconstruct.h"
 
-#include "geometry/fibers/slice_frame.h"
+#include "geometry/fibers/slices/slice_frame.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Step "directions": voxels near a fiber take its direction (fabric thesis, 5.6.7), and the share of material explained. */
 #include "geometry/reconstruct.h"
 
-#include "geometry/fibers/segment_bricks.h"
+#include "geometry/fibers/lines/segment_bricks.h"
 #include "geometry/orientation/direction_noise.h"
 
 #include <math.h>

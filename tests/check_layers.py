@@ -16,7 +16,7 @@ SEES = {
     "server": {"base", "server"},
     "clients": {"base", "clients"},
 }
-SERVER_MAY = {"optimizer/job_folder.h", "optimizer/job_document.h", "optimizer/pipeline.h"}
+SERVER_MAY = {"optimizer/job/job_folder.h", "optimizer/job/job_document.h", "optimizer/job/stage_table.h"}
 SHARED_NAMES = {"README.md", "conftest.py", ".gitignore", "index.html"}
 
 

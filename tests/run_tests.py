@@ -7,6 +7,7 @@ C beside Python: one computes while the other waits for daemons.
 import argparse
 import concurrent.futures
 import os
+import pathlib
 import subprocess
 import sys
 import tempfile
@@ -102,14 +103,14 @@ def main():
 
     def run_c(folder):
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
-            source = os.path.join(ROOT, "tests", kind)
-            for name in sorted(os.listdir(source)) if os.path.isdir(source) else []:
-                if not (name.startswith("test_") and name.endswith(".c") and wanted(name)):
+            for source in sorted(pathlib.Path(ROOT, "tests", kind).rglob("test_*.c")):
+                name = str(source.relative_to(os.path.join(ROOT, "tests")))[:-2]  # "unit/base/test_rng"
+                if not wanted(name):
                     continue
-                junit = os.path.join(folder, name + ".xml")
-                code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", kind, name[:-2])], TIMEOUT_S,
+                junit = os.path.join(folder, source.stem + ".xml")
+                code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", name)], TIMEOUT_S,
                                             dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
-                totals.add(f"{kind}/{name[:-2]}", junit, code, output, seconds)
+                totals.add(name, junit, code, output, seconds)
 
     def run_python(folder):
         for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:

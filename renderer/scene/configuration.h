@@ -13,7 +13,7 @@
 
 #include <stdint.h>
 
-struct environment; /* renderer/transport/environment.h */
+struct environment; /* renderer/transport/light/environment.h */
 
 enum configuration_light {
     LIGHT_SQUARE_LAMP = 0,

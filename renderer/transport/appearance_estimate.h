@@ -6,7 +6,7 @@
 
 #include "renderer/scattering/appearance.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/volume_scene.h"
+#include "renderer/transport/volume/volume_scene.h"
 
 /* One cloth in the forms that there are of it. */
 struct appearance_scene {

@@ -2,8 +2,8 @@
 
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate_blocks.h"
-#include "renderer/transport/path_tracer.h"
-#include "renderer/transport/volume_tracer.h"
+#include "renderer/transport/surface/path_tracer.h"
+#include "renderer/transport/volume/volume_tracer.h"
 
 #include <math.h>
 #include <stdlib.h>

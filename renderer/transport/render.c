@@ -2,7 +2,7 @@
 
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate_blocks.h"
-#include "renderer/transport/path_tracer.h"
+#include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/render_pixels.h"
 
 #include <stdio.h>

@@ -2,7 +2,7 @@
 
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate_blocks.h"
-#include "renderer/transport/volume_tracer.h"
+#include "renderer/transport/volume/volume_tracer.h"
 
 #include <stdlib.h>
 

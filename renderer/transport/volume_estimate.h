@@ -7,7 +7,7 @@
 
 #include "renderer/scattering/phase_model.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/volume_scene.h"
+#include "renderer/transport/volume/volume_scene.h"
 
 struct volume_estimate_request {
     const struct volume_scene *scene;

@@ -4,7 +4,7 @@
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render_pixels.h"
-#include "renderer/transport/volume_tracer.h"
+#include "renderer/transport/volume/volume_tracer.h"
 
 #include <stdio.h>
 #include <string.h>

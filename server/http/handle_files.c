@@ -1,4 +1,4 @@
-#include "optimizer/job_folder.h"
+#include "optimizer/job/job_folder.h"
 #include "server/http/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_paths.h"

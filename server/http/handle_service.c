@@ -1,5 +1,5 @@
-#include "optimizer/job_document.h"
-#include "optimizer/pipeline.h"
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/stage_table.h"
 #include "server/http/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/http/static_files.h"

@@ -1,7 +1,7 @@
 #include "server/jobs/attempt.h"
 #include "base/clock.h"
 #include "base/durable.h"
-#include "optimizer/job_folder.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 
 #include <signal.h>

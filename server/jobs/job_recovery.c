@@ -3,7 +3,7 @@
  * users. */
 #include "base/clock.h"
 #include "base/durable.h"
-#include "optimizer/job_folder.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_service.h"
 

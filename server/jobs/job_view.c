@@ -1,8 +1,8 @@
 #include "server/jobs/job_view.h"
 #include "base/clock.h"
 #include "base/durable.h"
-#include "optimizer/job_folder.h"
-#include "optimizer/pipeline.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/job/stage_table.h"
 #include "server/jobs/attempt.h"
 #include "server/jobs/job_paths.h"
 

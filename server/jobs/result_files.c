@@ -1,5 +1,5 @@
 /* The files under results/: listing and opening, always relative to an open folder and never through a link. */
-#include "optimizer/job_folder.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
 

@@ -3,8 +3,8 @@
  * answers, not what the file holds, and memory is that of the points. */
 #include "server/jobs/series_view.h"
 #include "base/durable.h"
-#include "optimizer/job_document.h"
-#include "optimizer/job_folder.h"
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 #include "server/jobs/upload.h"
 #include "base/durable.h"
-#include "optimizer/job_folder.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 
 #include <errno.h>

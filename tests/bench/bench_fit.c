@@ -28,11 +28,11 @@
  *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
  *                                        from the normal, as fitted by each model to the 16 photographs; _brightest: at 80 degrees, of any microflakes
  */
-#include "optimizer/descent/method_names.h"
-#include "optimizer/objective/objective.h"
+#include "optimizer/job/method_names.h"
+#include "optimizer/fit/objective/objective.h"
 #include "tests/bench/fit_bench.h"
-#include "tests/support/fake_estimator.h"
-#include "tests/support/fit_fabrics.h"
+#include "tests/support/tracer/fake_estimator.h"
+#include "tests/support/cloth/fit_fabrics.h"
 
 #include <ctype.h>
 #include <errno.h>

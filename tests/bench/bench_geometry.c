@@ -4,8 +4,8 @@
  *   geometry.weave_ct.axis_class_accuracy   share of the labelled tow voxels of a real weave in the right axis class
  * bench_geometry [--pictures DIR] [TEXT...]: only those of plain.d4.snr2 ... felt.d12.snr5, weave_ct whose name contains a TEXT. DIR gets
  * slices with the fibers drawn on them. What is not a figure (times, counts) goes to standard error. */
-#include "tests/support/phantom_reconstruction.h"
-#include "tests/support/weave_labels.h"
+#include "tests/support/cloth/phantom_reconstruction.h"
+#include "tests/support/cloth/weave_labels.h"
 
 #include <math.h>
 #include <png.h>

@@ -16,8 +16,8 @@
  */
 #include "base/rng.h"
 #include "renderer/transport/estimate.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/orbit_configurations.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -6,8 +6,8 @@
  * Arguments: paths a configuration (4096), voxels along an edge (500).
  */
 #include "renderer/transport/volume_estimate.h"
-#include "tests/support/hand_volume.h"
-#include "tests/support/orbit_configurations.h"
+#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <stdio.h>

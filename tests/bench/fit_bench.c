@@ -1,6 +1,6 @@
 #include "tests/bench/fit_bench.h"
 
-#include "optimizer/descent/estimate_journal.h"
+#include "optimizer/fit/descent/estimate_journal.h"
 
 #include <math.h>
 #include <stdio.h>

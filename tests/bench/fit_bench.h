@@ -2,8 +2,8 @@
 #ifndef SELVEDGE_TESTS_BENCH_FIT_H
 #define SELVEDGE_TESTS_BENCH_FIT_H
 
-#include "optimizer/descent/descent.h"
-#include "tests/support/fit_phantom.h"
+#include "optimizer/fit/descent/descent.h"
+#include "tests/support/cloth/fit_phantom.h"
 
 enum { BENCH_N_MODEL = 4, BENCH_MAX_STEP = 600 };
 

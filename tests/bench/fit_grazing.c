@@ -1,7 +1,7 @@
 /* Lamp and camera in mirrored directions, from the normal to grazing: figures fit.grazing.* of bench_fit. */
-#include "optimizer/descent/method_names.h"
+#include "optimizer/job/method_names.h"
 #include "tests/bench/fit_bench.h"
-#include "tests/support/fit_fabrics.h"
+#include "tests/support/cloth/fit_fabrics.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* Measured tables: figures fit.real.* and fit.real_all_rotations.* of bench_fit. */
 #include "base/durable.h"
-#include "optimizer/descent/method_names.h"
-#include "optimizer/photographs/measurement_table.h"
+#include "optimizer/job/method_names.h"
+#include "optimizer/fit/photographs/measurement_table.h"
 #include "tests/bench/fit_bench.h"
 
 #include <glob.h>

@@ -1,4 +1,4 @@
-#include "optimizer/photographs/photograph.h"
+#include "optimizer/fit/photographs/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "optimizer/job_document.h"
+#include "optimizer/job/job_document.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdlib.h>

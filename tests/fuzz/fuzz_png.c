@@ -1,5 +1,5 @@
 /* Checksums of chunks are made right first, so that mutations get past them. */
-#include "optimizer/photographs/photograph.h"
+#include "optimizer/fit/photographs/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdlib.h>

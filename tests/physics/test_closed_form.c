@@ -2,8 +2,8 @@
  * scattering does not show, so far apart that they neither shade nor light each other.
  */
 #include "renderer/transport/estimate.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/reference_two_lobe.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/reference_two_lobe.h"
 
 #include <math.h>
 #include <setjmp.h>

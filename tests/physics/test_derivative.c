@@ -4,8 +4,8 @@
  */
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/path_tracer.h"
-#include "tests/support/hand_weave.h"
+#include "renderer/transport/surface/path_tracer.h"
+#include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

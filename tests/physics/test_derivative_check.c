@@ -1,8 +1,8 @@
 /* The gradient certificate: every model passes it, at its defaults and at its bounds; wrong scores do not. */
 #include "renderer/transport/derivative_check.h"
-#include "tests/support/hand_volume.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/orbit_configurations.h"
+#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,10 +1,10 @@
 /* The density multiplier of a volume model as a fitted parameter: with the lamp behind the cloth it comes back within
  * its standard error; and one that nothing depends on is said not to be determined. */
 #include "base/rng.h"
-#include "optimizer/descent/descent.h"
-#include "optimizer/descent/method_names.h"
-#include "optimizer/descent/trace_estimator.h"
-#include "tests/support/hand_volume.h"
+#include "optimizer/fit/descent/descent.h"
+#include "optimizer/job/method_names.h"
+#include "optimizer/fit/descent/trace_estimator.h"
+#include "tests/support/cloth/hand_volume.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,10 +2,10 @@
  * a whole endless cloth in a uniform environment.
  */
 #include "renderer/transport/camera.h"
-#include "renderer/transport/path_tracer.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/orbit_configurations.h"
-#include "tests/support/reference_two_lobe.h"
+#include "renderer/transport/surface/path_tracer.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/reference_two_lobe.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

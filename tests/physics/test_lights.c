@@ -1,12 +1,12 @@
 /* Lights and cameras beside the square lamp and the perspective camera: against closed forms, quadrature, or each
  * other. Tolerances are standard errors (4, over several dozen comparisons) plus the stated remainders.
  */
-#include "renderer/transport/environment.h"
+#include "renderer/transport/light/environment.h"
 #include "renderer/transport/estimate.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/orbit_configurations.h"
-#include "tests/support/painted_environment.h"
-#include "tests/support/reference_two_lobe.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/painted_environment.h"
+#include "tests/support/tracer/reference_two_lobe.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

@@ -2,10 +2,10 @@
  */
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/path_tracer.h"
+#include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/render.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/orbit_configurations.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <setjmp.h>

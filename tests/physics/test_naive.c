@@ -2,8 +2,8 @@
  * The lamp is large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
  */
 #include "renderer/transport/estimate.h"
-#include "tests/support/hand_weave.h"
-#include "tests/support/naive_tracer.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/naive_tracer.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

@@ -4,8 +4,8 @@
  */
 #include "base/rng.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/lamp_guide.h"
-#include "tests/support/hand_weave.h"
+#include "renderer/transport/light/lamp_guide.h"
+#include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

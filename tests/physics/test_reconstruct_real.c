@@ -4,7 +4,7 @@
 #include "base/clock.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/tile_crop.h"
-#include "tests/support/weave_labels.h"
+#include "tests/support/cloth/weave_labels.h"
 
 #include <math.h>
 #include <png.h>

@@ -1,8 +1,8 @@
 /* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
  * bits for any number of threads. */
 #include "renderer/transport/volume_estimate.h"
-#include "renderer/transport/volume_tracer.h"
-#include "tests/support/hand_volume.h"
+#include "renderer/transport/volume/volume_tracer.h"
+#include "tests/support/cloth/hand_volume.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,11 +2,11 @@
  * single scattering in a slab that scatters equally everywhere, from above and from below; the limits of distant lamps
  * and cameras; pictures against constants; lights that add up. Tolerances are standard errors, with what a closed form
  * leaves out beside them. */
-#include "renderer/transport/environment.h"
+#include "renderer/transport/light/environment.h"
 #include "renderer/transport/volume_estimate.h"
-#include "tests/support/hand_volume.h"
-#include "tests/support/orbit_configurations.h"
-#include "tests/support/painted_environment.h"
+#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/painted_environment.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,8 +2,8 @@
  * large, so that the naive one finds it, and the lobes are wide, so that its directions serve. */
 #include "base/thread_pool.h"
 #include "renderer/transport/volume_estimate.h"
-#include "tests/support/hand_volume.h"
-#include "tests/support/naive_volume.h"
+#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/tracer/naive_volume.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

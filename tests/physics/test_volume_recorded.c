@@ -1,8 +1,8 @@
 /* Recorded volume paths, evaluated again for other parameters with everything else held fixed: the recorded value is the
  * traced one, and its differences are the traced derivatives, to 1e-3, for every parameter and the density multiplier.
  * And white cloth without roulette. */
-#include "renderer/transport/volume_tracer.h"
-#include "tests/support/hand_volume.h"
+#include "renderer/transport/volume/volume_tracer.h"
+#include "tests/support/cloth/hand_volume.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

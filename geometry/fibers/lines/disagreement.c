@@ -1,0 +1,82 @@
+#include "geometry/fibers/lines/disagreement.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+
+enum { REACH = 4 };
+
+/* Squared sine of the angle at vertex i; negative where the voxel is empty. */
+static float sine2(const struct polyline_set *p, size_t line, size_t i, const struct direction_volume *d)
+{
+    size_t a = i >= p->first[line] + 2 ? i - 2 : p->first[line], b = i + 2 < p->first[line + 1] ? i + 2 : p->first[line + 1] - 1;
+    size_t at[3];
+    float t[3], e[3], norm = 0.0f, cosine = 0.0f;
+    for (int c = 0; c < 3; c++) {
+        float x = floorf(p->vertex[i][c]), last = (float)(d->n[c] - 1);
+        at[c] = (size_t)fminf(fmaxf(x, 0.0f), last);
+        t[c] = p->vertex[b][c] - p->vertex[a][c];
+        norm += t[c] * t[c];
+    }
+    size_t voxel = volume_index(d->n, at[0], at[1], at[2]);
+    if (d->density[voxel] == 0 || !(norm > 0.0f)) return -1.0f;
+    direction_volume_get(d, voxel, e);
+    for (int c = 0; c < 3; c++) cosine += t[c] * e[c];
+    return fmaxf(0.0f, 1.0f - cosine * cosine / norm);
+}
+
+static bool disagrees(const float *value, size_t n, size_t i, float limit)
+{
+    float sum = 0.0f, weight = 0.0f;
+    for (size_t k = i >= REACH ? i - REACH : 0; k <= i + REACH && k < n; k++)
+        if (value[k] >= 0.0f) {
+            sum += value[k];
+            weight += 1.0f;
+        }
+    return weight > 0.0f && sum > limit * weight;
+}
+
+status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d, double max_angle_rad,
+                                 size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
+{
+    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), *value = malloc((lines->n_vertex + 1) * sizeof *value);
+    if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
+    status s = STATUS_OK;
+    *n_cut = 0;
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
+        size_t n = polyline_length(lines, l), run = 0;
+        scratch_keep_within(d->space);
+        for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
+        for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
+            if (i < n && !disagrees(value, n, i, limit)) continue;
+            if (i - run >= min_vertex) s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
+            *n_cut += i < n;
+            run = i + 1;
+        }
+    }
+    free(value);
+    return s;
+}
+
+status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d, double max_angle_rad, size_t reach,
+                                  size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
+{
+    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), *value = malloc((lines->n_vertex + 1) * sizeof *value);
+    if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
+    status s = STATUS_OK;
+    *n_cut = 0;
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
+        size_t n = polyline_length(lines, l), from = 0, to = n;
+        scratch_keep_within(d->space);
+        for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
+        for (size_t i = 0; i < n && i < reach; i++) {
+            if (disagrees(value, n, i, limit)) from = i + 1;
+            if (disagrees(value, n, n - 1 - i, limit)) to = n - 1 - i;
+        }
+        *n_cut += to > from ? n - (to - from) : n;
+        if (to < from + min_vertex) continue;
+        s = polyline_add_part(result, lines, l, lines->first[l] + from, lines->first[l] + to, err);
+    }
+    free(value);
+    return s;
+}

@@ -1,0 +1,76 @@
+#include "geometry/fibers/lines/kinks.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+
+static const double QUANTILE = 0.95, LEAST_LIMIT = 1.2; /* the last per diameter */
+/* Near ends, where lines go astray and a cut costs a few vertices only, it takes less. */
+static const double END_DIAMETERS = 1.5, END_SHARE = 0.7;
+
+/* Vertices over which the turn is taken on either side. */
+static size_t span(double diameter_voxel)
+{
+    return (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5);
+}
+
+/* Angle between the chords to and from vertex i per voxel of their mean length; 0 near the ends. */
+static float turn_at(const struct polyline_set *p, size_t line, size_t i, size_t reach)
+{
+    if (i < p->first[line] + reach || i + reach >= p->first[line + 1]) return 0.0f;
+    const float *x = p->vertex[i - reach], *y = p->vertex[i], *z = p->vertex[i + reach];
+    float uu = 0.0f, ww = 0.0f, uw = 0.0f;
+    for (int a = 0; a < 3; a++) {
+        float u = y[a] - x[a], w = z[a] - y[a];
+        uu += u * u;
+        ww += w * w;
+        uw += u * w;
+    }
+    if (!(uu > 0.0f && ww > 0.0f)) return 0.0f;
+    return acosf(fmaxf(-1.0f, fminf(1.0f, uw / sqrtf(uu * ww)))) / (0.5f * (sqrtf(uu) + sqrtf(ww)));
+}
+
+static int ascending(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+status polylines_kink_limit(const struct polyline_set *lines, double diameter_voxel, double over_usual, double *limit_per_voxel, struct error *err)
+{
+    float *turn = malloc((lines->n_vertex + 1) * sizeof *turn);
+    size_t n = 0, reach = span(diameter_voxel);
+    if (turn == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for kinks: out of memory");
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l] + reach; i + reach < lines->first[l + 1]; i++) turn[n++] = turn_at(lines, l, i, reach);
+    qsort(turn, n, sizeof *turn, ascending);
+    double usual = n > 0 ? (double)turn[(size_t)(QUANTILE * (double)(n - 1))] : 0.0;
+    *limit_per_voxel = fmax(LEAST_LIMIT / diameter_voxel, over_usual * usual);
+    free(turn);
+    return STATUS_OK;
+}
+
+status polylines_cut_kinks(const struct polyline_set *lines, double diameter_voxel, double over_usual, size_t min_vertex,
+                           struct polyline_set *result, size_t *n_cut, struct error *err)
+{
+    size_t reach = span(diameter_voxel), near = (size_t)(END_DIAMETERS * diameter_voxel + 0.5);
+    double limit;
+    bool *kink = calloc(lines->n_vertex + 1, sizeof *kink);
+    *n_cut = 0;
+    if (kink == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for kinks: out of memory");
+    status s = polylines_kink_limit(lines, diameter_voxel, over_usual, &limit, err);
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
+        size_t begin = lines->first[l], end = lines->first[l + 1], piece = begin;
+        for (size_t i = begin + reach; i + reach < end; i++)
+            if ((double)turn_at(lines, l, i, reach) > (i < begin + near || i + near >= end ? END_SHARE * limit : limit))
+                for (size_t k = i - reach; k <= i + reach; k++) kink[k] = true;
+        for (size_t i = begin; i <= end && s == STATUS_OK; i++) {
+            if (i < end && !kink[i]) continue;
+            if (i - piece >= min_vertex) s = polyline_add_part(result, lines, l, piece, i, err);
+            *n_cut += i < end;
+            piece = i + 1;
+        }
+    }
+    free(kink);
+    return s;
+}

@@ -1,0 +1,106 @@
+#include "geometry/fibers/lines/polyline.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void polyline_set_init(struct polyline_set *p) { *p = (struct polyline_set){0}; }
+
+void polyline_set_release(struct polyline_set *p)
+{
+    if (p == NULL) return;
+    free(p->first);
+    free(p->vertex);
+    free(p->axis);
+    *p = (struct polyline_set){0};
+}
+
+static status no_memory(struct error *err) { return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory"); }
+
+status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err)
+{
+    if (p->n_line + 1 >= p->line_capacity) {
+        size_t n = p->line_capacity == 0 ? 256 : 2 * p->line_capacity;
+        size_t *first = realloc(p->first, (n + 1) * sizeof *first);
+        if (first != NULL) p->first = first;
+        uint8_t *axes = realloc(p->axis, n);
+        if (axes != NULL) p->axis = axes;
+        if (first == NULL || axes == NULL) return no_memory(err);
+        p->line_capacity = n;
+    }
+    p->axis[p->n_line] = axis;
+    p->first[p->n_line] = p->first[p->n_line + 1] = p->n_vertex;
+    p->n_line++;
+    return STATUS_OK;
+}
+
+status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
+{
+    if (p->n_vertex == UINT32_MAX) return error_set(err, STATUS_TOO_LARGE, "cannot trace fibers: over 2^32 vertices");
+    if (p->n_vertex == p->vertex_capacity) {
+        size_t n = p->vertex_capacity == 0 ? 4096 : 2 * p->vertex_capacity;
+        float(*vertex)[3] = realloc(p->vertex, n * sizeof *vertex);
+        if (vertex == NULL) return no_memory(err);
+        p->vertex = vertex;
+        p->vertex_capacity = n;
+    }
+    memcpy(p->vertex[p->n_vertex++], x, sizeof *p->vertex);
+    p->first[p->n_line] = p->n_vertex;
+    return STATUS_OK;
+}
+
+status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end, struct error *err)
+{
+    status s = polyline_begin(p, from->axis[line], err);
+    for (; i < end && s == STATUS_OK; i++) s = polyline_add(p, from->vertex[i], err);
+    return s;
+}
+
+static size_t cell_index(const struct vertex_grid *g, const float x[3])
+{
+    size_t c[3];
+    for (int a = 0; a < 3; a++) {
+        float f = floorf(x[a] / g->cell);
+        c[a] = f <= 0.0f ? 0 : f >= (float)(g->n[a] - 1) ? g->n[a] - 1 : (size_t)f;
+    }
+    return (c[2] * g->n[1] + c[1]) * g->n[0] + c[0];
+}
+
+status vertex_grid_init(struct vertex_grid *g, const struct polyline_set *p, const size_t n_voxel[3], float cell,
+                        struct error *err)
+{
+    *g = (struct vertex_grid){.cell = cell};
+    for (int a = 0; a < 3; a++) g->n[a] = (size_t)ceilf((float)n_voxel[a] / cell) + 1;
+    size_t n_cell = g->n[0] * g->n[1] * g->n[2];
+    g->first = calloc(n_cell + 2, sizeof *g->first);
+    g->vertex = malloc((p->n_vertex + 1) * sizeof *g->vertex);
+    g->line_of = malloc((p->n_vertex + 1) * sizeof *g->line_of);
+    if (g->first == NULL || g->vertex == NULL || g->line_of == NULL) {
+        vertex_grid_release(g);
+        return no_memory(err);
+    }
+    for (size_t i = 0; i < p->n_vertex; i++) g->first[cell_index(g, p->vertex[i]) + 2]++;
+    for (size_t c = 2; c <= n_cell; c++) g->first[c] += g->first[c - 1];
+    for (size_t i = 0; i < p->n_vertex; i++) g->vertex[g->first[cell_index(g, p->vertex[i]) + 1]++] = (uint32_t)i;
+    for (size_t l = 0; l < p->n_line; l++)
+        for (size_t i = p->first[l]; i < p->first[l + 1]; i++) g->line_of[i] = (uint32_t)l;
+    return STATUS_OK;
+}
+
+void vertex_grid_release(struct vertex_grid *g)
+{
+    if (g == NULL) return;
+    free(g->first);
+    free(g->vertex);
+    free(g->line_of);
+    *g = (struct vertex_grid){0};
+}
+
+void vertex_grid_range(const struct vertex_grid *g, const float x[3], float r, size_t from[3], size_t to[3])
+{
+    for (int a = 0; a < 3; a++) {
+        float lo = floorf((x[a] - r) / g->cell), hi = floorf((x[a] + r) / g->cell), last = (float)(g->n[a] - 1);
+        from[a] = (size_t)fminf(fmaxf(lo, 0.0f), last);
+        to[a] = (size_t)fminf(fmaxf(hi, 0.0f), last);
+    }
+}

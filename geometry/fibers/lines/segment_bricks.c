@@ -1,0 +1,247 @@
+#include "geometry/fibers/lines/segment_bricks.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+void segment_bricks_release(struct segment_bricks *s)
+{
+    if (s == NULL) return;
+    free(s->segment);
+    free(s->first);
+    free(s->index);
+    *s = (struct segment_bricks){0};
+}
+
+static void brick_range(const struct segment_bricks *s, const struct segment *g, size_t from[3], size_t to[3])
+{
+    for (int a = 0; a < 3; a++) {
+        float lo = (fminf(g->a[a], g->b[a]) - s->reach) / (float)s->edge;
+        float hi = (fmaxf(g->a[a], g->b[a]) + s->reach) / (float)s->edge, last = (float)(s->n_brick[a] - 1);
+        from[a] = (size_t)fminf(fmaxf(floorf(lo), 0.0f), last);
+        to[a] = (size_t)fminf(fmaxf(floorf(hi), 0.0f), last);
+    }
+}
+
+/* Counting pass and filling pass of a compressed row list. */
+static void file_segments(struct segment_bricks *s, bool fill)
+{
+    for (size_t i = 0; i < s->n_segment; i++) {
+        size_t from[3], to[3], b[3];
+        brick_range(s, &s->segment[i], from, to);
+        for (b[2] = from[2]; b[2] <= to[2]; b[2]++)
+            for (b[1] = from[1]; b[1] <= to[1]; b[1]++)
+                for (b[0] = from[0]; b[0] <= to[0]; b[0]++) {
+                    size_t brick = (b[2] * s->n_brick[1] + b[1]) * s->n_brick[0] + b[0];
+                    if (fill)
+                        s->index[s->first[brick + 1]++] = (uint32_t)i;
+                    else
+                        s->first[brick + 2]++;
+                }
+    }
+}
+
+static status file_all(struct segment_bricks *s, struct error *err)
+{
+    size_t n = segment_n_brick(s);
+    s->first = calloc(n + 2, sizeof *s->first);
+    if (s->first == NULL) goto no_memory;
+    file_segments(s, false);
+    for (size_t b = 2; b <= n + 1; b++) s->first[b] += s->first[b - 1];
+    s->index = malloc((s->first[n + 1] + 1) * sizeof *s->index);
+    if (s->index == NULL) goto no_memory;
+    file_segments(s, true);
+    return STATUS_OK;
+no_memory:
+    segment_bricks_release(s);
+    return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+}
+
+static status start(struct segment_bricks *s, size_t n_segment, const size_t n_voxel[3], size_t edge, float reach,
+                    struct error *err)
+{
+    *s = (struct segment_bricks){.edge = edge, .reach = reach};
+    memcpy(s->n_voxel, n_voxel, sizeof s->n_voxel);
+    for (int a = 0; a < 3; a++) s->n_brick[a] = (n_voxel[a] + edge - 1) / edge;
+    if (n_segment >= UINT32_MAX) return error_set(err, STATUS_TOO_LARGE, "cannot file fiber segments: over 2^32");
+    s->segment = malloc((n_segment + 1) * sizeof *s->segment);
+    if (s->segment == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+    return STATUS_OK;
+}
+
+status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3], size_t edge,
+                           float reach, struct error *err)
+{
+    status st = start(s, lines->n_vertex, n_voxel, edge, reach, err);
+    if (st != STATUS_OK) return st;
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++) {
+            struct segment *g = &s->segment[s->n_segment++];
+            memcpy(g->a, lines->vertex[i], sizeof g->a);
+            memcpy(g->b, lines->vertex[i + 1], sizeof g->b);
+            g->line = (uint32_t)l;
+            g->axis = lines->axis[l];
+            g->is_first = i == lines->first[l];
+            g->is_last = i + 2 == lines->first[l + 1];
+        }
+    return file_all(s, err);
+}
+
+status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],
+                                  const double voxel_size_m[3], size_t edge, float reach, struct error *err)
+{
+    status st = start(s, f->n_vertex, n_voxel, edge, reach, err);
+    if (st != STATUS_OK) return st;
+    for (size_t l = 0; l < f->n_fiber; l++)
+        for (size_t i = f->first_vertex[l]; i + 1 < f->first_vertex[l + 1]; i++) {
+            struct segment *g = &s->segment[s->n_segment++];
+            for (size_t a = 0; a < 3; a++) {
+                g->a[a] = (float)((double)f->position_m[3 * i + a] / voxel_size_m[a]);
+                g->b[a] = (float)((double)f->position_m[3 * i + 3 + a] / voxel_size_m[a]);
+            }
+            g->line = (uint32_t)l;
+            g->axis = f->axis_class[l];
+            g->is_first = i == f->first_vertex[l];
+            g->is_last = i + 2 == f->first_vertex[l + 1];
+        }
+    return file_all(s, err);
+}
+
+void segment_brick_box(const struct segment_bricks *s, size_t i_brick, size_t from[3], size_t n[3])
+{
+    size_t b[3] = {i_brick % s->n_brick[0], i_brick / s->n_brick[0] % s->n_brick[1],
+                   i_brick / (s->n_brick[0] * s->n_brick[1])};
+    for (int a = 0; a < 3; a++) {
+        from[a] = b[a] * s->edge;
+        n[a] = from[a] + s->edge <= s->n_voxel[a] ? s->edge : s->n_voxel[a] - from[a];
+    }
+}
+
+struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_t i_brick, size_t factor)
+{
+    struct point_lattice l = {.spacing = 1.0f / (float)factor};
+    size_t from[3], n[3];
+    segment_brick_box(s, i_brick, from, n);
+    for (int a = 0; a < 3; a++) {
+        l.origin[a] = (float)from[a];
+        l.n[a] = n[a] * factor;
+    }
+    return l;
+}
+
+/* A segment seen from the lattice: what the inner loops need. */
+struct view {
+    float u[3], inverse2;      /* b - a, 1 / |u|^2 */
+    float from_voxel, to_voxel; /* slab along u, measured from a in voxels */
+    float across[3];           /* how far points at `reach` can lie beyond the segment's box on each axis */
+};
+
+static struct view view_of(const struct segment *g, float reach)
+{
+    struct view w = {.u = {g->b[0] - g->a[0], g->b[1] - g->a[1], g->b[2] - g->a[2]}};
+    float length2 = w.u[0] * w.u[0] + w.u[1] * w.u[1] + w.u[2] * w.u[2], length = sqrtf(length2);
+    w.inverse2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+    w.from_voxel = g->is_first || !(length2 > 0.0f) ? -reach : -1.0f;
+    w.to_voxel = length + (g->is_last || !(length2 > 0.0f) ? reach : 1.0f);
+    for (int a = 0; a < 3; a++) {
+        float c = length2 > 0.0f ? w.u[a] / length : 0.0f;
+        w.across[a] = g->is_first || g->is_last ? reach : fminf(reach, reach * sqrtf(fmaxf(0.0f, 1.0f - c * c)) + fabsf(c) + 0.1f);
+    }
+    return w;
+}
+
+/* Points of the lattice that the segment may be nearest to, along each axis. False when there are none. */
+static bool lattice_range(const struct point_lattice *l, const struct segment *g, const struct view *w, size_t from[3],
+                          size_t to[3])
+{
+    for (int a = 0; a < 3; a++) {
+        float lo = (fminf(g->a[a], g->b[a]) - w->across[a] - l->origin[a]) / l->spacing - 0.5f;
+        float hi = (fmaxf(g->a[a], g->b[a]) + w->across[a] - l->origin[a]) / l->spacing - 0.5f;
+        if (hi < 0.0f || lo > (float)(l->n[a] - 1)) return false;
+        from[a] = lo <= 0.0f ? 0 : (size_t)ceilf(lo);
+        to[a] = hi >= (float)(l->n[a] - 1) ? l->n[a] - 1 : (size_t)hi;
+        if (from[a] > to[a]) return false;
+    }
+    return true;
+}
+
+/* Largest |x| in a row. */
+static float reach_of_row(float px0, float spacing, size_t n)
+{
+    return fmaxf(fabsf(px0), fabsf(px0 + spacing * (float)n));
+}
+
+/* The part of a row (n points from px0 on, relative to g->a) that lies in the slab. False when none does. */
+static bool slab_range(const struct view *w, float px0, float spacing, float py, float pz, size_t n, size_t *from, size_t *to)
+{
+    float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (py * w->u[1] + pz * w->u[2]) * scale;
+    *from = 0;
+    *to = n;
+    if (fabsf(c) < 0.05f) return fixed > w->from_voxel - reach_of_row(px0, spacing, n) * 0.05f &&
+                                 fixed < w->to_voxel + reach_of_row(px0, spacing, n) * 0.05f;
+    float x0 = (w->from_voxel - fixed) / c, x1 = (w->to_voxel - fixed) / c;
+    float lo = (fminf(x0, x1) - px0) / spacing, hi = (fmaxf(x0, x1) - px0) / spacing;
+    if (hi < 0.0f || lo > (float)(n - 1)) return false;
+    if (lo > 0.0f) *from = (size_t)ceilf(lo);
+    if (hi < (float)(n - 1)) *to = (size_t)hi + 1;
+    return *from < *to;
+}
+
+/* Squared distance of a point, relative to g->a, to the segment; comparisons in place of fminf so that loops are vectorised. */
+static inline float squared_distance(float px, float py, float pz, const float u[3], float inverse2)
+{
+    float t = (px * u[0] + py * u[1] + pz * u[2]) * inverse2;
+    t = t < 0.0f ? 0.0f : t;
+    t = t > 1.0f ? 1.0f : t;
+    float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2];
+    return dx * dx + dy * dy + dz * dz;
+}
+
+static void stamp_row(const float u[3], float inverse2, float px0, float spacing, float py, float pz, size_t n,
+                      float *restrict distance2)
+{
+    for (size_t i = 0; i < n; i++) {
+        float d2 = squared_distance(px0 + (float)(int)i * spacing, py, pz, u, inverse2);
+        distance2[i] = d2 < distance2[i] ? d2 : distance2[i];
+    }
+}
+
+static void stamp_row_nearest(const float u[3], float inverse2, float px0, float spacing, float py, float pz, size_t n,
+                              uint32_t id, float *restrict distance2, uint32_t *restrict nearest)
+{
+    for (size_t i = 0; i < n; i++) {
+        float d2 = squared_distance(px0 + (float)(int)i * spacing, py, pz, u, inverse2), old = distance2[i];
+        uint32_t old_id = nearest[i];
+        nearest[i] = d2 < old ? id : old_id;
+        distance2[i] = d2 < old ? d2 : old;
+    }
+}
+
+void segment_distances(const struct segment_bricks *s, size_t i_brick, const struct point_lattice *l, float *distance2,
+                       uint32_t *nearest)
+{
+    size_t n_point = l->n[0] * l->n[1] * l->n[2];
+    for (size_t i = 0; i < n_point; i++) distance2[i] = s->reach * s->reach;
+    for (size_t i = 0; nearest != NULL && i < n_point; i++) nearest[i] = UINT32_MAX;
+    for (size_t e = s->first[i_brick]; e < s->first[i_brick + 1]; e++) {
+        const struct segment *g = &s->segment[s->index[e]];
+        size_t from[3], to[3];
+        const struct view w = view_of(g, s->reach);
+        if (!lattice_range(l, g, &w, from, to)) continue;
+        float px = l->origin[0] + ((float)from[0] + 0.5f) * l->spacing - g->a[0];
+        for (size_t k = from[2]; k <= to[2]; k++)
+            for (size_t j = from[1]; j <= to[1]; j++) {
+                size_t row = (k * l->n[1] + j) * l->n[0] + from[0], i0, i1;
+                float py = l->origin[1] + ((float)j + 0.5f) * l->spacing - g->a[1];
+                float pz = l->origin[2] + ((float)k + 0.5f) * l->spacing - g->a[2];
+                if (!slab_range(&w, px, l->spacing, py, pz, to[0] - from[0] + 1, &i0, &i1)) continue;
+                float px0 = px + (float)i0 * l->spacing;
+                if (nearest == NULL)
+                    stamp_row(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, distance2 + row + i0);
+                else
+                    stamp_row_nearest(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, s->index[e], distance2 + row + i0,
+                                      nearest + row + i0);
+            }
+    }
+}

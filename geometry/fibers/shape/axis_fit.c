@@ -1,0 +1,334 @@
+#include "geometry/fibers/shape/axis_fit.h"
+
+#include "geometry/fibers/shape/axis_solve.h"
+#include "geometry/fibers/lines/segment_bricks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK, N_TABLE = 512 };
+static const float OUTLIER = 0.6f; /* of the density: residuals beyond are other fibers */
+/* Standard deviation of a fiber's curvature (its change from vertex to vertex), per diameter. */
+static const double CURVATURE_SD = 0.35;
+static const double TAIL = 2.5; /* blurs beyond the radius that a fiber is seen */
+
+/* What one brick has to say: about the vertices of its segments, and about the profile. */
+struct brick_sum {
+    struct axis_pull *pull; /* two for every segment of the brick */
+    double normal[4][4], gradient[4], square, weight; /* of the residuals */
+    bool failed;
+};
+
+struct fit_job {
+    const struct volume *v;
+    const struct segment_bricks *bricks;
+    struct axis_profile profile;
+    float reach, table_scale;
+    float share[N_TABLE + 2], slope[N_TABLE + 2]; /* g and dg/dd over the distance */
+    struct brick_scratch {
+        float model[N_CELL], own2[N_CELL], by_radius[N_CELL], by_blur[N_CELL];
+        uint32_t own[N_CELL], touched[N_CELL];
+    } *scratch; /* per thread */
+    struct brick_sum *sum; /* per brick */
+};
+
+static void make_table(struct fit_job *job)
+{
+    double r = job->profile.radius, b = job->profile.blur, end = r + TAIL * b;
+    job->reach = (float)end;
+    job->table_scale = (float)(N_TABLE / end);
+    for (int i = 0; i < N_TABLE + 2; i++) {
+        double z = (i * end / N_TABLE - r) / b;
+        job->share[i] = (float)(0.5 * erfc(z * M_SQRT1_2));
+        job->slope[i] = (float)(-exp(-0.5 * z * z) / (b * sqrt(2.0 * M_PI)));
+    }
+}
+
+static float look_up(const float table[N_TABLE + 2], float at)
+{
+    int i = (int)at;
+    float f = at - (float)i;
+    return i >= N_TABLE ? 0.0f : (1.0f - f) * table[i] + f * table[i + 1];
+}
+
+/* Place along the segment of the point nearest to p (relative to a), within it; false when p lies beyond an end of the line. */
+static bool foot_of(const struct segment *g, const float p[3], float *t, float offset[3], float *d2)
+{
+    float u[3], along = 0.0f, length2 = 0.0f;
+    for (int a = 0; a < 3; a++) {
+        u[a] = g->b[a] - g->a[a];
+        along += u[a] * p[a];
+        length2 += u[a] * u[a];
+    }
+    *t = length2 > 0.0f ? along / length2 : 0.0f;
+    if ((g->is_first && *t < 0.0f) || (g->is_last && *t > 1.0f)) return false;
+    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t; /* comparisons, here and below: fminf is a call */
+    *d2 = 0.0f;
+    for (int a = 0; a < 3; a++) {
+        offset[a] = p[a] - *t * u[a];
+        *d2 += offset[a] * offset[a];
+    }
+    return true;
+}
+
+/* The part of a row of voxel centres, from x on relative to a, whose feet lie within a voxel of the segment. */
+static void row_range(const float u[3], float length2, float x, float y, float z, size_t n, size_t *from, size_t *to)
+{
+    float margin = sqrtf(length2), fixed = y * u[1] + z * u[2];
+    *from = 0;
+    *to = n;
+    if (fabsf(u[0]) < 0.2f * margin) {
+        float wide = (float)n * fabsf(u[0]) + fabsf(x * u[0]);
+        if (fixed < -margin - wide || fixed > length2 + margin + wide) *to = 0;
+        return;
+    }
+    float x0 = (-margin - fixed) / u[0] - x, x1 = (length2 + margin - fixed) / u[0] - x;
+    float lo = ceilf(fminf(x0, x1)), hi = floorf(fmaxf(x0, x1)) + 1.0f;
+    *from = lo <= 0.0f ? 0 : lo >= (float)n ? n : (size_t)lo;
+    *to = hi <= 0.0f ? 0 : hi >= (float)n ? n : (size_t)hi;
+}
+
+/* Voxels of the brick for which this segment is the nearest of its line so far. */
+static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], const size_t n[3], uint32_t segment, size_t n_touched)
+{
+    const struct segment *g = &job->bricks->segment[segment];
+    size_t lo[3], hi[3];
+    float u[3], length2 = 0.0f;
+    for (int a = 0; a < 3; a++) {
+        float l = ceilf(fminf(g->a[a], g->b[a]) - job->reach - 0.5f), h = floorf(fmaxf(g->a[a], g->b[a]) + job->reach - 0.5f) + 1.0f;
+        float first = (float)from[a], end = (float)(from[a] + n[a]);
+        if (h <= first || l >= end) return n_touched;
+        lo[a] = l <= first ? 0 : (size_t)(l - first);
+        hi[a] = h >= end ? n[a] : (size_t)(h - first);
+        u[a] = g->b[a] - g->a[a];
+        length2 += u[a] * u[a];
+    }
+    for (size_t k = lo[2]; k < hi[2]; k++)
+        for (size_t j = lo[1]; j < hi[1]; j++) {
+            size_t i0, i1;
+            float p[3] = {(float)(from[0] + lo[0]) + 0.5f - g->a[0], (float)(from[1] + j) + 0.5f - g->a[1], (float)(from[2] + k) + 0.5f - g->a[2]};
+            row_range(u, length2, p[0], p[1], p[2], hi[0] - lo[0], &i0, &i1);
+            p[0] += (float)i0;
+            for (size_t i = lo[0] + i0; i < lo[0] + i1; i++, p[0] += 1.0f) {
+                float t, offset[3], d2;
+                size_t at = (k * BRICK + j) * BRICK + i;
+                if (!foot_of(g, p, &t, offset, &d2) || d2 >= job->reach * job->reach || d2 >= s->own2[at]) continue;
+                if (s->own[at] == UINT32_MAX) s->touched[n_touched++] = (uint32_t)at;
+                s->own2[at] = d2;
+                s->own[at] = segment;
+            }
+        }
+    return n_touched;
+}
+
+static void add_to_model(const struct fit_job *job, struct brick_scratch *s, size_t n_touched)
+{
+    for (size_t i = 0; i < n_touched; i++) {
+        uint32_t at = s->touched[i];
+        float d = sqrtf(s->own2[at]), slope = look_up(job->slope, d * job->table_scale);
+        s->model[at] += look_up(job->share, d * job->table_scale);
+        s->by_radius[at] -= slope;
+        s->by_blur[at] -= slope * (d - (float)job->profile.radius) / (float)job->profile.blur;
+    }
+}
+
+/* Residual and weight of a voxel. */
+static float residual(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3], uint32_t at, float *weight)
+{
+    size_t i = from[0] + at % BRICK, j = from[1] + at / BRICK % BRICK, k = from[2] + at / (BRICK * BRICK);
+    float low = (float)job->profile.low, high = (float)job->profile.high, share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
+    float e = job->v->density[volume_index(job->v->n, i, j, k)] - low - (high - low) * share;
+    float q = 1.0f / (1.0f + e * e / (OUTLIER * OUTLIER));
+    *weight = q * q;
+    return e;
+}
+
+static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], size_t n_touched, uint32_t first_segment,
+                      const uint32_t *slot, struct brick_sum *sum)
+{
+    float amplitude = (float)(job->profile.high - job->profile.low);
+    for (size_t i = 0; i < n_touched; i++) {
+        uint32_t at = s->touched[i];
+        const struct segment *g = &job->bricks->segment[s->own[at]];
+        float p[3] = {(float)(from[0] + at % BRICK) + 0.5f - g->a[0], (float)(from[1] + at / BRICK % BRICK) + 0.5f - g->a[1],
+                      (float)(from[2] + at / (BRICK * BRICK)) + 0.5f - g->a[2]};
+        float t, offset[3], d2, weight;
+        if (!foot_of(g, p, &t, offset, &d2) || !(d2 > 1e-6f)) continue;
+        float d = sqrtf(d2), e = residual(job, s, from, at, &weight), slope = -amplitude * look_up(job->slope, d * job->table_scale);
+        for (int end = 0; end < 2; end++) {
+            struct axis_pull *q = &sum->pull[2 * slot[s->own[at] - first_segment] + (uint32_t)end];
+            float w = weight * (end == 0 ? 1.0f - t : t) * slope / d;
+            for (int a = 0, c = 0; a < 3; a++) {
+                q->gradient[a] += w * e * offset[a];
+                for (int b = 0; b <= a; b++, c++) q->normal[c] += w * slope / d * offset[a] * offset[b];
+            }
+        }
+    }
+}
+
+/* All lines of a brick in turn: either their densities to the model, or their pulls. */
+static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t i_brick, const size_t from[3], const size_t n[3], bool pulls,
+                      uint32_t *slot, struct brick_sum *sum)
+{
+    const struct segment_bricks *b = job->bricks;
+    for (size_t e = b->first[i_brick], end; e < b->first[i_brick + 1]; e = end) {
+        uint32_t line = b->segment[b->index[e]].line, lowest = UINT32_MAX;
+        size_t n_touched = 0;
+        for (end = e; end < b->first[i_brick + 1] && b->segment[b->index[end]].line == line; end++) {
+            n_touched = stamp(job, s, from, n, b->index[end], n_touched);
+            if (b->index[end] < lowest) lowest = b->index[end];
+        }
+        if (pulls) {
+            for (size_t i = e; i < end; i++) slot[b->index[i] - lowest] = (uint32_t)(i - b->first[i_brick]);
+            add_pulls(job, s, from, n_touched, lowest, slot, sum);
+        } else {
+            add_to_model(job, s, n_touched);
+        }
+        for (size_t i = 0; i < n_touched; i++) {
+            s->own2[s->touched[i]] = INFINITY;
+            s->own[s->touched[i]] = UINT32_MAX;
+        }
+    }
+}
+
+/* Normal equations of the profile: radius, blur, low, high. */
+static void add_profile(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3], const size_t n[3], struct brick_sum *sum)
+{
+    double amplitude = job->profile.high - job->profile.low;
+    for (size_t k = 0; k < n[2]; k++)
+        for (size_t j = 0; j < n[1]; j++)
+            for (size_t i = 0; i < n[0]; i++) {
+                uint32_t at = (uint32_t)((k * BRICK + j) * BRICK + i);
+                float weight;
+                if (!(s->model[at] > 0.0f)) continue;
+                double e = (double)residual(job, s, from, at, &weight), share = fmin(1.0, (double)s->model[at]);
+                sum->square += (double)weight * e * e;
+                sum->weight += (double)weight;
+                double by[4] = {amplitude * (double)s->by_radius[at], amplitude * (double)s->by_blur[at], 1.0 - share, share};
+                for (int a = 0; a < 4; a++) {
+                    sum->gradient[a] += (double)weight * e * by[a];
+                    for (int c = 0; c < 4; c++) sum->normal[a][c] += (double)weight * by[a] * by[c];
+                }
+            }
+}
+
+static void fit_brick(void *context, size_t i_brick, size_t i_thread)
+{
+    struct fit_job *job = context;
+    const struct segment_bricks *b = job->bricks;
+    size_t n_segment = b->first[i_brick + 1] - b->first[i_brick], from[3], n[3], longest = 0;
+    if (n_segment == 0) return;
+    scratch_keep_within(job->v->space);
+    struct brick_scratch *s = &job->scratch[i_thread];
+    struct brick_sum *sum = &job->sum[i_brick];
+    for (size_t e = b->first[i_brick], start = e; e < b->first[i_brick + 1]; e++) { /* how far apart the segments of a line are numbered */
+        if (b->segment[b->index[e]].line != b->segment[b->index[start]].line) start = e;
+        size_t apart = b->index[e] - b->index[start] + 1;
+        longest = apart > longest ? apart : longest;
+    }
+    uint32_t *slot = malloc(longest * sizeof *slot);
+    sum->pull = calloc(2 * n_segment, sizeof *sum->pull);
+    sum->failed = sum->pull == NULL || slot == NULL;
+    if (!sum->failed) {
+        for (size_t e = 0; e < 2 * n_segment; e++) sum->pull[e].segment = b->index[b->first[i_brick] + e / 2];
+        for (size_t i = 0; i < N_CELL; i++) {
+            s->model[i] = s->by_radius[i] = s->by_blur[i] = 0.0f;
+            s->own2[i] = INFINITY;
+            s->own[i] = UINT32_MAX;
+        }
+        segment_brick_box(b, i_brick, from, n);
+        each_line(job, s, i_brick, from, n, false, slot, sum);
+        each_line(job, s, i_brick, from, n, true, slot, sum);
+        add_profile(job, s, from, n, sum);
+    }
+    free(slot);
+}
+
+/* Variance of what the model leaves of the densities: noise, and what it cannot say. */
+static double residual_variance(const struct fit_job *job, size_t n_brick)
+{
+    double square = 0.0, weight = 0.0;
+    for (size_t b = 0; b < n_brick; b++) {
+        square += job->sum[b].square;
+        weight += job->sum[b].weight;
+    }
+    return weight > 0.0 ? square / weight : 1.0;
+}
+
+/* One step for the profile, kept within reason. */
+static void step_profile(const struct fit_job *job, size_t n_brick, double diameter, struct axis_profile *p)
+{
+    double m[16] = {0.0}, x[4] = {0.0};
+    for (size_t b = 0; b < n_brick; b++)
+        for (int a = 0; a < 4; a++) {
+            x[a] += job->sum[b].gradient[a];
+            for (int c = 0; c < 4; c++) m[4 * a + c] += job->sum[b].normal[a][c];
+        }
+    if (!axis_solve_dense(m, 4, x)) return;
+    p->radius = fmin(0.75 * diameter, fmax(0.3 * diameter, p->radius + fmin(0.3, fmax(-0.3, x[0]))));
+    p->blur = fmin(2.5, fmax(0.4, p->blur + fmin(0.2, fmax(-0.2, x[1]))));
+    p->low = fmin(0.4, fmax(-0.2, p->low + x[2]));
+    p->high = fmin(1.5, fmax(0.5, p->high + x[3]));
+}
+
+static status one_round(struct fit_job *job, struct polyline_set *lines, const uint32_t *first_vertex_of, struct axis_pull *total,
+                        double diameter, struct thread_pool *pool, const struct progress *progress, struct error *err)
+{
+    struct segment_bricks bricks = {0};
+    make_table(job);
+    status s = segment_bricks_init(&bricks, lines, job->v->n, BRICK, job->reach + 1.0f, err);
+    if (s != STATUS_OK) return s;
+    size_t n_brick = segment_n_brick(&bricks);
+    job->bricks = &bricks;
+    job->sum = calloc(n_brick, sizeof *job->sum);
+    if (job->sum == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    if (s == STATUS_OK) {
+        s = thread_pool_run(pool, n_brick, fit_brick, job, progress);
+        if (s != STATUS_OK) error_set(err, s, "fitting fibers was cancelled");
+        for (size_t b = 0; b < n_brick && s == STATUS_OK; b++)
+            if (job->sum[b].failed) s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    }
+    if (s == STATUS_OK) {
+        memset(total, 0, lines->n_vertex * sizeof *total);
+        for (size_t b = 0; b < n_brick; b++) /* in order, so that sums do not depend on the threads */
+            for (size_t e = 0; e < 2 * (bricks.first[b + 1] - bricks.first[b]); e++)
+                axis_pull_add(&total[first_vertex_of[job->sum[b].pull[e].segment] + e % 2], &job->sum[b].pull[e]);
+        step_profile(job, n_brick, diameter, &job->profile);
+        double curvature_sd = CURVATURE_SD / diameter;
+        s = axis_solve_lines(lines, total, residual_variance(job, n_brick) / (curvature_sd * curvature_sd), pool, err);
+    }
+    for (size_t b = 0; job->sum != NULL && b < n_brick; b++) free(job->sum[b].pull);
+    free(job->sum);
+    job->sum = NULL;
+    segment_bricks_release(&bricks);
+    return s;
+}
+
+status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round, struct axis_profile *profile,
+                     struct thread_pool *pool, const struct progress *progress, struct error *err)
+{
+    struct fit_job *job = calloc(1, sizeof *job);
+    uint32_t *first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *first_vertex_of);
+    struct axis_pull *total = malloc((lines->n_vertex + 1) * sizeof *total);
+    size_t n_segment = 0;
+    status s = STATUS_OK;
+    if (job != NULL) job->scratch = malloc(thread_pool_n_thread(pool) * sizeof *job->scratch);
+    if (job == NULL || job->scratch == NULL || first_vertex_of == NULL || total == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+        goto out;
+    }
+    job->v = v;
+    job->profile = *profile;
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++) first_vertex_of[n_segment++] = (uint32_t)i;
+    for (int round = 0; round < n_round && s == STATUS_OK; round++)
+        s = one_round(job, lines, first_vertex_of, total, diameter_voxel, pool, progress, err);
+    if (s == STATUS_OK) *profile = job->profile;
+out:
+    if (job != NULL) free(job->scratch);
+    free(job);
+    free(first_vertex_of);
+    free(total);
+    return s;
+}

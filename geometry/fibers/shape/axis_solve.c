@@ -1,0 +1,119 @@
+#include "geometry/fibers/shape/axis_solve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BAND = 7 }; /* the diagonal and six below: second differences of three coordinates */
+
+void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
+{
+    for (int i = 0; i < 6; i++) to->normal[i] += from->normal[i];
+    for (int i = 0; i < 3; i++) to->gradient[i] += from->gradient[i];
+}
+
+bool axis_solve_dense(double *m, int n, double *x)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = m[i * n + j];
+            for (int k = 0; k < j; k++) sum -= m[i * n + k] * m[j * n + k];
+            if (i == j && !(sum > 0.0)) return false;
+            m[i * n + j] = i == j ? sqrt(sum) : sum / m[j * n + j];
+        }
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++) x[i] -= m[i * n + k] * x[k];
+        x[i] /= m[i * n + i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) x[i] -= m[k * n + i] * x[k];
+        x[i] /= m[i * n + i];
+    }
+    return true;
+}
+
+/* The same with m[i][k] the element (i, i - k). */
+static bool solve_banded(double (*m)[BAND], size_t n, double *x)
+{
+    for (size_t i = 0; i < n; i++) {
+        size_t first = i >= BAND - 1 ? i - (BAND - 1) : 0;
+        for (size_t j = first; j <= i; j++) {
+            double sum = m[i][i - j];
+            for (size_t k = first; k < j; k++)
+                if (j - k < BAND) sum -= m[i][i - k] * m[j][j - k];
+            if (i == j && !(sum > 0.0)) return false;
+            m[i][i - j] = i == j ? sqrt(sum) : sum / m[j][0];
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        for (size_t k = 1; k < BAND && k <= i; k++) x[i] -= m[i][k] * x[i - k];
+        x[i] /= m[i][0];
+    }
+    for (size_t i = n; i-- > 0;) {
+        for (size_t k = 1; k < BAND && i + k < n; k++) x[i] -= m[i + k][k] * x[i + k];
+        x[i] /= m[i][0];
+    }
+    return true;
+}
+
+struct solve_job {
+    struct polyline_set *lines;
+    const struct axis_pull *pull;
+    double stiffness, hold;
+    bool *failed; /* per line */
+};
+
+static void solve_line(void *context, size_t l, size_t i_thread)
+{
+    (void)i_thread;
+    struct solve_job *job = context;
+    size_t n = polyline_length(job->lines, l);
+    float(*p)[3] = job->lines->vertex + job->lines->first[l];
+    const struct axis_pull *q = job->pull + job->lines->first[l];
+    static const double second[3] = {1.0, -2.0, 1.0};
+    double(*m)[BAND] = calloc(3 * n, sizeof *m), *x = calloc(3 * n, sizeof *x);
+    if (m == NULL || x == NULL) {
+        job->failed[l] = true;
+        goto out;
+    }
+    for (size_t i = 0; i < n; i++)
+        for (size_t a = 0, c = 0; a < 3; a++) {
+            x[3 * i + a] = (double)q[i].gradient[a];
+            m[3 * i + a][0] += job->hold;
+            for (size_t b = 0; b <= a; b++, c++) m[3 * i + a][a - b] += (double)q[i].normal[c];
+        }
+    for (size_t i = 0; i + 2 < n; i++)
+        for (size_t a = 0; a < 3; a++) {
+            double bend = (double)p[i][a] - 2.0 * (double)p[i + 1][a] + (double)p[i + 2][a];
+            for (size_t r = 0; r < 3; r++) {
+                x[3 * (i + r) + a] -= job->stiffness * second[r] * bend;
+                for (size_t c = 0; c <= r; c++) m[3 * (i + r) + a][3 * (r - c)] += job->stiffness * second[r] * second[c];
+            }
+        }
+    if (!solve_banded(m, 3 * n, x)) goto out; /* stays as it is */
+    for (size_t i = 0; i < n; i++) {
+        double length = sqrt(x[3 * i] * x[3 * i] + x[3 * i + 1] * x[3 * i + 1] + x[3 * i + 2] * x[3 * i + 2]);
+        for (size_t a = 0; a < 3; a++) p[i][a] += (float)(x[3 * i + a] * (length > 1.0 ? 1.0 / length : 1.0));
+    }
+out:
+    free(m);
+    free(x);
+}
+
+status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness, struct thread_pool *pool,
+                        struct error *err)
+{
+    struct solve_job job = {.lines = lines, .pull = pull, .failed = calloc(lines->n_line + 1, sizeof(bool))};
+    double mean = 0.0;
+    if (job.failed == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    for (size_t i = 0; i < lines->n_vertex; i++) /* half the trace: the direction along the fiber has none */
+        mean += 0.5 * (double)(pull[i].normal[0] + pull[i].normal[2] + pull[i].normal[5]);
+    mean = lines->n_vertex > 0 ? mean / (double)lines->n_vertex : 0.0;
+    job.stiffness = stiffness;
+    job.hold = 0.02 * mean + 1e-12;
+    status s = thread_pool_run(pool, lines->n_line, solve_line, &job, NULL);
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++)
+        if (job.failed[l]) s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    free(job.failed);
+    return s;
+}

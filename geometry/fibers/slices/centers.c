@@ -1,0 +1,345 @@
+#include "geometry/fibers/slices/centers.h"
+
+#include "geometry/fibers/slices/center_refine.h"
+#include "geometry/fibers/slices/slice_image.h"
+#include "geometry/vision/vision.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_SCALE = 4 };
+static const double scale_factor[N_SCALE] = {0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
+
+/* Lone disks answer 0.74, disks inside a dense bundle (neighbours fill the filter's surround) about 0.25. */
+static const float MIN_STRENGTH = 0.12f;
+/* Two centers are never nearer than this share of the diameter. */
+static const float MIN_SPACING = 0.55f;
+
+struct slice_result {
+    struct center *center;
+    size_t n, capacity;
+    status failed;
+};
+
+struct detect_job {
+    const struct volume *v;
+    const struct direction_volume *d;
+    const uint16_t *mask;
+    const struct slice_frame *frame;
+    size_t first;             /* slice of the slab's task 0 */
+    float *image;             /* of the slab */
+    struct pixel_range *own;  /* per slice of the slab */
+    size_t margin;            /* pixels around what is its own that a picture needs */
+    double sigma[N_SCALE];
+    float min_distance;
+    double diameter;
+    float *scratch; /* per thread: a part of the picture and N_SCALE responses */
+    size_t scratch_per_thread;
+    struct slice_result *slice;
+    struct error *error; /* per thread */
+};
+
+/* The part of a slice's picture that matters. */
+struct view {
+    size_t i_slice, width, height;
+    float origin[2]; /* of pixel (0, 0) in the whole picture */
+    float *image, *response;
+};
+
+void center_list_release(struct center_list *l)
+{
+    if (l == NULL) return;
+    free(l->first);
+    free(l->center);
+    *l = (struct center_list){0};
+}
+
+/* Voxel that holds point x; false (and the nearest voxel) when x lies outside of the volume. */
+static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
+{
+    bool inside = true;
+    for (int a = 0; a < 3; a++) {
+        inside = inside && x[a] >= 0.0f && x[a] < (float)n[a];
+        at[a] = x[a] <= 0.0f ? 0 : x[a] >= (float)n[a] - 1.0f ? n[a] - 1 : (size_t)x[a];
+    }
+    return inside;
+}
+
+static bool is_peak(const struct view *w, const float *response, size_t u, size_t v)
+{
+    float c = response[v * w->width + u];
+    for (size_t y = v > 0 ? v - 1 : 0; y <= v + 1 && y < w->height; y++)
+        for (size_t x = u > 0 ? u - 1 : 0; x <= u + 1 && x < w->width; x++) {
+            float r = response[y * w->width + x];
+            if (r > c || (r == c && (y < v || (y == v && x < u)))) return false;
+        }
+    return true;
+}
+
+/* Offset of the maximum of the paraboloid through a 3 x 3 neighbourhood (least squares), at most one pixel. */
+static void refine_position(const struct view *w, const float *response, size_t u, size_t v, float offset[2])
+{
+    offset[0] = offset[1] = 0.0f;
+    if (u == 0 || v == 0 || u + 1 >= w->width || v + 1 >= w->height) return;
+    const float *p = response + v * w->width + u;
+    size_t pitch = w->width;
+    float gu = 0.0f, gv = 0.0f, uu = 0.0f, vv = 0.0f;
+    for (ptrdiff_t r = -1; r <= 1; r++) {
+        const float *q = p + r * (ptrdiff_t)pitch;
+        gu += (q[1] - q[-1]) / 6.0f;
+        uu += (q[1] - 2.0f * q[0] + q[-1]) / 3.0f;
+        gv += (p[pitch + (size_t)(r + 1) - 1] - p[-(ptrdiff_t)pitch + r]) / 6.0f;
+        vv += (p[(ptrdiff_t)pitch + r] - 2.0f * p[r] + p[-(ptrdiff_t)pitch + r]) / 3.0f;
+    }
+    float uv = (p[pitch + 1] - p[pitch - 1] - p[-(ptrdiff_t)pitch + 1] + p[-(ptrdiff_t)pitch - 1]) / 4.0f;
+    float det = uu * vv - uv * uv;
+    if (!(det > 0.0f) || !(uu < 0.0f)) return;
+    offset[0] = fminf(1.0f, fmaxf(-1.0f, (uv * gv - vv * gu) / det));
+    offset[1] = fminf(1.0f, fmaxf(-1.0f, (uv * gu - uu * gv) / det));
+}
+
+/* Mean direction of the class's voxels within one pixel of (u, v), as slopes. False when there is none, or the center lies
+ * outside of the volume. */
+static bool find_slope(const struct detect_job *job, size_t i_slice, struct center *c)
+{
+    const struct slice_frame *f = job->frame;
+    float sum[3] = {0.0f, 0.0f, 0.0f}, x[3]; /* along u, v, w */
+    size_t at[3];
+    slice_frame_point(f, c->u, c->v, (float)i_slice + 0.5f, x);
+    if (!voxel_at(job->v->n, x, at)) return false;
+    for (int v = -1; v <= 1; v++)
+        for (int u = -1; u <= 1; u++) {
+            slice_frame_point(f, c->u + (float)u, c->v + (float)v, (float)i_slice + 0.5f, x);
+            if (!voxel_at(job->v->n, x, at)) continue;
+            size_t voxel = volume_index(job->v->n, at[0], at[1], at[2]);
+            if ((job->mask[voxel] >> f->index & 1) == 0 || job->mask[voxel] < CLASS_KEPT) continue;
+            float d[3], local[3] = {0.0f, 0.0f, 0.0f};
+            direction_volume_get(job->d, voxel, d);
+            for (int a = 0; a < 3; a++) {
+                local[0] += d[a] * f->u[a];
+                local[1] += d[a] * f->v[a];
+                local[2] += d[a] * f->w[a];
+            }
+            float sign = local[2] < 0.0f ? -1.0f : 1.0f;
+            for (int a = 0; a < 3; a++) sum[a] += sign * local[a];
+        }
+    if (!(sum[2] > 0.0f)) return false;
+    c->slope_u = sum[0] / sum[2];
+    c->slope_v = sum[1] / sum[2];
+    return true;
+}
+
+static bool push(struct slice_result *r, const struct center *c)
+{
+    if (r->n == r->capacity) {
+        size_t n = r->capacity == 0 ? 64 : 2 * r->capacity;
+        struct center *bigger = realloc(r->center, n * sizeof *bigger);
+        if (bigger == NULL) return false;
+        r->center = bigger;
+        r->capacity = n;
+    }
+    r->center[r->n++] = *c;
+    return true;
+}
+
+static bool collect_peaks(const struct detect_job *job, const struct view *w, struct slice_result *r)
+{
+    size_t n_pixel = w->width * w->height;
+    for (int s = 0; s < N_SCALE; s++)
+        for (size_t v = 0; v < w->height; v++)
+            for (size_t u = 0; u < w->width; u++) {
+                const float *map = w->response + (size_t)s * n_pixel;
+                size_t at = v * w->width + u;
+                if (map[at] < MIN_STRENGTH) continue;
+                if (!is_peak(w, map, u, v)) continue;
+                if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at])) continue;
+                float offset[2];
+                refine_position(w, map, u, v, offset);
+                struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
+                                   .v = w->origin[1] + (float)v + 0.5f + offset[1],
+                                   .sigma = (float)job->sigma[s],
+                                   .strength = map[at]};
+                if (find_slope(job, w->i_slice, &c) && !push(r, &c)) return false;
+            }
+    return true;
+}
+
+static int stronger_first(const void *a, const void *b)
+{
+    const struct center *x = a, *y = b;
+    if (x->strength != y->strength) return x->strength < y->strength ? 1 : -1;
+    if (x->v != y->v) return x->v < y->v ? -1 : 1;
+    return (x->u > y->u) - (x->u < y->u);
+}
+
+static int lower_v_first(const void *a, const void *b)
+{
+    const struct center *x = a, *y = b;
+    if (x->v != y->v) return x->v < y->v ? -1 : 1;
+    return (x->u > y->u) - (x->u < y->u);
+}
+
+/* Of peaks nearer to each other than min_distance the strongest stays. Those that stay are filed in cells of that edge. */
+static bool thin_out(const struct detect_job *job, const struct view *w, struct slice_result *r)
+{
+    size_t kept = 0, n_cell[2] = {(size_t)((float)w->width / job->min_distance) + 3, (size_t)((float)w->height / job->min_distance) + 3};
+    float limit = job->min_distance * job->min_distance;
+    if (r->n == 0) return true;
+    uint32_t *head = calloc(n_cell[0] * n_cell[1], sizeof *head), *next = malloc(r->n * sizeof *next);
+    if (head == NULL || next == NULL) {
+        free(head);
+        free(next);
+        return false;
+    }
+    qsort(r->center, r->n, sizeof *r->center, stronger_first);
+    for (size_t i = 0; i < r->n; i++) {
+        const struct center *c = &r->center[i];
+        size_t cu = (size_t)fmaxf(0.0f, (c->u - w->origin[0]) / job->min_distance) + 1;
+        size_t cv = (size_t)fmaxf(0.0f, (c->v - w->origin[1]) / job->min_distance) + 1;
+        bool near = false;
+        for (size_t y = cv - 1; y <= cv + 1 && y < n_cell[1]; y++)
+            for (size_t x = cu - 1; x <= cu + 1 && x < n_cell[0]; x++)
+                for (uint32_t at = head[y * n_cell[0] + x]; at != 0 && !near; at = next[at - 1]) {
+                    float du = c->u - r->center[at - 1].u, dv = c->v - r->center[at - 1].v;
+                    near = du * du + dv * dv < limit;
+                }
+        if (near) continue;
+        size_t cell = (cv < n_cell[1] ? cv : n_cell[1] - 1) * n_cell[0] + (cu < n_cell[0] ? cu : n_cell[0] - 1);
+        r->center[kept] = *c;
+        next[kept] = head[cell];
+        head[cell] = (uint32_t)++kept;
+    }
+    r->n = kept;
+    free(head);
+    free(next);
+    return true;
+}
+
+/* The slice's own pixels and a margin around them, copied out of the slab. */
+static struct view cut_view(const struct detect_job *job, size_t i_task, float *scratch)
+{
+    const struct slice_frame *f = job->frame;
+    const struct pixel_range *own = &job->own[i_task];
+    size_t m = job->margin, u0 = own->u0 > m ? own->u0 - m : 0, v0 = own->v0 > m ? own->v0 - m : 0;
+    size_t u1 = own->u1 + m < f->width ? own->u1 + m : f->width, v1 = own->v1 + m < f->height ? own->v1 + m : f->height;
+    struct view w = {job->first + i_task, u1 - u0, v1 - v0, {(float)u0, (float)v0}, scratch, scratch + (u1 - u0) * (v1 - v0)};
+    const float *from = job->image + i_task * f->width * f->height;
+    for (size_t v = 0; v < w.height; v++) memcpy(w.image + v * w.width, from + (v0 + v) * f->width + u0, w.width * sizeof *from);
+    return w;
+}
+
+static void move_centers(struct slice_result *r, float du, float dv)
+{
+    for (size_t i = 0; i < r->n; i++) {
+        r->center[i].u += du;
+        r->center[i].v += dv;
+    }
+}
+
+static void detect_slice(void *context, size_t i_task, size_t i_thread)
+{
+    struct detect_job *job = context;
+    scratch_keep_within(job->v->space);
+    if (job->own[i_task].u0 >= job->own[i_task].u1) return; /* nothing of the class in it */
+    struct view w = cut_view(job, i_task, job->scratch + i_thread * job->scratch_per_thread);
+    struct slice_result *r = &job->slice[w.i_slice];
+    size_t n_pixel = w.width * w.height;
+    for (int s = 0; s < N_SCALE && r->failed == STATUS_OK; s++)
+        r->failed = vision_blob_response(w.image, w.width, w.height, job->sigma[s], w.response + (size_t)s * n_pixel,
+                                         &job->error[i_thread]);
+    if (r->failed != STATUS_OK) return;
+    if (!collect_peaks(job, &w, r) || !thin_out(job, &w, r))
+        r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    move_centers(r, -w.origin[0], -w.origin[1]);
+    centers_refine(w.image, w.width, w.height, job->diameter, r->center, r->n, w.response, w.response + n_pixel);
+    move_centers(r, w.origin[0], w.origin[1]);
+    if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
+}
+
+static status gather(struct detect_job *job, size_t n_slice, struct center_list *list, struct error *err)
+{
+    size_t total = 0;
+    for (size_t k = 0; k < n_slice; k++) total += job->slice[k].n;
+    list->first = calloc(n_slice + 1, sizeof *list->first);
+    list->center = malloc((total + 1) * sizeof *list->center);
+    if (list->first == NULL || list->center == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    list->n_slice = n_slice;
+    for (size_t k = 0; k < n_slice; k++) {
+        if (job->slice[k].n > 0)
+            memcpy(list->center + list->first[k], job->slice[k].center, job->slice[k].n * sizeof *list->center);
+        list->first[k + 1] = list->first[k] + job->slice[k].n;
+    }
+    return STATUS_OK;
+}
+
+/* Slabs of slices: their pictures, then the centers in them. */
+static status detect_slabs(struct detect_job *job, const struct slice_source *source, size_t n_slab, struct thread_pool *pool,
+                           const struct progress *progress, struct error *err)
+{
+    size_t n = job->frame->n_slice;
+    const struct progress quiet = progress_silent(progress);
+    status s = STATUS_OK;
+    for (job->first = 0; job->first < n && s == STATUS_OK; job->first += n_slab) {
+        size_t n_here = job->first + n_slab < n ? n_slab : n - job->first;
+        s = slice_images_fill(source, job->first, n_here, pool, job->image, job->own, err);
+        if (s == STATUS_OK) s = thread_pool_run(pool, n_here, detect_slice, job, &quiet);
+        if (s == STATUS_CANCELLED) error_set(err, s, "finding fiber centers was cancelled");
+        progress_report(progress, (double)(job->first + n_here) / (double)n);
+    }
+    for (size_t t = 0, n_thread = thread_pool_n_thread(pool); t < n_thread && s == STATUS_OK; t++)
+        if (job->error[t].code != STATUS_OK) {
+            s = job->error[t].code;
+            if (err != NULL) *err = job->error[t];
+        }
+    return s;
+}
+
+/* Pictures need the filters' reach around centers, what a center may move, and its window stretched by the slope. */
+static size_t picture_margin(double largest_sigma, double diameter)
+{
+    return (size_t)ceil(4.0 * largest_sigma + diameter) + 8;
+}
+
+status centers_detect(const struct volume *v, const struct direction_volume *d, const struct subvolumes *sub,
+                      const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
+                      const struct progress *progress, struct center_list *list, struct error *err)
+{
+    struct detect_job job = {.v = v, .d = d, .mask = sub->mask, .frame = frame};
+    struct slice_source source = {.v = v, .mask = sub->mask, .frame = frame};
+    size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool), n_pixel = frame->width * frame->height;
+    size_t n_slab = scratch_buffer_bytes(v->space) / (n_pixel * sizeof(float));
+    *list = (struct center_list){0};
+    status s = vision_init(err);
+    if (s != STATUS_OK) return s;
+    n_slab = n_slab < n_thread ? n_thread : n_slab > n_slice ? n_slice : n_slab;
+    for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
+    job.diameter = diameter_voxel;
+    job.min_distance = MIN_SPACING * (float)diameter_voxel;
+    job.margin = picture_margin(job.sigma[N_SCALE - 1], diameter_voxel);
+    for (int a = 0; a < 3; a++) { /* beyond this, pictures are void: diagonals need 3/2 of the margin for it */
+        size_t reach = job.margin * 3 / 2;
+        source.from[a] = sub->from[a] > reach ? sub->from[a] - reach : 0;
+        source.to[a] = sub->to[a] + reach < v->n[a] ? sub->to[a] + reach : v->n[a];
+    }
+    job.scratch_per_thread = n_pixel * (N_SCALE + 1);
+    job.scratch = malloc(n_thread * job.scratch_per_thread * sizeof *job.scratch);
+    job.image = malloc(n_slab * n_pixel * sizeof *job.image);
+    job.own = malloc(n_slab * sizeof *job.own);
+    job.slice = calloc(n_slice, sizeof *job.slice);
+    job.error = calloc(n_thread, sizeof *job.error);
+    if (job.scratch == NULL || job.image == NULL || job.own == NULL || job.slice == NULL || job.error == NULL)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    if (s == STATUS_OK) s = detect_slabs(&job, &source, n_slab, pool, progress, err);
+    if (s == STATUS_OK) s = gather(&job, n_slice, list, err);
+    for (size_t k = 0; job.slice != NULL && k < n_slice; k++) free(job.slice[k].center);
+    free(job.scratch);
+    free(job.image);
+    free(job.own);
+    free(job.slice);
+    free(job.error);
+    if (s != STATUS_OK) center_list_release(list);
+    return s;
+}

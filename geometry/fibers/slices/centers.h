@@ -1,0 +1,36 @@
+/* Where fibers cross the slices of a subvolume (fabric thesis, 5.6.1 and 5.6.2): blobs in scale space (Lindeberg 1998).
+ *
+ * A subvolume shows the density of voxels whose direction is near to the normal of its slices, all others emptied. In the paper the
+ * three subvolumes share out the voxels, and fibers that turn from one to another fall apart. Here there are nine slicing directions
+ * (slice_frame.h), and a voxel belongs to all within 40 degrees (every direction is within 36 of one), so that fibers between two are seen whole in both; duplicates
+ * are removed after linking.
+ */
+#ifndef SELVEDGE_GEOMETRY_CENTERS_H
+#define SELVEDGE_GEOMETRY_CENTERS_H
+
+#include "base/thread_pool.h"
+#include "geometry/fibers/slices/slice_frame.h"
+#include "geometry/fibers/slices/subvolumes.h"
+#include "geometry/volume/volume.h"
+
+struct center {
+    float u, v;              /* in pixels of the frame: a pixel's centre is at (i + 1/2) */
+    float slope_u, slope_v; /* du, dv per slice, from the direction volume */
+    float sigma;            /* scale of the strongest response, voxels: radius hint is sigma * sqrt 2 */
+    float strength;         /* scale-normalised response; 0.74 for a lone disk of density 1 */
+};
+
+struct center_list {
+    size_t n_slice;
+    size_t *first; /* n_slice + 1 */
+    struct center *center; /* of slice k: first[k] .. first[k + 1] - 1, sorted by v, then u */
+};
+
+void center_list_release(struct center_list *l);
+
+/* Centers of all slices of a frame. diameter_voxel sets the scales. STATUS_CANCELLED, STATUS_NO_MEMORY. */
+status centers_detect(const struct volume *v, const struct direction_volume *d, const struct subvolumes *sub,
+                      const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
+                      const struct progress *progress, struct center_list *list, struct error *err);
+
+#endif

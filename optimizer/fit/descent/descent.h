@@ -1,0 +1,97 @@
+/* Methods of descent: one file each, one row in the registry, found by id.
+ *
+ * A method is a deterministic function of the problem and of the estimates it asks for; it keeps nothing between runs
+ * and never looks at a clock. That is what makes a fit bit-identical for any number of threads and after a resume
+ * (estimate_journal.h).
+ */
+#ifndef SELVEDGE_OPTIMIZER_DESCENT_H
+#define SELVEDGE_OPTIMIZER_DESCENT_H
+
+#include "optimizer/fit/descent/estimator.h"
+#include "optimizer/fit/objective/coordinate.h"
+#include "optimizer/fit/objective/fit_layout.h"
+#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/objective/objective.h"
+#include "optimizer/fit/objective/uncertainty.h"
+
+enum { FIT_MAX_START = 16 };
+
+/* One of several starts. */
+struct fit_start {
+    double from[SCATTERING_MAX_PARAM], param[SCATTERING_MAX_PARAM]; /* internal unit */
+    double objective, objective_se, prior_penalty;
+    bool converged;
+    bool kept;
+    bool elsewhere; /* as good as the kept one within the noise, but ended at other parameters */
+    uint64_t n_path;
+};
+
+/* What a method reports after every iteration. Pointers are valid during the call. */
+struct fit_step {
+    size_t step;
+    const char *phase;
+    double wall_s; /* since the fit began, this and all earlier attempts */
+    uint64_t n_path, n_path_total;
+    struct objective_value objective;
+    size_t n_param, n_configuration;
+    const double *param;    /* where the objective was estimated */
+    const double *param_se; /* NULL when unknown */
+    const struct estimate *replica[2];
+    double step_length, step_limit, gain; /* of the step that led here, as damping is: the largest move and the limit
+                                             it had, in step limits (coordinate.h); the fall of f that it promised */
+    double damping,
+        noise; /* mean damping added to the diagonal; Monte-Carlo variance per residual of the pooled model */
+    const char *note;
+    const struct fit_nuisance *nuisance; /* NULL: none */
+};
+
+struct fit_problem {
+    size_t n_param;
+    const struct param_info *info; /* of the model */
+    const struct fit_parameter *param;
+    const struct observation_set *observation; /* fitted ones only; one configuration of the estimator each; contrasts
+                                                  behind all radiances */
+    const struct estimator *estimator;
+    uint64_t path_budget;                                                            /* 0: the method's default */
+    size_t max_iteration;                                                            /* 0: the method's default */
+    status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
+    void *report_context;
+    const struct progress *progress; /* fraction of the budget; cancel */
+    const struct gaussian_prior *prior; /* n_param, fit coordinates; NULL: none. Methods that know no priors ignore it */
+    double gain_sd;                     /* of ln gain of every configuration, marginalised; 0: none. Likewise */
+};
+
+struct fit_result {
+    double param[SCATTERING_MAX_PARAM];
+    bool converged;
+    char reason[240];
+    size_t n_step;
+    uint64_t n_path;
+    double wall_s;
+    struct objective_value objective; /* predicted at `param` by all estimates of the fit together */
+    struct uncertainty uncertainty;
+    double prior_penalty; /* what the priors add to the objective at `param` */
+    /* Filled in by fit_run (fit_run.h): */
+    struct fit_nuisance nuisance;
+    double unknown[SCATTERING_MAX_PARAM]; /* of fit_layout.h: leaders of ties and nuisance terms */
+    struct uncertainty unknown_uncertainty;
+    size_t n_start; /* entries of start; 0: there was one only */
+    struct fit_start start[FIT_MAX_START];
+};
+
+struct descent_method {
+    const char *id;
+    const char *title;
+    uint64_t default_path_budget;
+    size_t default_max_iteration;
+    bool plain_paths; /* estimator.h */
+    /* Paths that a fit takes however small its budget is: with this budget, or more, it stays inside. */
+    uint64_t (*least_budget)(const struct fit_problem *problem);
+    status (*run)(const struct fit_problem *problem, struct fit_result *result, struct error *err);
+};
+
+/* All methods, NULL-terminated, in the order of method_names.h; and by id (NULL when unknown). */
+const struct descent_method *const *descent_registry(void);
+const struct descent_method *descent_find(const char *id);
+
+#endif

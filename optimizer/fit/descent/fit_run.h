@@ -1,0 +1,25 @@
+/* A whole fit as a job asks for it: ties, priors and nuisance terms around a method of descent, from one start or
+ * several. The method sees a smaller problem (fit_layout.h); everything that comes out is in the model's parameters.
+ *
+ * Several starts: the first is the problem's own; the others are spread evenly (additive recurrence by the generalised
+ * golden ratio) over the inner 80 % of the bounds in fit coordinates, or over two standard deviations of a prior.
+ * Each takes its share of the path budget when one is given, and the method's default otherwise. A later start is kept
+ * instead of an earlier one when its objective (with what the priors add) is lower by more than two standard errors of
+ * the difference.
+ *
+ * Deterministic like the methods themselves, and it asks for the same estimates in the same order: with a journal below
+ * (estimate_journal.h) every option resumes bit by bit.
+ */
+#ifndef SELVEDGE_OPTIMIZER_FIT_RUN_H
+#define SELVEDGE_OPTIMIZER_FIT_RUN_H
+
+#include "optimizer/fit/descent/descent.h"
+
+/* problem: in the model's parameters; its prior and gain_sd are not looked at. option NULL: none. */
+status fit_run(const struct descent_method *method, const struct fit_problem *problem, const struct fit_option *option,
+               struct fit_result *result, struct error *err);
+
+/* Start k >= 1 of a layout: values of the unknowns. */
+void fit_run_start(const struct fit_layout *l, size_t k, double *unknown);
+
+#endif

@@ -1,0 +1,24 @@
+/* The path tracer as an estimator: mean radiances of a list of configurations for one model of appearance. */
+#ifndef SELVEDGE_OPTIMIZER_TRACE_ESTIMATOR_H
+#define SELVEDGE_OPTIMIZER_TRACE_ESTIMATOR_H
+
+#include "base/thread_pool.h"
+#include "optimizer/fit/descent/estimator.h"
+#include "optimizer/fit/photographs/observation.h"
+#include "renderer/transport/appearance_estimate.h"
+
+/* Everything pointed to outlives the estimator. */
+struct trace_estimator {
+    const struct appearance *model;
+    struct appearance_scene scene;
+    struct thread_pool *pool;
+    uint64_t seed;
+    const struct configuration *configuration;
+    size_t n_configuration;
+};
+
+struct estimator trace_estimator(struct trace_estimator *t);
+/* The configurations of a set of observations, in its order; free() them. NULL without memory. */
+struct configuration *trace_configurations(const struct observation_set *o);
+
+#endif

@@ -1,0 +1,59 @@
+#include "optimizer/fit/objective/coordinate.h"
+
+#include <math.h>
+#include <string.h>
+
+static double forward(enum coordinate_kind kind, double p)
+{
+    switch (kind) {
+    case COORDINATE_LOG:
+        return log(p);
+    case COORDINATE_LOGIT:
+        return log(p) - log1p(-p);
+    default:
+        return p;
+    }
+}
+
+void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper)
+{
+    bool angle = strcmp(info->unit, "deg") == 0;
+    if (!angle && info->lower > 0.0 && info->upper < 1.0)
+        k->kind = COORDINATE_LOGIT;
+    else
+        k->kind = info->lower > 0.0 ? COORDINATE_LOG : COORDINATE_LINEAR;
+    k->param_lower = lower;
+    k->param_upper = upper;
+    k->lower = forward(k->kind, lower);
+    k->upper = forward(k->kind, upper);
+    k->step_limit = k->kind == COORDINATE_LOGIT ? 1.0 : k->kind == COORDINATE_LOG ? 0.25 : (upper - lower) / 8.0;
+}
+
+double coordinate_of(const struct coordinate *k, double param) { return forward(k->kind, param); }
+
+double coordinate_from_param(const struct coordinate *k, double param)
+{
+    if (param <= k->param_lower) return k->lower;
+    if (param >= k->param_upper) return k->upper;
+    return forward(k->kind, param);
+}
+
+double coordinate_to_param(const struct coordinate *k, double x)
+{
+    if (x <= k->lower) return k->param_lower;
+    if (x >= k->upper) return k->param_upper;
+    double p = k->kind == COORDINATE_LOG ? exp(x) : k->kind == COORDINATE_LOGIT ? 1.0 / (1.0 + exp(-x)) : x;
+    return fmin(fmax(p, k->param_lower), k->param_upper);
+}
+
+double coordinate_slope(const struct coordinate *k, double param)
+{
+    switch (k->kind) {
+    case COORDINATE_LOG:
+        return param;
+    case COORDINATE_LOGIT:
+        return param * (1.0 - param);
+    default:
+        return 1.0;
+    }
+}

@@ -1,0 +1,67 @@
+/* The unknowns of a fit: the free parameters of the model after ties, and nuisance terms; and the way between them and
+ * the model's full list of parameters.
+ *
+ *   value of parameter p = ratio_p * value of its leader
+ *   what a photograph shows = gain * (rendered radiance) + stray light
+ *
+ * Nuisance terms: a global gain (Gaussian on ln gain about 0) and a stray light (radiance >= 0, half a Gaussian about 0)
+ * are unknowns like parameters; one gain for each photograph is not an unknown but taken out of the residuals
+ * (linear_model.h).
+ *
+ * Priors are Gaussian in the fit coordinate x (coordinate.h): mean x(mean), standard deviation se |dx/dp| at the mean
+ * (delta rule). With residuals r in units of the objective and s2 their variance, -2 ln(posterior) is
+ * (r.r + s2 sum ((x - mean) / sd)^2) / s2, so a fit minimises f + s2 sum ((x - mean) / sd)^2.
+ */
+#ifndef SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
+#define SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
+
+#include "optimizer/fit/objective/coordinate.h"
+#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/objective/nuisance.h"
+#include "renderer/transport/estimate.h"
+
+/* One parameter of a fit, internal units. Bounds lie inside the model's. A fixed one keeps `start`. */
+struct fit_parameter {
+    double lower, upper, start;
+    bool fixed;
+};
+
+/* What is asked for beyond the parameters themselves; internal units, one slot for each parameter of the model. */
+struct fit_option {
+    size_t leader[SCATTERING_MAX_PARAM];
+    double ratio[SCATTERING_MAX_PARAM];
+    double prior_mean[SCATTERING_MAX_PARAM], prior_se[SCATTERING_MAX_PARAM]; /* NaN: none */
+    double global_gain_sd;                                                   /* of ln gain; 0: no global gain */
+    double photograph_gain_sd; /* of ln gain, one for each observation; 0: none */
+    double stray_light_sd;     /* radiance; 0: none */
+    size_t n_start;            /* 1 or more */
+};
+
+struct fit_layout {
+    size_t n_full, n_unknown;
+    size_t owner[SCATTERING_MAX_PARAM]; /* unknown that a parameter follows */
+    double ratio[SCATTERING_MAX_PARAM];
+    struct param_info info[SCATTERING_MAX_PARAM]; /* of the unknowns, as the next three */
+    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct gaussian_prior prior[SCATTERING_MAX_PARAM];
+    bool has_prior;
+    size_t i_gain, i_stray; /* unknown, or SIZE_MAX */
+};
+
+/* Every parameter on its own, no priors, no nuisance terms, one start. */
+void fit_option_init(struct fit_option *o);
+/* STATUS_INVALID when ties and nuisance terms make more unknowns than SCATTERING_MAX_PARAM, or a prior lies outside the
+ * model's range. */
+status fit_layout_init(struct fit_layout *l, const struct param_info *info, const struct fit_parameter *parameter,
+                       size_t n_param, const struct fit_option *o, struct error *err);
+/* Values of the unknowns -> the model's parameters. */
+void fit_layout_full(const struct fit_layout *l, const double *unknown, double *full);
+/* d fit coordinate of parameter p / d fit coordinate of its owner. */
+double fit_layout_stretch(const struct fit_layout *l, const struct param_info *info, const double *unknown, size_t p);
+/* What the photograph would show by an estimate of the renderer, with derivatives by the unknowns when jac is wanted.
+ * Derivatives of tied parameters come from the same paths: their errors are taken as fully correlated. e and out may be
+ * the same. */
+void fit_layout_estimate(const struct fit_layout *l, const double *unknown, bool want_jacobian,
+                         const struct estimate *e, struct estimate *out);
+
+#endif

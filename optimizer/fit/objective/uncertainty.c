@@ -1,0 +1,178 @@
+#include "optimizer/fit/objective/uncertainty.h"
+#include "optimizer/fit/objective/small_matrix.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N = SCATTERING_MAX_PARAM };
+/* A quantity that is positive and spans decades is not known when it may be half or twice as large (one standard error). */
+static const double log_determined = 0.69;
+
+/* Share of a photograph's stated variance that its three channels have in common: exposure, lamp and the patch of cloth are
+ * the same for them, noise is not. Sources state no correlation; taken as independent (0), errors of widths, which all
+ * channels tell together, would be up to 30 % too small where half of the variance is common. */
+static const double photograph_in_common = 0.5;
+
+/* The part of V of one row that goes with no other row. */
+static double own_variance(const struct linear_model *m, size_t row, const double misfit[2])
+{
+    return (1.0 - photograph_in_common) * m->photograph_var[row] + misfit[m->contrast[row] > 0.0] * m->extra[row];
+}
+
+static double path_variance(const struct linear_model *m, size_t row) { return linear_model_row_noise(m, row); }
+
+static double common_variance(const struct linear_model *m, size_t row)
+{
+    return photograph_in_common * m->photograph_var[row];
+}
+
+/* Noise that moves the three channels of a configuration together: they come from the same paths, the same exposure. */
+static void add_common_noise(const struct linear_model *m, size_t i, double (*variance)(const struct linear_model *m, size_t row),
+                             const size_t *index, size_t n, double *b)
+{
+    double va[N] = {0}, vb[N] = {0};
+    for (size_t row = 3 * i; row < 3 * i + 3; row++) {
+        double sd = m->weight[row] * sqrt(variance(m, row));
+        for (size_t p = 0; p < n; p++) {
+            va[p] += sd * m->j[0][row * m->n_param + index[p]];
+            vb[p] += sd * m->j[1][row * m->n_param + index[p]];
+        }
+    }
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) b[p * n + q] += 0.5 * (va[p] * vb[q] + vb[p] * va[q]);
+}
+
+/* H and B of the parameters index[0..n-1]. */
+static void normal_matrices(const struct linear_model *m, const size_t *index,
+                            size_t n, const double misfit[2], double *h, double *b, double *mean_variance)
+{
+    memset(h, 0, n * n * sizeof *h);
+    memset(b, 0, n * n * sizeof *b);
+    *mean_variance = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) {
+        const double *ja = m->j[0] + row * m->n_param, *jb = m->j[1] + row * m->n_param;
+        const double *va = m->j_var[0] + row * m->n_param, *vb = m->j_var[1] + row * m->n_param;
+        double u = m->weight[row], v = own_variance(m, row, misfit),
+               r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * linear_model_row_noise(m, row);
+        *mean_variance += u * (v + common_variance(m, row) + path_variance(m, row)) / (double)m->n_row;
+        for (size_t p = 0; p < n; p++) {
+            for (size_t q = 0; q < n; q++) {
+                double jj = 0.5 * (ja[index[p]] * jb[index[q]] + jb[index[p]] * ja[index[q]]);
+                h[p * n + q] += u * jj;
+                b[p * n + q] += u * u * v * jj;
+            }
+            b[p * n + p] += u * u * r2 * 0.25 * (va[index[p]] + vb[index[p]]);
+        }
+    }
+    for (size_t i = 0; i < m->n_row / 3; i++) {
+        add_common_noise(m, i, path_variance, index, n, b);
+        add_common_noise(m, i, common_variance, index, n, b);
+    }
+}
+
+/* Covariance of the parameters index[0..n-1], all others held. */
+static void covariance(const struct linear_model *m, const struct coordinate *k,
+                       const size_t *index, size_t n, const double misfit[2], double *cov)
+{
+    double h[N * N], b[N * N], inverse[N * N], half[N * N], s2, scale[N];
+    normal_matrices(m, index, n, misfit, h, b, &s2);
+    s2 = fmax(s2, 1e-12);
+    for (size_t p = 0; p < n; p++) scale[p] = (k[index[p]].upper - k[index[p]].lower) / sqrt(12.0);
+    for (size_t p = 0; p < n; p++) {
+        for (size_t q = 0; q < n; q++) {
+            h[p * n + q] *= scale[p] * scale[q];
+            b[p * n + q] *= scale[p] * scale[q];
+        }
+    }
+    small_clip_eigenvalues(h, n, 0.0);
+    small_clip_eigenvalues(b, n, 0.0);
+    for (size_t p = 0; p < n; p++) {
+        double precision = m->prior != NULL ? m->prior[index[p]].precision * scale[p] * scale[p] : 0.0;
+        h[p * n + p] += s2 * (1.0 + precision);
+        b[p * n + p] += s2 * s2 * (1.0 + precision);
+    }
+    if (!small_invert(h, n, inverse)) { /* cannot be: eigenvalues >= s2 > 0; the prior alone then */
+        memset(inverse, 0, n * n * sizeof *inverse);
+        for (size_t p = 0; p < n; p++) inverse[p * n + p] = 1.0 / s2;
+    }
+    small_multiply(inverse, b, n, half);
+    small_multiply(half, inverse, n, cov);
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) cov[p * n + q] *= scale[p] * scale[q];
+}
+
+static void scatter(const double *cov, const size_t *index, size_t n, size_t n_param, double *full)
+{
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) full[index[p] * n_param + index[q]] = cov[p * n + q];
+}
+
+/* Near the low end of a log range the range alone is a small error of the parameter: judged in the coordinate, too. */
+bool uncertainty_determined(const struct coordinate *k, double sd, double se_param)
+{
+    bool in_proportion = k->kind != COORDINATE_LOG || sd < log_determined;
+    return in_proportion && sd < 0.5 * (k->upper - k->lower) / sqrt(12.0) &&
+           se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
+}
+
+/* Of a mean's residual of extra weight 1, over the rows that count. */
+static void mean_variances(const struct linear_model *m, struct uncertainty *u)
+{
+    double n = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) {
+        if (!(m->extra[row] > 0.0) || m->contrast[row] > 0.0) continue;
+        u->noise_var += linear_model_row_noise(m, row) / m->extra[row];
+        u->photograph_var += m->photograph_var[row] / m->extra[row];
+        n += 1.0;
+    }
+    u->noise_var /= fmax(n, 1.0);
+    u->photograph_var /= fmax(n, 1.0);
+}
+
+/* Within a thousandth of the range; what spans decades is judged in the logarithm. */
+static bool at_bound(const struct coordinate *k, double x)
+{
+    if (k->kind == COORDINATE_LOG) {
+        double margin = 1e-3 * (k->upper - k->lower);
+        return x <= k->lower + margin || x >= k->upper - margin;
+    }
+    double value = coordinate_to_param(k, x), margin = 1e-3 * (k->param_upper - k->param_lower);
+    return value <= k->param_lower + margin || value >= k->param_upper - margin;
+}
+
+void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
+                         const bool *fixed, struct uncertainty *u)
+{
+    size_t n = m->n_param, moving[N], n_moving = 0, n_inner = 0;
+    double cov[N * N], misfit[2];
+    memset(u, 0, sizeof *u);
+    u->n_param = n;
+    for (size_t p = 0; p < n; p++) {
+        u->at_bound[p] = !fixed[p] && at_bound(&k[p], m->x_ref[p]);
+        if (!fixed[p]) moving[n_moving++] = p;
+        n_inner += !fixed[p] && !u->at_bound[p];
+    }
+    linear_model_misfits(m, n_inner, misfit);
+    u->misfit_var = misfit[0];
+    mean_variances(m, u);
+    if (n_moving > 0) {
+        covariance(m, k, moving, n_moving, misfit, cov);
+        scatter(cov, moving, n_moving, n, u->cov);
+    }
+    for (size_t p = 0; p < n; p++) {
+        double uniform = (k[p].param_upper - k[p].param_lower) / sqrt(12.0);
+        double slope = coordinate_slope(&k[p], coordinate_to_param(&k[p], m->x_ref[p]));
+        double most = m->prior != NULL && m->prior[p].precision > 0.0 ? slope / sqrt(m->prior[p].precision) : uniform;
+        u->se_param[p] = fixed[p] ? 0.0 : fmin(slope * sqrt(u->cov[p * n + p]), fmin(uniform, most));
+        u->determined[p] = fixed[p] || uncertainty_determined(&k[p], sqrt(u->cov[p * n + p]), u->se_param[p]);
+        u->correlation[p * n + p] = 1.0;
+    }
+    for (size_t a = 0; a < n_moving; a++) {
+        for (size_t c = 0; c < a; c++) {
+            size_t p = moving[a], q = moving[c];
+            double r = u->cov[p * n + q] / sqrt(u->cov[p * n + p] * u->cov[q * n + q]);
+            u->correlation[p * n + q] = u->correlation[q * n + p] = fmin(fmax(r, -1.0), 1.0);
+        }
+    }
+}

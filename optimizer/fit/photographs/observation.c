@@ -1,0 +1,178 @@
+#include "optimizer/fit/photographs/observation.h"
+#include "base/durable.h"
+#include "optimizer/fit/photographs/measurement_table.h"
+#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/fit/photographs/photograph_contrast.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_TABLE_BYTES = 16 << 20 };
+
+void observation_set_init(struct observation_set *o) { memset(o, 0, sizeof *o); }
+
+void observation_set_release(struct observation_set *o)
+{
+    free(o->item);
+    observation_set_init(o);
+}
+
+status observation_set_append(struct observation_set *o, const struct observation *item, struct error *err)
+{
+    if (o->n == o->capacity) {
+        size_t capacity = o->capacity > 0 ? 2 * o->capacity : 64;
+        struct observation *grown = realloc(o->item, capacity * sizeof *grown);
+        if (grown == NULL)
+            return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu observations: out of memory", capacity);
+        o->item = grown;
+        o->capacity = capacity;
+    }
+    o->item[o->n++] = *item;
+    return STATUS_OK;
+}
+
+size_t observation_set_count(const struct observation_set *o, enum job_set set)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < o->n; i++) n += o->item[i].set == set;
+    return n;
+}
+
+status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
+                              struct error *err)
+{
+    for (size_t i = 0; i < o->n; i++) {
+        if (o->item[i].set != set) continue;
+        status s = observation_set_append(part, &o->item[i], err);
+        if (s != STATUS_OK) return s;
+    }
+    return STATUS_OK;
+}
+
+void observation_set_weigh(struct observation_set *o)
+{
+    size_t n = 0;
+    double mean = 0.0;
+    for (size_t i = 0; i < o->n; i++) {
+        if (!(o->item[i].weight > 0.0)) continue;
+        mean += o->item[i].weight;
+        o->item[n++] = o->item[i];
+    }
+    o->n = n;
+    mean /= n > 0 ? (double)n : 1.0;
+    for (size_t i = 0; i < n; i++) o->item[i].weight /= mean;
+}
+
+bool observation_is_contrast(const struct observation *o) { return o->configuration.contrast_cells > 0; }
+
+static bool contrast_is_known(const struct observation *o)
+{
+    return o->contrast_se_rgb[0] < 1.0 && o->contrast_se_rgb[1] < 1.0 && o->contrast_se_rgb[2] < 1.0;
+}
+
+struct observation observation_of_contrast(const struct observation *o, double weight)
+{
+    struct observation row = *o;
+    row.configuration.contrast_cells = (uint32_t)o->n_cell;
+    row.weight = contrast_is_known(o) ? weight * o->weight : 0.0;
+    memcpy(row.mean_rgb, o->contrast_rgb, sizeof row.mean_rgb);
+    memcpy(row.se_rgb, o->contrast_se_rgb, sizeof row.se_rgb);
+    return row;
+}
+
+status observation_set_append_contrasts(const struct observation_set *from, double weight, struct observation_set *to,
+                                        struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i < from->n && s == STATUS_OK; i++) {
+        struct observation row = observation_of_contrast(&from->item[i], weight);
+        s = observation_set_append(to, &row, err);
+    }
+    return s;
+}
+
+struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
+                                               double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
+                                               double cloth_rotation_deg)
+{
+    const double rad = M_PI / 180.0, cm = 0.01;
+    struct configuration c = {
+        .light_theta_rad = light_theta_deg * rad,
+        .light_phi_rad = light_phi_deg * rad,
+        .camera_theta_rad = camera_theta_deg * rad,
+        .camera_phi_rad = camera_phi_deg * rad,
+        .cloth_rotation_rad = cloth_rotation_deg * rad,
+        .light_distance_m = doc->lamp_distance_cm * cm,
+        .lamp_side_m = doc->lamp_side_cm * cm,
+        .camera_distance_m = doc->camera_distance_cm * cm,
+        .crop_m = doc->crop_cm * cm,
+    };
+    return c;
+}
+
+static status load_table(const struct job_document *doc, const char *folder, struct observation_set *o,
+                         struct error *err)
+{
+    char path[4096];
+    char *text = NULL;
+    size_t n = 0;
+    snprintf(path, sizeof path, "%s/%s", folder, doc->measurement_file);
+    status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
+    if (s != STATUS_OK) {
+        if (err != NULL) snprintf(err->field, sizeof err->field, "measurements.file");
+        return s;
+    }
+    s = measurement_table_parse(text, n, doc->measurement_file, doc, o, err);
+    free(text);
+    return s;
+}
+
+static status load_photograph(const struct job_document *doc, size_t i, const char *folder, observation_warning warn,
+                              void *context, struct observation_set *o, struct error *err)
+{
+    const struct job_photograph *p = &doc->photograph[i];
+    struct photograph_mean mean;
+    struct observation item = {.set = p->set, .weight = p->weight};
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s", folder, p->file);
+    status s = photograph_measure(path, p, &mean, err);
+    if (s != STATUS_OK) {
+        if (err != NULL) snprintf(err->field, sizeof err->field, "photographs[%zu].file", i);
+        return s;
+    }
+    if (mean.warning[0] != '\0' && warn != NULL) warn(context, mean.warning);
+    snprintf(item.name, sizeof item.name, "%s", p->file);
+    if (doc->texture_block_mm > 0.0) {
+        item.n_cell = job_texture_cells(doc);
+        s = photograph_contrast(path, p, item.n_cell, item.contrast_rgb, item.contrast_se_rgb, err);
+        if (s != STATUS_OK) {
+            if (err != NULL) snprintf(err->field, sizeof err->field, "fit.texture.block_mm");
+            return s;
+        }
+        if (!contrast_is_known(&item) && doc->texture_weight > 0.0 && warn != NULL) {
+            char text[400];
+            snprintf(text, sizeof text,
+                     "photographs[%zu] ('%s') is black in one of its channels, so its texture is not compared with the rendering's",
+                     i, p->file);
+            warn(context, text);
+        }
+    }
+    memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
+    memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
+    item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
+                                                   p->camera_phi_deg, p->cloth_rotation_deg);
+    return observation_set_append(o, &item, err);
+}
+
+status observation_set_load(const struct job_document *doc, const char *folder, observation_warning warn, void *context,
+                            struct observation_set *o, struct error *err)
+{
+    if (doc->measurement_file[0] != '\0') return load_table(doc, folder, o, err);
+    for (size_t i = 0; i < doc->n_photograph; i++) {
+        status s = load_photograph(doc, i, folder, warn, context, o, err);
+        if (s != STATUS_OK) return s;
+    }
+    return STATUS_OK;
+}

@@ -1,0 +1,61 @@
+/* What was measured: one mean rgb radiance with its standard error per configuration, from a table or from photographs.
+ * Radiance unit: configuration.h (a perfect white diffuser facing the lamp has radiance 1).
+ * Ownership: init/release; the array is malloc'ed and owned.
+ */
+#ifndef SELVEDGE_OPTIMIZER_OBSERVATION_H
+#define SELVEDGE_OPTIMIZER_OBSERVATION_H
+
+#include "base/status.h"
+#include "optimizer/job/job_document.h"
+#include "renderer/scene/configuration.h"
+
+#include <stdbool.h>
+
+struct observation {
+    char name[JOB_MAX_NAME_BYTES]; /* file name of the photograph, or "fit-03" for a row of a table */
+    enum job_set set;
+    struct configuration configuration;
+    double mean_rgb[3];
+    double se_rgb[3]; /* 0 when the source states none */
+    double weight;    /* factor of the objective's weight of this observation; 1 */
+    size_t n_cell;    /* a side, of the contrast; 0: not measured */
+    double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
+};
+
+struct observation_set {
+    size_t n, capacity;
+    struct observation *item;
+};
+
+void observation_set_init(struct observation_set *o);
+void observation_set_release(struct observation_set *o);
+status observation_set_append(struct observation_set *o, const struct observation *item, struct error *err);
+size_t observation_set_count(const struct observation_set *o, enum job_set set);
+/* Copies the observations of one set, in order, into `part` (initialised). */
+status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
+                              struct error *err);
+/* What a fit sees of a set: rows of weight 0 are taken out, and the other weights divided by their mean, so that only their
+ * ratios count. */
+void observation_set_weigh(struct observation_set *o);
+
+/* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb are those of the
+ * contrast, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
+bool observation_is_contrast(const struct observation *o);
+/* That observation from one with n_cell > 0. */
+struct observation observation_of_contrast(const struct observation *o, double weight);
+/* Appends the contrasts of all observations of `from` to `to`. */
+status observation_set_append_contrasts(const struct observation_set *from, double weight, struct observation_set *to,
+                                        struct error *err);
+
+/* Configuration in SI units from the document's angles and set-up. */
+struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
+                                               double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
+                                               double cloth_rotation_deg);
+
+/* Reads what the document names, files being in `folder`. Warnings (see photograph.h) go to warn, NULL allowed.
+ * err->field is the document's field. */
+typedef void (*observation_warning)(void *context, const char *text);
+status observation_set_load(const struct job_document *doc, const char *folder, observation_warning warn, void *context,
+                            struct observation_set *o, struct error *err);
+
+#endif

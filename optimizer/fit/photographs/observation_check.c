@@ -1,0 +1,178 @@
+#include "optimizer/fit/photographs/observation_check.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { NAMED = 3 };
+
+/* Dark: below this share of the median of the rows lit from the same side, as seen per light that falls on the cloth.
+ * From the front, measured cloths have no row below 0.33 of it and black satins none below 0.07; what passes through a
+ * dense cloth beside its gaps can be far less. */
+static const double dark_share_front = 0.04, dark_share_behind = 1e-3;
+static const double least_cos = 0.05; /* a lamp has a size: some of it stays above the horizon */
+/* Too bright: in white diffusers facing the lamp. Highlights of measured cloths reach 2. */
+static const double brightest = 20.0;
+static const double allowed_difference = 0.05, allowed_se = 5.0;
+
+static double brightness(const struct observation *o)
+{
+    return (o->mean_rgb[0] + o->mean_rgb[1] + o->mean_rgb[2]) / 3.0;
+}
+
+static int compare_double(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static bool lit_from_behind(const struct observation *o) { return o->configuration.light_theta_rad > M_PI_2; }
+
+/* Brightness per light that falls on the cloth, which grazing lamps do not make dark. */
+static double reflected(const struct observation *o)
+{
+    return brightness(o) / fmax(fabs(cos(o->configuration.light_theta_rad)), least_cos);
+}
+
+/* Of the rows of weight that are lit from one side. */
+static double median_reflected(const struct observation_set *o, bool behind)
+{
+    double *v = malloc((o->n + 1) * sizeof *v), median = 0.0;
+    size_t n = 0;
+    if (v == NULL) return 0.0;
+    for (size_t i = 0; i < o->n; i++)
+        if (o->item[i].weight > 0.0 && lit_from_behind(&o->item[i]) == behind) v[n++] = reflected(&o->item[i]);
+    qsort(v, n, sizeof *v, compare_double);
+    if (n > 0) median = v[n / 2];
+    free(v);
+    return median;
+}
+
+static void check_dark(const struct observation_set *o, observation_warning warn, void *context)
+{
+    const double median[2] = {median_reflected(o, false), median_reflected(o, true)};
+    size_t n_dark = 0;
+    for (size_t i = 0; i < o->n; i++) {
+        const struct observation *item = &o->item[i];
+        bool behind = lit_from_behind(item);
+        double a = reflected(item), share = behind ? dark_share_behind : dark_share_front;
+        char text[400];
+        if ((a > 0.0 && a >= share * median[behind]) || !(item->weight > 0.0)) continue;
+        if (++n_dark > NAMED) continue;
+        if (a > 0.0)
+            snprintf(text, sizeof text,
+                     "row '%s' is dark: its brightness %.2g is %.2g %% of what the others lead to expect "
+                     "under its lamp",
+                     item->name, brightness(item), 100.0 * a / median[behind]);
+        else
+            snprintf(text, sizeof text, "row '%s' is zero in all channels: was the lamp on?", item->name);
+        warn(context, text);
+    }
+    if (n_dark > NAMED) {
+        char text[100];
+        snprintf(text, sizeof text, "%zu more rows are dark or zero", n_dark - NAMED);
+        warn(context, text);
+    }
+}
+
+/* Of a cloth; gaps show the lamp behind it. */
+static double brightest_possible(const struct configuration *c)
+{
+    double lamp = M_PI * c->light_distance_m * c->light_distance_m / (c->lamp_side_m * c->lamp_side_m);
+    return c->light_theta_rad > M_PI_2 ? fmax(brightest, lamp) : brightest;
+}
+
+static void check_bright(const struct observation_set *o, observation_warning warn, void *context)
+{
+    size_t n_bright = 0;
+    for (size_t i = 0; i < o->n; i++) {
+        const struct observation *item = &o->item[i];
+        double largest = fmax(fmax(item->mean_rgb[0], item->mean_rgb[1]), item->mean_rgb[2]);
+        char text[400];
+        if (!(item->weight > 0.0) || largest <= brightest_possible(&item->configuration)) continue;
+        if (++n_bright > NAMED) continue;
+        snprintf(text, sizeof text,
+                 "row '%s' is brighter than any cloth: its radiance is %.3g, that of a perfect white diffuser facing "
+                 "the lamp is 1; is its scale right?",
+                 item->name, largest);
+        warn(context, text);
+    }
+    if (n_bright > NAMED) {
+        char text[100];
+        snprintf(text, sizeof text, "%zu more rows are brighter than any cloth", n_bright - NAMED);
+        warn(context, text);
+    }
+}
+
+/* Unit vector towards theta, phi. */
+static void direction_of(double theta_rad, double phi_rad, double d[3])
+{
+    d[0] = sin(theta_rad) * cos(phi_rad);
+    d[1] = sin(theta_rad) * sin(phi_rad);
+    d[2] = cos(theta_rad);
+}
+
+static bool close_to(const double *a, const double *b)
+{
+    return fmax(fmax(fabs(a[0] - b[0]), fabs(a[1] - b[1])), fabs(a[2] - b[2])) < 1e-6;
+}
+
+/* Where lamp and camera are as seen from the cloth: directions, because angles have many names for one (180 and -180,
+ * any phi at theta 0). Means over rotations know no phi but that between the two. */
+static bool same_configuration(const struct configuration *a, const struct configuration *b)
+{
+    const struct configuration *of[2] = {a, b};
+    double light[2][3], camera[2][3], between[2][3];
+    if (a->n_rotation != b->n_rotation) return false;
+    for (int i = 0; i < 2; i++) {
+        double turn = of[i]->cloth_rotation_rad;
+        direction_of(of[i]->light_theta_rad, of[i]->light_phi_rad - turn, light[i]);
+        direction_of(of[i]->camera_theta_rad, of[i]->camera_phi_rad - turn, camera[i]);
+        between[i][0] = light[i][0] * camera[i][0] + light[i][1] * camera[i][1];
+        between[i][1] = light[i][0] * camera[i][1] - light[i][1] * camera[i][0];
+        between[i][2] = light[i][2];
+    }
+    if (a->n_rotation > 1) return close_to(between[0], between[1]) && fabs(camera[0][2] - camera[1][2]) < 1e-6;
+    return close_to(light[0], light[1]) && close_to(camera[0], camera[1]);
+}
+
+/* Largest difference of a channel relative to the brightness; 0 when noise explains it. */
+static double contradiction(const struct observation *a, const struct observation *b)
+{
+    double scale = fmax(brightness(a), brightness(b)), largest = 0.0;
+    for (int c = 0; c < 3; c++) {
+        double difference = fabs(a->mean_rgb[c] - b->mean_rgb[c]);
+        if (difference > allowed_se * hypot(a->se_rgb[c], b->se_rgb[c])) largest = fmax(largest, difference);
+    }
+    return scale > 0.0 && largest > allowed_difference * scale ? largest / scale : 0.0;
+}
+
+static void check_contradictions(const struct observation_set *o, observation_warning warn, void *context)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < o->n; i++) {
+        for (size_t j = 0; j < i; j++) {
+            const struct observation *a = &o->item[j], *b = &o->item[i];
+            char text[500];
+            if (!(a->weight > 0.0 && b->weight > 0.0) || !same_configuration(&a->configuration, &b->configuration)) continue;
+            double difference = contradiction(a, b);
+            if (!(difference > 0.0) || ++n > NAMED) continue;
+            snprintf(text, sizeof text,
+                     "rows '%s' and '%s' have the same angles to the cloth and differ by %.0f %%: no model fits both",
+                     a->name, b->name, 100.0 * difference);
+            warn(context, text);
+        }
+    }
+    if (n > NAMED) {
+        char text[100];
+        snprintf(text, sizeof text, "%zu more pairs of rows contradict each other", n - NAMED);
+        warn(context, text);
+    }
+}
+
+void observation_set_check(const struct observation_set *o, observation_warning warn, void *context)
+{
+    check_dark(o, warn, context);
+    check_bright(o, warn, context);
+    check_contradictions(o, warn, context);
+}

@@ -1,0 +1,158 @@
+/* The job document (JSON): parsed and checked once, by the same code in daemon and worker.
+ *
+ * {
+ *   "sample": "blue twill, batch 7",                     required, 1..200 characters
+ *   "volume": {                                           required unless "fibers" is given
+ *     "files": ["scan.tif"],                              names of input files (one, or TIFF slices in order, or .mhd +
+ * its data file) "voxel_size_um": 2.0 | [2.0, 2.0, 2.5],             required unless the file states it "raw":
+ * {"shape": [nx,ny,nz], "type": "uint16", "endian": "little", "header_bytes": 0}, only for files without a header
+ *     "axes": "xyz",  "matrix": [9 numbers],  "crop_voxel": [x0,y0,z0,x1,y1,z1],
+ *     "align": "none"|"auto",  "crop": "none"|"auto",  "crop_keep": 0.5,  "join_seams": true,
+ *     "density_low": v, "density_high": v,
+ *     "filter": {"s":, "t":, "h":, "eps_d":, "eps_J":},   all optional: chosen from the data
+ *     "link_sigma_voxel":, "min_vertices":, "radius_um": v, "radius_per_axis": bool
+ *   },
+ *   "fibers": {"file": "cloth.hair", "tile_mm": [x, y],   instead of "volume"
+ *              "voxel_um": v},                            of the density that volume models see; default: half a radius
+ *   "lamp": {"side_cm": 10, "distance_cm": 61},           optional
+ *   "camera": {"distance_cm": 100, "crop_cm": 1},         optional
+ *   "black_sheet": true,                                  optional
+ *   "measurements": {"file": "blue.csv"}                  this ...
+ *   "photographs": [                                      ... or this
+ *     {"file":"p00.exr","set":"fit"|"held-out","light_theta_deg":,"light_phi_deg":,"camera_theta_deg":,"camera_phi_deg":,
+ *      "cloth_rotation_deg":, "scale": 1.0, "weight": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
+ *   "fit": {"model": "two_lobe.v1" or "models": ["two_lobe.v1", "phase_two_lobe.v1", ...],   ids of appearance.h; several
+ *                                                         are fitted one after the other and compared
+ *           "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
+ *           "max_iterations": n, "path_budget": n,        of each model
+ *           "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},   for every model that has the parameter
+ *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
+ *           "fit_radius": true | {"lower_um": v, "upper_um": v},         one mean radius of all fibers; default: half to
+ *                                                                        twice the one that the cloth has
+ *           "candidates": [{"light_theta_deg":, ...}] | {"grid": true}, which photograph to take next
+ *           "texture": {"block_mm": 0.5, "weight": 1},                  contrast of photographs (model.md); weight 0: only
+ *                                                                        reported
+ *           "tied", "bounds", "priors", "starts", "nuisance":           see job_fit_option.h
+ *           "render_px": 96, "render_samples": 16}
+ * }
+ * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path
+ * such as "photographs[3].light_theta_deg" and a text that says what is allowed. Limits: see job_limits.
+ */
+#ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
+#define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
+
+#include "base/status.h"
+#include "optimizer/job/job_fit_option.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum {
+    JOB_MAX_DOCUMENT_BYTES = 1 << 20,
+    JOB_MAX_PHOTOGRAPH = 1024,
+    JOB_MAX_VOLUME_FILE = 4096,
+    JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
+    JOB_MAX_CANDIDATE = 1024,
+    JOB_MAX_MODEL = 8
+};
+
+/* One model to be fitted. */
+struct job_model {
+    char id[64];
+    double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, flat; NaN: not given */
+    struct job_fit_option option;
+};
+
+enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
+
+struct job_photograph {
+    char file[JOB_MAX_NAME_BYTES];
+    enum job_set set;
+    double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
+    double scale, weight;
+    size_t crop_px[4]; /* all 0: whole picture */
+    bool srgb;
+};
+
+/* A configuration of which a photograph might be taken. */
+struct job_candidate {
+    double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
+};
+
+struct job_document {
+    char sample[256];
+    /* volume */
+    bool has_volume;
+    size_t n_volume_file;
+    char (*volume_file)[JOB_MAX_NAME_BYTES];
+    size_t raw_shape[3]; /* all 0: not given */
+    char raw_type[8];
+    bool raw_big_endian;
+    size_t raw_header_bytes;
+    double voxel_size_um[3]; /* NaN: not given */
+    char axes[8];
+    double matrix[9];
+    size_t crop_voxel[6];
+    bool align, crop;         /* "auto"; false where matrix, crop_voxel are given */
+    double crop_keep;         /* NaN: not given */
+    bool join_seams;
+    double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j; /* NaN: not given */
+    size_t filter_h;                                                                  /* 0: not given */
+    double link_sigma_voxel, radius_um;                                               /* NaN: not given */
+    size_t min_vertex;
+    int radius_per_axis; /* -1: by what is measured (not given) */
+    /* fibers */
+    char fiber_file[JOB_MAX_NAME_BYTES];
+    double tile_mm[2]; /* NaN: from the file */
+    double voxel_um;   /* NaN: chosen from the radius */
+    /* set-up */
+    double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
+    bool black_sheet;
+    /* observations */
+    char measurement_file[JOB_MAX_NAME_BYTES]; /* "" when photographs are given */
+    size_t n_photograph;
+    struct job_photograph *photograph;
+    /* fit */
+    size_t n_model;
+    struct job_model model[JOB_MAX_MODEL];
+    char method[64];
+    uint64_t seed;
+    size_t max_iteration;                              /* 0: the method's default */
+    uint64_t path_budget;                              /* 0: the method's default */
+    /* volume models: d is a parameter, the last one; its entries in fixed and start follow from these two */
+    double density_multiplier_per_cm; /* NaN: the model's default */
+    bool fit_density;
+    bool fit_radius;
+    double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
+    double texture_block_mm, texture_weight; /* block 0: not asked for */
+    size_t n_candidate; /* for the next photograph; 0: not asked for */
+    struct job_candidate *candidate;
+    size_t render_px, render_sample;
+};
+
+/* text need not be NUL-terminated. On success *doc owns memory: job_document_free. */
+status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
+void job_document_free(struct job_document *doc);
+
+struct param_info;
+/* Bounds, start and fixed flag of each parameter of a model after ties, bounds and priors; out: n_param. STATUS_INVALID
+ * with the field at fault when they contradict each other. */
+status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
+                       struct job_fit_parameter *out, struct error *err);
+
+/* Blocks a side of the crop whose means are compared; texture_block_mm > 0. */
+size_t job_texture_cells(const struct job_document *doc);
+/* Their edge in mm: near to texture_block_mm, which need not divide the crop. */
+double job_texture_cell_mm(const struct job_document *doc);
+
+/* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
+void job_document_visit_files(const struct job_document *doc,
+                              void (*visit)(void *context, const char *name, const char *role), void *context);
+/* The error of a job that wants the density fitted without a row that is lit from behind. */
+status job_density_undetermined(bool black_sheet, struct error *err);
+/* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
+bool job_file_name_valid(const char *name);
+/* The like of any text: '_' for what is not allowed, cut to 127 bytes. */
+void job_file_name_make_valid(const char *text, char name[JOB_MAX_NAME_BYTES]);
+
+#endif

@@ -1,0 +1,456 @@
+/* Ties, bounds, priors, starts and nuisance terms of the section "fit" (job_fit_option.h). */
+#include "optimizer/job/method_names.h"
+#include "optimizer/job/job_document_parts.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Random keys of one start (fit_run.h) are enough for six runs of the published method with so many. */
+enum { MAX_ITERATION_OF_STARTS = 500 };
+
+void job_fit_option_init(struct job_fit_option *o)
+{
+    *o = (struct job_fit_option){.n_start = 1, .gain_prior_rel = 0.05, .stray_light_prior = 0.01};
+    for (size_t p = 0; p < JOB_MAX_PARAM; p++) {
+        o->lower[p] = o->upper[p] = o->prior_mean[p] = o->prior_se[p] = NAN;
+        o->leader[p] = p;
+        o->ratio[p] = 1.0;
+    }
+}
+
+struct reader {
+    const struct appearance *model;
+    struct job_document *doc;
+};
+
+/* Slots of one model that a key names: a group ("C_TT") or one parameter ("C_TT.r"). */
+static size_t find_slots(const struct appearance *m, const char *key, size_t slot[JOB_MAX_PARAM])
+{
+    size_t n = 0;
+    for (size_t p = 0; p < m->n_param; p++)
+        if (strcmp(m->param[p].symbol, key) == 0 || strcmp(m->param[p].name, key) == 0) slot[n++] = p;
+    return n;
+}
+
+static status check_known(const struct reader *r, const char *path, const char *key, struct error *err)
+{
+    size_t slot[JOB_MAX_PARAM];
+    for (size_t i = 0; i < r->doc->n_model; i++)
+        if (find_slots(&r->model[i], key, slot) > 0) return STATUS_OK;
+    return job_unknown_parameter(r->model, r->doc->n_model, path, key, err);
+}
+
+/* ---- ties ---- */
+
+struct tie {
+    const char *path;
+    size_t n_name;
+    const char *name[JOB_MAX_PARAM];
+    double share[JOB_MAX_PARAM];
+};
+
+static status read_tie(const struct json_field *f, struct tie *t, struct error *err)
+{
+    bool list = json_is_array(f->object);
+    if (!list && !json_is_object(f->object))
+        return error_set_field(err, STATUS_INVALID, f->path,
+                               "'%s' must be a list of parameter names, or an object of names and proportions", f->path);
+    size_t n = list ? json_array_size(f->object) : json_object_size(f->object);
+    if (n > JOB_MAX_PARAM)
+        return error_set_field(err, STATUS_INVALID, f->path, "'%s' names %zu parameters: allowed are %d", f->path, n,
+                               JOB_MAX_PARAM);
+    void *iter = list ? NULL : json_object_iter((json_t *)(uintptr_t)f->object);
+    for (t->n_name = 0; t->n_name < n; t->n_name++) {
+        t->share[t->n_name] = 1.0;
+        t->name[t->n_name] = list ? json_string_value(json_array_get(f->object, t->n_name)) : json_object_iter_key(iter);
+        if (t->name[t->n_name] == NULL)
+            return error_set_field(err, STATUS_INVALID, f->path, "'%s' must be a list of parameter names", f->path);
+        if (list) continue;
+        status s = json_field_required_number(f, t->name[t->n_name], 1e-3, 1e3, &t->share[t->n_name], err);
+        if (s != STATUS_OK) return s;
+        iter = json_object_iter_next((json_t *)(uintptr_t)f->object, iter);
+    }
+    return STATUS_OK;
+}
+
+static bool is_tied(const struct job_fit_option *o, size_t n_param, size_t p)
+{
+    for (size_t q = 0; q < n_param; q++)
+        if (q != p && o->leader[q] == p) return true;
+    return o->leader[p] != p;
+}
+
+/* Ties the slots of one model that a group names; *n_slot: how many those are. */
+static status apply_tie(const struct tie *t, const struct appearance *m, struct job_fit_option *o, size_t *n_slot,
+                        struct error *err)
+{
+    size_t slot[JOB_MAX_PARAM * 3], leader = SIZE_MAX;
+    double leader_share = 1.0;
+    *n_slot = 0;
+    for (size_t i = 0; i < t->n_name; i++) {
+        size_t n = find_slots(m, t->name[i], slot);
+        for (size_t k = 0; k < n; k++) {
+            size_t p = slot[k];
+            bool first = leader == SIZE_MAX;
+            bool used = first ? is_tied(o, m->n_param, p) : p == leader || is_tied(o, m->n_param, p);
+            if (first) {
+                leader = p;
+                leader_share = t->share[i];
+            }
+            if (used)
+                return error_set_field(err, STATUS_INVALID, t->path, "'%s' ties '%s' a second time", t->path,
+                                       m->param[p].name);
+            if (strcmp(m->param[p].unit, m->param[leader].unit) != 0)
+                return error_set_field(err, STATUS_INVALID, t->path,
+                                       "'%s' ties '%s' to '%s': only parameters of the same unit can be tied", t->path,
+                                       m->param[p].name, m->param[leader].name);
+            o->leader[p] = leader;
+            o->ratio[p] = t->share[i] / leader_share;
+            (*n_slot)++;
+        }
+    }
+    return STATUS_OK;
+}
+
+static status parse_tied(const struct reader *r, const struct json_field *fit, struct error *err)
+{
+    const json_t *list = json_object_get(fit->object, "tied");
+    if (list == NULL) return STATUS_OK;
+    if (!json_is_array(list))
+        return error_set_field(err, STATUS_INVALID, "fit.tied", "'fit.tied' must be a list of groups of parameters");
+    for (size_t g = 0; g < json_array_size(list); g++) {
+        struct json_field f = {.object = json_array_get(list, g)};
+        struct tie t = {.path = f.path};
+        size_t largest = 0;
+        snprintf(f.path, sizeof f.path, "fit.tied[%zu]", g);
+        status s = read_tie(&f, &t, err);
+        for (size_t i = 0; i < t.n_name && s == STATUS_OK; i++) s = check_known(r, f.path, t.name[i], err);
+        for (size_t i = 0; i < r->doc->n_model && s == STATUS_OK; i++) {
+            size_t n_slot;
+            s = apply_tie(&t, &r->model[i], &r->doc->model[i].option, &n_slot, err);
+            if (n_slot > largest) largest = n_slot;
+        }
+        if (s != STATUS_OK) return s;
+        if (largest < 2)
+            return error_set_field(err, STATUS_INVALID, f.path, "'%s' must name at least two parameters of one model",
+                                   f.path);
+    }
+    return STATUS_OK;
+}
+
+/* ---- bounds and priors ---- */
+
+static status parse_bound(const struct json_field *f, const char *key, const struct appearance *m,
+                          struct job_fit_option *o, struct error *err)
+{
+    size_t slot[JOB_MAX_PARAM], n_slot = find_slots(m, key, slot);
+    char path[JSON_PATH_BYTES];
+    double v[2];
+    if (n_slot == 0) return STATUS_OK;
+    const struct param_info *info = &m->param[slot[0]];
+    double lower = param_to_file_unit(info, info->lower), upper = param_to_file_unit(info, info->upper);
+    const double slack = 1e-12 * (fabs(lower) + fabs(upper));
+    status s = json_field_number_array(f, key, 2, lower - slack, upper + slack, v, err);
+    if (s != STATUS_OK) return s;
+    json_field_path(f, key, path);
+    if (!(v[0] < v[1]))
+        return error_set_field(err, STATUS_INVALID, path,
+                               "'%s' is [%g, %g]: the first must be below the second (to hold a parameter, use "
+                               "'fit.fixed')",
+                               path, v[0], v[1]);
+    for (size_t i = 0; i < n_slot; i++) {
+        if (!isnan(o->lower[slot[i]]))
+            return error_set_field(err, STATUS_INVALID, path, "'%s' bounds '%s' a second time", path,
+                                   m->param[slot[i]].name);
+        o->lower[slot[i]] = fmax(v[0], lower);
+        o->upper[slot[i]] = fmin(v[1], upper);
+    }
+    return STATUS_OK;
+}
+
+static status parse_prior(const struct json_field *f, const char *key, const struct appearance *m,
+                          struct job_fit_option *o, struct error *err)
+{
+    static const char *const allowed[] = {"mean", "se", NULL};
+    size_t slot[JOB_MAX_PARAM], n_slot = find_slots(m, key, slot);
+    struct json_field sub;
+    bool present;
+    double mean = 0.0, se = 0.0;
+    if (n_slot == 0) return STATUS_OK;
+    status s = json_field_object(f, key, &sub, &present, err);
+    if (s == STATUS_OK) s = json_field_check_keys(&sub, allowed, err);
+    if (s != STATUS_OK) return s;
+    const struct param_info *info = &m->param[slot[0]];
+    double lower = param_to_file_unit(info, info->lower), upper = param_to_file_unit(info, info->upper);
+    const double slack = 1e-12 * (fabs(lower) + fabs(upper));
+    s = json_field_required_number(&sub, "mean", lower - slack, upper + slack, &mean, err);
+    if (s == STATUS_OK) s = json_field_required_number(&sub, "se", 1e-6 * upper, 1e3 * upper, &se, err);
+    if (s != STATUS_OK) return s;
+    for (size_t i = 0; i < n_slot; i++) {
+        if (!isnan(o->prior_mean[slot[i]]))
+            return error_set_field(err, STATUS_INVALID, sub.path, "'%s' gives '%s' a second prior", sub.path,
+                                   m->param[slot[i]].name);
+        o->prior_mean[slot[i]] = fmin(fmax(mean, lower), upper);
+        o->prior_se[slot[i]] = se;
+    }
+    return STATUS_OK;
+}
+
+static status parse_each(const struct reader *r, const struct json_field *fit, const char *section,
+                         status (*one)(const struct json_field *f, const char *key, const struct appearance *m,
+                                       struct job_fit_option *o, struct error *err),
+                         struct error *err)
+{
+    struct json_field f;
+    bool present;
+    status s = json_field_object(fit, section, &f, &present, err);
+    if (s != STATUS_OK || !present) return s;
+    void *iter = json_object_iter((json_t *)(uintptr_t)f.object);
+    for (; iter != NULL && s == STATUS_OK; iter = json_object_iter_next((json_t *)(uintptr_t)f.object, iter)) {
+        char path[JSON_PATH_BYTES];
+        const char *key = json_object_iter_key(iter);
+        json_field_path(&f, key, path);
+        s = check_known(r, path, key, err);
+        for (size_t i = 0; i < r->doc->n_model && s == STATUS_OK; i++)
+            s = one(&f, key, &r->model[i], &r->doc->model[i].option, err);
+    }
+    return s;
+}
+
+/* ---- nuisance terms ---- */
+
+static status parse_nuisance(const struct json_field *fit, struct job_fit_option *o, struct error *err)
+{
+    static const char *const key[] = {"gain", "gain_prior_rel", "stray_light", "stray_light_prior", NULL};
+    static const char *const gain[] = {"none", "global", "per_photograph", NULL};
+    struct json_field f;
+    bool present;
+    size_t i_gain = 0;
+    double gain_prior = NAN, stray_prior = NAN;
+    status s = json_field_object(fit, "nuisance", &f, &present, err);
+    if (s != STATUS_OK || !present) return s;
+    s = json_field_check_keys(&f, key, err);
+    if (s == STATUS_OK) s = json_field_choice(&f, "gain", gain, &i_gain, err);
+    if (s == STATUS_OK) s = json_field_number(&f, "gain_prior_rel", 1e-4, 1.0, &gain_prior, err);
+    if (s == STATUS_OK) s = json_field_bool(&f, "stray_light", &o->stray_light, err);
+    if (s == STATUS_OK) s = json_field_number(&f, "stray_light_prior", 1e-6, 1.0, &stray_prior, err);
+    if (s != STATUS_OK) return s;
+    o->gain = (enum job_gain)i_gain;
+    if (!isnan(gain_prior) && o->gain == JOB_GAIN_NONE)
+        return error_set_field(err, STATUS_INVALID, "fit.nuisance.gain_prior_rel",
+                               "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
+    if (!isnan(stray_prior) && !o->stray_light)
+        return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
+                               "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
+                               "fitted");
+    if (!isnan(gain_prior)) o->gain_prior_rel = gain_prior;
+    if (!isnan(stray_prior)) o->stray_light_prior = stray_prior;
+    return STATUS_OK;
+}
+
+/* The published method knows nothing of priors and nuisance terms. */
+static status check_method(const struct job_document *doc, struct error *err)
+{
+    bool has_prior = false;
+    for (size_t i = 0; i < doc->n_model; i++)
+        for (size_t p = 0; p < JOB_MAX_PARAM; p++)
+            has_prior = has_prior || !isnan(doc->model[i].option.prior_mean[p]);
+    const struct job_fit_option *o = &doc->model[0].option;
+    const char *path = has_prior ? "fit.priors" : o->gain != JOB_GAIN_NONE || o->stray_light ? "fit.nuisance" : NULL;
+    if (path == NULL || strcmp(doc->method, METHOD_GAUSS_NEWTON) == 0) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' has no such terms", path,
+                           METHOD_GAUSS_NEWTON, doc->method);
+}
+
+/* What is the same for all models. */
+static status parse_common(const struct json_field *f, struct job_document *doc, struct error *err)
+{
+    struct job_fit_option common;
+    job_fit_option_init(&common);
+    status s = json_field_size(f, "starts", 1, JOB_MAX_START, &common.n_start, err);
+    if (s == STATUS_OK) s = parse_nuisance(f, &common, err);
+    if (s != STATUS_OK) return s;
+    if (common.n_start > 1 && doc->max_iteration > MAX_ITERATION_OF_STARTS)
+        return error_set_field(err, STATUS_INVALID, "fit.max_iterations",
+                               "'fit.max_iterations' is %zu: with several starts at most %d are allowed",
+                               doc->max_iteration, MAX_ITERATION_OF_STARTS);
+    for (size_t i = 0; i < doc->n_model; i++) {
+        struct job_fit_option *o = &doc->model[i].option;
+        o->n_start = common.n_start;
+        o->gain = common.gain;
+        o->gain_prior_rel = common.gain_prior_rel;
+        o->stray_light = common.stray_light;
+        o->stray_light_prior = common.stray_light_prior;
+    }
+    return STATUS_OK;
+}
+
+status job_parse_fit_options(const struct json_field *f, const struct appearance *model, struct job_document *doc,
+                             struct error *err)
+{
+    struct reader r = {model, doc};
+    struct job_fit_parameter resolved[JOB_MAX_PARAM];
+    status s = parse_tied(&r, f, err);
+    if (s == STATUS_OK) s = parse_each(&r, f, "bounds", parse_bound, err);
+    if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
+    if (s == STATUS_OK) s = parse_common(f, doc, err);
+    if (s == STATUS_OK) s = check_method(doc, err);
+    for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
+        s = job_fit_resolve(model[i].param, model[i].n_param, &doc->model[i], resolved, err);
+    return s;
+}
+
+/* ---- what follows for each parameter ---- */
+
+static bool same(double a, double b) { return fabs(a - b) <= 1e-9 * (fabs(a) + fabs(b)); }
+
+/* The first value of `given` in p's group, as the leader's value; NaN for none. *clash: a member that says otherwise. */
+static double group_value(const struct job_fit_option *o, size_t n_param, const double *given, size_t leader,
+                          size_t *clash)
+{
+    double value = NAN;
+    *clash = SIZE_MAX;
+    for (size_t p = 0; p < n_param; p++) {
+        if (o->leader[p] != leader || isnan(given[p])) continue;
+        double v = given[p] / o->ratio[p];
+        if (isnan(value))
+            value = v;
+        else if (!same(value, v))
+            *clash = p;
+    }
+    return value;
+}
+
+static status group_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o, size_t leader,
+                           double *lower, double *upper, struct error *err)
+{
+    *lower = -INFINITY;
+    *upper = INFINITY;
+    for (size_t p = 0; p < n_param; p++) {
+        if (o->leader[p] != leader) continue;
+        double a = isnan(o->lower[p]) ? param_to_file_unit(&info[p], info[p].lower) : o->lower[p];
+        double b = isnan(o->upper[p]) ? param_to_file_unit(&info[p], info[p].upper) : o->upper[p];
+        *lower = fmax(*lower, a / o->ratio[p]);
+        *upper = fmin(*upper, b / o->ratio[p]);
+    }
+    if (*lower < *upper) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "fit.tied",
+                           "'fit.tied' leaves no room for '%s': the bounds of the parameters tied to it exclude each other",
+                           info[leader].name);
+}
+
+/* Stated by keys of its own, density_multiplier_per_cm and fit_density. */
+static bool is_density(const struct param_info *info) { return strcmp(info->name, APPEARANCE_DENSITY_MULTIPLIER) == 0; }
+
+/* A prior is one of its leader's value: it must lie where the leader's coordinate is defined, and agree with some value
+ * between the bounds that the group has. */
+static status check_priors(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
+                           const double bound[2], bool held, struct error *err)
+{
+    const double most_se = 3.0;
+    const struct job_fit_option *o = &given->option;
+    double lower = param_to_file_unit(&info[leader], info[leader].lower),
+           upper = param_to_file_unit(&info[leader], info[leader].upper);
+    const double slack = 1e-12 * (fabs(lower) + fabs(upper));
+    for (size_t p = 0; p < n_param; p++) {
+        if (o->leader[p] != leader || isnan(o->prior_mean[p])) continue;
+        if (held)
+            return error_set_field(err, STATUS_INVALID, "fit.priors", "'fit.priors' has '%s', which %s", info[p].name,
+                                   is_density(&info[p]) ? "is fitted only with 'fit.fit_density'" : "'fit.fixed' holds fixed");
+        double mean = o->prior_mean[p] / o->ratio[p];
+        if (mean < lower - slack || mean > upper + slack)
+            return error_set_field(err, STATUS_INVALID, "fit.priors",
+                                   "'fit.priors' has '%s' at %g, which 'fit.tied' makes '%s' at %g: allowed are %g and %g",
+                                   info[p].name, o->prior_mean[p], info[leader].name, mean, lower, upper);
+        if (fmax(bound[0] - mean, mean - bound[1]) > most_se * o->prior_se[p] / o->ratio[p])
+            return error_set_field(err, STATUS_INVALID, "fit.priors",
+                                   "'fit.priors' has '%s' at %g +- %g, its bounds are %g and %g: no value agrees with "
+                                   "both",
+                                   info[p].name, o->prior_mean[p], o->prior_se[p], bound[0] * o->ratio[p],
+                                   bound[1] * o->ratio[p]);
+    }
+    return STATUS_OK;
+}
+
+/* The first member of a group that has a value; the last parameter when none has. */
+static size_t stated_member(const struct job_fit_option *o, size_t n_param, const double *value, size_t leader)
+{
+    size_t p = 0;
+    while (p + 1 < n_param && (o->leader[p] != leader || isnan(value[p]))) p++;
+    return p;
+}
+
+/* Of the member of the group that the document speaks of; lower and upper are the leader's. */
+static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o, size_t leader,
+                             const char *field, const double *given, double lower, double upper, struct error *err)
+{
+    size_t p = stated_member(o, n_param, given, leader);
+    if (is_density(&info[p])) /* neither in 'fit.fixed' nor in 'fit.start' */
+        return error_set_field(err, STATUS_INVALID, "fit.density_multiplier_per_cm",
+                               "'fit.density_multiplier_per_cm' is %g%s: 'fit.bounds' has %g and %g", given[p],
+                               strcmp(field, "fit.fixed") == 0 ? ", and held there without 'fit.fit_density'" : "", lower, upper);
+    return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g%s", field, info[p].name,
+                           given[p], lower * o->ratio[p], upper * o->ratio[p],
+                           is_tied(o, n_param, p) ? ", with those of what 'fit.tied' ties it to" : "");
+}
+
+static status resolve_group(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
+                            struct job_fit_parameter *out, struct error *err)
+{
+    const struct job_fit_option *o = &given->option;
+    double lower, upper;
+    size_t clash;
+    status s = group_bounds(info, n_param, o, leader, &lower, &upper, err);
+    if (s != STATUS_OK) return s;
+    double held = group_value(o, n_param, given->fixed, leader, &clash);
+    if (clash != SIZE_MAX)
+        return error_set_field(err, STATUS_INVALID, "fit.fixed",
+                               "'fit.fixed' holds '%s' at a value that 'fit.tied' does not allow", info[clash].name);
+    double begin = group_value(o, n_param, given->start, leader, &clash);
+    if (clash != SIZE_MAX)
+        return error_set_field(err, STATUS_INVALID, "fit.start",
+                               "'fit.start' starts '%s' at a value that 'fit.tied' does not allow", info[clash].name);
+    if (!isnan(held) && !isnan(begin) && !is_density(&info[leader]))
+        return error_set_field(err, STATUS_INVALID, "fit.start",
+                               "'fit.start' has '%s', which 'fit.fixed' holds fixed by what 'fit.tied' ties it to",
+                               info[stated_member(o, n_param, given->start, leader)].name);
+    s = check_priors(info, n_param, given, leader, (const double[2]){lower, upper}, !isnan(held), err);
+    if (s != STATUS_OK) return s;
+    size_t ignored;
+    double prior = group_value(o, n_param, o->prior_mean, leader, &ignored);
+    const double slack = 1e-9 * (fabs(lower) + fabs(upper));
+    double value = !isnan(held) ? held : begin;
+    if (value < lower - slack || value > upper + slack)
+        return outside_bounds(info, n_param, o, leader, !isnan(held) ? "fit.fixed" : "fit.start",
+                              !isnan(held) ? given->fixed : given->start, lower, upper, err);
+    if (isnan(value)) value = !isnan(prior) ? prior : param_to_file_unit(&info[leader], info[leader].start);
+    value = fmin(fmax(value, lower), upper);
+    for (size_t p = 0; p < n_param; p++) {
+        if (o->leader[p] != leader) continue;
+        out[p] = (struct job_fit_parameter){lower * o->ratio[p], upper * o->ratio[p], value * o->ratio[p],
+                                            !isnan(held)};
+    }
+    return STATUS_OK;
+}
+
+status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
+                       struct job_fit_parameter *out, struct error *err)
+{
+    size_t n_free = 0;
+    if (n_param > JOB_MAX_PARAM)
+        return error_set_field(err, STATUS_INVALID, "fit.model", "model '%s' has %zu parameters: allowed are %d",
+                               given->id, n_param, JOB_MAX_PARAM);
+    for (size_t p = 0; p < n_param; p++) {
+        if (given->option.leader[p] != p) continue;
+        status s = resolve_group(info, n_param, given, p, out, err);
+        if (s != STATUS_OK) return s;
+    }
+    for (size_t p = 0; p < n_param; p++) n_free += !out[p].fixed;
+    if (n_free > 0) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "fit.fixed",
+                           "'fit.fixed' and 'fit.tied' together hold every parameter of model '%s': leave at least one "
+                           "free",
+                           given->id);
+}

@@ -1,0 +1,38 @@
+/* selvedge-phantom: cloth with known answers, to try the whole chain on and to measure it. */
+#include "optimizer/phantom/phantom_commands.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const char usage[] =
+    "selvedge-phantom: cloth with known answers\n"
+    "\n"
+    "  selvedge-phantom cloth --out DIR [options]        make fibers, and the CT scan of them\n"
+    "  selvedge-phantom photograph --fibers FILE --out DIR [options]\n"
+    "                                                    render photographs with known parameters\n"
+    "  selvedge-phantom compare --truth FILE --fibers FILE [options]\n"
+    "                                                    measure reconstructed fibers against true ones\n"
+    "\n"
+    "Each command has a --help of its own. Exit codes: 0 done, 1 failed, 2 wrong use.\n";
+
+static const struct {
+    const char *name;
+    int (*run)(int argc, char **argv);
+} command[] = {
+    {"cloth", phantom_command_cloth},
+    {"photograph", phantom_command_photograph},
+    {"compare", phantom_command_compare},
+};
+
+int main(int argc, char **argv)
+{
+    if (argc >= 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
+        fputs(usage, stdout);
+        return 0;
+    }
+    for (size_t i = 0; argc >= 2 && i < sizeof command / sizeof *command; i++)
+        if (strcmp(argv[1], command[i].name) == 0) return command[i].run(argc - 1, argv + 1);
+    if (argc >= 2) fprintf(stderr, "selvedge-phantom: unknown command '%s'\n", argv[1]);
+    fputs(usage, stderr);
+    return 2;
+}

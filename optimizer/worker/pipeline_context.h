@@ -1,0 +1,141 @@
+/* What the stages of a job share: inputs, products, and the way to the outside. One thread runs the stages; each stage
+ * uses the pool. Ownership: pipeline_context_init/release; everything in it is owned unless said otherwise.
+ */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
+
+#include "base/log.h"
+#include "base/progress.h"
+#include "base/scratch_space.h"
+#include "base/thread_pool.h"
+#include "geometry/fibers/fiber_set.h"
+#include "geometry/reconstruct.h"
+#include "geometry/volume/volume.h"
+#include "optimizer/fit/descent/descent.h"
+#include "optimizer/job/job_document.h"
+#include "optimizer/fit/objective/next_photograph.h"
+#include "optimizer/fit/objective/noisy_minimum.h"
+#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/job/stage_table.h"
+#include "optimizer/worker/worker_folder.h"
+#include "optimizer/worker/worker_status.h"
+#include "renderer/scattering/appearance.h"
+#include "renderer/scene/scene.h"
+#include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/derivative_check.h"
+
+/* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */
+struct validation {
+    struct estimate *replica[2];
+    struct estimate *contrast[2]; /* of pipeline_context.contrast, as many as observations; unused without one */
+    struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
+    struct objective_value fit_with_gains, held_out_with_gains; /* each row with its own gain; NaN unless the job asks for that */
+    double
+        worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
+};
+
+/* A candidate for the next photograph. */
+struct pipeline_candidate {
+    size_t i_candidate; /* of the document */
+    struct candidate_score score;
+};
+
+/* One model of the job: what is fitted and what came out. */
+struct pipeline_model {
+    struct appearance appearance;
+    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    const struct job_fit_option *option; /* of the document */
+    struct fit_result fit;
+    struct validation validation;
+    struct derivative_check certificate; /* of the free parameters at the result; filled in before the report */
+    struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */
+};
+
+/* What the search for the fiber radius gave (pipeline_radius.h). */
+struct pipeline_radius {
+    size_t i_model, n_step;               /* the model that was fitted at each radius; records of the series */
+    double start_m, radius_m, se_m;       /* mean radius before and after; its standard error */
+    double lower_m, upper_m;
+    struct noisy_minimum curve;           /* u = ln of the radius in metres; f: objective of the fit there */
+    uint64_t n_path;
+    double wall_s;
+};
+
+struct pipeline_context {
+    const struct worker_folder *folder; /* not owned, as the next three */
+    struct worker_status *status;
+    struct log *log;
+    struct thread_pool *pool;
+    size_t memory_limit_bytes;          /* of the geometry stages; 0: none */
+    struct scratch_space *space;        /* of volumes: JOB/work beyond that limit; NULL without one */
+    struct progress progress; /* of the running stage */
+
+    struct job_document *doc;
+    uint64_t fingerprint;               /* of the job document's text and this build of the program */
+    struct observation_set observation; /* all */
+    struct observation_set fitted;      /* those of the set "fit" */
+    struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */
+    struct observation_set contrast;    /* of all observations, in their order; empty when not asked for */
+    size_t n_model;
+    struct pipeline_model *model; /* in the order of the document */
+    struct pipeline_radius radius; /* when the job has the radius fitted */
+
+    struct reconstruct_option option;
+    struct reconstruct_report geometry;
+    struct volume volume; /* empty when not in memory: pipeline_need_volume */
+    struct direction_volume direction;
+    struct fiber_set fiber;
+    struct scene *scene;
+    struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */
+    bool has_volume_scene;
+    double stage_wall_s[16]; /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
+};
+
+void pipeline_context_init(struct pipeline_context *c);
+void pipeline_context_release(struct pipeline_context *c);
+
+/* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. */
+status pipeline_read_inputs(struct pipeline_context *c, struct error *err);
+
+/* Runs all stages that are not done. memory: context of the caller with folder, status, log, pool filled in. */
+status pipeline_run(struct pipeline_context *c, struct error *err);
+
+/* ---- the stages (pipeline_geometry.c, pipeline_fit.c, pipeline_report.c): run does the work and stores it under
+ * work/<stage>/; load brings back what a finished stage stored ---- */
+status stage_volume(struct pipeline_context *c, struct error *err);
+status stage_volume_load(struct pipeline_context *c, struct error *err);
+status stage_orientation(struct pipeline_context *c, struct error *err);
+status stage_orientation_load(struct pipeline_context *c, struct error *err);
+status stage_fibers(struct pipeline_context *c, struct error *err);
+status stage_fibers_load(struct pipeline_context *c, struct error *err);
+status stage_directions(struct pipeline_context *c, struct error *err);
+status stage_directions_load(struct pipeline_context *c, struct error *err);
+status stage_scene(struct pipeline_context *c, struct error *err);
+status stage_fit(struct pipeline_context *c, struct error *err);
+status stage_fit_load(struct pipeline_context *c, struct error *err);
+status stage_validation(struct pipeline_context *c, struct error *err);
+status stage_validation_load(struct pipeline_context *c, struct error *err);
+status stage_report(struct pipeline_context *c, struct error *err);
+
+/* The mapped volume in memory, from its checkpoint when it was let go. */
+status pipeline_need_volume(struct pipeline_context *c, struct error *err);
+/* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
+status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
+                          char path[WORKER_PATH_BYTES], struct error *err);
+/* The cloth for ray tracing from the fibers as they are; what was made before is released. The second makes it for
+ * surface models only. */
+status pipeline_make_scene(struct pipeline_context *c, struct error *err);
+status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err);
+/* As above, with a number for all models but the first: "estimates.journal", "estimates-1.journal". */
+status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
+                           char path[WORKER_PATH_BYTES], struct error *err);
+/* The cloth in all forms that there are. */
+struct appearance_scene pipeline_scene(const struct pipeline_context *c);
+/* Unknowns of a model's fit: parameters that are neither fixed nor follow another. */
+size_t pipeline_n_free(const struct pipeline_model *m);
+/* After validation: the error by which a model is judged, that over the held-out rows (the fitted ones when there are none), each
+ * with its own gain where the job says that photographs have one; and the model for which it is lowest (rel_square). */
+const struct objective_value *pipeline_judged_error(const struct pipeline_model *m);
+size_t pipeline_best_model(const struct pipeline_context *c);
+
+#endif

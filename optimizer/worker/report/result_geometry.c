@@ -1,0 +1,110 @@
+#include "optimizer/worker/report/result_geometry.h"
+#include "optimizer/worker/report/json_number.h"
+
+static json_t *alignment_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
+{
+    static const char *const outcome[] = {[ALIGN_DONE] = "found", [ALIGN_NO_DIRECTION] = "no_direction", [ALIGN_OTHER_AXES] = "other_axes"};
+    if (!o->align) return json_null();
+    const struct alignment *a = &g->align;
+    const struct main_directions *m = &g->main;
+    json_t *json = json_pack("{s:s, s:b, s:o, s:o, s:o, s:o, s:o, s:o}", "outcome", outcome[a->outcome], "applied", (int)g->aligned, "n_system",
+                             json_count(m->n), "rotation_deg", json_number(a->rotation_deg), "shear_deg", json_number(a->shear_deg), "tilt_deg",
+                             json_number(a->tilt_deg), "standard_error_deg", json_number(a->se_deg), "tilt_standard_error_deg",
+                             json_number(a->tilt_se_deg));
+    json_object_set_new(json, "weft", json_number_list(m->direction[0], 3, 1.0));
+    json_object_set_new(json, "warp", json_number_list(m->direction[1], 3, 1.0));
+    json_object_set_new(json, "repeat_mm", json_number_list(m->repeat_m, 2, 1e3));
+    json_object_set_new(json, "correlation", json_number_list(m->correlation, 2, 1.0));
+    json_object_set_new(json, "share", json_number_list(m->share, 2, 1.0));
+    return json;
+}
+
+static json_t *crop_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
+{
+    if (!o->crop) return json_null();
+    return json_pack("{s:o, s:o, s:o}", "keep", json_number(o->crop_keep), "valid", json_count_list(g->tile.valid, 4), "mismatch",
+                     json_number_list(g->tile.mismatch, 2, 1.0));
+}
+
+static json_t *seam_density_json(const struct seam_density *s)
+{
+    return json_pack("{s:o, s:o, s:o}", "across", json_number_list(s->across, 2, 1.0), "neighbour", json_number_list(s->neighbour, 2, 1.0),
+                     "ratio", json_number_list(s->ratio, 2, 1.0));
+}
+
+static json_t *seam_fibers_json(const struct reconstruct_report *g)
+{
+    const struct fiber_seam *s = &g->seam_fiber;
+    const double *found_m = g->seam_found.offset_m;
+    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "offset_found_um", g->n[0] > 0 ? json_number_list(found_m, 2, 1e6) : json_null(), "n_end", json_count_list(s->n_end, 2), "continued", json_number_list(s->share, 2, 1.0), "offset_um",
+                     json_number_list(s->offset_m, 2, 1e6), "n_joined", json_count(g->n_seam_joined));
+}
+
+/* Everything that was given or chosen, under the names of the job document. */
+static json_t *options_json(const struct reconstruct_option *o)
+{
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", json_number(o->s), "t", json_number(o->t), "h",
+                             json_count(o->h), "eps_d", json_number(o->eps_d), "eps_J", json_number(o->eps_j), "link_sigma_voxel",
+                             json_number(o->link_sigma_voxel), "min_vertices", json_count(o->min_vertex), "smooth_alpha",
+                             json_number(o->smooth_alpha));
+    json_object_set_new(json, "density_low", json_number(o->density_low));
+    json_object_set_new(json, "density_high", json_number(o->density_high));
+    json_object_set_new(json, "matrix", json_number_list(o->matrix, 9, 1.0));
+    bool cropped = false;
+    for (int i = 0; i < 6; i++) cropped = cropped || o->crop_voxel[i] > 0;
+    json_object_set_new(json, "crop_voxel", cropped ? json_count_list(o->crop_voxel, 6) : json_null());
+    return json;
+}
+
+json_t *result_geometry_json(const struct pipeline_context *c)
+{
+    const struct reconstruct_report *g = &c->geometry;
+    const double um = 1e6, mm = 1e3;
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input", c->doc->has_volume ? "volume" : "fibers", "n_fiber",
+                             json_count(c->fiber.n_fiber), "n_vertex", json_count(c->fiber.n_vertex), "tile_mm",
+                             json_number_list(c->fiber.tile_size_m, 2, mm));
+    json_object_set_new(json, "total_length_mm", json_number(g->total_length_m * mm));
+    double radius = 0.0;
+    for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
+    json_object_set_new(json, "mean_radius_um", json_number(radius * um));
+    json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
+    if (!c->doc->has_volume) return json;
+    const struct reconstruct_option *o = &c->option;
+    json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));
+    json_object_set_new(json, "voxel_size_um", json_number_list(g->voxel_size_m, 3, um));
+    json_object_set_new(json, "file_voxel_size_um", json_number_list(g->file_voxel_size_m, 3, um));
+    json_object_set_new(json, "density_low", json_number(g->density_low));
+    json_object_set_new(json, "density_high", json_number(g->density_high));
+    json_object_set_new(json, "separability", json_number(g->separability));
+    json_object_set_new(json, "noise_sd", json_number(g->noise_sd));
+    json_object_set_new(json, "fiber_diameter_voxel", json_number(g->fiber_diameter_voxel));
+    json_object_set_new(json, "n_material_voxel", json_count(g->n_material_voxel));
+    json_object_set_new(json, "n_kept_voxel", json_count(g->n_kept_voxel));
+    json_object_set_new(json, "n_class_voxel", json_count_list(g->n_class_voxel, 3));
+    json_object_set_new(json, "n_center", json_count_list(g->n_center, 3));
+    json_object_set_new(json, "n_chain", json_count_list(g->n_chain, 3));
+    json_object_set_new(json, "n_short_dropped", json_count_list(g->n_short_dropped, 3));
+    json_object_set_new(json, "n_gap_bridged", json_count(g->n_gap_bridged));
+    json_object_set_new(json, "n_joined", json_count(g->n_joined));
+    json_object_set_new(json, "radius_um", json_number_list(g->radius_m, 3, um));
+    json_object_set_new(json, "radius_se_um", json_number_list(g->radius_se_m, 3, um));
+    json_object_set_new(json, "radius_per_axis", json_boolean(g->radius_per_axis));
+    json_object_set_new(json, "radius_score", json_number_list(g->radius_score, 3, 1.0));
+    json_object_set_new(json, "dice", json_number(g->dice));
+    json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));
+    json_object_set_new(json, "direction_change_mean_deg", json_number(g->direction_change_mean_deg));
+    json_object_set_new(json, "alignment", alignment_json(o, g));
+    json_object_set_new(json, "crop", crop_json(o, g));
+    json_object_set_new(json, "seam_density", seam_density_json(&g->seam_density));
+    json_object_set_new(json, "options", options_json(o));
+    return json;
+}
+
+json_t *result_warnings_json(struct pipeline_context *c)
+{
+    json_t *list = json_array();
+    char text[600];
+    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
+        json_array_append_new(list, json_string(text));
+    return list;
+}

@@ -1,0 +1,252 @@
+#include "optimizer/worker/report/result_json.h"
+#include "optimizer/worker/report/json_number.h"
+#include "optimizer/worker/report/result_geometry.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/result_options_json.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- names and exposure ---- */
+
+static bool name_taken(picture_name *list, size_t i)
+{
+    for (size_t j = 0; j < i; j++)
+        if (strcmp(list[i], list[j]) == 0) return true;
+    return false;
+}
+
+status result_picture_names(const struct observation_set *o, picture_name **name, struct error *err)
+{
+    picture_name *list = calloc(o->n > 0 ? o->n : 1, sizeof *list);
+    if (list == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot name pictures: out of memory");
+    for (size_t i = 0; i < o->n; i++) {
+        const char *from = o->item[i].name, *dot = strrchr(from, '.');
+        int n = dot != NULL && dot > from ? (int)(dot - from) : (int)strlen(from);
+        snprintf(list[i], sizeof list[i], "%.*s", n, from);
+        /* a row may itself be named like what another one was given */
+        for (size_t number = i; name_taken(list, i); number += o->n)
+            snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, number);
+    }
+    *name = list;
+    return STATUS_OK;
+}
+
+static int compare_double(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+double result_png_exposure(const struct observation_set *o)
+{
+    double *v = malloc((o->n > 0 ? o->n : 1) * sizeof *v), exposure = 1.0;
+    if (v == NULL || o->n == 0) {
+        free(v);
+        return exposure;
+    }
+    for (size_t i = 0; i < o->n; i++)
+        v[i] = fmax(fmax(o->item[i].mean_rgb[0], o->item[i].mean_rgb[1]), o->item[i].mean_rgb[2]);
+    qsort(v, o->n, sizeof *v, compare_double);
+    double bright = v[(o->n - 1) * 9 / 10];
+    if (bright > 0.0) exposure = 0.8 / bright;
+    free(v);
+    return exposure;
+}
+
+/* ---- parts ---- */
+
+static json_t *at_bound(const struct pipeline_model *m, size_t p)
+{
+    if (!m->fit.uncertainty.at_bound[p]) return json_null();
+    const struct fit_parameter *k = &m->parameter[p];
+    return json_string(m->fit.param[p] - k->lower < k->upper - m->fit.param[p] ? "lower" : "upper");
+}
+
+static json_t *parameters_json(const struct pipeline_model *m)
+{
+    json_t *list = json_array();
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        const struct param_info *info = &m->appearance.param[p];
+        const struct fit_parameter *k = &m->parameter[p];
+        json_t *parameter =
+            json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit", info->unit,
+                      "value", json_number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
+                      json_number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
+                      param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
+                      param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
+                      (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);
+        result_parameter_options(m, p, parameter);
+        json_array_append_new(list, parameter);
+    }
+    return list;
+}
+
+static json_t *correlation_json(const struct pipeline_model *m)
+{
+    size_t n = m->appearance.n_param;
+    json_t *list = json_array();
+    for (size_t p = 0; p < n; p++)
+        json_array_append_new(list, json_number_list(m->fit.uncertainty.correlation + p * n, n, 1.0));
+    return list;
+}
+
+/* What a photograph would show by the rendering (nuisance.h), and its standard error, from both replicas. */
+static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3])
+{
+    struct estimate a, b;
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
+    for (int q = 0; q < 3; q++) {
+        mean[q] = 0.5 * (a.mean[q] + b.mean[q]);
+        se[q] = 0.5 * sqrt(a.var[q] + b.var[q]);
+    }
+}
+
+/* Everything that a fit and its validation gave. */
+static void put_fit(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    uint64_t n_path = 0;
+    for (size_t i = 0; i < c->observation.n; i++)
+        n_path += m->validation.replica[0][i].n_path + m->validation.replica[1][i].n_path;
+    json_object_set_new(json, "converged", json_boolean(m->fit.converged));
+    json_object_set_new(json, "reason", json_string(m->fit.reason));
+    json_object_set_new(json, "parameters", parameters_json(m));
+    json_object_set_new(json, "correlation", correlation_json(m));
+    json_object_set_new(json, "objective", json_number(m->validation.fit.value));
+    json_object_set_new(json, "objective_se", json_number(m->validation.fit.se));
+    json_object_set_new(json, "fit_rel_rms", json_number(m->validation.fit.rel_rms));
+    json_object_set_new(json, "fit_rel_rms_se", json_number(m->validation.fit.rel_rms_se));
+    json_object_set_new(json, "heldout_rel_rms", json_number(m->validation.held_out.rel_rms));
+    json_object_set_new(json, "heldout_rel_rms_se", json_number(m->validation.held_out.rel_rms_se));
+    json_object_set_new(json, "misfit_rel_rms", json_number(sqrt(m->fit.uncertainty.misfit_var)));
+    json_object_set_new(json, "validation_worst_rel_se", json_number(m->validation.worst_rel_se));
+    result_fit_options(c, m, json);
+    json_object_set_new(json, "n_path_fit", json_integer((json_int_t)m->fit.n_path));
+    json_object_set_new(json, "n_step", json_count(m->fit.n_step));
+    json_object_set_new(json, "fit_wall_s", json_number(m->fit.wall_s));
+    json_object_set_new(json, "n_path_validation", json_integer((json_int_t)n_path));
+}
+
+/* One entry of "models". */
+static json_t *model_json(const struct pipeline_context *c, size_t i_model)
+{
+    const struct pipeline_model *m = &c->model[i_model];
+    bool surface = m->appearance.kind == APPEARANCE_SURFACE;
+    json_t *json = json_pack("{s:s, s:s, s:s, s:b}", "id", m->appearance.id, "title", m->appearance.title, "kind",
+                             surface ? "surface" : "volume", "best", (int)(i_model == pipeline_best_model(c)));
+    json_t *rows = json_array();
+    put_fit(json, c, m);
+    for (size_t i = 0; i < c->observation.n; i++) {
+        double mean[3], se[3];
+        rendered_mean(m, i, mean, se);
+        json_t *row = json_pack("{s:o, s:o}", "rendered", json_number_list(mean, 3, 1.0), "rendered_se",
+                                json_number_list(se, 3, 1.0));
+        result_row_options(c, m, i, row);
+        json_array_append_new(rows, row);
+    }
+    json_object_set_new(json, "rows", rows);
+    return json;
+}
+
+static json_t *row_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i,
+                        const char *picture)
+{
+    const struct observation *o = &c->observation.item[i];
+    const struct configuration *k = &o->configuration;
+    const double deg = 180.0 / M_PI;
+    double rendered[3], se[3];
+    char png[200], exr[200], photograph[200];
+    rendered_mean(m, i, rendered, se);
+    snprintf(png, sizeof png, "renderings/%s.png", picture);
+    snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
+    snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
+    json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "name", o->name, "set",
+                            o->set == JOB_SET_FIT ? "fit" : "held-out", "light_theta_deg", k->light_theta_rad * deg,
+                            "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg", k->camera_theta_rad * deg,
+                            "camera_phi_deg", k->camera_phi_rad * deg, "cloth_rotation_deg",
+                            k->cloth_rotation_rad * deg, "weight", o->weight);
+    json_object_set_new(row, "all_rotations", json_boolean(k->n_rotation > 1));
+    json_object_set_new(row, "measured", json_number_list(o->mean_rgb, 3, 1.0));
+    json_object_set_new(row, "measured_se", json_number_list(o->se_rgb, 3, 1.0));
+    json_object_set_new(row, "rendered", json_number_list(rendered, 3, 1.0));
+    json_object_set_new(row, "rendered_se", json_number_list(se, 3, 1.0));
+    json_object_set_new(row, "rendering_png", json_string(png));
+    json_object_set_new(row, "rendering_exr", json_string(exr));
+    json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
+    result_row_options(c, m, i, row);
+    return row;
+}
+
+static json_t *stages_json(const struct pipeline_context *c)
+{
+    size_t n_stage;
+    const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
+    json_t *list = json_array();
+    for (size_t i = 0; i < n_stage; i++)
+        json_array_append_new(list,
+                              json_pack("{s:s, s:o}", "name", info[i].name, "wall_s", json_number(c->stage_wall_s[i])));
+    return list;
+}
+
+/* The search for the fiber radius; null when the job did not ask for it. */
+static json_t *radius_json(const struct pipeline_context *c)
+{
+    const struct pipeline_radius *r = &c->radius;
+    const double um = 1e6;
+    if (!c->doc->fit_radius) return json_null();
+    json_t *curve = json_array();
+    for (size_t i = 0; i < r->curve.n_point; i++) {
+        const struct noisy_point *p = &r->curve.point[i];
+        json_array_append_new(curve, json_pack("{s:o, s:o, s:o}", "radius_um", json_number(exp(p->u) * um), "objective",
+                                               json_number(p->f), "objective_se", json_number(p->se)));
+    }
+    return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:I, s:o, s:o}", "model",
+                     c->model[r->i_model].appearance.id, "start_um", json_number(r->start_m * um), "radius_um",
+                     json_number(r->radius_m * um), "minimum_um", json_number(exp(r->curve.u) * um), "standard_error_um",
+                     json_number(r->se_m * um), "lower_um", json_number(r->lower_m * um), "upper_um", json_number(r->upper_m * um),
+                     "determined", (int)r->curve.determined, "at_bound", (int)r->curve.at_bound, "n_path",
+                     (json_int_t)r->n_path, "wall_s", json_number(r->wall_s), "curve", curve);
+}
+
+static json_t *result_json(struct pipeline_context *c, picture_name *picture)
+{
+    const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
+    json_t *rows = json_array(), *models = json_array();
+    for (size_t i = 0; i < c->observation.n; i++)
+        json_array_append_new(rows, row_json(c, best, i, picture[i]));
+    for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
+    json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", c->doc->sample, "model",
+                             best->appearance.id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed);
+    put_fit(json, c, best);
+    json_object_set_new(json, "rows", rows);
+    json_object_set_new(json, "models", models);
+    json_object_set_new(json, "radius", radius_json(c));
+    json_object_set_new(json, "geometry", result_geometry_json(c));
+    json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
+    json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));
+    json_object_set_new(json, "stages", stages_json(c));
+    json_object_set_new(json, "warnings", result_warnings_json(c));
+    json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
+    return json;
+}
+
+status result_json_write(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    picture_name *picture = NULL;
+    status s = result_picture_names(&c->observation, &picture, err);
+    if (s != STATUS_OK) return s;
+    json_t *json = result_json(c, picture);
+    char *text = json_dumps(json, JSON_REAL_PRECISION(17) | JSON_INDENT(1));
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "result.json", path);
+    s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
+                     : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    free(text);
+    json_decref(json);
+    free(picture);
+    return s;
+}

@@ -1,0 +1,182 @@
+#include "optimizer/worker/report/result_pictures.h"
+#include "base/durable.h"
+#include "geometry/volume/vol_file.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/worker/report/result_json.h"
+#include "renderer/transport/appearance_render.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* "RESULTS/<folder>/<name><ending>" and a temporary name beside it with the same ending (writers look at it). */
+static void picture_paths(const struct pipeline_context *c, const char *folder, const char *name, const char *ending,
+                          char path[WORKER_PATH_BYTES], char temporary[WORKER_PATH_BYTES])
+{
+    char relative[300];
+    snprintf(relative, sizeof relative, "%s%s%s%s", folder, folder[0] != '\0' ? "/" : "", name, ending);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
+    snprintf(relative, sizeof relative, "%s%s.part-%s%s", folder, folder[0] != '\0' ? "/" : "", name, ending);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, temporary);
+}
+
+/* After a writer has made `temporary`. */
+static status put_in_place(const struct pipeline_context *c, status written, const char *temporary, const char *path,
+                           struct error *err)
+{
+    status s = written == STATUS_OK ? worker_folder_check(c->folder, err) : written;
+    if (s == STATUS_OK) return durable_rename(temporary, path, err);
+    unlink(temporary);
+    return s;
+}
+
+static bool exists(const char *path) { return access(path, F_OK) == 0; }
+
+static status make_folder(const struct pipeline_context *c, const char *name, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, name, path);
+    return durable_make_folder(path, err);
+}
+
+/* ---- geometry ---- */
+
+static status write_fibers(const struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    picture_paths(c, "", "fibers", ".hair", path, temporary);
+    status s = put_in_place(c, fiber_set_write_hair(&c->fiber, temporary, err), temporary, path, err);
+    if (s != STATUS_OK) return s;
+    picture_paths(c, "", "fibers", ".txt", path, temporary);
+    return put_in_place(c, fiber_set_write_text(&c->fiber, temporary, err), temporary, path, err);
+}
+
+static status write_volumes(const struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    picture_paths(c, "", "direction", ".vol", path, temporary);
+    status s = exists(path) ? STATUS_OK
+                            : put_in_place(c, vol_write_direction(temporary, &c->direction, VOL_QUANTISED, err),
+                                           temporary, path, err);
+    picture_paths(c, "", "density", ".vol", path, temporary);
+    if (s != STATUS_OK || exists(path)) return s;
+    return put_in_place(c, vol_write_kept_density(temporary, &c->direction, err), temporary, path, err);
+}
+
+status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width, size_t height, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    status s = make_folder(c, "pictures", err);
+    if (s != STATUS_OK) return s;
+    picture_paths(c, "pictures", name, ".png", path, temporary);
+    return put_in_place(c, image_write_png_rgb8(rgb, width, height, temporary, err), temporary, path, err);
+}
+
+static status write_slice(const struct pipeline_context *c, int axis, struct error *err)
+{
+    static const char *const name[] = {"slice-x", "slice-y", "slice-z"};
+    uint8_t *rgb = NULL;
+    size_t width, height;
+    status s =
+        reconstruct_slice_picture(&c->volume, &c->fiber, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
+    if (s != STATUS_OK) return s;
+    s = result_picture_write(c, name[axis], rgb, width, height, err);
+    free(rgb);
+    return s;
+}
+
+status result_geometry_write(struct pipeline_context *c, struct error *err)
+{
+    status s = write_fibers(c, err);
+    if (s != STATUS_OK || !c->doc->has_volume) return s;
+    s = write_volumes(c, err);
+    if (s == STATUS_OK) s = pipeline_need_volume(c, err);
+    for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(c, axis, err);
+    return s;
+}
+
+/* ---- renderings ---- */
+
+static status write_image(const struct pipeline_context *c, const struct image *im, const char *folder,
+                          const char *name, double exposure, bool exr, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    status s = STATUS_OK;
+    if (exr) {
+        picture_paths(c, folder, name, ".exr", path, temporary);
+        s = put_in_place(c, image_write_exr(im, temporary, err), temporary, path, err);
+    }
+    picture_paths(c, folder, name, ".png", path, temporary);
+    return s == STATUS_OK ? put_in_place(c, image_write_png(im, exposure, temporary, err), temporary, path, err) : s;
+}
+
+static status write_photograph(const struct pipeline_context *c, size_t i, const char *name, double exposure,
+                               struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct image im;
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->photograph[i].file, path);
+    status s = photograph_read(path, &c->doc->photograph[i], &im, NULL, err);
+    if (s != STATUS_OK) return s;
+    s = write_image(c, &im, "photographs", name, exposure, false, err);
+    image_release(&im);
+    return s;
+}
+
+struct picture_progress {
+    const struct progress *whole;
+    double base, share;
+};
+
+static void report_picture(void *context, double fraction)
+{
+    const struct picture_progress *p = context;
+    progress_report(p->whole, p->base + p->share * fraction);
+}
+
+static status write_rendering(struct pipeline_context *c, size_t i, const char *name, double exposure,
+                              const struct progress *progress, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    struct image im;
+    picture_paths(c, "renderings", name, ".png", path, temporary); /* written last of the two */
+    if (exists(path)) return STATUS_OK;
+    const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
+    struct appearance_render_request q = {.scene = pipeline_scene(c),
+                                          .model = &m->appearance,
+                                          .param = m->fit.param,
+                                          .configuration = &c->observation.item[i].configuration,
+                                          .width = c->doc->render_px,
+                                          .height = c->doc->render_px,
+                                          .n_sample = c->doc->render_sample,
+                                          .seed = c->doc->seed ^ 0x70696374757265u,
+                                          .stream = (uint32_t)i};
+    status s = appearance_render_run(&q, c->pool, progress, &im, err);
+    if (s != STATUS_OK) return s;
+    s = write_image(c, &im, "renderings", name, exposure, true, err);
+    image_release(&im);
+    return s;
+}
+
+status result_renderings_write(struct pipeline_context *c, double base, struct error *err)
+{
+    picture_name *name = NULL;
+    double exposure = result_png_exposure(&c->observation);
+    size_t n = c->observation.n;
+    status s = result_picture_names(&c->observation, &name, err);
+    if (s == STATUS_OK) s = make_folder(c, "renderings", err);
+    if (s == STATUS_OK && c->doc->n_photograph > 0) s = make_folder(c, "photographs", err);
+    for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++)
+        s = write_photograph(c, i, name[i], exposure, err);
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        struct picture_progress part = {&c->progress, base + (1.0 - base) * (double)i / (double)n,
+                                        (1.0 - base) / (double)n};
+        struct progress progress = {report_picture, &part, c->progress.cancel};
+        s = write_rendering(c, i, name[i], exposure, &progress, err);
+    }
+    free(name);
+    return s;
+}

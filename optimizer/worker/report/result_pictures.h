@@ -1,0 +1,17 @@
+/* Pictures and geometry files under results/. A file that an earlier attempt has written is kept; files appear whole or
+ * not at all. */
+#ifndef SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
+#define SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* fibers.hair, fibers.txt; with a volume also density.vol (uint8), direction.vol (2-byte directions) and
+ * pictures/slice-{x,y,z}.png. */
+status result_geometry_write(struct pipeline_context *c, struct error *err);
+/* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
+status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width, size_t height, struct error *err);
+/* renderings/<name>.exr and .png for every observation, photographs/<name>.png beside them. Reports progress from base
+ * on. */
+status result_renderings_write(struct pipeline_context *c, double base, struct error *err);
+
+#endif

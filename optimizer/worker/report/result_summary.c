@@ -1,0 +1,121 @@
+/* results/summary.txt: the result on one page, for people. */
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/result_json.h"
+#include "optimizer/worker/report/result_options_json.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void print_parameters(const struct pipeline_model *m, FILE *out)
+{
+    fprintf(out, "%-18s %10s %10s  %-22s %s\n", "parameter", "value", "std error", "allowed", "remarks");
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        const struct param_info *info = &m->appearance.param[p];
+        const struct fit_parameter *k = &m->parameter[p];
+        const struct uncertainty *u = &m->fit.uncertainty;
+        char allowed[64];
+        snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
+                 param_to_file_unit(info, k->upper), info->unit);
+        fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, m->fit.param[p]),
+                param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : m->option->leader[p] != p ? "tied " : "",
+                u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these photographs");
+    }
+}
+
+static void print_rows(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
+{
+    const double deg = 180.0 / M_PI;
+    fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi",
+            "turn", "measured r g b", "rendered r g b", "error");
+    for (size_t i = 0; i < c->observation.n; i++) {
+        const struct observation *o = &c->observation.item[i];
+        const struct configuration *k = &o->configuration;
+        double r[3], error = 0.0;
+        char turn[16];
+        struct estimate a, b;
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
+        for (int q = 0; q < 3; q++) {
+            r[q] = 0.5 * (a.mean[q] + b.mean[q]);
+            error += (r[q] - o->mean_rgb[q]) * (r[q] - o->mean_rgb[q]) / 3.0;
+        }
+        snprintf(turn, sizeof turn, "%.1f", k->cloth_rotation_rad * deg);
+        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6s   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
+                o->name, o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg,
+                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->n_rotation > 1 ? "all" : turn, o->mean_rgb[0],
+                o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], 100.0 * sqrt(error * objective_relative_weight(o)));
+    }
+}
+
+/* "2.41 +- 0.05 %"; "-" where there are no such rows. */
+static void percent(const struct objective_value *v, char *text, size_t n)
+{
+    if (isfinite(v->rel_rms))
+        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * v->rel_rms, 100.0 * v->rel_rms_se);
+    else
+        snprintf(text, n, "-");
+}
+
+/* All models side by side, when there are several. */
+static void print_comparison(const struct pipeline_context *c, FILE *out)
+{
+    const bool gains = c->model[0].option->gain == JOB_GAIN_PER_PHOTOGRAPH;
+    fprintf(out, "%-24s %16s %16s %9s %9s  %s\n", "model", "fitted", "held out", "paths", "time", "");
+    for (size_t i = 0; i < c->n_model; i++) {
+        const struct pipeline_model *m = &c->model[i];
+        char fitted[48], held_out[48];
+        percent(gains ? &m->validation.fit_with_gains : &m->validation.fit, fitted, sizeof fitted);
+        percent(gains ? &m->validation.held_out_with_gains : &m->validation.held_out, held_out, sizeof held_out);
+        fprintf(out, "%-24s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, held_out, (double)m->fit.n_path, m->fit.wall_s,
+                i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
+    }
+    fprintf(out, "relative RMS errors%s; what follows is of the best model\n\n", gains ? ", each photograph with its own gain" : "");
+}
+
+static void print_summary(struct pipeline_context *c, FILE *out)
+{
+    char text[600];
+    const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
+    fprintf(out, "%s\n\n", c->doc->sample);
+    if (c->n_model > 1) print_comparison(c, out);
+    fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
+    fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
+    fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
+    fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
+            1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
+    if (c->doc->has_volume)
+        fprintf(out, "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those inside\n",
+                c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
+    fprintf(out, "         quality.html shows how good the geometry is\n\n");
+    if (c->doc->fit_radius)
+        fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m,
+                1e6 * c->radius.se_m, 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
+                c->radius.curve.at_bound ? " (at the edge of its range)" : "");
+    percent(&m->validation.fit, text, sizeof text);
+    fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
+    percent(&m->validation.held_out, text, sizeof text);
+    if (isfinite(m->validation.held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
+    fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
+            m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
+    print_parameters(m, out);
+    result_summary_options(c, m, out);
+    print_rows(c, m, out);
+    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
+        fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
+}
+
+status result_summary_write(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    FILE *out = open_memstream(&text, &n);
+    if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the summary: out of memory");
+    print_summary(c, out);
+    fclose(out);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "summary.txt", path);
+    status s = worker_folder_replace(c->folder, path, text, n, err);
+    free(text);
+    return s;
+}

@@ -1,0 +1,45 @@
+#include "optimizer/worker/stages/pipeline_budget.h"
+#include "optimizer/worker/stages/pipeline_fit_option.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* What all starts of a model's fit take together. */
+static status least_budget(const struct pipeline_context *c, const struct pipeline_model *m, uint64_t *least,
+                           struct error *err)
+{
+    const struct descent_method *method = descent_find(c->doc->method);
+    struct fit_option option;
+    struct fit_layout *layout = calloc(1, sizeof *layout);
+    if (layout == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
+    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    status s = fit_layout_init(layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
+    const struct fit_problem problem = {.n_param = layout->n_unknown,
+                                        .info = layout->info,
+                                        .param = layout->parameter,
+                                        .observation = &c->row,
+                                        .max_iteration = c->doc->max_iteration};
+    *least = s == STATUS_OK && method != NULL ? method->least_budget(&problem) * option.n_start : 0;
+    free(layout);
+    return s;
+}
+
+status pipeline_warn_budget(struct pipeline_context *c, struct error *err)
+{
+    for (size_t i = 0; i < c->n_model && c->doc->path_budget > 0; i++) {
+        const struct pipeline_model *m = &c->model[i];
+        char warning[400];
+        uint64_t least;
+        status s = least_budget(c, m, &least, err);
+        if (s != STATUS_OK) return s;
+        if (least <= c->doc->path_budget) continue;
+        snprintf(warning, sizeof warning,
+                 "fit.path_budget: %" PRIu64 " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
+                 " all the same: that is the least%s",
+                 c->doc->path_budget, m->appearance.id, c->doc->method, c->fitted.n, least,
+                 m->option->n_start > 1 ? " for so many starts" : "");
+        worker_status_warn(c->status, warning);
+    }
+    return STATUS_OK;
+}

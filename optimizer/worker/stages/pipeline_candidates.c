@@ -1,0 +1,84 @@
+/* The next photograph: every candidate configuration of the job is rendered at the result, with derivatives, and ranked
+ * by what it would add (next_photograph.h). */
+#include "optimizer/worker/stages/pipeline_advice.h"
+#include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/pipeline_trace.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { LEAST_PATH = 1024, MOST_PATH = 65536 }; /* a candidate and replica */
+
+static status candidate_set(const struct job_document *doc, struct observation_set *o, struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i < doc->n_candidate && s == STATUS_OK; i++) {
+        const struct job_candidate *c = &doc->candidate[i];
+        struct observation item = {.weight = 1.0};
+        item.configuration = observation_configuration(doc, c->light_theta_deg, c->light_phi_deg, c->camera_theta_deg,
+                                                       c->camera_phi_deg, c->cloth_rotation_deg);
+        s = observation_set_append(o, &item, err);
+    }
+    return s;
+}
+
+static int compare_rank(const void *a, const void *b)
+{
+    const struct pipeline_candidate *x = a, *y = b;
+    if (x->score.information != y->score.information) return x->score.information > y->score.information ? -1 : 1;
+    return x->i_candidate < y->i_candidate ? -1 : x->i_candidate > y->i_candidate;
+}
+
+static status rank(struct pipeline_context *c, size_t i_model, const struct observation_set *o,
+                   struct estimate *replica[2], size_t *n_path, struct error *err)
+{
+    struct pipeline_model *m = &c->model[i_model];
+    double share = 0.25 * (double)m->fit.n_path / (double)o->n; /* half the paths of the fit for all of them */
+    for (size_t i = 0; i < o->n; i++) n_path[i] = (size_t)fmin(fmax(share, LEAST_PATH), MOST_PATH);
+    struct pipeline_trace trace;
+    struct fit_option option;
+    struct fit_layout layout;
+    double wall_s;
+    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty, option.photograph_gain_sd};
+    struct progress quiet = {.cancel = c->progress.cancel};
+    status s = fit_layout_init(&layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
+    if (s != STATUS_OK) return s;
+    s = pipeline_trace_open(&trace, c, "report", "candidates.journal", i_model, o, err);
+    for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
+        struct estimator e = estimate_journal_estimator(trace.journal);
+        struct estimator_call call = {m->fit.param, n_path, 0, q == 0 ? REPLICA_CANDIDATE_A : REPLICA_CANDIDATE_B, true};
+        s = e.run(e.context, &call, &quiet, replica[q], &wall_s, err);
+    }
+    for (size_t i = 0; i < o->n && s == STATUS_OK; i++) {
+        m->candidate[i].i_candidate = i;
+        next_photograph_score(&fit, &replica[0][i], &replica[1][i], &m->candidate[i].score);
+    }
+    if (s == STATUS_OK) qsort(m->candidate, o->n, sizeof *m->candidate, compare_rank);
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+status pipeline_rank_candidates(struct pipeline_context *c, struct error *err)
+{
+    size_t n = c->doc->n_candidate;
+    if (n == 0) return STATUS_OK;
+    struct observation_set o;
+    struct estimate *replica[2] = {calloc(n, sizeof(struct estimate)), calloc(n, sizeof(struct estimate))};
+    size_t *n_path = malloc(n * sizeof *n_path);
+    observation_set_init(&o);
+    status s = replica[0] != NULL && replica[1] != NULL && n_path != NULL
+                   ? candidate_set(c->doc, &o, err)
+                   : error_set(err, STATUS_NO_MEMORY, "cannot rank candidates: out of memory");
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) {
+        free(c->model[i].candidate);
+        c->model[i].candidate = calloc(n, sizeof *c->model[i].candidate);
+        s = c->model[i].candidate != NULL ? rank(c, i, &o, replica, n_path, err)
+                                          : error_set(err, STATUS_NO_MEMORY, "cannot rank candidates: out of memory");
+    }
+    observation_set_release(&o);
+    free(n_path);
+    free(replica[0]);
+    free(replica[1]);
+    return s;
+}

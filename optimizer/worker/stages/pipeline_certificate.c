@@ -1,0 +1,66 @@
+/* The gradient certificate of a job: derivative_check.h on its own cloth, photographs and result. */
+#include "base/clock.h"
+#include "optimizer/fit/descent/trace_estimator.h"
+#include "optimizer/worker/stages/pipeline_advice.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { N_PATH = 2048 };
+
+/* What counts as a failure: rounding of single precision leaves up to 0.2 %. */
+static const double allowed_error = 0.01;
+
+static void warn_of(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    const struct derivative_check *k = &m->certificate;
+    char warning[400];
+    if (k->error[k->worst] - 3.0 * k->error_se[k->worst] <= allowed_error) return;
+    snprintf(warning, sizeof warning,
+             "the derivatives by '%s' of model '%s' are off by %.2g +- %.1g of themselves on this cloth: do not trust "
+             "the fit's standard errors, and report this",
+             m->appearance.param[k->worst].name, m->appearance.id, k->error[k->worst], k->error_se[k->worst]);
+    worker_status_warn(c->status, warning);
+}
+
+static status certify(struct pipeline_context *c, struct pipeline_model *m, const struct configuration *configuration,
+                      const double *weight, struct error *err)
+{
+    bool skip[SCATTERING_MAX_PARAM];
+    double start_s = clock_monotonic_s();
+    for (size_t p = 0; p < m->appearance.n_param; p++) skip[p] = m->parameter[p].fixed;
+    struct derivative_check_request q = {.scene = pipeline_scene(c),
+                                         .model = &m->appearance,
+                                         .param = m->fit.param,
+                                         .skip = skip,
+                                         .configuration = configuration,
+                                         .weight = weight,
+                                         .n_configuration = c->fitted.n,
+                                         .n_path = N_PATH,
+                                         .seed = c->doc->seed,
+                                         .replica = REPLICA_CERTIFICATE};
+    status s = derivative_check_run(&q, &c->progress, &m->certificate, err);
+    if (s != STATUS_OK) return s;
+    const struct derivative_check *k = &m->certificate;
+    log_info(c->log, "gradient certificate of %s: worst relative error %.2g +- %.1g (%s), %zu paths, %.1f s",
+             m->appearance.id, k->error[k->worst], k->error_se[k->worst], m->appearance.param[k->worst].name,
+             (size_t)k->n_path, clock_monotonic_s() - start_s);
+    warn_of(c, m);
+    return STATUS_OK;
+}
+
+status pipeline_certify(struct pipeline_context *c, struct error *err)
+{
+    struct configuration *configuration = trace_configurations(&c->fitted);
+    double *weight = malloc((c->fitted.n + 1) * sizeof *weight);
+    status s = configuration != NULL && weight != NULL
+                   ? STATUS_OK
+                   : error_set(err, STATUS_NO_MEMORY, "cannot check derivatives: out of memory");
+    for (size_t i = 0; i < c->fitted.n && s == STATUS_OK; i++)
+        weight[i] = sqrt(objective_relative_weight(&c->fitted.item[i]));
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = certify(c, &c->model[i], configuration, weight, err);
+    free(weight);
+    free(configuration);
+    return s;
+}

@@ -1,0 +1,35 @@
+#include "optimizer/worker/stages/pipeline_contrast.h"
+#include "optimizer/worker/stages/pipeline_trace.h"
+
+#include <math.h>
+
+/* Other random numbers than those of the means (pipeline_validation.c). */
+enum { ITERATION = 2 };
+
+status pipeline_validate_contrast(struct pipeline_context *c, size_t i_model, const size_t *n_path,
+                                  const struct progress *progress, struct error *err)
+{
+    struct pipeline_model *m = &c->model[i_model];
+    struct pipeline_trace trace;
+    struct pipeline_part part;
+    double wall_s;
+    if (c->contrast.n == 0) return STATUS_OK;
+    status s = pipeline_trace_open(&trace, c, "validation", "contrast.journal", i_model, &c->contrast, err);
+    for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
+        struct estimator e = estimate_journal_estimator(trace.journal);
+        struct progress half = pipeline_sub_progress(&part, progress, 0.5 * q, 0.5);
+        struct estimator_call call = {m->fit.param, n_path, ITERATION, q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B, false};
+        s = e.run(e.context, &call, &half, m->validation.contrast[q], &wall_s, err);
+    }
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+void pipeline_rendered_contrast(const struct pipeline_model *m, size_t i, double contrast_rgb[3], double se_rgb[3])
+{
+    const struct estimate *a = &m->validation.contrast[0][i], *b = &m->validation.contrast[1][i];
+    for (int c = 0; c < 3; c++) {
+        contrast_rgb[c] = 0.5 * (a->mean[c] + b->mean[c]);
+        se_rgb[c] = 0.5 * sqrt(a->var[c] + b->var[c]);
+    }
+}

@@ -1,0 +1,207 @@
+/* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
+#include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/pipeline_radius.h"
+#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/work_file.h"
+#include "optimizer/worker/worker_series.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct fit_listener {
+    struct pipeline_context *pipeline;
+    size_t i_model, step_base; /* steps of the models before this one */
+    struct worker_series *series;
+    struct estimate_journal *journal;
+};
+
+static status on_step(void *context, const struct fit_step *step, struct error *err)
+{
+    struct fit_listener *l = context;
+    struct pipeline_context *c = l->pipeline;
+    const struct pipeline_model *m = &c->model[l->i_model];
+    bool replayed = estimate_journal_replaying(l->journal);
+    worker_status_objective(c->status, l->step_base + step->step, step->objective.value, step->objective.se);
+    if (replayed)
+        worker_status_restart_eta(c->status);
+    else
+        log_info(c->log, "step %zu (%s): objective %.5g +- %.2g, relative RMS error %.3f, %.0f thousand paths in all",
+                 step->step, step->phase, step->objective.value, step->objective.se, step->objective.rel_rms,
+                 (double)step->n_path_total / 1e3);
+    const struct worker_series_model model = {&m->appearance, m->parameter, l->i_model, l->step_base};
+    return worker_series_add(l->series, step, &model, replayed, err);
+}
+
+static status run_method(struct pipeline_context *c, const struct estimator *estimator, struct fit_listener *listener,
+                         const struct progress *progress, struct error *err)
+{
+    const struct descent_method *method = descent_find(c->doc->method);
+    struct pipeline_model *m = &c->model[listener->i_model];
+    if (method == NULL)
+        return error_set_field(err, STATUS_INVALID, "fit.method", "unknown method '%s'", c->doc->method);
+    struct fit_problem problem = {.n_param = m->appearance.n_param,
+                                  .info = m->appearance.param,
+                                  .param = m->parameter,
+                                  .observation = &c->row,
+                                  .estimator = estimator,
+                                  .path_budget = c->doc->path_budget,
+                                  .max_iteration = c->doc->max_iteration,
+                                  .report = on_step,
+                                  .report_context = listener,
+                                  .progress = progress};
+    struct fit_option option;
+    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    return fit_run(method, &problem, &option, &m->fit, err);
+}
+
+/* Another start that ended elsewhere with the same objective: the photographs cannot tell the two apart. */
+static void warn_of_starts(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    for (size_t k = 0; k < m->fit.n_start; k++) {
+        char warning[400];
+        if (!m->fit.start[k].elsewhere) continue;
+        snprintf(warning, sizeof warning,
+                 "start %zu of the fit of %s ended at other parameters with an objective (%.4g) that cannot be told "
+                 "from the one kept: the photographs allow more than one solution",
+                 k + 1, m->appearance.id, m->fit.start[k].objective);
+        worker_status_warn(c->status, warning);
+    }
+}
+
+static void warn_convergence(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    char warning[400];
+    if (m->fit.converged) return;
+    snprintf(warning, sizeof warning, "the fit%s%s has not converged: %s", c->n_model > 1 ? " of " : "",
+             c->n_model > 1 ? m->appearance.id : "", m->fit.reason);
+    worker_status_warn(c->status, warning);
+}
+
+static void warn_density(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    int d = appearance_param_index(&m->appearance, APPEARANCE_DENSITY_MULTIPLIER);
+    if (d < 0 || m->parameter[d].fixed || m->fit.uncertainty.determined[d]) return;
+    char warning[300];
+    snprintf(warning, sizeof warning,
+             "the density multiplier of %s is not determined by these photographs: too little light comes through "
+             "the cloth, or too much",
+             m->appearance.id);
+    worker_status_warn(c->status, warning);
+}
+
+/* "a, b, c" of the flagged parameters; false when there is none. */
+static bool list_names(const struct pipeline_model *m, const bool *flag, size_t n_text, char *text)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (size_t p = 0; p < m->appearance.n_param && used < n_text; p++)
+        if (flag[p]) used += (size_t)snprintf(text + used, n_text - used, "%s%s", used > 0 ? ", " : "", m->appearance.param[p].name);
+    return used > 0;
+}
+
+static void warn_parameters(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    bool at_bound[SCATTERING_MAX_PARAM], unknown[SCATTERING_MAX_PARAM];
+    char names[300], warning[400];
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        bool density = strcmp(m->appearance.param[p].name, APPEARANCE_DENSITY_MULTIPLIER) == 0; /* warn_density */
+        at_bound[p] = !m->parameter[p].fixed && m->fit.uncertainty.at_bound[p];
+        unknown[p] = !m->parameter[p].fixed && !m->fit.uncertainty.determined[p] && !density;
+    }
+    if (list_names(m, at_bound, sizeof names, names)) {
+        snprintf(warning, sizeof warning, "at the edge of the allowed range in the fit of %s: %s", m->appearance.id, names);
+        worker_status_warn(c->status, warning);
+    }
+    if (list_names(m, unknown, sizeof names, names)) {
+        snprintf(warning, sizeof warning, "not determined by these measurements in the fit of %s: %s", m->appearance.id, names);
+        worker_status_warn(c->status, warning);
+    }
+}
+
+/* Of a fit that was made, now or by an earlier attempt. */
+static void tell(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    log_info(c->log, "fit of %s %s after %zu steps, %.3g paths, %.1f s: %s", m->appearance.id,
+             m->fit.converged ? "converged" : "did NOT converge", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s,
+             m->fit.reason);
+    warn_convergence(c, m);
+    warn_of_starts(c, m);
+    warn_density(c, m);
+    warn_parameters(c, m);
+}
+
+static status fit_model(struct fit_listener *listener, struct error *err)
+{
+    struct pipeline_context *c = listener->pipeline;
+    struct pipeline_model *m = &c->model[listener->i_model];
+    struct pipeline_trace trace;
+    struct pipeline_part rest, part;
+    double before = c->doc->fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
+    struct progress whole = pipeline_sub_progress(&rest, &c->progress, before, 1.0 - before);
+    struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_model);
+    struct estimator estimator;
+    char message[160];
+    snprintf(message, sizeof message, "fitting %s (model %zu of %zu)", m->appearance.id, listener->i_model + 1,
+             c->n_model);
+    if (c->n_model > 1) {
+        worker_status_message(c->status, message);
+        log_info(c->log, "%s", message);
+    }
+    status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", listener->i_model, &c->row, err);
+    if (s != STATUS_OK) goto out;
+    listener->journal = trace.journal;
+    estimator = estimate_journal_estimator(trace.journal);
+    s = run_method(c, &estimator, listener, &progress, err);
+    if (s != STATUS_OK) goto out;
+    if (estimate_journal_n_replayed(trace.journal) > 0)
+        log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
+    tell(c, m);
+    listener->step_base += m->fit.n_step;
+out:
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+static size_t result_sections(struct pipeline_context *c, struct work_section section[JOB_MAX_MODEL + 1])
+{
+    for (size_t i = 0; i < c->n_model; i++)
+        section[i] = (struct work_section){&c->model[i].fit, sizeof c->model[i].fit};
+    section[c->n_model] = (struct work_section){&c->radius, sizeof c->radius};
+    return c->n_model + 1;
+}
+
+static status store_fits(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct work_section section[JOB_MAX_MODEL + 1];
+    size_t n = result_sections(c, section);
+    status s = pipeline_work_path(c, "fit", "result.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    return s == STATUS_OK ? work_file_write(path, "fit.5", section, n, err) : s;
+}
+
+status stage_fit_load(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct work_section section[JOB_MAX_MODEL + 1];
+    size_t n = result_sections(c, section);
+    status s = pipeline_work_path(c, "fit", "result.bin", path, err);
+    if (s == STATUS_OK) s = work_file_read(path, "fit.5", section, n, err);
+    if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) tell(c, &c->model[i]);
+    return s;
+}
+
+status stage_fit(struct pipeline_context *c, struct error *err)
+{
+    struct fit_listener listener = {.pipeline = c};
+    status s = worker_series_open(c->folder, &listener.series, err);
+    if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_search(c, listener.series, err);
+    listener.step_base = c->radius.n_step;
+    for (; listener.i_model < c->n_model && s == STATUS_OK; listener.i_model++) s = fit_model(&listener, err);
+    if (s == STATUS_OK) s = store_fits(c, err);
+    worker_series_close(listener.series);
+    return s;
+}

@@ -1,0 +1,289 @@
+/* Stages "volume" to "scene": from the scan, or from a fiber file, to a cloth ready for ray tracing. */
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/work_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double um = 1e-6, mm = 1e-3;
+
+/* The document's options over the defaults. */
+static void set_options(const struct job_document *doc, struct reconstruct_option *o)
+{
+    reconstruct_option_default(o);
+    memcpy(o->raw.n, doc->raw_shape, sizeof o->raw.n);
+    memcpy(o->raw.type, doc->raw_type, sizeof o->raw.type);
+    o->raw.big_endian = doc->raw_big_endian;
+    o->raw.header_bytes = doc->raw_header_bytes;
+    for (int a = 0; a < 3; a++) o->voxel_size_m[a] = doc->voxel_size_um[a] * um; /* NaN stays NaN */
+    memcpy(o->axes, doc->axes, sizeof o->axes);
+    memcpy(o->matrix, doc->matrix, sizeof o->matrix);
+    memcpy(o->crop_voxel, doc->crop_voxel, sizeof o->crop_voxel);
+    o->align = doc->align;
+    o->crop = doc->crop;
+    if (!isnan(doc->crop_keep)) o->crop_keep = doc->crop_keep;
+    o->density_low = doc->density_low;
+    o->density_high = doc->density_high;
+    if (!isnan(doc->filter_s)) o->s = doc->filter_s;
+    if (!isnan(doc->filter_t)) o->t = doc->filter_t;
+    if (doc->filter_h > 0) o->h = doc->filter_h;
+    if (!isnan(doc->filter_eps_d)) o->eps_d = doc->filter_eps_d;
+    if (!isnan(doc->filter_eps_j)) o->eps_j = doc->filter_eps_j;
+    if (!isnan(doc->link_sigma_voxel)) o->link_sigma_voxel = doc->link_sigma_voxel;
+    if (doc->min_vertex > 0) o->min_vertex = doc->min_vertex;
+    if (!isnan(doc->radius_um))
+        for (int a = 0; a < 3; a++) o->radius_m[a] = doc->radius_um * um;
+    o->radius_rule = doc->radius_per_axis < 0 ? RADIUS_AUTO : doc->radius_per_axis > 0 ? RADIUS_PER_AXIS : RADIUS_COMMON;
+}
+
+static void warn_geometry(void *context, const char *text)
+{
+    struct pipeline_context *c = context;
+    worker_status_warn(c->status, text);
+}
+
+/* ---- volume ---- */
+
+static status read_volume(struct pipeline_context *c, struct error *err)
+{
+    size_t n = c->doc->n_volume_file;
+    char(*text)[WORKER_PATH_BYTES] = malloc(n * sizeof *text);
+    const char **path = malloc(n * sizeof *path);
+    status s = STATUS_OK;
+    if (text == NULL || path == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
+        goto out;
+    }
+    for (size_t i = 0; i < n; i++) {
+        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text[i]);
+        path[i] = text[i];
+    }
+    s = reconstruct_read(path, n, &c->option, c->space, c->pool, &c->progress, &c->volume, &c->geometry, err);
+    if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
+        log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files", c->memory_limit_bytes / 1000000);
+out:
+    free(path);
+    free(text);
+    return s;
+}
+
+status stage_volume(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    set_options(c->doc, &c->option);
+    status s = read_volume(c, err);
+    if (s == STATUS_OK) s = pipeline_work_path(c, "volume", "volume.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    if (s != STATUS_OK) return s;
+    reconstruct_warn_volume(&c->option, &c->geometry, warn_geometry, c);
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {c->volume.n, sizeof c->volume.n},
+                                     {c->volume.voxel_size_m, sizeof c->volume.voxel_size_m},
+                                     {c->volume.density, volume_n_voxel(c->volume.n) * sizeof(float), c->space}};
+    return work_file_write(path, "volume.1", section, 5, err);
+}
+
+static status load_volume(struct pipeline_context *c, struct reconstruct_option *option,
+                          struct reconstruct_report *report, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct volume v = {.space = c->space};
+    status s = pipeline_work_path(c, "volume", "volume.bin", path, err);
+    if (s != STATUS_OK) return s;
+    struct work_section section[] = {{option, sizeof *option},
+                                     {report, sizeof *report},
+                                     {v.n, sizeof v.n},
+                                     {v.voxel_size_m, sizeof v.voxel_size_m},
+                                     {NULL, 0, c->space}};
+    s = work_file_read(path, "volume.1", section, 5, err);
+    if (s != STATUS_OK) return s;
+    v.density = section[4].data;
+    volume_release(&c->volume);
+    c->volume = v;
+    return STATUS_OK;
+}
+
+status stage_volume_load(struct pipeline_context *c, struct error *err)
+{
+    status s = load_volume(c, &c->option, &c->geometry, err);
+    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, warn_geometry, c);
+    return s;
+}
+
+status pipeline_need_volume(struct pipeline_context *c, struct error *err)
+{
+    struct reconstruct_option option;
+    struct reconstruct_report report;
+    return c->volume.density != NULL ? STATUS_OK : load_volume(c, &option, &report, err);
+}
+
+/* ---- direction volume: the stages "orientation" and "directions" store the same things ---- */
+
+static status store_direction(struct pipeline_context *c, const char *stage, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    status s = pipeline_work_path(c, stage, "direction.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    if (s != STATUS_OK) return s;
+    struct direction_volume *d = &c->direction;
+    size_t n = volume_n_voxel(d->n);
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {d->n, sizeof d->n},
+                                     {d->voxel_size_m, sizeof d->voxel_size_m},
+                                     {d->density, n, c->space},
+                                     {d->octahedral, 4 * n, c->space}};
+    return work_file_write(path, "direction.1", section, 6, err);
+}
+
+static status load_direction(struct pipeline_context *c, const char *stage, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct direction_volume d = {.space = c->space};
+    status s = pipeline_work_path(c, stage, "direction.bin", path, err);
+    if (s != STATUS_OK) return s;
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {d.n, sizeof d.n},
+                                     {d.voxel_size_m, sizeof d.voxel_size_m},
+                                     {NULL, 0, c->space},
+                                     {NULL, 0, c->space}};
+    s = work_file_read(path, "direction.1", section, 6, err);
+    if (s != STATUS_OK) return s;
+    d.density = section[4].data;
+    d.octahedral = section[5].data;
+    direction_volume_release(&c->direction);
+    c->direction = d;
+    return STATUS_OK;
+}
+
+status stage_orientation(struct pipeline_context *c, struct error *err)
+{
+    status s = pipeline_need_volume(c, err);
+    if (s == STATUS_OK)
+        s = reconstruct_orientation(&c->volume, &c->option, c->pool, &c->progress, &c->direction, &c->geometry, err);
+    return s == STATUS_OK ? store_direction(c, "orientation", err) : s;
+}
+
+status stage_orientation_load(struct pipeline_context *c, struct error *err)
+{
+    return load_direction(c, "orientation", err);
+}
+
+status stage_directions(struct pipeline_context *c, struct error *err)
+{
+    status s = reconstruct_transfer(&c->fiber, &c->direction, c->pool, &c->progress, &c->geometry, err);
+    return s == STATUS_OK ? store_direction(c, "directions", err) : s;
+}
+
+status stage_directions_load(struct pipeline_context *c, struct error *err)
+{
+    return load_direction(c, "directions", err);
+}
+
+/* ---- fibers ---- */
+
+/* No cloth has a fiber as wide as its tile. A length in a wrong unit makes such fibers, all of which meet across the faces:
+ * the pairs of their ends are more than can be counted. */
+static status check_radii(const struct fiber_set *f, const char *name, struct error *err)
+{
+    double most_m = 0.5 * fmin(f->tile_size_m[0], f->tile_size_m[1]);
+    for (size_t i = 0; i < f->n_fiber; i++)
+        if ((double)f->radius_m[i] > most_m)
+            return error_set_field(err, STATUS_INVALID, "fibers.file",
+                                   "cannot use fibers '%s': fiber %zu has a radius of %g mm, the tile is %g x %g mm: the unit may "
+                                   "be wrong, lengths are millimetres",
+                                   name, i, (double)f->radius_m[i] / mm, f->tile_size_m[0] / mm, f->tile_size_m[1] / mm);
+    return STATUS_OK;
+}
+
+static status read_fiber_file(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    const char *name = c->doc->fiber_file, *dot = strrchr(name, '.');
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, name, path);
+    bool text = dot != NULL && strcmp(dot, ".txt") == 0;
+    status s = text ? fiber_set_read_text(&c->fiber, path, err) : fiber_set_read_hair(&c->fiber, path, err);
+    if (s != STATUS_OK) {
+        if (err != NULL) snprintf(err->field, sizeof err->field, "fibers.file");
+        return s;
+    }
+    for (int a = 0; a < 2; a++)
+        if (!isnan(c->doc->tile_mm[a])) c->fiber.tile_size_m[a] = c->doc->tile_mm[a] * mm;
+    if (!(c->fiber.tile_size_m[0] > 0.0 && c->fiber.tile_size_m[1] > 0.0))
+        return error_set_field(
+            err, STATUS_INVALID, "fibers.tile_mm",
+            "'fibers.tile_mm' is missing: the file '%s' does not say with which period the cloth repeats", name);
+    fiber_set_classify(&c->fiber);
+    s = fiber_set_validate(&c->fiber, err);
+    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, "fibers.file");
+    return s == STATUS_OK ? check_radii(&c->fiber, name, err) : s;
+}
+
+status stage_fibers(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    status s;
+    if (c->doc->has_volume) {
+        s = pipeline_need_volume(c, err);
+        if (s == STATUS_OK)
+            s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &c->progress, &c->fiber,
+                                   &c->geometry, err);
+        volume_release(&c->volume);
+        memset(&c->volume, 0, sizeof c->volume);
+        if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
+        if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
+    } else {
+        s = read_fiber_file(c, err);
+        c->geometry.n_fiber = c->fiber.n_fiber;
+        c->geometry.n_vertex = c->fiber.n_vertex;
+        if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
+    }
+    if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
+    if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
+    if (s == STATUS_OK) s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    if (s != STATUS_OK) return s;
+    struct fiber_set *f = &c->fiber;
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {&f->n_fiber, sizeof f->n_fiber},
+                                     {&f->n_vertex, sizeof f->n_vertex},
+                                     {f->tile_size_m, sizeof f->tile_size_m},
+                                     {f->first_vertex, (f->n_fiber + 1) * sizeof *f->first_vertex},
+                                     {f->position_m, 3 * f->n_vertex * sizeof *f->position_m},
+                                     {f->radius_m, f->n_fiber * sizeof *f->radius_m},
+                                     {f->axis_class, f->n_fiber}};
+    return work_file_write(path, "fibers.1", section, 9, err);
+}
+
+status stage_fibers_load(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct fiber_set f;
+    fiber_set_init(&f);
+    status s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
+    if (s != STATUS_OK) return s;
+    struct work_section section[] = {{&c->option, sizeof c->option},
+                                     {&c->geometry, sizeof c->geometry},
+                                     {&f.n_fiber, sizeof f.n_fiber},
+                                     {&f.n_vertex, sizeof f.n_vertex},
+                                     {f.tile_size_m, sizeof f.tile_size_m},
+                                     {NULL, 0},
+                                     {NULL, 0},
+                                     {NULL, 0},
+                                     {NULL, 0}};
+    s = work_file_read(path, "fibers.1", section, 9, err);
+    if (s != STATUS_OK) return s;
+    f.first_vertex = section[5].data;
+    f.position_m = section[6].data;
+    f.radius_m = section[7].data;
+    f.axis_class = section[8].data;
+    fiber_set_release(&c->fiber);
+    c->fiber = f;
+    return STATUS_OK;
+}

@@ -1,0 +1,242 @@
+#include "optimizer/worker/stages/pipeline_radius.h"
+#include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/job/method_names.h"
+#include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/pipeline_trace.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FIRST_POINTS = 5, MOST_POINTS = 11 };
+
+static const double um = 1e-6, tolerance = 0.01;
+/* Of the budget of a fit, for each radius; with less than some paths a row there would be no second iteration. */
+static const double budget_share = 0.12, least_paths_a_row = 21000.0;
+
+struct search {
+    struct pipeline_context *c;
+    struct worker_series *series;
+    float *radius_m; /* of the cloth as it came */
+    size_t n_done;
+    double u[NOISY_MAX_POINT], param[NOISY_MAX_POINT][SCATTERING_MAX_PARAM];
+};
+
+static double mean_radius_m(const struct fiber_set *f)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < f->n_fiber; i++) sum += (double)f->radius_m[i];
+    return sum / (double)f->n_fiber;
+}
+
+static void scale_radii(struct fiber_set *f, const float *radius_m, double factor)
+{
+    for (size_t i = 0; i < f->n_fiber; i++) f->radius_m[i] = (float)((double)radius_m[i] * factor);
+}
+
+/* Each fit begins where the one at the nearest radius ended. */
+static void set_starts(const struct search *q, double u, struct fit_parameter *parameter)
+{
+    size_t nearest = 0;
+    for (size_t k = 1; k < q->n_done; k++)
+        if (fabs(q->u[k] - u) < fabs(q->u[nearest] - u)) nearest = k;
+    const struct pipeline_model *m = &q->c->model[q->c->radius.i_model];
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        parameter[p] = m->parameter[p];
+        if (q->n_done > 0 && !parameter[p].fixed)
+            parameter[p].start = fmin(fmax(q->param[nearest][p], parameter[p].lower), parameter[p].upper);
+    }
+}
+
+static status run_fit(struct search *q, double u, const struct estimator *e, const struct progress *progress,
+                      struct fit_result *r, struct error *err)
+{
+    struct pipeline_context *c = q->c;
+    struct pipeline_model *m = &c->model[c->radius.i_model];
+    const struct descent_method *method = descent_find(METHOD_GAUSS_NEWTON);
+    uint64_t budget = c->doc->path_budget > 0 ? c->doc->path_budget : method->default_path_budget;
+    double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)c->fitted.n);
+    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct fit_option option;
+    set_starts(q, u, parameter);
+    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    option.n_start = 1;
+    const struct fit_problem problem = {.n_param = m->appearance.n_param,
+                                        .info = m->appearance.param,
+                                        .param = parameter,
+                                        .observation = &c->fitted,
+                                        .estimator = e,
+                                        .path_budget = (uint64_t)paths,
+                                        .progress = progress};
+    return fit_run(method, &problem, &option, r, err);
+}
+
+/* One record of the series a radius. */
+static status report(struct search *q, const struct fit_result *r, double radius_m, bool replayed, struct error *err)
+{
+    struct pipeline_context *c = q->c;
+    const struct pipeline_model *m = &c->model[c->radius.i_model];
+    char note[80];
+    snprintf(note, sizeof note, "radius %.4g um", radius_m / um);
+    const struct fit_step step = {.step = q->n_done,
+                                  .phase = "radius",
+                                  .wall_s = c->radius.wall_s,
+                                  .n_path = r->n_path,
+                                  .n_path_total = c->radius.n_path,
+                                  .objective = r->objective,
+                                  .n_param = m->appearance.n_param,
+                                  .param = r->param,
+                                  .param_se = r->uncertainty.se_param,
+                                  .note = note};
+    const struct worker_series_model model = {&m->appearance, m->parameter, c->radius.i_model, 0};
+    worker_status_objective(c->status, step.step, r->objective.value, r->objective.se);
+    if (replayed)
+        worker_status_restart_eta(c->status);
+    else
+        log_info(c->log, "radius %.4g um: objective %.5g +- %.2g after %zu steps", radius_m / um, r->objective.value,
+                 r->objective.se, r->n_step);
+    return worker_series_add(q->series, &step, &model, replayed, err);
+}
+
+static status evaluate(void *context, double u, double *f, double *se, struct error *err)
+{
+    struct search *q = context;
+    struct pipeline_context *c = q->c;
+    struct pipeline_trace trace = {0};
+    struct pipeline_part part;
+    double share = PIPELINE_RADIUS_SHARE / MOST_POINTS;
+    struct progress progress = pipeline_sub_progress(&part, &c->progress, share * (double)q->n_done, share);
+    struct estimator estimator;
+    struct fit_result r;
+    char name[64], message[100];
+    snprintf(name, sizeof name, "radius-%02zu.journal", q->n_done);
+    snprintf(message, sizeof message, "fiber radius: trying %.4g um", exp(u) / um);
+    worker_status_message(c->status, message);
+    scale_radii(&c->fiber, q->radius_m, exp(u) / c->radius.start_m);
+    status s = pipeline_make_surface_scene(c, err);
+    if (s != STATUS_OK) return s;
+    s = pipeline_trace_open(&trace, c, "fit", name, c->radius.i_model, &c->fitted, err);
+    if (s != STATUS_OK) goto out;
+    estimator = estimate_journal_estimator(trace.journal);
+    s = run_fit(q, u, &estimator, &progress, &r, err);
+    if (s != STATUS_OK) goto out;
+    c->radius.n_path += r.n_path;
+    c->radius.wall_s += r.wall_s;
+    s = report(q, &r, exp(u), estimate_journal_replaying(trace.journal), err);
+    *f = r.objective.value + r.prior_penalty;
+    *se = fmax(r.objective.se, 1e-12);
+    q->u[q->n_done] = u;
+    memcpy(q->param[q->n_done++], r.param, sizeof r.param);
+out:
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+/* From the place on the curve to the radius and its error. */
+static void conclude(struct pipeline_context *c)
+{
+    struct pipeline_radius *r = &c->radius;
+    const struct pipeline_model *m = &c->model[r->i_model];
+    double n_free = 1.0 + (double)pipeline_n_free(m), n_row = 3.0 * (double)c->fitted.n;
+    double s2 = fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), objective_mean_photograph_variance(&c->fitted));
+    double var = r->curve.u_se * r->curve.u_se + (r->curve.curvature > 0.0 ? 2.0 * s2 / r->curve.curvature : INFINITY);
+    double range = log(r->upper_m / r->lower_m);
+    r->curve.determined = r->curve.determined && sqrt(var) < 0.5 * range / sqrt(12.0);
+    r->radius_m = pipeline_radius_used(r) ? exp(r->curve.u) : r->start_m;
+    r->se_m = fmin(exp(r->curve.u) * sqrt(var), (r->upper_m - r->lower_m) / sqrt(12.0));
+}
+
+static void tell(struct pipeline_context *c)
+{
+    const struct pipeline_radius *r = &c->radius;
+    char warning[300];
+    log_info(c->log, "fiber radius %.4g +- %.2g um (%s), it was %.4g um", r->radius_m / um, r->se_m / um,
+             r->curve.determined ? "determined" : "not determined", r->start_m / um);
+    if (r->curve.determined) return;
+    if (r->curve.at_bound)
+        snprintf(warning, sizeof warning,
+                 "the fiber radius ends at the edge of its range, %.4g um (fit.fit_radius: %.4g to %.4g um)",
+                 r->radius_m / um, r->lower_m / um, r->upper_m / um);
+    else
+        snprintf(warning, sizeof warning,
+                 "the fiber radius is not determined by these photographs: %.4g um is kept as it was", r->start_m / um);
+    worker_status_warn(c->status, warning);
+}
+
+bool pipeline_radius_used(const struct pipeline_radius *r) { return r->curve.determined || r->curve.at_bound; }
+
+static status use_radius(struct pipeline_context *c, const float *radius_m, struct error *err)
+{
+    scale_radii(&c->fiber, radius_m, c->radius.radius_m / c->radius.start_m);
+    return pipeline_make_scene(c, err);
+}
+
+static status check_range(struct pipeline_context *c, struct error *err)
+{
+    struct pipeline_radius *r = &c->radius;
+    const struct job_document *doc = c->doc;
+    r->lower_m = isnan(doc->radius_lower_um) ? 0.5 * r->start_m : doc->radius_lower_um * um;
+    r->upper_m = isnan(doc->radius_upper_um) ? 2.0 * r->start_m : doc->radius_upper_um * um;
+    if (r->upper_m < 1.1 * r->lower_m) /* one of the two was given and lies beyond the other's default */
+        return error_set_field(err, STATUS_INVALID, "fit.fit_radius",
+                               "'fit.fit_radius' leaves no range to search: %.4g to %.4g um; the cloth's fibers have "
+                               "%.4g um",
+                               r->lower_m / um, r->upper_m / um, r->start_m / um);
+    double tile_m = fmin(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]);
+    if (r->upper_m > 0.25 * tile_m)
+        return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
+                               "'fit.fit_radius.upper_um' is %.4g: fibers of that radius are wider than half of the "
+                               "tile (%.4g um)",
+                               r->upper_m / um, tile_m / um);
+    return STATUS_OK;
+}
+
+/* Said before the search, which takes long; the range is what the user asked for. */
+static void warn_of_range(struct pipeline_context *c)
+{
+    const struct pipeline_radius *r = &c->radius;
+    char warning[300];
+    if (r->start_m >= r->lower_m && r->start_m <= r->upper_m) return;
+    snprintf(warning, sizeof warning,
+             "'fit.fit_radius' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, "
+             "which is not in this range",
+             r->lower_m / um, r->upper_m / um, r->start_m / um);
+    worker_status_warn(c->status, warning);
+}
+
+status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err)
+{
+    struct search q = {.c = c, .series = series};
+    size_t n_bytes = c->fiber.n_fiber * sizeof *q.radius_m;
+    memset(&c->radius, 0, sizeof c->radius);
+    c->radius.start_m = mean_radius_m(&c->fiber);
+    while (c->model[c->radius.i_model].appearance.kind != APPEARANCE_SURFACE) c->radius.i_model++;
+    status s = check_range(c, err);
+    if (s != STATUS_OK) return s;
+    warn_of_range(c);
+    q.radius_m = malloc(n_bytes);
+    if (q.radius_m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for the fiber radius: out of memory");
+    memcpy(q.radius_m, c->fiber.radius_m, n_bytes);
+    const struct noisy_minimum_option option = {.lower = log(c->radius.lower_m),
+                                                .upper = log(c->radius.upper_m),
+                                                .n_first = FIRST_POINTS,
+                                                .n_most = MOST_POINTS,
+                                                .tolerance = tolerance};
+    s = noisy_minimum_search(&option, evaluate, &q, &c->radius.curve, err);
+    c->radius.n_step = q.n_done;
+    if (s == STATUS_OK) {
+        conclude(c);
+        tell(c);
+        s = use_radius(c, q.radius_m, err);
+    }
+    free(q.radius_m);
+    return s;
+}
+
+status pipeline_radius_apply(struct pipeline_context *c, struct error *err)
+{
+    warn_of_range(c);
+    tell(c);
+    return use_radius(c, c->fiber.radius_m, err);
+}

@@ -1,0 +1,20 @@
+/* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
+ * pictures are rendered. */
+#include "optimizer/worker/stages/pipeline_advice.h"
+#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/quality.h"
+#include "optimizer/worker/report/result_json.h"
+#include "optimizer/worker/report/result_pictures.h"
+
+status stage_report(struct pipeline_context *c, struct error *err)
+{
+    status s = pipeline_certify(c, err);
+    if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
+    if (s == STATUS_OK) s = result_json_write(c, err);
+    if (s == STATUS_OK) s = result_summary_write(c, err);
+    if (s == STATUS_OK) s = result_geometry_write(c, err);
+    if (s == STATUS_OK) s = quality_write(c, err);
+    if (s == STATUS_OK) s = result_renderings_write(c, 0.1, err);
+    if (s == STATUS_OK) s = result_json_write(c, err);
+    return s;
+}

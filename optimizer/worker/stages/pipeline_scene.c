@@ -1,0 +1,95 @@
+/* Stage "scene": the cloth ready for ray tracing, as fibers and, for volume models, as a volume. */
+#include "geometry/fibers/voxelise.h"
+#include "geometry/reconstruct.h"
+#include "optimizer/worker/pipeline_context.h"
+
+#include <math.h>
+#include <stdio.h>
+
+enum { VOXELISE_MEMORY_SHARE = 4 };
+static const double um = 1e-6;
+
+static bool wants_volume_scene(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->n_model; i++)
+        if (c->model[i].appearance.kind == APPEARANCE_VOLUME) return true;
+    return false;
+}
+
+/* The cloth came as fibers: volume models get the density of those. Cheap enough to be done again after a resume. */
+static status voxelise(struct pipeline_context *c, struct error *err)
+{
+    const struct voxelise_option option = {.voxel_size_m = c->doc->voxel_um * um,
+                                           .limit_bytes = c->memory_limit_bytes > 0
+                                                              ? c->memory_limit_bytes / VOXELISE_MEMORY_SHARE
+                                                              : SIZE_MAX};
+    double radius_m = 0.0, voxel_m;
+    char warning[300];
+    status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
+    if (s != STATUS_OK) {
+        if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, "fibers.voxel_um");
+        return s;
+    }
+    for (size_t i = 0; i < c->fiber.n_fiber; i++)
+        radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
+    if (isnan(option.voxel_size_m) && voxel_m > 0.51 * radius_m) {
+        snprintf(warning, sizeof warning,
+                 "volume models see the fibers in voxels of %.3g um instead of %.3g um (half a radius): finer ones do "
+                 "not fit into the memory setting",
+                 voxel_m / um, 0.5 * radius_m / um);
+        worker_status_warn(c->status, warning);
+    }
+    return STATUS_OK;
+}
+
+static status make_volume_scene(struct pipeline_context *c, struct error *err)
+{
+    const struct volume_scene_option option = {.black_sheet = c->doc->black_sheet};
+    status s = volume_scene_init(&c->volume_scene, &c->direction, &option, err);
+    c->has_volume_scene = s == STATUS_OK;
+    if (s == STATUS_OK)
+        log_info(c->log, "volume: %zu x %zu x %zu voxels of %.3g um, %.0f MB", c->direction.n[0], c->direction.n[1],
+                 c->direction.n[2], c->direction.voxel_size_m[0] / um,
+                 (double)volume_scene_memory_bytes(&c->volume_scene) / 1e6);
+    return s;
+}
+
+static void release_scenes(struct pipeline_context *c)
+{
+    scene_free(c->scene);
+    c->scene = NULL;
+    if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
+    c->has_volume_scene = false;
+}
+
+status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err)
+{
+    const struct scene_option option = {.black_sheet = c->doc->black_sheet};
+    release_scenes(c);
+    return scene_new(&c->fiber, &option, &c->scene, err);
+}
+
+status pipeline_make_scene(struct pipeline_context *c, struct error *err)
+{
+    status s = pipeline_make_surface_scene(c, err);
+    if (s != STATUS_OK) return s;
+    log_info(c->log, "scene: %zu fibers, %zu segments, %.0f MB", c->fiber.n_fiber, scene_n_segment(c->scene),
+             (double)scene_memory_bytes(c->scene) / 1e6);
+    if (!wants_volume_scene(c)) return STATUS_OK;
+    if (!c->doc->has_volume) {
+        direction_volume_release(&c->direction);
+        s = voxelise(c, err);
+    }
+    return s == STATUS_OK ? make_volume_scene(c, err) : s;
+}
+
+static void warn(void *context, const char *text)
+{
+    struct pipeline_context *c = context;
+    worker_status_warn(c->status, text);
+}
+status stage_scene(struct pipeline_context *c, struct error *err)
+{
+    reconstruct_warn_fibers(&c->geometry, &c->fiber, warn, c); /* this stage runs in every attempt */
+    return pipeline_make_scene(c, err);
+}

@@ -1,0 +1,75 @@
+#include "optimizer/worker/stages/pipeline_trace.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+
+/* Of everything that estimates depend on beside the call. */
+static uint64_t fingerprint(const struct pipeline_context *c, size_t i_model)
+{
+    const struct fiber_set *f = &c->fiber;
+    const char *id = c->model[i_model].appearance.id;
+    uint32_t sum = (uint32_t)crc32_z(0, (const void *)f->position_m, 3 * f->n_vertex * sizeof *f->position_m);
+    sum = (uint32_t)crc32_z(sum, (const void *)f->radius_m, f->n_fiber * sizeof *f->radius_m);
+    sum = (uint32_t)crc32_z(sum, (const void *)id, strlen(id));
+    if (c->model[i_model].appearance.kind == APPEARANCE_VOLUME)
+        sum = (uint32_t)crc32_z(sum, (const void *)c->direction.density, volume_n_voxel(c->direction.n));
+    for (size_t i = 0; i < c->observation.n; i++) {
+        sum = (uint32_t)crc32_z(sum, (const void *)c->observation.item[i].mean_rgb,
+                                sizeof c->observation.item[i].mean_rgb);
+        sum = (uint32_t)crc32_z(sum, (const void *)&c->observation.item[i].configuration, sizeof(struct configuration));
+    }
+    return c->fingerprint << 32 | sum;
+}
+
+static status may_write(void *context, struct error *err)
+{
+    const struct pipeline_context *c = context;
+    return worker_folder_check(c->folder, err);
+}
+
+status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
+                           size_t i_model, const struct observation_set *o, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    *t = (struct pipeline_trace){.configuration = trace_configurations(o)};
+    if (t->configuration == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
+    t->live = (struct trace_estimator){.model = &c->model[i_model].appearance,
+                                       .scene = pipeline_scene(c),
+                                       .pool = c->pool,
+                                       .seed = c->doc->seed,
+                                       .configuration = t->configuration,
+                                       .n_configuration = o->n};
+    t->live_estimator = trace_estimator(&t->live);
+    status s = pipeline_model_path(c, stage, name, i_model, path, err);
+    return s == STATUS_OK ? estimate_journal_open(path, fingerprint(c, i_model), &t->live_estimator, may_write, c,
+                                                  &t->journal, err)
+                          : s;
+}
+
+void pipeline_trace_close(struct pipeline_trace *t)
+{
+    estimate_journal_close(t->journal);
+    free(t->configuration);
+}
+
+static void report_part(void *context, double fraction)
+{
+    const struct pipeline_part *p = context;
+    progress_report(p->whole, p->base + p->share * fraction);
+}
+
+struct progress pipeline_sub_progress(struct pipeline_part *part, const struct progress *whole, double base,
+                                      double share)
+{
+    *part = (struct pipeline_part){whole, base, share};
+    return (struct progress){report_part, part, whole->cancel};
+}
+
+struct progress pipeline_model_progress(struct pipeline_part *part, const struct progress *whole,
+                                        const struct pipeline_context *c, size_t i_model)
+{
+    double share = 1.0 / (double)c->n_model;
+    return pipeline_sub_progress(part, whole, share * (double)i_model, share);
+}

@@ -1,0 +1,34 @@
+/* What the stages "fit" and "validation" share: the path tracer of one model behind a journal, and the progress of one
+ * model out of several. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_TRACE_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_TRACE_H
+
+#include "optimizer/fit/descent/estimate_journal.h"
+#include "optimizer/fit/descent/trace_estimator.h"
+#include "optimizer/worker/pipeline_context.h"
+
+struct pipeline_trace {
+    struct trace_estimator live;
+    struct estimator live_estimator;
+    struct configuration *configuration;
+    struct estimate_journal *journal;
+};
+
+/* Opens (and replays) the journal work/<stage>/<name> of the model, "estimates.journal" for its own fit. Not to be moved in memory until closed; close in any
+ * case. */
+status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
+                           size_t i_model, const struct observation_set *o, struct error *err);
+void pipeline_trace_close(struct pipeline_trace *t);
+
+struct pipeline_part {
+    const struct progress *whole;
+    double base, share;
+};
+/* Fractions 0..1 become base .. base + share of `whole`. */
+struct progress pipeline_sub_progress(struct pipeline_part *part, const struct progress *whole, double base,
+                                      double share);
+/* Models take equal shares. */
+struct progress pipeline_model_progress(struct pipeline_part *part, const struct progress *whole,
+                                        const struct pipeline_context *c, size_t i_model);
+
+#endif

@@ -1,0 +1,226 @@
+/* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
+ * rows apart. */
+#include "optimizer/worker/stages/pipeline_contrast.h"
+#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/work_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
+
+/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for
+ * it: a share of the fit's, but enough for a fair judgement where the fit needed few. */
+static const double validation_rel_se = 0.005, validation_share = 0.7, validation_least_paths = 4e6;
+
+static double brightness(const struct observation *o)
+{
+    return fmax((o->mean_rgb[0] + o->mean_rgb[1] + o->mean_rgb[2]) / 3.0, OBJECTIVE_TAU);
+}
+
+/* Relative variance of one path, from a pilot run. */
+static double relative_path_variance(const struct observation *o, const struct estimate *pilot)
+{
+    double a = brightness(o), largest = 0.0;
+    for (int c = 0; c < 3; c++) largest = fmax(largest, pilot->var[c]);
+    return (double)pilot->n_path * largest / (a * a);
+}
+
+/* Paths a replica, so that both together reach the standard error asked for; all rows give way alike when the budget is
+ * short. */
+static void plan_validation(const struct pipeline_context *c, const struct pipeline_model *m,
+                            const struct estimate *pilot, size_t *n_path)
+{
+    double total = 0.0;
+    for (size_t i = 0; i < c->observation.n; i++)
+        if (c->observation.item[i].weight > 0.0)
+            total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
+    double least = c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
+    double budget = fmax(validation_share * (double)m->fit.n_path, least);
+    double shrink = fmin(1.0, budget / fmax(total, 1.0));
+    for (size_t i = 0; i < c->observation.n; i++) {
+        double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
+                   (validation_rel_se * validation_rel_se);
+        n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
+        if (!(c->observation.item[i].weight > 0.0)) n = (double)pilot[i].n_path; /* shown, and counts nowhere */
+        n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
+    }
+}
+
+/* What row i's photograph would show by one replica. */
+static void show_row(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, int replica, bool own_gain,
+                     struct estimate *out)
+{
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[replica][i], out);
+    if (own_gain)
+        nuisance_apply_own_gain(&c->observation.item[i], out, m->option->gain_prior_rel, m->fit.uncertainty.misfit_var, out);
+}
+
+/* NaN when the set has no rows. */
+static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set, bool own_gains,
+                           struct objective_value *value, struct error *err)
+{
+    struct observation_set part;
+    size_t n = c->observation.n, n_part = 0;
+    struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
+    observation_set_init(&part);
+    *value = (struct objective_value){NAN, NAN, NAN, NAN, NAN, NAN};
+    status s = a != NULL ? observation_set_select(&c->observation, set, &part, err)
+                         : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    observation_set_weigh(&part); /* as the fit does */
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        if (c->observation.item[i].set != set || !(c->observation.item[i].weight > 0.0)) continue;
+        show_row(c, m, i, 0, own_gains, &a[n_part]);
+        show_row(c, m, i, 1, own_gains, &b[n_part++]);
+    }
+    if (s == STATUS_OK && part.n > 0) objective_evaluate(&part, a, b, value);
+    observation_set_release(&part);
+    free(a);
+    return s;
+}
+
+static status score_validation(const struct pipeline_context *c, struct pipeline_model *m, struct error *err)
+{
+    struct validation *v = &m->validation;
+    status s = evaluate_set(c, m, JOB_SET_FIT, false, &v->fit, err);
+    if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, false, &v->held_out, err);
+    v->fit_with_gains = v->held_out_with_gains = (struct objective_value){NAN, NAN, NAN, NAN, NAN, NAN};
+    if (s == STATUS_OK && m->option->gain == JOB_GAIN_PER_PHOTOGRAPH) {
+        s = evaluate_set(c, m, JOB_SET_FIT, true, &v->fit_with_gains, err);
+        if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, true, &v->held_out_with_gains, err);
+    }
+    v->worst_rel_se = 0.0;
+    for (size_t i = 0; i < c->observation.n; i++)
+        for (int k = 0; k < 3; k++)
+            v->worst_rel_se = fmax(v->worst_rel_se, 0.5 * sqrt(v->replica[0][i].var[k] + v->replica[1][i].var[k]) /
+                                                        brightness(&c->observation.item[i]));
+    return s;
+}
+
+static status allocate_validations(struct pipeline_context *c, struct error *err)
+{
+    for (size_t i = 0; i < 4 * c->n_model; i++) {
+        struct validation *v = &c->model[i / 4].validation;
+        struct estimate **replica = i % 4 < 2 ? &v->replica[i % 2] : &v->contrast[i % 2];
+        free(*replica);
+        *replica = calloc(c->observation.n, sizeof **replica);
+        if (*replica == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    }
+    return STATUS_OK;
+}
+
+/* Pilot, then two replicas, each through a journal: an interrupted validation does not start over. */
+static status estimate_validation(struct pipeline_context *c, struct pipeline_model *m, const struct estimator *e,
+                                  const struct progress *whole, size_t *n_path, struct error *err)
+{
+    struct pipeline_part part;
+    struct progress progress = pipeline_sub_progress(&part, whole, 0.0, 0.1);
+    struct estimator_call call = {m->fit.param, n_path, 0, REPLICA_FINAL_A, false};
+    double wall_s;
+    double pilot = 0.05 * (double)m->fit.n_path / (double)c->observation.n;
+    for (size_t i = 0; i < c->observation.n; i++)
+        n_path[i] = (size_t)fmin(fmax(pilot, VALIDATION_LEAST), VALIDATION_PILOT);
+    status s = e->run(e->context, &call, &progress, m->validation.replica[0], &wall_s, err);
+    if (s != STATUS_OK) return s;
+    plan_validation(c, m, m->validation.replica[0], n_path);
+    for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
+        progress = pipeline_sub_progress(&part, whole, 0.1 + 0.45 * q, 0.45);
+        call.iteration = 1;
+        call.replica = q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B;
+        s = e->run(e->context, &call, &progress, m->validation.replica[q], &wall_s, err);
+    }
+    return s;
+}
+
+/* Models whose error cannot be told from that of the best one: which is best is chance. */
+static void warn_of_equals(struct pipeline_context *c)
+{
+    size_t best = pipeline_best_model(c), used = 0, n;
+    const bool held_out = isfinite(c->model[best].validation.held_out.rel_rms);
+    char text[600];
+    for (size_t i = 0; i < c->n_model && used < sizeof text; i++) {
+        const struct objective_value *x = pipeline_judged_error(&c->model[best]), *y = pipeline_judged_error(&c->model[i]);
+        if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
+        if (used == 0)
+            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.3g +- %.2g %%) from",
+                                    held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
+                                    100.0 * x->rel_rms_se);
+        n = used < sizeof text ? sizeof text - used : 0;
+        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.3g +- %.2g %%)", c->model[i].appearance.id,
+                                 100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
+    }
+    if (used > 0) worker_status_warn(c->status, text);
+}
+
+static status validate_model(struct pipeline_context *c, size_t i_model, size_t *n_path, struct error *err)
+{
+    struct pipeline_model *m = &c->model[i_model];
+    struct pipeline_trace trace;
+    struct pipeline_part part, means, contrasts;
+    struct progress progress = pipeline_model_progress(&part, &c->progress, c, i_model);
+    double share = c->contrast.n > 0 ? 0.5 : 1.0;
+    struct progress of_means = pipeline_sub_progress(&means, &progress, 0.0, share);
+    struct progress of_contrasts = pipeline_sub_progress(&contrasts, &progress, share, 1.0 - share);
+    struct estimator estimator;
+    status s = pipeline_trace_open(&trace, c, "validation", "estimates.journal", i_model, &c->observation, err);
+    if (s != STATUS_OK) goto out;
+    estimator = estimate_journal_estimator(trace.journal);
+    s = estimate_validation(c, m, &estimator, &of_means, n_path, err);
+    if (s == STATUS_OK) s = pipeline_validate_contrast(c, i_model, n_path, &of_contrasts, err);
+    if (s == STATUS_OK) s = score_validation(c, m, err);
+    if (s != STATUS_OK) goto out;
+    log_info(c->log,
+             "validation of %s: relative RMS error %.4f +- %.4f over the fitted rows, %.4f +- %.4f over the held-out rows; rendered "
+             "means have a standard error below %.2f %%",
+             m->appearance.id, m->validation.fit.rel_rms, m->validation.fit.rel_rms_se, m->validation.held_out.rel_rms,
+             m->validation.held_out.rel_rms_se, 100.0 * m->validation.worst_rel_se);
+out:
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+_Static_assert(4 * JOB_MAX_MODEL <= WORK_FILE_MAX_SECTION, "a checkpoint has room for the estimates of all models");
+static void estimate_sections(struct pipeline_context *c, struct work_section section[4 * JOB_MAX_MODEL])
+{
+    for (size_t i = 0; i < 4 * c->n_model; i++) {
+        struct validation *v = &c->model[i / 4].validation;
+        section[i] = (struct work_section){i % 4 < 2 ? v->replica[i % 2] : v->contrast[i % 2],
+                                           c->observation.n * sizeof(struct estimate)};
+    }
+}
+
+static status store_validations(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct work_section section[4 * JOB_MAX_MODEL];
+    estimate_sections(c, section);
+    status s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    return s == STATUS_OK ? work_file_write(path, "validation.2", section, 4 * c->n_model, err) : s;
+}
+
+status stage_validation_load(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct work_section section[4 * JOB_MAX_MODEL];
+    status s = allocate_validations(c, err);
+    if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
+    if (s != STATUS_OK) return s;
+    estimate_sections(c, section);
+    s = work_file_read(path, "validation.2", section, 4 * c->n_model, err);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = score_validation(c, &c->model[i], err);
+    if (s == STATUS_OK) warn_of_equals(c);
+    return s;
+}
+
+status stage_validation(struct pipeline_context *c, struct error *err)
+{
+    size_t *n_path = calloc(c->observation.n, sizeof *n_path);
+    status s = n_path != NULL ? allocate_validations(c, err)
+                              : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = validate_model(c, i, n_path, err);
+    if (s == STATUS_OK) s = store_validations(c, err);
+    if (s == STATUS_OK) warn_of_equals(c);
+    free(n_path);
+    return s;
+}

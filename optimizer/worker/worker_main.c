@@ -1,0 +1,184 @@
+/* selvedge-worker JOBDIR: one job from its folder to its results. Layout of the folder: optimizer/job/job_folder.h. */
+#include "base/log.h"
+#include "base/thread_pool.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/result_json.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <ucontext.h>
+#include <unistd.h>
+
+static const char usage[] =
+    "usage: selvedge-worker [options] JOBDIR\n"
+    "Run the job in JOBDIR: job.json and input/ are read, results/ is written. Run again after an interruption, it "
+    "continues where it was.\n"
+    "\n"
+    "  --threads N        computing threads (default: one a processor); results do not depend on it\n"
+    "  --memory-mib N     resident memory of the geometry stages in mebibytes (default 2048); larger volumes are\n"
+    "                     worked on in files under JOBDIR/work. Results do not depend on it, but volume models of fiber\n"
+    "                     files see coarser voxels (with a warning) where a quarter of it does not hold finer ones\n"
+    "  --quiet            log to JOBDIR/log.txt only\n"
+    "  --version, --help\n"
+    "\n"
+    "Exit status: 0 succeeded, 1 failed (JOBDIR/status.json says why), 2 usage, 3 cancelled by SIGTERM, 4 another "
+    "attempt owns the job.\n";
+
+struct arguments {
+    const char *folder;
+    size_t n_thread, memory_mib;
+    bool quiet;
+};
+
+static bool parse_count(const char *text, size_t upper, size_t *out)
+{
+    char *end;
+    errno = 0;
+    unsigned long long v = strtoull(text, &end, 10);
+    if (errno != 0 || end == text || *end != '\0' || text[0] == '-' || v == 0 || v > upper) return false;
+    *out = (size_t)v;
+    return true;
+}
+
+/* -1: go on; otherwise the exit status. */
+static int parse_arguments(int argc, char **argv, struct arguments *a)
+{
+    static const struct option option[] = {
+        {"threads", required_argument, NULL, 't'}, {"memory-mib", required_argument, NULL, 'm'},
+        {"quiet", no_argument, NULL, 'q'},         {"help", no_argument, NULL, 'h'},
+        {"version", no_argument, NULL, 'v'},       {NULL, 0, NULL, 0}};
+    *a = (struct arguments){.memory_mib = 2048};
+    for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
+        bool ok = true;
+        switch (c) {
+        case 't':
+            ok = parse_count(optarg, 1024, &a->n_thread);
+            break;
+        case 'm':
+            ok = parse_count(optarg, (size_t)1 << 32, &a->memory_mib);
+            break;
+        case 'q':
+            a->quiet = true;
+            break;
+        case 'h':
+            fputs(usage, stdout);
+            return 0;
+        case 'v':
+            puts(RESULT_PROGRAM);
+            return 0;
+        default:
+            fputs(usage, stderr);
+            return WORKER_USAGE;
+        }
+        if (!ok) {
+            fprintf(stderr, "selvedge-worker: '%s' is not a count in the allowed range\n", optarg);
+            return WORKER_USAGE;
+        }
+    }
+    if (optind != argc - 1) {
+        fputs(usage, stderr);
+        return WORKER_USAGE;
+    }
+    a->folder = argv[optind];
+    return -1;
+}
+
+/* Runs in threads that a library has started before main (OpenBLAS does): they do not block the signal. Block it there
+ * for good and send it again, until the status thread's sigtimedwait takes it. */
+static void pass_on(int signal_number, siginfo_t *info, void *context)
+{
+    (void)info;
+    ucontext_t *interrupted = context;
+    sigaddset(&interrupted->uc_sigmask, signal_number);
+    kill(getpid(), signal_number);
+}
+
+/* SIGTERM and SIGINT belong to the status thread; a broken pipe is an error, not a death. */
+static void set_signals(void)
+{
+    struct sigaction action = {.sa_sigaction = pass_on, .sa_flags = SA_SIGINFO | SA_RESTART};
+    sigset_t set;
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGINT, &action, NULL);
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    sigaddset(&set, SIGINT);
+    pthread_sigmask(SIG_BLOCK, &set, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+static status run_job(struct pipeline_context *c, size_t n_thread, struct error *err)
+{
+    worker_status_stage(c->status, "volume", "Reading the job", 0, 8, 0.0, 0.0);
+    status s = thread_pool_new(n_thread, &c->pool, err);
+    if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
+    if (s == STATUS_OK) s = pipeline_run(c, err);
+    return s;
+}
+
+/* The state that the outcome means, written to status.json and the log. */
+static int conclude(struct worker_status *st, struct log *log, status outcome, const struct error *error)
+{
+    struct error err = {0};
+    int code = outcome == STATUS_OK ? WORKER_SUCCEEDED : outcome == STATUS_CANCELLED ? WORKER_CANCELLED : WORKER_FAILED;
+    if (worker_status_stale(st) || outcome == STATUS_STALE) {
+        log_error(log, "stopped: the attempt of this worker is no longer current");
+        return WORKER_STALE;
+    }
+    if (code == WORKER_SUCCEEDED)
+        log_info(log, "succeeded");
+    else if (code == WORKER_CANCELLED)
+        log_info(log, "cancelled");
+    else
+        log_error(log, "failed (%s%s%s): %s", status_name(outcome), error->field[0] != '\0' ? ", " : "", error->field,
+                  error->text);
+    const char *state = code == WORKER_SUCCEEDED ? "succeeded" : code == WORKER_CANCELLED ? "cancelled" : "failed";
+    if (worker_status_finish(st, state, code == WORKER_FAILED ? error : NULL, &err) != STATUS_OK) {
+        log_error(log, "%s", err.text);
+        return err.code == STATUS_STALE ? WORKER_STALE : WORKER_FAILED;
+    }
+    return code;
+}
+
+int main(int argc, char **argv)
+{
+    struct arguments a;
+    struct worker_folder folder;
+    struct pipeline_context context;
+    struct error err = {0};
+    char log_path[WORKER_PATH_BYTES];
+    int code = parse_arguments(argc, argv, &a);
+    if (code >= 0) return code;
+    set_signals();
+    status s = worker_folder_open(&folder, a.folder, &err);
+    if (s != STATUS_OK) {
+        fprintf(stderr, "selvedge-worker: %s\n", err.text);
+        return s == STATUS_STALE ? WORKER_STALE : s == STATUS_NOT_FOUND ? WORKER_USAGE : WORKER_FAILED;
+    }
+    pipeline_context_init(&context);
+    context.folder = &folder;
+    context.memory_limit_bytes = a.memory_mib << 20;
+    worker_folder_path(&folder, JOB_FILE_LOG, NULL, log_path);
+    s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &context.log, &err);
+    if (s == STATUS_OK) s = worker_status_start(&folder, context.log, &context.status, &err);
+    if (s != STATUS_OK) {
+        fprintf(stderr, "selvedge-worker: %s\n", err.text);
+        code = WORKER_FAILED;
+    } else {
+        s = run_job(&context, a.n_thread, &err);
+        code = conclude(context.status, context.log, s, &err);
+    }
+    worker_status_free(context.status);
+    pipeline_context_release(&context);
+    thread_pool_free(context.pool);
+    log_close(context.log);
+    worker_folder_close(&folder);
+    return code;
+}

@@ -1,0 +1,262 @@
+#include "optimizer/worker/worker_status.h"
+#include "base/clock.h"
+#include "base/durable.h"
+#include "base/utf8.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/json_number.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+
+enum { MAX_WARNING = 50, WARNING_BYTES = 512, HEARTBEAT_MS = 400 };
+
+struct worker_status {
+    const struct worker_folder *folder;
+    struct log *log;
+    pthread_t thread;
+    bool running;
+    atomic_bool cancel, stale, stop;
+    pthread_mutex_t mutex; /* everything below */
+    char stage[64], message[300];
+    size_t i_stage, n_stage;
+    double base, weight, stage_fraction;
+    double started_s, started_unix_s, first_fraction; /* first_fraction: what earlier attempts had done */
+    bool has_objective;
+    size_t step;
+    double objective, objective_se;
+    size_t n_warning, n_more; /* more: in the log only */
+    char warning[MAX_WARNING][WARNING_BYTES];
+};
+
+/* Keeps a text for status.json, which takes UTF-8 only; the cut may have split a character. */
+static void keep(char *to, size_t n_bytes, const char *text)
+{
+    snprintf(to, n_bytes, "%s", text);
+    utf8_repair(to);
+}
+
+/* Remaining time by the speed so far; unknown before one per cent is done. */
+static double eta_s(const struct worker_status *st, double fraction)
+{
+    double done = fraction - st->first_fraction;
+    if (done < 0.01 || fraction <= 0.0) return NAN;
+    return (clock_monotonic_s() - st->started_s) * (1.0 - fraction) / done;
+}
+
+static json_t *error_json(const struct error *error)
+{
+    if (error == NULL) return json_null();
+    return json_pack("{s:s, s:s, s:s}", "code", status_name(error->code), "field", error->field, "text", error->text);
+}
+
+/* With the mutex held. */
+static char *status_text(const struct worker_status *st, const char *state, const struct error *error)
+{
+    bool over = strcmp(state, "running") != 0;
+    double fraction = strcmp(state, "succeeded") == 0 ? 1.0 : fmin(1.0, st->base + st->weight * st->stage_fraction);
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    json_t *warnings = json_array();
+    for (size_t i = 0; i < st->n_warning; i++) json_array_append_new(warnings, json_string(st->warning[i]));
+    json_t *json =
+        json_pack("{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state",
+                  state, "attempt", (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage",
+                  (json_int_t)st->i_stage, "n_stage", (json_int_t)st->n_stage, "stage_fraction", st->stage_fraction,
+                  "fraction", fraction, "eta_s", over ? json_null() : json_number(eta_s(st, fraction)),
+                  "heartbeat_unix_s", clock_wall_s(), "started_unix_s", st->started_unix_s, "message", st->message,
+                  "objective", st->has_objective ? json_number(st->objective) : json_null(), "objective_se",
+                  st->has_objective ? json_number(st->objective_se) : json_null(), "step",
+                  st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
+                  error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
+    char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(12)) : NULL;
+    json_decref(json);
+    return text;
+}
+
+static void beat(struct worker_status *st)
+{
+    char path[WORKER_PATH_BYTES];
+    struct error err = {0};
+    if (worker_folder_check(st->folder, &err) == STATUS_STALE) {
+        atomic_store(&st->stale, true);
+        atomic_store(&st->cancel, true);
+        return;
+    }
+    worker_folder_path(st->folder, JOB_FILE_STATUS, NULL, path);
+    pthread_mutex_lock(&st->mutex);
+    char *text = status_text(st, "running", NULL);
+    pthread_mutex_unlock(&st->mutex);
+    /* a heartbeat that cannot be written (disk full) is no reason to lose the work */
+    if (text != NULL && durable_replace_volatile(path, text, strlen(text), &err) != STATUS_OK)
+        log_warning(st->log, "%s", err.text);
+    free(text);
+}
+
+static void *heartbeat(void *context)
+{
+    struct worker_status *st = context;
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    sigaddset(&set, SIGINT);
+    const struct timespec wait = {0, HEARTBEAT_MS * 1000000L};
+    while (!atomic_load(&st->stop)) {
+        beat(st);
+        int signal_number = sigtimedwait(&set, NULL, &wait);
+        if (signal_number > 0 && !atomic_load(&st->stop)) {
+            log_info(st->log, "received %s: stopping", signal_number == SIGTERM ? "SIGTERM" : "SIGINT");
+            atomic_store(&st->cancel, true);
+        }
+    }
+    return NULL;
+}
+
+status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **out,
+                           struct error *err)
+{
+    struct worker_status *st = calloc(1, sizeof *st);
+    if (st == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: out of memory");
+    st->folder = folder;
+    st->log = log;
+    st->started_s = clock_monotonic_s();
+    st->started_unix_s = clock_wall_s();
+    snprintf(st->message, sizeof st->message, "starting");
+    pthread_mutex_init(&st->mutex, NULL);
+    if (pthread_create(&st->thread, NULL, heartbeat, st) != 0) {
+        pthread_mutex_destroy(&st->mutex);
+        free(st);
+        return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: no thread");
+    }
+    st->running = true;
+    *out = st;
+    return STATUS_OK;
+}
+
+static void stop_thread(struct worker_status *st)
+{
+    if (!st->running) return;
+    atomic_store(&st->stop, true);
+    pthread_kill(st->thread, SIGINT); /* ends the wait */
+    pthread_join(st->thread, NULL);
+    st->running = false;
+}
+
+status worker_status_finish(struct worker_status *st, const char *state, const struct error *error, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    stop_thread(st);
+    if (worker_status_stale(st)) return error_set(err, STATUS_STALE, "the attempt of this worker is no longer current");
+    pthread_mutex_lock(&st->mutex);
+    if (strcmp(state, "succeeded") == 0)
+        snprintf(st->message, sizeof st->message, "done");
+    else
+        keep(st->message, sizeof st->message, error != NULL ? error->text : state);
+    char *text = status_text(st, state, error);
+    pthread_mutex_unlock(&st->mutex);
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the final status: out of memory");
+    worker_folder_path(st->folder, JOB_FILE_STATUS, NULL, path);
+    status s = worker_folder_replace(st->folder, path, text, strlen(text), err);
+    free(text);
+    return s;
+}
+
+void worker_status_free(struct worker_status *st)
+{
+    if (st == NULL) return;
+    stop_thread(st);
+    pthread_mutex_destroy(&st->mutex);
+    free(st);
+}
+
+const atomic_bool *worker_status_cancel(const struct worker_status *st) { return &st->cancel; }
+bool worker_status_stale(const struct worker_status *st) { return atomic_load(&st->stale); }
+
+void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage,
+                         double base, double weight)
+{
+    pthread_mutex_lock(&st->mutex);
+    snprintf(st->stage, sizeof st->stage, "%s", name);
+    keep(st->message, sizeof st->message, title);
+    st->i_stage = i_stage;
+    st->n_stage = n_stage;
+    st->base = base;
+    st->weight = weight;
+    st->stage_fraction = 0.0;
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_fraction(struct worker_status *st, double stage_fraction)
+{
+    pthread_mutex_lock(&st->mutex);
+    st->stage_fraction = fmax(st->stage_fraction, fmin(stage_fraction, 1.0)); /* progress does not run backwards */
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_restart_eta(struct worker_status *st)
+{
+    pthread_mutex_lock(&st->mutex);
+    st->first_fraction = st->base + st->weight * st->stage_fraction;
+    st->started_s = clock_monotonic_s();
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_message(struct worker_status *st, const char *text)
+{
+    pthread_mutex_lock(&st->mutex);
+    keep(st->message, sizeof st->message, text);
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_objective(struct worker_status *st, size_t step, double objective, double se)
+{
+    pthread_mutex_lock(&st->mutex);
+    st->has_objective = true;
+    st->step = step;
+    st->objective = objective;
+    st->objective_se = se;
+    pthread_mutex_unlock(&st->mutex);
+}
+
+/* With the mutex held. The last place of the list counts what finds none. */
+static void add_warning(struct worker_status *st, const char *text)
+{
+    if (st->n_warning < MAX_WARNING - 1) {
+        keep(st->warning[st->n_warning++], WARNING_BYTES, text);
+        return;
+    }
+    st->n_warning = MAX_WARNING;
+    snprintf(st->warning[MAX_WARNING - 1], WARNING_BYTES, "%zu more warnings are in the job's log", ++st->n_more);
+}
+
+void worker_status_warn(struct worker_status *st, const char *text)
+{
+    log_warning(st->log, "%s", text);
+    pthread_mutex_lock(&st->mutex);
+    bool known = false;
+    for (size_t i = 0; i < st->n_warning; i++) known |= strncmp(st->warning[i], text, WARNING_BYTES - 1) == 0;
+    if (!known) add_warning(st, text);
+    pthread_mutex_unlock(&st->mutex);
+}
+
+size_t worker_status_n_warning(struct worker_status *st)
+{
+    pthread_mutex_lock(&st->mutex);
+    size_t n = st->n_warning;
+    pthread_mutex_unlock(&st->mutex);
+    return n;
+}
+
+bool worker_status_warning(struct worker_status *st, size_t i, char *text, size_t n_bytes)
+{
+    pthread_mutex_lock(&st->mutex);
+    bool found = i < st->n_warning;
+    if (found) snprintf(text, n_bytes, "%s", st->warning[i]);
+    pthread_mutex_unlock(&st->mutex);
+    return found;
+}

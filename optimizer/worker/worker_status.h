@@ -1,0 +1,42 @@
+/* status.json and the thread that keeps it fresh; the same thread waits for SIGTERM and SIGINT and sets the cancel
+ * flag, and notices when the attempt has become stale. All functions may be called from any thread.
+ */
+#ifndef SELVEDGE_OPTIMIZER_WORKER_STATUS_H
+#define SELVEDGE_OPTIMIZER_WORKER_STATUS_H
+
+#include "base/log.h"
+#include "optimizer/worker/worker_folder.h"
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+struct worker_status;
+
+/* Starts the thread. SIGTERM and SIGINT must be blocked in the caller (and so in all threads made later). */
+status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **st,
+                           struct error *err);
+/* Writes the final state ("succeeded", "failed", "cancelled") durably and ends the thread; error only for "failed". A
+ * stale worker writes nothing. */
+status worker_status_finish(struct worker_status *st, const char *state, const struct error *error, struct error *err);
+void worker_status_free(struct worker_status *st);
+
+const atomic_bool *worker_status_cancel(const struct worker_status *st);
+bool worker_status_stale(const struct worker_status *st);
+
+/* Stage i_stage of n_stage begins; base and weight: the whole job's fraction before it and its share. */
+void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage,
+                         double base, double weight);
+void worker_status_fraction(struct worker_status *st, double stage_fraction);
+/* What is done so far cost nothing (an earlier attempt did it): the remaining time is estimated from here on. */
+void worker_status_restart_eta(struct worker_status *st);
+void worker_status_message(struct worker_status *st, const char *text);
+void worker_status_objective(struct worker_status *st, size_t step, double objective, double se);
+/* Kept in the list and written to the log. From the 50th on they are in the log only, and the list's last entry counts
+ * them. */
+void worker_status_warn(struct worker_status *st, const char *text);
+size_t worker_status_n_warning(struct worker_status *st);
+/* Copies warning i; false when there is none. */
+bool worker_status_warning(struct worker_status *st, size_t i, char *text, size_t n_bytes);
+
+#endif

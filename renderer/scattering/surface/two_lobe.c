@@ -1,0 +1,83 @@
+/* two_lobe.v1: the textile fiber model of the fabric thesis, section 5.4, as published. */
+#include "renderer/scattering/gauss_polynomial.h"
+#include "renderer/scattering/surface/two_lobe_core.h"
+
+/* What a uniform environment brings to th_o through each lobe, before colours. */
+static void lobe_energy(const struct scattering_state *s, float theta_o, float energy[3])
+{
+    enum { N = 24 };
+    float unused[2], sum[2][2] = {{0}};
+    for (int k = 0; k < 2; k++) {
+        float lo = fmaxf((float)-M_PI_2, -theta_o - 4 * s->beta[k]),
+              hi = fminf((float)M_PI_2, -theta_o + 4 * s->beta[k]);
+        float step = (hi - lo) / N;
+        for (int i = 0; i < N; i++) {
+            float t = lo + ((float)i + 0.5f) * step, x = t + theta_o, cos_t = cosf(t), scale[2];
+            two_lobe_scale_at(s, false, t, scale, unused);
+            float m = s->peak[k] * expf(-x * x * s->inv_2var[k]) * scale[k] * cos_t * cos_t * step;
+            sum[k][0] += m;
+            sum[k][1] += m * two_lobe_schlick(cos_t);
+        }
+    }
+    energy[0] = sum[TWO_LOBE_R][0];
+    energy[1] = sum[TWO_LOBE_R][1];
+    energy[2] = sum[TWO_LOBE_TT][0] - sum[TWO_LOBE_TT][1];
+}
+
+static void fill_energy(struct scattering_state *s)
+{
+    enum { STRIDE = 16 };
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i += STRIDE)
+        lobe_energy(s, (float)(i * (M_PI_2 / TWO_LOBE_N_TABLE)), s->sampling[i].energy);
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
+        int i0 = i / STRIDE * STRIDE;
+        float t = (float)(i - i0) / STRIDE;
+        for (int k = 0; k < 3 && i != i0; k++)
+            s->sampling[i].energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
+    }
+}
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    status st = scattering_check_param(&scattering_two_lobe, param, err);
+    if (st != STATUS_OK) return st;
+    struct scattering_state *s = two_lobe_state_new(param);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++)
+        for (int k = 0; k < 2; k++) {
+            double d_beta;
+            double g = lobe_normaliser(i * (M_PI_2 / TWO_LOBE_N_TABLE), param[TWO_LOBE_P_BETA_R + k], NULL, &d_beta);
+            s->normal[i].value[k] = (float)g;
+            s->normal[i].d_beta[k] = (float)d_beta;
+        }
+    fill_energy(s);
+    two_lobe_fill_reach(s);
+    *state = s;
+    return STATUS_OK;
+}
+
+static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
+{
+    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
+    two_lobe_eval_terms(s, false, &di, &dout, &t, s_rgb, score);
+}
+
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
+                      float s_rgb[3], float *score)
+{
+    return two_lobe_eval_pdf(s, false, wi, wo, weight_rgb, s_rgb, score);
+}
+
+const struct scattering_model scattering_two_lobe = {
+    .id = "two_lobe.v1",
+    .title = "Two-lobe textile fiber (R and TT), fabric thesis section 5.4",
+    .n_param = TWO_LOBE_N_PARAM,
+    .param = two_lobe_param,
+    .prepare = prepare,
+    .release = two_lobe_release,
+    .eval = eval,
+    .sample = two_lobe_sample,
+    .pdf = two_lobe_pdf,
+    .eval_pdf = eval_pdf,
+};

@@ -1,0 +1,79 @@
+#include "renderer/scattering/surface/two_lobe_core.h"
+
+#include <math.h>
+
+#define DEG (M_PI / 180)
+
+/* Fabric thesis, Table 5.1. */
+const struct param_info two_lobe_param[TWO_LOBE_N_PARAM] = {
+    {"C_R.r", "C_R", "", 0, 0.001, 0.999, 0.1},
+    {"C_R.g", "C_R", "", 1, 0.001, 0.999, 0.1},
+    {"C_R.b", "C_R", "", 2, 0.001, 0.999, 0.1},
+    {"C_TT.r", "C_TT", "", 0, 0.001, 0.999, 0.85},
+    {"C_TT.g", "C_TT", "", 1, 0.001, 0.999, 0.85},
+    {"C_TT.b", "C_TT", "", 2, 0.001, 0.999, 0.85},
+    {"beta_R", "beta_R", "deg", -1, 1 * DEG, 10 * DEG, 5 * DEG},
+    {"beta_TT", "beta_TT", "deg", -1, 10 * DEG, 45 * DEG, 10 * DEG},
+    {"gamma_TT", "gamma_TT", "deg", -1, 1 * DEG, 45 * DEG, 10 * DEG},
+};
+
+struct scattering_state *two_lobe_state_new(const double *param)
+{
+    struct scattering_state *s = calloc(1, sizeof *s);
+    if (s == NULL) return NULL;
+    for (int c = 0; c < 3; c++) {
+        s->c_r[c] = (float)param[TWO_LOBE_P_C_R + c];
+        s->not_c_r[c] = (float)(1 - param[TWO_LOBE_P_C_R + c]);
+        s->c_tt[c] = (float)param[TWO_LOBE_P_C_TT + c];
+    }
+    for (int k = 0; k < 2; k++) {
+        double beta = param[TWO_LOBE_P_BETA_R + k];
+        s->beta[k] = (float)beta;
+        s->peak[k] = (float)(1 / (sqrt(2 * M_PI) * beta));
+        s->inv_2var[k] = (float)(0.5 / (beta * beta));
+        s->inv[k] = (float)(1 / beta);
+        s->inv_cube[k] = (float)(1 / (beta * beta * beta));
+    }
+    von_mises_init(&s->azimuth, param[TWO_LOBE_P_GAMMA_TT]);
+    return s;
+}
+
+void two_lobe_fill_reach(struct scattering_state *s)
+{
+    const double step = M_PI_2 / TWO_LOBE_N_TABLE;
+    for (int i = 0; i <= TWO_LOBE_N_TABLE; i++)
+        for (int k = 0; k < 2; k++) {
+            s->sampling[i].near[k] = (float)erf((M_PI_2 - i * step) / (M_SQRT2 * (double)s->beta[k]));
+            s->sampling[i].far[k] = (float)erf((M_PI_2 + i * step) / (M_SQRT2 * (double)s->beta[k]));
+        }
+}
+
+float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
+{
+    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
+    return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
+}
+
+void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
+                     float wi[3])
+{
+    struct fiber_direction dout = fiber_direction_of(wo);
+    struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);
+    int k = u[0] < two_lobe_p_r(s, &e, weight_rgb) ? TWO_LOBE_R : TWO_LOBE_TT;
+
+    /* th_i about -th_o: the pole on the side of -th_o is the near one */
+    bool upper_near = dout.theta_rad <= 0;
+    float hi = upper_near ? e.near[k] : e.far[k], lo = -(upper_near ? e.far[k] : e.near[k]);
+    float theta = -dout.theta_rad + (float)M_SQRT2 * s->beta[k] * erf_inverse(lo + u[1] * (hi - lo));
+    theta = fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
+    float sin_theta = sinf(theta), cos_theta = fmaxf(cosf(theta), 0);
+
+    float delta = k == TWO_LOBE_R ? (float)(2 * M_PI) * u[2] : von_mises_sample(&s->azimuth, u[2]);
+    float c = -cosf(delta), d = -sinf(delta); /* turned by pi: forward is behind the fiber */
+    wi[0] = sin_theta;
+    wi[1] = cos_theta * (c * dout.azimuth[0] - d * dout.azimuth[1]);
+    wi[2] = cos_theta * (d * dout.azimuth[0] + c * dout.azimuth[1]);
+}
+
+void two_lobe_release(struct scattering_state *s) { free(s); }

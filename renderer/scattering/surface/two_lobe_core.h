@@ -1,0 +1,220 @@
+/* What two_lobe.v1 and two_lobe_balanced.v1 share: state, evaluation with scores, sampling. Included by those two files
+ * only.
+ *
+ *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
+ *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
+ *     published: th_f = th_i, scale = 1 / G(-th_i, beta);  balanced: th_f = (th_i - th_o) / 2, scale = a(th_i) a(th_o)
+ *                (R) and b(th_i) b(th_o) (TT), of which b depends on both widths (two_lobe_balanced.c)
+ *
+ * Sampling of wi: a lobe by its energy at th_o and what the channels are worth, th_i from the normal density about
+ * -th_o cut to +-pi/2, azimuth uniform or von Mises. pdf() is the exact density of that. All functions are inlined with
+ * `balanced` constant.
+ */
+#ifndef SELVEDGE_RENDERER_TWO_LOBE_CORE_H
+#define SELVEDGE_RENDERER_TWO_LOBE_CORE_H
+
+#include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/surface/scattering_registry.h"
+#include "renderer/scattering/von_mises.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+
+enum { TWO_LOBE_N_TABLE = 1024, TWO_LOBE_N_PARAM = 9, TWO_LOBE_R = 0, TWO_LOBE_TT = 1 };
+enum {
+    TWO_LOBE_P_C_R = 0,
+    TWO_LOBE_P_C_TT = 3,
+    TWO_LOBE_P_BETA_R = 6,
+    TWO_LOBE_P_BETA_TT = 7,
+    TWO_LOBE_P_GAMMA_TT = 8
+};
+
+struct two_lobe_normal_entry { /* by |th|: G or the balanced scale, and its derivative by the lobe's own beta */
+    float value[2], d_beta[2];
+};
+
+struct two_lobe_sampling_entry { /* by |th_o| */
+    float energy[3]; /* from all around, before colours: integrals of M_R, M_R (1 - cos th)^5, M_TT (1 - (1 - cos th)^5)
+                      */
+    float near[2],
+        far[2]; /* erf of the distance from the lobe's centre to the near and the far pole, in units of sqrt(2) beta */
+};
+
+struct scattering_state {
+    float c_r[3], not_c_r[3], c_tt[3]; /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all */
+    float beta[2];
+    float peak[2]; /* 1 / (sqrt(2 pi) beta) */
+    float inv_2var[2];
+    float inv[2], inv_cube[2]; /* 1 / beta, 1 / beta^3 */
+    struct von_mises azimuth;
+    struct two_lobe_normal_entry normal[TWO_LOBE_N_TABLE + 1];
+    struct two_lobe_sampling_entry sampling[TWO_LOBE_N_TABLE + 1];
+    float cross[TWO_LOBE_N_TABLE + 1]; /* balanced only, by |th|: d ln of TT's scale / d beta_R */
+};
+
+extern const struct param_info two_lobe_param[TWO_LOBE_N_PARAM];
+
+/* Everything but the tables; NULL without memory. */
+struct scattering_state *two_lobe_state_new(const double *param);
+/* near and far of the sampling table. */
+void two_lobe_fill_reach(struct scattering_state *s);
+
+static inline float two_lobe_table_position(float theta_rad, int *i)
+{
+    float x = fabsf(theta_rad) * (float)(TWO_LOBE_N_TABLE / M_PI_2);
+    *i = x < TWO_LOBE_N_TABLE - 1 ? (int)x : TWO_LOBE_N_TABLE - 1;
+    return x - (float)*i;
+}
+
+static inline float two_lobe_mix(float a, float b, float t) { return a + t * (b - a); }
+
+/* Scale of both lobes and d ln scale / d beta at one angle. */
+static inline void two_lobe_scale_at(const struct scattering_state *s, bool balanced, float theta_rad, float scale[2],
+                                     float score[2])
+{
+    int i;
+    float t = two_lobe_table_position(theta_rad, &i);
+    const struct two_lobe_normal_entry *a = &s->normal[i], *b = a + 1;
+    for (int k = 0; k < 2; k++) {
+        float value = two_lobe_mix(a->value[k], b->value[k], t), d = two_lobe_mix(a->d_beta[k], b->d_beta[k], t);
+        scale[k] = balanced ? value : 1 / value;
+        score[k] = balanced ? d / value : -d / value;
+    }
+}
+
+static inline float two_lobe_schlick(float cos_theta)
+{
+    float x = 1 - cos_theta, x2 = x * x;
+    return x2 * x2 * x;
+}
+
+static inline float two_lobe_cross_at(const struct scattering_state *s, float theta_rad)
+{
+    int i;
+    float t = two_lobe_table_position(theta_rad, &i);
+    return two_lobe_mix(s->cross[i], s->cross[i + 1], t);
+}
+
+struct two_lobe_terms {
+    float g[2]; /* normal densities g(th_o; -th_i, beta) */
+    float x2;   /* (th_i + th_o)^2 */
+    float one_minus_cos, von_mises;
+};
+
+static inline struct two_lobe_terms two_lobe_terms_of(const struct scattering_state *s,
+                                                      const struct fiber_direction *di,
+                                                      const struct fiber_direction *dout)
+{
+    struct two_lobe_terms t;
+    float x = di->theta_rad + dout->theta_rad;
+    t.x2 = x * x;
+    t.one_minus_cos = fiber_one_minus_cos_opposite(di, dout);
+    for (int k = 0; k < 2; k++) t.g[k] = s->peak[k] * expf(-t.x2 * s->inv_2var[k]);
+    t.von_mises = s->azimuth.norm * expf(-s->azimuth.kappa * t.one_minus_cos);
+    return t;
+}
+
+static inline void two_lobe_eval_terms(const struct scattering_state *s, bool balanced,
+                                       const struct fiber_direction *di, const struct fiber_direction *dout,
+                                       const struct two_lobe_terms *t, float s_rgb[3], float *score)
+{
+    float scale[2], d_scale[2], k;
+    two_lobe_scale_at(s, balanced, di->theta_rad, scale, d_scale);
+    if (balanced) {
+        float scale_o[2], d_scale_o[2];
+        two_lobe_scale_at(s, true, dout->theta_rad, scale_o, d_scale_o);
+        for (int j = 0; j < 2; j++) {
+            scale[j] *= scale_o[j];
+            d_scale[j] += d_scale_o[j];
+        }
+        k = two_lobe_schlick(cosf(0.5f * (di->theta_rad - dout->theta_rad)));
+    } else {
+        k = two_lobe_schlick(di->cos_theta);
+    }
+    float a = t->g[TWO_LOBE_R] * scale[TWO_LOBE_R] * (float)(0.5 / M_PI);
+    float b = t->g[TWO_LOBE_TT] * scale[TWO_LOBE_TT] * t->von_mises;
+    float part_r[3], part_tt[3];
+    for (int c = 0; c < 3; c++) {
+        float fresnel = s->c_r[c] + s->not_c_r[c] * k;
+        part_r[c] = fresnel * a;
+        part_tt[c] = s->c_tt[c] * s->not_c_r[c] * (1 - k) * b;
+        s_rgb[c] = part_r[c] + part_tt[c];
+    }
+    if (score == NULL) return;
+
+    float d_width[2];
+    for (int j = 0; j < 2; j++) d_width[j] = t->x2 * s->inv_cube[j] - s->inv[j] + d_scale[j];
+    float d_cross = balanced ? two_lobe_cross_at(s, di->theta_rad) + two_lobe_cross_at(s, dout->theta_rad) : 0;
+    float d_gamma = s->azimuth.score_at_peak - s->azimuth.score_slope * t->one_minus_cos;
+    for (int j = 0; j < 3 * TWO_LOBE_N_PARAM; j++) score[j] = 0;
+    for (int c = 0; c < 3; c++) {
+        float *h = score + c * TWO_LOBE_N_PARAM;
+        float inv = s_rgb[c] > 1e-30f ? 1 / s_rgb[c] : 0; /* nothing scattered: no weight, no score */
+        h[TWO_LOBE_P_C_R + c] = (1 - k) * (a - s->c_tt[c] * b) * inv;
+        h[TWO_LOBE_P_C_TT + c] = part_tt[c] / s->c_tt[c] * inv;
+        h[TWO_LOBE_P_BETA_R] = (part_r[c] * d_width[TWO_LOBE_R] + part_tt[c] * d_cross) * inv;
+        h[TWO_LOBE_P_BETA_TT] = part_tt[c] * inv * d_width[TWO_LOBE_TT];
+        h[TWO_LOBE_P_GAMMA_TT] = part_tt[c] * inv * d_gamma;
+    }
+}
+
+static inline struct two_lobe_sampling_entry two_lobe_sampling_at(const struct scattering_state *s, float theta_rad)
+{
+    int i;
+    float t = two_lobe_table_position(theta_rad, &i);
+    const struct two_lobe_sampling_entry *a = &s->sampling[i], *b = a + 1;
+    struct two_lobe_sampling_entry e;
+    for (int k = 0; k < 3; k++) e.energy[k] = two_lobe_mix(a->energy[k], b->energy[k], t);
+    for (int k = 0; k < 2; k++) {
+        e.near[k] = two_lobe_mix(a->near[k], b->near[k], t);
+        e.far[k] = two_lobe_mix(a->far[k], b->far[k], t);
+    }
+    return e;
+}
+
+/* Probability of drawing from the R lobe: least summed variance of the channels, so in proportion to the root of the
+ * channels' summed squares. Neither lobe is starved: both carry derivatives even where one is dark. */
+static inline float two_lobe_p_r(const struct scattering_state *s, const struct two_lobe_sampling_entry *e,
+                                 const float *weight_rgb)
+{
+    float r = 0, tt = 0;
+    for (int c = 0; c < 3; c++) {
+        float w = weight_rgb != NULL ? weight_rgb[c] : 1;
+        float a = w * (s->c_r[c] * e->energy[0] + s->not_c_r[c] * e->energy[1]),
+              b = w * s->c_tt[c] * s->not_c_r[c] * e->energy[2];
+        r += a * a;
+        tt += b * b;
+    }
+    r = sqrtf(r);
+    float p = r / (r + sqrtf(tt));
+    p = p < 0.95f ? p : 0.95f;
+    return p > 0.05f ? p : 0.05f; /* 0/0 too */
+}
+
+static inline float two_lobe_pdf_terms(const struct scattering_state *s, const struct fiber_direction *di,
+                                       const struct fiber_direction *dout, const float *weight_rgb,
+                                       const struct two_lobe_terms *t)
+{
+    struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout->theta_rad);
+    float p_r = two_lobe_p_r(s, &e, weight_rgb);
+    float r = t->g[TWO_LOBE_R] * 2 / (e.near[TWO_LOBE_R] + e.far[TWO_LOBE_R]) * (float)(0.5 / M_PI);
+    float tt = t->g[TWO_LOBE_TT] * 2 / (e.near[TWO_LOBE_TT] + e.far[TWO_LOBE_TT]) * t->von_mises;
+    return (p_r * r + (1 - p_r) * tt) / (di->cos_theta > FIBER_COS_MIN ? di->cos_theta : FIBER_COS_MIN);
+}
+
+static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool balanced, const float wi[3],
+                                      const float wo[3], const float *weight_rgb, float s_rgb[3], float *score)
+{
+    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
+    two_lobe_eval_terms(s, balanced, &di, &dout, &t, s_rgb, score);
+    return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
+}
+
+/* Shared by both models as they are. */
+void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
+                     float wi[3]);
+float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb);
+void two_lobe_release(struct scattering_state *s);
+
+#endif

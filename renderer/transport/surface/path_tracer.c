@@ -1,0 +1,448 @@
+#include "renderer/transport/surface/path_tracer.h"
+
+#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/transport/light/lamp_guide.h"
+
+#include <math.h>
+#include <string.h>
+
+#ifndef ROULETTE_BELOW
+#define ROULETTE_BELOW 0.6f
+#endif
+#ifndef SHADOW_BELOW
+#define SHADOW_BELOW 0.01f
+#endif
+#ifndef PROBE_SCALE
+#define PROBE_SCALE 1.5f
+#endif
+#ifndef PROBE_BELOW
+#define PROBE_BELOW 0.1f
+#endif
+
+void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
+                       const struct scattering_state *state, const struct configuration *c, bool want_jacobian)
+{
+    memset(s, 0, sizeof *s);
+    s->scene = scene;
+    s->model = model;
+    s->state[0] = state;
+    s->n_set = 1;
+    s->has_lamp = s->probes = c->light != LIGHT_NO_LAMP;
+    if (s->has_lamp) lamp_init(&s->lamp, c);
+    for (int k = 0; k < 3; k++) {
+        s->environment[k] = (float)c->environment_rgb[k];
+        if (s->environment[k] > 0) s->has_environment = true;
+    }
+    s->image = c->environment;
+    s->image_turn[0] = (float)cos(c->cloth_rotation_rad);
+    s->image_turn[1] = (float)sin(c->cloth_rotation_rad);
+    s->roulette_below = ROULETTE_BELOW;
+    if (s->probes) lamp_guide_energy_of(model, state, &s->energy[0]);
+    s->want_jacobian = want_jacobian;
+}
+
+void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
+                            const struct configuration *c, bool want_jacobian)
+{
+    path_setting_init(s, scene, sets->model, sets->state[0], c, want_jacobian);
+    s->n_set = sets->n;
+    for (size_t i = 0; i < sets->n; i++) {
+        s->state[i] = sets->state[i];
+        if (s->probes && i > 0) lamp_guide_energy_of(s->model, s->state[i], &s->energy[i]);
+    }
+}
+
+static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
+{
+    out[0] = (float)((double)local_mm[0] + offset_mm[0]);
+    out[1] = (float)((double)local_mm[1] + offset_mm[1]);
+    out[2] = local_mm[2];
+}
+
+/* The state that a path carries. */
+struct walk {
+    const struct path_setting *s;
+    struct rng *rng;
+    const struct lamp *lamp;
+    size_t n_lamp;
+    struct path_result *out; /* of one lamp: what is added now goes there */
+    struct path_result *first_out;
+    size_t n_out;           /* a result for each lamp, one without lamps */
+    struct path_step *step; /* being recorded, or NULL */
+    const struct scattering_state *state; /* of the fiber that was hit */
+    size_t i_set;                         /* its parameter set */
+    float throughput[3];
+    float towards[PATH_MAX_LAMP][3]; /* the lamps, from the present vertex: where its probes go */
+    float p_probe;                   /* probability of a probe there */
+    float share[PATH_MAX_LAMP];      /* of lamp connections at the present vertex: the rest is its predecessor's probes' */
+    float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
+    float h[PATH_N_DERIVATIVE];            /* running score sums, laid out as path_result's derivatives */
+};
+
+/* Adds value * (1, H + score) to the result; score NULL: the last step's are in H already. */
+static inline void add_light(struct walk *w, const float value[3], const float *score)
+{
+    for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
+    if (!w->s->want_jacobian) return;
+    size_t n = w->s->model->n_param, i = 0;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t k = 0; k < w->s->n_set; k++) {
+            const float *own = score != NULL && k == w->i_set ? score + c * n : NULL;
+            for (size_t p = 0; p < n; p++, i++) w->out->jac[i] += value[c] * (w->h[i] + (own != NULL ? own[p] : 0));
+        }
+}
+
+/* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
+static void keep_nan(struct walk *w, const float value[3])
+{
+    if (isnan(value[0] + value[1] + value[2])) w->out->radiance[0] = NAN;
+}
+
+static void add_light_to_all(struct walk *w, const float value[3], const float *score)
+{
+    for (size_t i = 0; i < w->n_out; i++) {
+        w->out = w->first_out + i;
+        add_light(w, value, score);
+    }
+}
+
+/* Next-event estimation: one point on the lamp. share: of its light that counts here. What path_step's light is; 0: none. */
+static float connect_lamp(struct walk *w, const struct lamp *lamp, float share, const struct scene_ray *ray,
+                          const struct scene_hit *hit, const struct fiber_frame *f, const float wo[3], float wi[3])
+{
+    const struct path_setting *s = w->s;
+    float position[3], u[2], direction[3], pdf_lamp, s_rgb[3];
+    unwrapped(hit->position_mm, ray->offset_mm, position);
+    u[0] = rng_float(w->rng);
+    u[1] = rng_float(w->rng);
+    if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
+    if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return 0;
+    to_local(f, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float light = share * lamp->radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
+    for (int c = 0; c < 3; c++) {
+        value[c] = w->throughput[c] * s_rgb[c] * light;
+        most = value[c] > most ? value[c] : most;
+    }
+    if (!(most > 0)) {
+        keep_nan(w, value);
+        return 0;
+    }
+    if (most < SHADOW_BELOW) { /* hardly any light: trace few of these shadow rays, for more each */
+        float survival = most / SHADOW_BELOW;
+        if (rng_float(w->rng) >= survival) return 0;
+        light /= survival;
+        for (int c = 0; c < 3; c++) value[c] /= survival;
+    }
+    struct scene_ray shadow;
+    scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
+    if (scene_occluded(s->scene, &shadow)) return 0;
+    add_light(w, value, w->score);
+    return light;
+}
+
+/* Next-event estimation: one direction of the image environment. */
+static void connect_image(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
+                          const struct fiber_frame *f, const float wo[3])
+{
+    const struct path_setting *s = w->s;
+    float u[2], world[3], direction[3], radiance[3], pdf_image, wi[3], s_rgb[3], value[3], most = 0;
+    u[0] = rng_float(w->rng);
+    u[1] = rng_float(w->rng);
+    if (!environment_sample(s->image, u, world, radiance, &pdf_image)) return;
+    if (world[2] <= 0 && scene_has_black_sheet(s->scene)) return;
+    turn_about_normal(s->image_turn, -1, world, direction);
+    to_local(f, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float weight = cos_theta(wi) / pdf_image * power_heuristic(pdf_image, pdf);
+    for (int c = 0; c < 3; c++) {
+        radiance[c] *= weight;
+        value[c] = w->throughput[c] * s_rgb[c] * radiance[c];
+        most = value[c] > most ? value[c] : most;
+    }
+    if (!(most > 0)) {
+        keep_nan(w, value);
+        return;
+    }
+    if (most < SHADOW_BELOW) {
+        float survival = most / SHADOW_BELOW;
+        if (rng_float(w->rng) >= survival) return;
+        for (int c = 0; c < 3; c++) {
+            radiance[c] /= survival;
+            value[c] /= survival;
+        }
+    }
+    struct scene_ray shadow;
+    scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
+    if (scene_occluded(s->scene, &shadow)) return;
+    add_light_to_all(w, value, w->score);
+    if (w->step != NULL) {
+        memcpy(w->step->image_wi, wi, sizeof wi);
+        memcpy(w->step->image, radiance, sizeof radiance);
+    }
+}
+
+static void add_image(const struct path_setting *s, const float direction[3], float pdf, float beyond[3])
+{
+    float world[3], radiance[3];
+    turn_about_normal(s->image_turn, 1, direction, world);
+    float pdf_image = environment_at(s->image, world, radiance);
+    float share = pdf > 0 ? power_heuristic(pdf, pdf_image) : 1;
+    for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
+}
+
+static float lamp_beyond(const struct lamp *lamp, const struct scene_ray *ray, float pdf)
+{
+    float position[3];
+    unwrapped(ray->origin_mm, ray->offset_mm, position);
+    float pdf_lamp = lamp_pdf(lamp, position, ray->direction);
+    return pdf_lamp > 0 ? lamp->radiance * (pdf > 0 ? power_heuristic(pdf, pdf_lamp) : 1) : 0;
+}
+
+/* Radiance that a ray meets beyond the cloth. pdf: of the scattering sample that made it, 0 for a camera ray. */
+static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
+{
+    const struct path_setting *s = w->s;
+    if (ray->direction[2] < 0 && scene_has_black_sheet(s->scene)) return;
+    float around[3] = {0, 0, 0};
+    for (int c = 0; c < 3 && s->has_environment; c++) around[c] += s->environment[c];
+    if (s->image != NULL) add_image(s, ray->direction, pdf, around);
+    for (size_t i = 0; i < w->n_out; i++) {
+        float beyond[3], value[3], lamp = i < w->n_lamp ? lamp_beyond(&w->lamp[i], ray, pdf) : 0;
+        for (int c = 0; c < 3; c++) {
+            beyond[c] = lamp + around[c];
+            value[c] = w->throughput[c] * beyond[c];
+        }
+        w->out = w->first_out + i;
+        if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
+        if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
+    }
+}
+
+static inline void add_scores(struct walk *w)
+{
+    size_t n = w->s->model->n_param;
+    for (size_t c = 0; c < 3; c++) {
+        float *h = w->h + (c * w->s->n_set + w->i_set) * n;
+        for (size_t p = 0; p < n; p++) h[p] += w->score[c * n + p];
+    }
+}
+
+static void enter_fiber(struct walk *w, const struct scene_hit *hit)
+{
+    if (w->s->n_set == 1) return;
+    w->i_set = scene_group_of(w->s->scene, hit->i_segment);
+    w->state = w->s->state[w->i_set];
+}
+
+/* The probe's ray from the present vertex, whose throughput and scores the walk has taken. */
+static void probe_ahead(struct walk *w, size_t i_lamp, const struct scene_hit *from, const double offset_mm[2],
+                        const float direction[3], float weight)
+{
+    struct scene_ray ray;
+    struct scene_hit hit;
+    struct fiber_frame f;
+    float back[3] = {-direction[0], -direction[1], -direction[2]}, wo[3], wi[3];
+    scene_ray_leave(from, offset_mm, direction, &ray);
+    if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond is the walk's */
+    fiber_frame_from(&f, hit.tangent);
+    to_local(&f, back, wo);
+    enter_fiber(w, &hit);
+    float light = connect_lamp(w, &w->lamp[i_lamp], 1, &ray, &hit, &f, wo, wi);
+    if (w->step == NULL || light == 0) return;
+    memcpy(w->step->probe_wo, wo, sizeof wo);
+    memcpy(w->step->probe_light_wi, wi, sizeof wi);
+    w->step->probe_light = light * weight;
+    w->step->i_probe_group = scene_group_of(w->s->scene, hit.i_segment);
+}
+
+/* One more way to the light of a lamp by one other fiber: a ray near the lamp's direction (lamp_guide.h), a connection from
+ * what it hits, and nothing further. Such paths have two densities, of S and of the guide; each kind counts with its share of
+ * their sum, the walk's own by walk.share. A walk that itself turned towards the lamp would pay for it with its weight. */
+static void probe(struct walk *w, size_t i_lamp, const struct scene_ray *ray, const struct scene_hit *hit,
+                  const struct fiber_frame *f, const float wo[3])
+{
+    const struct path_setting *s = w->s;
+    float u[2], direction[3], wi[3], s_rgb[3], next[3], most = 0;
+    u[0] = rng_float(w->rng);
+    u[1] = rng_float(w->rng);
+    lamp_guide_sample(w->towards[i_lamp], u, direction);
+    to_local(f, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float weight = cos_theta(wi) / (pdf + w->p_probe * lamp_guide_pdf(w->towards[i_lamp], direction));
+    for (int c = 0; c < 3; c++) {
+        next[c] = w->throughput[c] * s_rgb[c] * weight;
+        most = next[c] > most ? next[c] : most;
+    }
+    if (!(most > 0)) {
+        keep_nan(w, next);
+        return;
+    }
+    if (most < PROBE_BELOW) {
+        float survival = most / PROBE_BELOW;
+        if (rng_float(w->rng) >= survival) return;
+        weight /= survival;
+        for (int c = 0; c < 3; c++) next[c] /= survival;
+    }
+    size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0, i_set = w->i_set;
+    const struct scattering_state *state = w->state;
+    float throughput[3], h[PATH_N_DERIVATIVE];
+    memcpy(throughput, w->throughput, sizeof throughput);
+    memcpy(h, w->h, n_flat * sizeof *h);
+    memcpy(w->throughput, next, sizeof next);
+    if (s->want_jacobian) add_scores(w);
+    if (w->step != NULL) memcpy(w->step->probe_wi, wi, sizeof wi);
+    probe_ahead(w, i_lamp, hit, ray->offset_mm, direction, weight);
+    w->state = state;
+    w->i_set = i_set;
+    memcpy(w->throughput, throughput, sizeof throughput);
+    memcpy(w->h, h, n_flat * sizeof *h);
+}
+
+/* As large as the part of the light that fibers like this one hand on forwards. */
+static float probe_probability(const struct walk *w)
+{
+    const struct lamp_guide_energy *e = &w->s->energy[w->i_set];
+    float forward = 0, all = 0;
+    for (int c = 0; c < 3; c++) {
+        forward += w->throughput[c] * e->forward[c];
+        all += w->throughput[c] * e->all[c];
+    }
+    float p = PROBE_SCALE * forward / all;
+    return p < 1 ? p : 1;
+}
+
+/* All lamps' light at a vertex, straight and by a probe. */
+static void connect_lamps(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
+                          const struct fiber_frame *f, const float wo[3])
+{
+    float wi[3], position[3];
+    unwrapped(hit->position_mm, ray->offset_mm, position);
+    if (w->s->probes) w->p_probe = probe_probability(w);
+    for (size_t k = 0; k < w->n_lamp; k++) {
+        w->out = w->first_out + k;
+        float light = connect_lamp(w, &w->lamp[k], w->share[k], ray, hit, f, wo, wi);
+        if (w->step != NULL && light != 0) {
+            memcpy(w->step->light_wi, wi, sizeof wi);
+            w->step->light = light;
+        }
+        if (!w->s->probes) continue;
+        lamp_guide_towards(&w->lamp[k], position, w->towards[k]);
+        bool sees = w->towards[k][2] > 0 || !scene_has_black_sheet(w->s->scene);
+        if (sees && (w->p_probe >= 1 || rng_float(w->rng) < w->p_probe)) probe(w, k, ray, hit, f, wo);
+    }
+}
+
+/* Scatters the ray at the hit. False: roulette (or a dark fiber) ends the path. */
+static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hit *hit, const struct fiber_frame *f,
+                    const float wo[3], float *pdf_out)
+{
+    const struct path_setting *s = w->s;
+    float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
+    for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
+    s->model->sample(w->state, wo, w->throughput, u, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    if (pdf == 0) return false; /* rounded to a direction along the fiber, where nothing is scattered to */
+    float weight = cos_theta(wi) / pdf, most = 0, next[3];
+    for (int c = 0; c < 3; c++) {
+        next[c] = w->throughput[c] * s_rgb[c] * weight;
+        most = next[c] > most ? next[c] : most;
+    }
+    if (!(most > 0)) {
+        keep_nan(w, next);
+        return false;
+    }
+    if (most < s->roulette_below) {
+        survival = most / s->roulette_below;
+        if (rng_float(w->rng) >= survival) return false;
+    }
+    for (int c = 0; c < 3; c++) w->throughput[c] = next[c] / survival;
+    if (s->want_jacobian) add_scores(w);
+    if (w->step != NULL) {
+        memcpy(w->step->wi, wi, sizeof wi);
+        w->step->weight = weight / survival;
+    }
+    to_world(f, wi, direction);
+    for (size_t k = 0; k < w->n_lamp && s->probes; k++)
+        w->share[k] = pdf / (pdf + w->p_probe * lamp_guide_pdf(w->towards[k], direction));
+    double offset[2] = {ray->offset_mm[0], ray->offset_mm[1]};
+    scene_ray_leave(hit, offset, direction, ray);
+    *pdf_out = pdf;
+    return true;
+}
+
+static struct path_step *next_step(struct path_record *r)
+{
+    if (r == NULL) return NULL;
+    size_t i = r->n_step++;
+    if (i >= r->capacity) return NULL;
+    memset(&r->step[i], 0, sizeof r->step[i]);
+    return &r->step[i];
+}
+
+static void walk_start(struct walk *w, const struct path_setting *s, struct rng *rng, struct path_result *out)
+{
+    size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0;
+    w->s = s;
+    w->rng = rng;
+    w->first_out = w->out = out;
+    w->n_out = w->n_lamp > 0 ? w->n_lamp : 1;
+    w->step = NULL;
+    w->state = s->state[0];
+    w->i_set = 0;
+    for (int c = 0; c < 3; c++) w->throughput[c] = 1;
+    for (size_t k = 0; k < w->n_lamp; k++) w->share[k] = 1;
+    memset(w->h, 0, n_flat * sizeof *w->h);
+    for (size_t i = 0; i < w->n_out; i++) {
+        memset(out[i].radiance, 0, sizeof out[i].radiance);
+        memset(out[i].jac, 0, n_flat * sizeof *out[i].jac);
+        out[i].n_vertex = 0;
+    }
+}
+
+static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *record)
+{
+    const struct path_setting *s = w->s;
+    float pdf = 0;
+    for (uint32_t i = 0; i < PATH_MAX_VERTEX; i++) {
+        struct scene_hit hit;
+        if (!scene_trace(s->scene, ray, &hit)) {
+            add_beyond(w, ray, pdf);
+            return;
+        }
+        w->first_out->n_vertex++;
+        w->step = next_step(record);
+        struct fiber_frame f;
+        fiber_frame_from(&f, hit.tangent);
+        float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
+        to_local(&f, back, wo);
+        enter_fiber(w, &hit);
+        if (w->step != NULL) {
+            memcpy(w->step->wo, wo, sizeof wo);
+            w->step->i_group = scene_group_of(s->scene, hit.i_segment);
+        }
+        connect_lamps(w, ray, &hit, &f, wo);
+        if (s->image != NULL) connect_image(w, ray, &hit, &f, wo);
+        if (!scatter(w, ray, &hit, &f, wo, &pdf)) return;
+    }
+}
+
+void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
+                struct path_record *record)
+{
+    struct walk w; /* large: only what is used is set */
+    w.lamp = &s->lamp;
+    w.n_lamp = s->has_lamp;
+    walk_start(&w, s, rng, out);
+    walk_on(&w, ray, record);
+}
+
+void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
+                      struct rng *rng, struct path_result *out)
+{
+    struct walk w;
+    w.lamp = lamp;
+    w.n_lamp = n_lamp;
+    walk_start(&w, s, rng, out);
+    walk_on(&w, ray, NULL);
+}

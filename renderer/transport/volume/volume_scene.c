@@ -1,0 +1,213 @@
+#include "renderer/transport/volume/volume_scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+
+/* Look-ups are all over the volume: large pages, where the system gives them, save it from looking up addresses too.
+ * Only whole pages inside the array are touched; failure does no harm. */
+static void use_large_pages(void *data, size_t n_bytes)
+{
+    const uintptr_t page = 2u << 20;
+    uintptr_t first = ((uintptr_t)data + page - 1) & ~(page - 1), last = ((uintptr_t)data + n_bytes) & ~(page - 1);
+    if (last <= first) return;
+    madvise((void *)first, last - first, MADV_HUGEPAGE);
+}
+
+/* One pass of the distance along an axis: out = min over k of max(k, in k bricks off). The three passes together give
+ * the distance in bricks to the nearest one that holds something, the largest over the axes. */
+static void spread_line(const uint8_t *in, size_t n, size_t stride, uint8_t *out)
+{
+    for (size_t i = 0; i < n; i++) {
+        uint8_t best = in[i * stride];
+        for (uint8_t k = 1; k < best; k++) {
+            uint8_t low = i >= k ? in[(i - k) * stride] : VOLUME_EMPTY_MAX;
+            uint8_t high = i + k < n ? in[(i + k) * stride] : VOLUME_EMPTY_MAX, near = low < high ? low : high;
+            near = near > k ? near : k;
+            best = near < best ? near : best;
+        }
+        out[i * stride] = best;
+    }
+}
+
+static void spread(uint8_t *from, uint8_t *to, const size_t n[3], int axis)
+{
+    const size_t stride[3] = {1, n[0], n[0] * n[1]};
+    int u = (axis + 1) % 3, w = (axis + 2) % 3;
+    for (size_t i = 0; i < n[u]; i++)
+        for (size_t j = 0; j < n[w]; j++) {
+            size_t first = i * stride[u] + j * stride[w];
+            spread_line(from + first, n[axis], stride[axis], to + first);
+        }
+}
+
+static inline size_t brick_of(const struct volume_scene *s, size_t i, size_t j, size_t k)
+{
+    return ((k >> VOLUME_BRICK_SHIFT) * (size_t)s->n_brick[1] + (j >> VOLUME_BRICK_SHIFT)) * (size_t)s->n_brick[0] +
+           (i >> VOLUME_BRICK_SHIFT);
+}
+
+static inline size_t place_in_brick(size_t i, size_t j, size_t k)
+{
+    const size_t mask = VOLUME_BRICK_EDGE - 1;
+    return ((k & mask) << 2 * VOLUME_BRICK_SHIFT) | ((j & mask) << VOLUME_BRICK_SHIFT) | (i & mask);
+}
+
+static uint32_t pack(uint8_t density, const float d[3])
+{
+    float scale = copysignf(1, d[2]) / (fabsf(d[0]) + fabsf(d[1]) + fabsf(d[2]));
+    uint32_t p = (uint32_t)(lrintf((d[0] + d[1]) * scale * 2047) + 2047),
+             q = (uint32_t)(lrintf((d[0] - d[1]) * scale * 2047) + 2047);
+    return (uint32_t)density << 24 | q << 12 | p;
+}
+
+/* The table of bricks: their distances to the nearest one that holds something, with a minus sign, or their numbers. */
+static status number_bricks(struct volume_scene *s, const struct direction_volume *v, struct error *err)
+{
+    const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};
+    size_t n_brick = volume_n_voxel(n);
+    uint8_t *empty = malloc(n_brick), *spare = malloc(n_brick);
+    status st = STATUS_OK;
+    s->brick = malloc(n_brick * sizeof *s->brick);
+    if (s->brick == NULL || empty == NULL || spare == NULL) {
+        st = error_set(err, STATUS_NO_MEMORY, "cannot trace a volume: out of memory");
+        goto out;
+    }
+    memset(spare, VOLUME_EMPTY_MAX, n_brick);
+    for (size_t k = 0; k < v->n[2]; k++)
+        for (size_t j = 0; j < v->n[1]; j++) {
+            const uint8_t *row = v->density + volume_index(v->n, 0, j, k);
+            uint8_t *brick = spare + brick_of(s, 0, j, k);
+            for (size_t i = 0; i < v->n[0]; i++)
+                if (row[i] != 0) brick[i >> VOLUME_BRICK_SHIFT] = 0;
+        }
+    spread(spare, empty, n, 0);
+    spread(empty, spare, n, 1);
+    spread(spare, empty, n, 2);
+    for (size_t b = 0; b < n_brick; b++) s->brick[b] = empty[b] == 0 ? (int32_t)s->n_stored++ : -(int32_t)empty[b];
+out:
+    free(empty);
+    free(spare);
+    return st;
+}
+
+static status fill_bricks(struct volume_scene *s, const struct direction_volume *v, struct error *err)
+{
+    size_t n_byte = s->n_stored * VOLUME_BRICK_VOXELS * sizeof *s->voxel;
+    s->voxel = aligned_alloc(64, n_byte); /* a brick starts a cache line */
+    if (s->voxel == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot trace a volume: no memory for %zu bytes of voxels", n_byte);
+    use_large_pages(s->voxel, n_byte);
+    memset(s->voxel, 0, n_byte);
+    for (size_t k = 0; k < v->n[2]; k++)
+        for (size_t j = 0; j < v->n[1]; j++)
+            for (size_t i = 0; i < v->n[0]; i++) {
+                size_t from = volume_index(v->n, i, j, k);
+                if (v->density[from] == 0) continue;
+                float d[3];
+                direction_volume_get(v, from, d);
+                s->voxel[(size_t)s->brick[brick_of(s, i, j, k)] * VOLUME_BRICK_VOXELS + place_in_brick(i, j, k)] =
+                    pack(v->density[from], d);
+            }
+    return STATUS_OK;
+}
+
+/* The slab between the lowest and the highest layer that hold something. False: none does. */
+static bool find_slab(struct volume_scene *s, const struct direction_volume *v)
+{
+    size_t layer = v->n[0] * v->n[1], low = v->n[2], high = 0;
+    uint8_t most = 0;
+    for (size_t k = 0; k < v->n[2]; k++) {
+        uint8_t here = 0;
+        for (size_t i = k * layer; i < (k + 1) * layer; i++) here = v->density[i] > here ? v->density[i] : here;
+        if (here == 0) continue;
+        most = here > most ? here : most;
+        low = k < low ? k : low;
+        high = k + 1;
+    }
+    s->low = (float)low;
+    s->high = (float)high;
+    s->largest_density = (float)most / 255;
+    return most > 0;
+}
+
+status volume_scene_init(struct volume_scene *s, const struct direction_volume *v, const struct volume_scene_option *o,
+                         struct error *err)
+{
+    memset(s, 0, sizeof *s);
+    size_t n_brick = 1;
+    for (int a = 0; a < 3; a++) {
+        if (v->n[a] == 0 || v->n[a] > (1u << 24) || !(v->voxel_size_m[a] > 0))
+            return error_set(err, STATUS_INVALID, "cannot trace a volume of %zu x %zu x %zu voxels", v->n[0], v->n[1],
+                             v->n[2]);
+        s->n[a] = v->n[a];
+        s->voxel_size_m[a] = v->voxel_size_m[a];
+        s->voxel_mm[a] = (float)(1e3 * v->voxel_size_m[a]);
+        s->n_brick[a] = (int32_t)((v->n[a] + VOLUME_BRICK_EDGE - 1) >> VOLUME_BRICK_SHIFT);
+        n_brick *= (size_t)s->n_brick[a];
+    }
+    if (n_brick > INT32_MAX)
+        return error_set(err, STATUS_INVALID, "cannot trace a volume of %zu x %zu x %zu voxels: too many", v->n[0],
+                         v->n[1], v->n[2]);
+    if (!find_slab(s, v)) return error_set(err, STATUS_INVALID, "cannot trace a volume in which every voxel is empty");
+    for (int a = 0; a < 2; a++) s->n_voxel[a] = (float)v->n[a];
+    s->black_sheet = o->black_sheet;
+    status st = number_bricks(s, v, err);
+    if (st == STATUS_OK) st = fill_bricks(s, v, err);
+    if (st != STATUS_OK) volume_scene_release(s);
+    return st;
+}
+
+void volume_scene_release(struct volume_scene *s)
+{
+    free(s->brick);
+    free(s->voxel);
+    s->brick = NULL;
+    s->voxel = NULL;
+}
+
+uint32_t volume_scene_voxel(const struct volume_scene *s, size_t i, size_t j, size_t k)
+{
+    int32_t brick = s->brick[brick_of(s, i, j, k)];
+    return brick < 0 ? 0 : s->voxel[(size_t)brick * VOLUME_BRICK_VOXELS + place_in_brick(i, j, k)];
+}
+
+size_t volume_scene_memory_bytes(const struct volume_scene *s)
+{
+    const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};
+    return sizeof *s + volume_n_voxel(n) * sizeof *s->brick + s->n_stored * VOLUME_BRICK_VOXELS * sizeof *s->voxel;
+}
+
+double volume_scene_thickness_mm(const struct volume_scene *s) { return (double)((s->high - s->low) * s->voxel_mm[2]); }
+
+void volume_ray_turn(const struct volume_scene *s, const float direction[3], struct volume_ray *ray)
+{
+    for (int a = 0; a < 3; a++) {
+        ray->direction[a] = direction[a];
+        ray->per_mm[a] = direction[a] / s->voxel_mm[a];
+        ray->mm_per[a] = s->voxel_mm[a] / direction[a]; /* infinite: never leaves that way */
+    }
+}
+
+bool volume_ray_enter(const struct volume_scene *s, const double origin_mm[3], const double direction[3],
+                      struct volume_ray *ray)
+{
+    if (!(direction[2] < 0) || !(origin_mm[2] >= 0)) return false;
+    double t = -origin_mm[2] / direction[2];
+    float d[3] = {(float)direction[0], (float)direction[1], (float)direction[2]};
+    for (int a = 0; a < 2; a++) {
+        double x = origin_mm[a] + t * direction[a], tile = (double)s->n_voxel[a] * (double)s->voxel_mm[a];
+        ray->offset_mm[a] = floor(x / tile) * tile;
+        ray->at[a] = (float)((x - ray->offset_mm[a]) / (double)s->voxel_mm[a]);
+    }
+    ray->at[2] = nextafterf(s->high, 0); /* inside: a first step that is lost in rounding would else seem to have crossed the slab */
+    volume_ray_turn(s, d, ray);
+    return true;
+}
+
+void volume_ray_position_mm(const struct volume_scene *s, const struct volume_ray *ray, float position_mm[3])
+{
+    for (int a = 0; a < 2; a++) position_mm[a] = (float)((double)(ray->at[a] * s->voxel_mm[a]) + ray->offset_mm[a]);
+    position_mm[2] = (ray->at[2] - s->high) * s->voxel_mm[2];
+}

@@ -1,0 +1,407 @@
+#include "renderer/transport/volume/volume_tracer.h"
+
+#include "renderer/transport/camera.h"
+#include "renderer/transport/volume/volume_flight.h"
+
+#define VOLUME_ROULETTE_BELOW 0.3f
+#define VOLUME_SHADOW_BELOW 0.02f
+#define VOLUME_HEADROOM 1.25f
+enum { VOLUME_MAX_LOOKUP = 200000, N_LANE = 16 };
+
+void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
+                         const struct phase_state *state, double multiplier_per_m, const struct configuration *c,
+                         bool want_jacobian)
+{
+    memset(s, 0, sizeof *s);
+    s->scene = scene;
+    s->model = model;
+    s->state = state;
+    s->extinction = model->extinction(state);
+    s->multiplier_per_m = (float)multiplier_per_m;
+    s->majorant_density = VOLUME_HEADROOM * scene->largest_density * s->extinction->largest;
+    s->majorant_per_mm = (float)(1e-3 * multiplier_per_m) * s->majorant_density;
+    s->inv_majorant_density = 1 / s->majorant_density;
+    s->mean_step_mm = 1 / s->majorant_per_mm;
+    s->has_lamp = c != NULL && c->light != LIGHT_NO_LAMP;
+    if (s->has_lamp) lamp_init(&s->lamp, c);
+    for (int k = 0; k < 3 && c != NULL; k++) {
+        s->environment[k] = (float)c->environment_rgb[k];
+        if (s->environment[k] > 0) s->has_environment = true;
+    }
+    if (c != NULL) {
+        s->image = c->environment;
+        s->image_turn[0] = (float)cos(c->cloth_rotation_rad);
+        s->image_turn[1] = (float)sin(c->cloth_rotation_rad);
+    }
+    s->roulette_below = VOLUME_ROULETTE_BELOW;
+    s->shadow_below = VOLUME_SHADOW_BELOW;
+    s->want_jacobian = want_jacobian;
+}
+
+/* Derivatives of ln of a flight's contribution: by ln d, and by the parameter of s(w). */
+struct flight_score {
+    float ln_d, param;
+};
+
+enum connection { FLIGHT, LAMP, IMAGE }; /* what a ray is for: to scatter again, or to bring light to a vertex */
+
+/* One path under way. Its ray waits at a point whose place in the table of bricks, or whose voxel, has been asked for
+ * but not yet looked at. */
+struct lane {
+    struct volume_ray ray;
+    const int32_t *brick;
+    const uint32_t *voxel; /* NULL: the brick comes first */
+    enum connection purpose;
+    uint32_t n_lookup; /* of this ray */
+    struct rng rng;
+    struct volume_result *out;
+    struct volume_record *record;
+    float throughput[3], pdf; /* of the last scattering sample; 0: camera ray */
+    float origin_mm[3];
+    struct flight_score flight;
+
+    struct volume_ray vertex; /* the last one */
+    struct fiber_frame frame;
+    float wo[3];
+
+    float light_wi[3], light[3], worth; /* what the connection brings if nothing is in its way; the most of that */
+    float passed;                       /* share of it that got through so far, for the rays thinned out as well */
+    float ratios;                       /* of a recorded path: the share without those */
+    struct flight_score shadow;
+
+    float h[VOLUME_N_DERIVATIVE]; /* running score sums of the phase function, [c * n_param + p] */
+};
+
+/* The next event of the record; NULL: none is kept, or it is full. */
+static struct volume_event *note(struct lane *l, int kind)
+{
+    struct volume_record *r = l->record;
+    if (r == NULL || r->n_event++ >= r->capacity) return NULL;
+    struct volume_event *e = &r->event[r->n_event - 1];
+    memset(e, 0, sizeof *e);
+    e->kind = kind;
+    return e;
+}
+
+static void note_lookup(struct lane *l, int kind, const struct lookup *k)
+{
+    struct volume_event *e = note(l, kind);
+    if (e == NULL) return;
+    e->density = k->density;
+    e->sine = k->sine;
+}
+
+static void note_light(struct lane *l, int kind, const float *wi, const float weight[3])
+{
+    struct volume_event *e = note(l, kind);
+    if (e == NULL) return;
+    memcpy(e->weight, weight, sizeof e->weight);
+    if (wi == NULL) return;
+    memcpy(e->wi, wi, sizeof e->wi);
+    memcpy(e->wo, l->wo, sizeof e->wo);
+}
+
+/* Adds value * (1, H + scores) to the result; score NULL: the last step's are in H already. */
+static void add_light(const struct volume_setting *s, struct lane *l, const float value[3], const float *score,
+                      const struct flight_score *shadow)
+{
+    for (int c = 0; c < 3; c++) l->out->radiance[c] += value[c];
+    if (!s->want_jacobian) return;
+    size_t n = s->model->n_param;
+    float ln_d = l->flight.ln_d + (shadow != NULL ? shadow->ln_d : 0);
+    float param = l->flight.param + (shadow != NULL ? shadow->param : 0);
+    for (size_t c = 0; c < 3; c++) {
+        float *jac = l->out->jac + c * (n + 1);
+        const float *h = l->h + c * n;
+        for (size_t p = 0; p < n; p++) jac[p] += value[c] * (h[p] + (score != NULL ? score[c * n + p] : 0));
+        if (s->extinction->i_param >= 0) jac[s->extinction->i_param] += value[c] * param;
+        jac[n] += value[c] * ln_d / s->multiplier_per_m;
+    }
+}
+
+/* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
+static void keep_nan(struct lane *l, const float value[3])
+{
+    if (isnan(value[0] + value[1] + value[2])) l->out->radiance[0] = NAN;
+}
+
+static float largest(const float value[3])
+{
+    float most = value[0] > value[1] ? value[0] : value[1];
+    return value[2] > most ? value[2] : most;
+}
+
+/* Radiance that the path's ray meets beyond the cloth. */
+static void add_beyond(const struct volume_setting *s, struct lane *l)
+{
+    const float *direction = l->ray.direction;
+    if (direction[2] < 0 && s->scene->black_sheet) return;
+    float beyond[3] = {0, 0, 0}, value[3];
+    if (s->has_lamp) {
+        float pdf_lamp = lamp_pdf(&s->lamp, l->origin_mm, direction);
+        float share = pdf_lamp > 0 ? s->lamp.radiance * (l->pdf > 0 ? power_heuristic(l->pdf, pdf_lamp) : 1) : 0;
+        for (int c = 0; c < 3; c++) beyond[c] = share;
+    }
+    for (int c = 0; c < 3 && s->has_environment; c++) beyond[c] += s->environment[c];
+    if (s->image != NULL) {
+        float world[3], radiance[3];
+        turn_about_normal(s->image_turn, 1, direction, world);
+        float pdf_image = environment_at(s->image, world, radiance);
+        float share = l->pdf > 0 ? power_heuristic(l->pdf, pdf_image) : 1;
+        for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
+    }
+    for (int c = 0; c < 3; c++) value[c] = l->throughput[c] * beyond[c];
+    if (!(largest(value) > 0)) return;
+    add_light(s, l, value, NULL, NULL);
+    note_light(l, VOLUME_BEYOND, NULL, beyond);
+}
+
+static bool connect(const struct volume_setting *s, struct lane *l, enum connection to);
+
+/* The ray is out of the cloth, or lost in it (VOLUME_MAX_LOOKUP steps: no light can be said to have come through). False: so ends the path. */
+static bool leave(const struct volume_setting *s, struct lane *l, bool lost)
+{
+    if (l->purpose == FLIGHT) {
+        if (!lost) add_beyond(s, l);
+        return false;
+    }
+    if (!lost && l->passed > 0) {
+        float value[3], score[VOLUME_N_DERIVATIVE], f_rgb[3];
+        for (int c = 0; c < 3; c++) value[c] = l->light[c] * l->passed;
+        if (s->want_jacobian) /* only now: few connections get here */
+            s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, score);
+        add_light(s, l, value, score, &l->shadow);
+        note_light(l, VOLUME_ARRIVE, NULL, (float[3]){l->passed / l->ratios, 0, 0});
+    }
+    return connect(s, l, l->purpose + 1);
+}
+
+/* On by at least skip_mm to the next tentative collision. False: the path has ended. */
+static inline bool move_on(const struct volume_setting *s, struct lane *l, float skip_mm)
+{
+    l->voxel = NULL;
+    l->out->n_lookup++;
+    bool lost = ++l->n_lookup > VOLUME_MAX_LOOKUP;
+    float step_mm = minus_log_rest(rng_float(&l->rng)) * s->mean_step_mm;
+    if (lost || !advance(s->scene, skip_mm + step_mm, &l->ray)) return leave(s, l, lost);
+    l->brick = brick_at(s->scene, &l->ray);
+    __builtin_prefetch(l->brick);
+    return true;
+}
+
+/* Sends a ray from the vertex. */
+static bool send(const struct volume_setting *s, struct lane *l, enum connection purpose, const float direction[3])
+{
+    l->purpose = purpose;
+    l->n_lookup = 0;
+    l->ray = l->vertex;
+    volume_ray_turn(s->scene, direction, &l->ray);
+    return move_on(s, l, 0);
+}
+
+/* Scatters the path at its vertex. False: roulette ends it. */
+static bool scatter(const struct volume_setting *s, struct lane *l)
+{
+    float u[3], wi[3], f_rgb[3], score[VOLUME_N_DERIVATIVE], direction[3], next[3], survival = 1;
+    for (int a = 0; a < 3; a++) u[a] = rng_float(&l->rng);
+    s->model->sample(s->state, l->wo, l->throughput, u, wi);
+    l->pdf = s->model->eval_pdf(s->state, wi, l->wo, l->throughput, f_rgb, s->want_jacobian ? score : NULL);
+    if (l->pdf == 0) return false; /* rounded to a direction that has no density */
+    for (int c = 0; c < 3; c++) next[c] = l->throughput[c] * f_rgb[c] / l->pdf;
+    float most = largest(next);
+    if (!(most > 0)) {
+        keep_nan(l, next);
+        return false;
+    }
+    if (most < s->roulette_below) {
+        survival = most / s->roulette_below;
+        if (rng_float(&l->rng) >= survival) return false;
+    }
+    for (int c = 0; c < 3; c++) l->throughput[c] = next[c] / survival;
+    for (size_t p = 0; s->want_jacobian && p < 3 * s->model->n_param; p++) l->h[p] += score[p];
+    note_light(l, VOLUME_SCATTER, wi, (float[3]){1 / (l->pdf * survival), 0, 0});
+    to_world(&l->frame, wi, direction);
+    volume_ray_position_mm(s->scene, &l->vertex, l->origin_mm);
+    return send(s, l, FLIGHT, direction);
+}
+
+/* A direction of the lamp or the image, its radiance over its density, and that density. */
+static bool sample_light(const struct volume_setting *s, struct lane *l, enum connection to, float direction[3],
+                         float radiance[3], float *pdf)
+{
+    float u[2] = {rng_float(&l->rng), rng_float(&l->rng)}, position_mm[3], world[3];
+    if (to == LAMP) {
+        volume_ray_position_mm(s->scene, &l->vertex, position_mm);
+        if (!lamp_sample(&s->lamp, position_mm, u, direction, pdf)) return false;
+        for (int c = 0; c < 3; c++) radiance[c] = s->lamp.radiance;
+        return true;
+    }
+    if (!environment_sample(s->image, u, world, radiance, pdf)) return false;
+    turn_about_normal(s->image_turn, -1, world, direction);
+    return true;
+}
+
+/* Next-event estimation: a ray to the lamp, one to the image, then the path goes on. False: it ends here. */
+static bool connect(const struct volume_setting *s, struct lane *l, enum connection to)
+{
+    for (; to <= IMAGE; to++) {
+        float direction[3], radiance[3], pdf_light, f_rgb[3];
+        if (!(to == LAMP ? s->has_lamp : s->image != NULL)) continue;
+        if (!sample_light(s, l, to, direction, radiance, &pdf_light)) continue;
+        if (direction[2] <= 0 && s->scene->black_sheet) continue;
+        to_local(&l->frame, direction, l->light_wi);
+        float pdf = s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, NULL);
+        float heuristic = power_heuristic(pdf_light, pdf) / pdf_light;
+        for (int c = 0; c < 3; c++) {
+            radiance[c] *= heuristic;
+            l->light[c] = l->throughput[c] * f_rgb[c] * radiance[c];
+        }
+        l->worth = largest(l->light);
+        if (!(l->worth > 0)) {
+            keep_nan(l, l->light);
+            continue;
+        }
+        l->passed = l->ratios = 1;
+        if (l->worth < s->shadow_below) { /* hardly any light: follow few of these rays, for more each */
+            l->passed = s->shadow_below / l->worth;
+            if (rng_float(&l->rng) * l->passed >= 1) continue;
+        }
+        note_light(l, VOLUME_CONNECT, l->light_wi, radiance);
+        l->shadow = (struct flight_score){0, 0};
+        return send(s, l, to, direction);
+    }
+    return scatter(s, l);
+}
+
+/* A real collision: the path's next vertex. */
+static bool collide(const struct volume_setting *s, struct lane *l, uint32_t voxel, const struct lookup *k)
+{
+    float tangent[3];
+    l->flight.ln_d += 1;
+    l->flight.param += k->d_ratio / k->ratio;
+    note_lookup(l, VOLUME_REAL, k);
+    if (++l->out->n_vertex >= VOLUME_MAX_VERTEX) return false;
+    float back[3] = {-l->ray.direction[0], -l->ray.direction[1], -l->ray.direction[2]};
+    volume_voxel_direction(voxel, tangent);
+    fiber_frame_from(&l->frame, tangent);
+    to_local(&l->frame, back, l->wo);
+    l->vertex = l->ray;
+    return connect(s, l, LAMP);
+}
+
+/* A tentative collision on the way to a light: ratio tracking. */
+static bool pass(const struct volume_setting *s, struct lane *l, const struct lookup *k)
+{
+    float inv = 1 / (1 - k->ratio);
+    l->passed *= 1 - k->ratio;
+    l->shadow.ln_d -= k->ratio * inv;
+    l->shadow.param -= k->d_ratio * inv;
+    if (l->record != NULL) l->ratios *= 1 - k->ratio;
+    note_lookup(l, VOLUME_PASSED, k);
+    float worth = l->passed * l->worth;
+    if (worth < s->shadow_below) {
+        if (rng_float(&l->rng) * s->shadow_below >= worth) return connect(s, l, l->purpose + 1);
+        l->passed = s->shadow_below / l->worth;
+    }
+    return move_on(s, l, 0);
+}
+
+/* One look at memory. False: the path has ended. */
+static inline bool step(const struct volume_setting *s, struct lane *l)
+{
+    if (l->voxel == NULL) {
+        int32_t brick = *l->brick;
+        if (brick < 0) return move_on(s, l, empty_mm(s->scene, &l->ray, -brick));
+        l->voxel = voxel_at(s->scene, brick, &l->ray);
+        __builtin_prefetch(l->voxel);
+        return true;
+    }
+    uint32_t voxel = *l->voxel;
+    if (voxel >> 24 == 0) return move_on(s, l, 0);
+    struct lookup k = look_up(s->extinction, s->inv_majorant_density, voxel, l->ray.direction);
+    if (l->purpose != FLIGHT) return pass(s, l, &k);
+    if (rng_float(&l->rng) < k.ratio) return collide(s, l, voxel, &k);
+    float inv = 1 / (1 - k.ratio);
+    l->flight.ln_d -= k.ratio * inv;
+    l->flight.param -= k.d_ratio * inv;
+    note_lookup(l, VOLUME_NULL, &k);
+    return move_on(s, l, 0);
+}
+
+/* False: the path ends at once. */
+static bool start(const struct volume_setting *s, struct lane *l, const struct volume_ray *ray, const struct rng *rng,
+                  struct volume_result *out, struct volume_record *record)
+{
+    size_t n = s->want_jacobian ? s->model->n_param : 0;
+    l->ray = *ray;
+    l->rng = *rng;
+    l->out = out;
+    l->record = record;
+    l->purpose = FLIGHT;
+    l->n_lookup = 0;
+    l->pdf = 0;
+    l->flight = (struct flight_score){0, 0};
+    volume_ray_position_mm(s->scene, ray, l->origin_mm);
+    for (int c = 0; c < 3; c++) l->throughput[c] = 1;
+    memset(l->h, 0, 3 * n * sizeof *l->h);
+    memset(out->radiance, 0, sizeof out->radiance);
+    memset(out->jac, 0, 3 * (n + 1) * sizeof *out->jac);
+    out->n_vertex = out->n_lookup = 0;
+    return move_on(s, l, 0);
+}
+
+void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out,
+                  struct volume_record *record)
+{
+    struct lane l;
+    if (start(s, &l, ray, rng, out, record))
+        while (step(s, &l)) continue;
+    *ray = l.ray;
+    *rng = l.rng;
+}
+
+void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
+                       struct volume_result *out)
+{
+    struct lane lane[N_LANE];
+    bool busy[N_LANE] = {false};
+    size_t next = 0, n_busy = 0;
+    do {
+        for (size_t i = 0; i < N_LANE; i++) {
+            if (busy[i]) {
+                busy[i] = step(s, &lane[i]);
+                n_busy -= !busy[i];
+            }
+            while (!busy[i] && next < n) {
+                busy[i] = start(s, &lane[i], &ray[next], &rng[next], &out[next], NULL);
+                n_busy += busy[i];
+                next++;
+            }
+        }
+    } while (n_busy > 0);
+}
+
+uint64_t volume_trace_camera(const struct volume_setting *s, const struct camera *camera, size_t n, double (*xy)[2],
+                             struct rng *rng, float *value)
+{
+    struct volume_ray ray[VOLUME_CAMERA_PATHS];
+    struct volume_result path[VOLUME_CAMERA_PATHS];
+    size_t n_ray = 0, place[VOLUME_CAMERA_PATHS], n_jac = s->want_jacobian ? 3 * (s->model->n_param + 1) : 0;
+    uint64_t n_vertex = 0;
+    for (size_t i = 0; i < n; i++) {
+        double origin_mm[3], direction[3];
+        camera_origin(camera, xy[i][0], xy[i][1], origin_mm);
+        camera_direction(camera, xy[i][0], xy[i][1], direction);
+        if (!volume_ray_enter(s->scene, origin_mm, direction, &ray[n_ray])) continue; /* sees nothing: adds 0 */
+        rng[n_ray] = rng[i];
+        place[n_ray++] = i;
+    }
+    volume_trace_many(s, n_ray, ray, rng, path);
+    for (size_t i = 0; i < n_ray; i++) {
+        float *v = value + place[i] * (3 + n_jac);
+        memcpy(v, path[i].radiance, sizeof path[i].radiance);
+        memcpy(v + 3, path[i].jac, n_jac * sizeof *v);
+        n_vertex += path[i].n_vertex;
+    }
+    return n_vertex;
+}

@@ -1,0 +1,110 @@
+/* Lines that change over to the neighbouring fiber are cut where they do; lines that bend as fibers do are not; ends that run across the
+ * measured directions are trimmed. */
+#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/lines/disagreement.h"
+#include "geometry/fibers/lines/kinks.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { N_VERTEX = 100, N_LINE = 12 };
+static const double DIAMETER = 7.0;
+
+/* Crimped lines side by side, radius of curvature at the crests 2 diameters; line `hopper` changes over by one diameter at vertex 50. */
+static void make_lines(struct polyline_set *even, size_t hopper)
+{
+    struct polyline_set drawn, *lines = &drawn;
+    polyline_set_init(lines);
+    for (size_t l = 0; l < N_LINE; l++) {
+        double wave = 2.0 * M_PI / 80.0, height = 1.0 / (2.0 * DIAMETER * wave * wave);
+        assert_int_equal(polyline_begin(lines, 0, NULL), STATUS_OK);
+        for (size_t i = 0; i < N_VERTEX; i++) {
+            double side = l == hopper ? 0.5 * DIAMETER * (1.0 + tanh(((double)i - 50.0) / 1.5)) : 0.0;
+            const float x[3] = {(float)i, (float)(20.0 + DIAMETER * (double)l + side), (float)(30.0 + height * sin(wave * (double)i))};
+            assert_int_equal(polyline_add(lines, x, NULL), STATUS_OK);
+        }
+    }
+    polyline_set_init(even);
+    assert_int_equal(polylines_resample(lines, even, NULL), STATUS_OK);
+    polyline_set_release(lines);
+}
+
+static void test_kink_is_cut(void **state)
+{
+    (void)state;
+    struct polyline_set lines, out;
+    size_t n_cut;
+    make_lines(&lines, 4);
+    polyline_set_init(&out);
+    assert_int_equal(polylines_cut_kinks(&lines, DIAMETER, 2.1, 10, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, N_LINE + 1);
+    assert_true(n_cut >= 5 && n_cut <= 25);
+    assert_int_equal(out.n_vertex + n_cut, lines.n_vertex);
+    float last = out.vertex[out.first[5] - 1][0], next = out.vertex[out.first[5]][0]; /* the two pieces of line 4 */
+    assert_true(last < 50.0f && last > 35.0f && next > 50.0f && next < 65.0f);
+    polyline_set_release(&lines);
+    polyline_set_release(&out);
+}
+
+static void test_crimp_is_kept(void **state)
+{
+    (void)state;
+    struct polyline_set lines, out;
+    size_t n_cut;
+    double limit;
+    make_lines(&lines, N_LINE);
+    polyline_set_init(&out);
+    assert_int_equal(polylines_kink_limit(&lines, DIAMETER, 2.1, &limit, NULL), STATUS_OK);
+    assert_true(limit * DIAMETER >= 1.2 - 1e-12);
+    assert_int_equal(polylines_cut_kinks(&lines, DIAMETER, 2.1, 10, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, N_LINE);
+    assert_int_equal(n_cut, 0);
+    polyline_set_release(&lines);
+    polyline_set_release(&out);
+}
+
+/* Fibers along x; a line whose first ten vertices run at 45 degrees to them. */
+static void test_stray_end_is_trimmed(void **state)
+{
+    (void)state;
+    const size_t n[3] = {64, 32, 16};
+    const double voxel_m[3] = {2e-6, 2e-6, 2e-6};
+    const float along[3] = {1.0f, 0.0f, 0.0f};
+    struct direction_volume d;
+    struct polyline_set lines, out;
+    size_t n_cut;
+    assert_int_equal(direction_volume_init_in(&d, n, voxel_m, NULL, NULL), STATUS_OK);
+    for (size_t i = 0; i < n[0] * n[1] * n[2]; i++) {
+        d.density[i] = 255;
+        direction_volume_set(&d, i, along);
+    }
+    polyline_set_init(&lines);
+    polyline_set_init(&out);
+    assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
+    for (int i = 0; i < 50; i++) {
+        const float x[3] = {(float)i + 5.5f, i < 10 ? 22.0f - (float)i : 12.0f, 8.5f};
+        assert_int_equal(polyline_add(&lines, x, NULL), STATUS_OK);
+    }
+    assert_int_equal(polylines_trim_disagreeing(&lines, &d, M_PI / 6.0, 12, 10, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, 1);
+    assert_true(n_cut >= 8 && n_cut <= 12);
+    assert_int_equal(out.n_vertex, 50 - n_cut);
+    assert_true(out.vertex[0][0] == (float)n_cut + 5.5f); /* from the start, nothing from the end */
+    polyline_set_release(&lines);
+    polyline_set_release(&out);
+    direction_volume_release(&d);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_kink_is_cut),
+        cmocka_unit_test(test_crimp_is_kept),
+        cmocka_unit_test(test_stray_end_is_trimmed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,312 @@
+/* The steps from directions to fibers, one by one: smoothing, linking, joining, relaxing, radius, alignment. */
+#include "base/rng.h"
+#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/lines/joining.h"
+#include "geometry/fibers/lines/linking.h"
+#include "geometry/fibers/shape/radius.h"
+#include "geometry/fibers/shape/relax.h"
+#include "geometry/fibers/shape/smoothing.h"
+#include "geometry/volume/volume_align.h"
+#include "tests/support/cloth/scan_files.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const double voxel_m[3] = {2e-6, 2e-6, 2e-6};
+
+/* The gradient of the energy vanishes: alpha (p - p0) + D^T D p = 0. */
+static void test_smoothing(void **state)
+{
+    (void)state;
+    enum { MOST = 40 };
+    struct rng r;
+    rng_start(&r, &(struct rng_key){.seed = 1}, 0, 0);
+    for (size_t n = 1; n <= MOST; n++) {
+        float start[MOST][3], x[MOST][3];
+        double work[4 * MOST], second[MOST + 2] = {0.0};
+        for (size_t i = 0; i < n; i++)
+            for (int a = 0; a < 3; a++) start[i][a] = 200.0f + (float)i + rng_float(&r);
+        memcpy(x, start, sizeof x);
+        polyline_smooth(x, n, 0.1, work);
+        if (n < 3) assert_memory_equal(x, start, n * sizeof *x);
+        for (int a = 0; a < 3 && n >= 3; a++) {
+            memset(second, 0, sizeof second); /* second[i + 1]: second difference centred at i */
+            for (size_t i = 1; i + 1 < n; i++) second[i + 1] = (double)x[i - 1][a] - 2.0 * (double)x[i][a] + (double)x[i + 1][a];
+            for (size_t i = 0; i < n; i++) {
+                double left = i > 0 ? second[i] : 0.0, right = i + 2 < n + 1 ? second[i + 2] : 0.0;
+                double gradient = 0.1 * ((double)x[i][a] - (double)start[i][a]) + left - 2.0 * second[i + 1] + right;
+                assert_true(fabs(gradient) < 2e-4);
+            }
+        }
+    }
+}
+
+/* Fibers that touch and lean by almost a diameter a slice keep their identity. */
+static void test_linking_leaning_neighbours(void **state)
+{
+    (void)state;
+    enum { N_SLICE = 30, N_FIBER = 6 };
+    const size_t n[3] = {120, 60, N_SLICE};
+    struct center center[N_SLICE * N_FIBER];
+    size_t first[N_SLICE + 1];
+    struct center_list list = {N_SLICE, first, center};
+    struct slice_frame frame;
+    struct polyline_set lines;
+    size_t n_chain;
+    slice_frame_init(&frame, 2, n);
+    for (size_t k = 0; k <= N_SLICE; k++) first[k] = k * N_FIBER;
+    for (size_t k = 0; k < N_SLICE; k++)
+        for (size_t i = 0; i < N_FIBER; i++) /* 4 voxels apart along u, moving 0.8 along u a slice; sorted by v */
+            center[k * N_FIBER + i] = (struct center){.u = 5.0f + 4.0f * (float)i + 0.8f * (float)k, .v = 30.0f + 0.1f * (float)i, .slope_u = 0.8f};
+    polyline_set_init(&lines);
+    assert_int_equal(centers_link(&list, &frame, 5.0, 4.0, 10, &lines, &n_chain, NULL), STATUS_OK);
+    assert_int_equal(n_chain, N_FIBER);
+    assert_int_equal(lines.n_line, N_FIBER);
+    for (size_t l = 0; l < N_FIBER; l++) {
+        const float *a = lines.vertex[lines.first[l]], *b = lines.vertex[lines.first[l + 1] - 1];
+        assert_int_equal(polyline_length(&lines, l), N_SLICE);
+        assert_true(fabsf(b[0] - a[0] - 0.8f * (N_SLICE - 1)) < 1e-3f);
+        assert_true(b[2] == N_SLICE - 0.5f);
+    }
+    polyline_set_release(&lines);
+}
+
+static void add_piece(struct polyline_set *p, uint8_t axis, float x0, float x1, float y)
+{
+    assert_int_equal(polyline_begin(p, axis, NULL), STATUS_OK);
+    for (float x = x0; x <= x1; x += 1.0f) assert_int_equal(polyline_add(p, (const float[3]){x, y, 16.0f}, NULL), STATUS_OK);
+}
+
+static void test_duplicates_and_joins(void **state)
+{
+    (void)state;
+    const size_t n[3] = {96, 32, 32};
+    struct volume v;
+    struct polyline_set in, single, out;
+    struct join_counts counts = {0};
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    const struct test_cylinder c[2] = {{{0.0, 8.0, 16.0}, {1.0, 0.0, 0.0}, 3.0}, {{0.0, 22.0, 16.0}, {1.0, 0.0, 0.0}, 3.0}};
+    test_fill_cylinders(&v, c, 2, 0.0, 1);
+    for (size_t k = 0; k < 32; k++) /* the second fiber is cut in two at x = 50 */
+        for (size_t j = 16; j < 32; j++)
+            for (size_t i = 47; i < 54; i++) v.density[volume_index(n, i, j, k)] = 0.0f;
+    polyline_set_init(&in);
+    polyline_set_init(&single);
+    polyline_set_init(&out);
+    add_piece(&in, 0, 2.5f, 40.5f, 8.0f);
+    add_piece(&in, 3, 36.5f, 60.5f, 8.5f); /* the same fiber from other slices, overlapping */
+    add_piece(&in, 0, 65.5f, 90.5f, 8.0f); /* and behind a gap */
+    add_piece(&in, 0, 2.5f, 46.5f, 22.0f);
+    add_piece(&in, 0, 54.5f, 90.5f, 22.0f); /* no material between */
+    assert_int_equal(polylines_remove_duplicates(&in, n, 6.0, 4, &single, &counts, NULL), STATUS_OK);
+    assert_int_equal(single.n_line, 5);
+    assert_true(counts.n_duplicate >= 4 && counts.n_duplicate < 12);
+    assert_int_equal(polylines_join(&single, &v, 6.0, 0.5, &out, &counts, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, 3);
+    assert_int_equal(counts.n_joined, 2); /* both joints of the middle piece */
+    assert_int_equal(counts.n_gap_bridged, 0);
+    for (size_t i = 1; i < polyline_length(&out, 0); i++) /* ordered, no holes */
+        assert_true(fabsf(out.vertex[i][0] - out.vertex[i - 1][0]) < 1.6f);
+    assert_true(fabsf(out.vertex[0][0] - out.vertex[out.first[1] - 1][0]) > 85.0f);
+    polyline_set_release(&in);
+    polyline_set_release(&single);
+    polyline_set_release(&out);
+    volume_release(&v);
+}
+
+/* Two touching fibers: lines that start a voxel off end on the axes, without being pulled together. */
+static void test_relax(void **state)
+{
+    (void)state;
+    const size_t n[3] = {64, 32, 32};
+    const struct test_cylinder c[2] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 3.5}, {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
+    struct volume v;
+    struct polyline_set lines;
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, c, 2, 0.2, 1);
+    polyline_set_init(&lines);
+    add_piece(&lines, 0, 0.5f, 63.5f, 13.3f);
+    add_piece(&lines, 0, 0.5f, 63.5f, 18.9f);
+    assert_int_equal(polylines_relax(&lines, &v, 4.2f, 6, 0.1, NULL, NULL, NULL), STATUS_OK);
+    double square = 0.0;
+    for (size_t i = 0; i < lines.n_vertex; i++) {
+        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5), dz = (double)lines.vertex[i][2] - 16.0;
+        square += dy * dy + dz * dz;
+    }
+    print_message("rms distance from the axes %.3f voxels\n", sqrt(square / (double)lines.n_vertex));
+    assert_true(sqrt(square / (double)lines.n_vertex) < 0.15);
+    polyline_set_release(&lines);
+    volume_release(&v);
+}
+
+/* Three fibers, two of them touching, of which only two have lines: these end on their axes, whatever the third one does, and with the true
+ * radius. A straight axis through N voxels of a surface that blur b spreads is known to sigma / sqrt(A) per voxel of length,
+ * A = pi r / (2 sqrt(pi) b) (a quarter of a circle's surface pushes each way), some 0.1 voxel; the fit averages over a few. */
+static void test_axis_fit(void **state)
+{
+    (void)state;
+    const size_t n[3] = {64, 40, 32};
+    const struct test_cylinder c[3] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 3.5},
+                                       {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 3.5},
+                                       {{0.0, 26.6, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
+    struct volume v;
+    struct polyline_set coarse, lines;
+    struct axis_profile profile = {3.2, 0.8, 0.0, 1.0};
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, c, 3, 0.2, 1);
+    polyline_set_init(&coarse);
+    polyline_set_init(&lines);
+    add_piece(&coarse, 0, 0.5f, 63.5f, 13.2f);
+    add_piece(&coarse, 0, 0.5f, 63.5f, 19.0f);
+    assert_int_equal(polylines_resample(&coarse, &lines, NULL), STATUS_OK);
+    assert_int_equal(polyline_length(&lines, 0), 64);
+    assert_int_equal(polylines_fit(&lines, &v, 7.0, 6, &profile, NULL, NULL, NULL), STATUS_OK);
+    double square = 0.0;
+    for (size_t i = 0; i < lines.n_vertex; i++) {
+        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5), dz = (double)lines.vertex[i][2] - 16.0;
+        square += dy * dy + dz * dz;
+    }
+    print_message("rms distance from the axes %.3f voxels, radius %.3f, blur %.2f, densities %.2f to %.2f\n",
+                  sqrt(square / (double)lines.n_vertex), profile.radius, profile.blur, profile.low, profile.high);
+    assert_true(sqrt(square / (double)lines.n_vertex) < 0.1);
+    assert_true(fabs(profile.radius - 3.5) < 0.03 * 3.5);
+    polyline_set_release(&coarse);
+    polyline_set_release(&lines);
+    volume_release(&v);
+}
+
+/* Histogram pass against counting by hand; both radii on a bundle of touching fibers, off-axis by a quarter voxel. */
+static void test_radius(void **state)
+{
+    (void)state;
+    enum { N_FIBER = 7 };
+    const size_t n[3] = {48, 48, 48};
+    struct test_cylinder c[N_FIBER];
+    struct polyline_set lines;
+    struct volume v;
+    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *h = part + RADIUS_PARTS;
+    polyline_set_init(&lines);
+    for (int i = 0; i < N_FIBER; i++) {
+        double y = 24.0 + (i > 0 ? 7.0 * cos(i * M_PI / 3.0) : 0.0), z = 24.0 + (i > 0 ? 7.0 * sin(i * M_PI / 3.0) : 0.0);
+        c[i] = (struct test_cylinder){{0.0, y, z}, {1.0, 0.0, 0.0}, 3.5};
+        assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
+        for (int x = 0; x <= 48; x++)
+            assert_int_equal(polyline_add(&lines, (const float[3]){(float)x, (float)y + (x % 2 ? 0.25f : -0.25f), (float)z}, NULL), STATUS_OK);
+    }
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, c, N_FIBER, 0.0, 1);
+    assert_int_equal(distance_histogram_measure(&v, &lines, 0.5, 8.0, NULL, NULL, part, NULL), STATUS_OK);
+    distance_histogram_sum(part, RADIUS_PARTS, h);
+    uint64_t total = h->far_count, inside = h->far_inside;
+    for (int b = 0; b < RADIUS_BINS; b++) {
+        total += h->inside[0][b] + h->outside[0][b];
+        inside += h->inside[0][b];
+    }
+    assert_int_equal(total % 4096, 0); /* whole bricks of 16^3 voxels, 64 points a voxel */
+    double volume = (double)inside / 64.0 / (N_FIBER * M_PI * 3.5 * 3.5 * 48.0); /* interpolation fills the contacts a little */
+    assert_true(volume > 0.99 && volume < 1.04);
+    assert_true(fabs(h->length_voxel[0] / (N_FIBER * 48.0 * sqrt(1.25)) - 1.0) < 1e-3);
+    double score = radius_best_score(h, 1), mass = radius_from_mass(h, 1, score) * pow(1.25, 0.25);
+    print_message("radius 3.5: best score %.3f, mass %.3f\n", score, mass);
+    assert_true(fabs(score - 3.5) < 0.15);
+    assert_true(fabs(mass - 3.5) < 0.05);
+    assert_true(radius_score(h, 1, score) >= radius_score(h, 1, score * 1.1));
+    assert_true(radius_score(h, 1, score) >= radius_score(h, 1, score * 0.9));
+    assert_true(radius_best_score(h, 2) == 0.0);
+    polyline_set_release(&lines);
+    volume_release(&v);
+    free(part);
+}
+
+/* Fibers along x and along y: when their radii differ they get one each, with an error that says so; when not, or when asked, one for all. */
+static void test_radius_of_each_class(void **state)
+{
+    (void)state;
+    const size_t n[3] = {96, 96, 32};
+    static const struct {
+        double along_y;
+        enum radius_rule rule;
+        bool per_axis;
+    } check[] = {{4.5, RADIUS_AUTO, true}, {3.5, RADIUS_AUTO, false}, {4.5, RADIUS_COMMON, false}, {3.5, RADIUS_PER_AXIS, true}};
+    struct distance_histogram *part = malloc(RADIUS_PARTS * sizeof *part);
+    for (size_t k = 0; k < sizeof check / sizeof *check; k++) {
+        struct test_cylinder c[6];
+        struct polyline_set lines;
+        struct volume v;
+        struct radius_measure m;
+        polyline_set_init(&lines);
+        for (int i = 0; i < 6; i++) {
+            int along = i % 2;
+            double at = 20.0 + 28.0 * (i / 2), z = along == 0 ? 8.0 : 23.0;
+            c[i] = (struct test_cylinder){{along == 0 ? 0.0 : at, along == 0 ? at : 0.0, z}, {along == 0, along == 1, 0.0}, along == 0 ? 3.5 : check[k].along_y};
+            assert_int_equal(polyline_begin(&lines, (uint8_t)along, NULL), STATUS_OK);
+            for (int x = 0; x <= 96; x++)
+                assert_int_equal(polyline_add(&lines, (const float[3]){(float)(along == 0 ? x : at), (float)(along == 0 ? at : x), (float)z}, NULL), STATUS_OK);
+        }
+        assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+        test_fill_cylinders(&v, c, 6, 0.1, 1);
+        for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i])); /* as the mapping does */
+        assert_int_equal(distance_histogram_measure(&v, &lines, 0.5, 8.0, NULL, NULL, part, NULL), STATUS_OK);
+        assert_int_equal(radius_choose(part, check[k].rule, &m, NULL), STATUS_OK);
+        print_message("radii 3.5 and %.1f: %.3f (%.3f) and %.3f (%.3f)\n", check[k].along_y, m.radius_voxel[0], m.se_voxel[0], m.radius_voxel[1], m.se_voxel[1]);
+        assert_int_equal(m.per_axis, check[k].per_axis);
+        assert_int_equal(m.radius_voxel[0] != m.radius_voxel[1], check[k].per_axis);
+        assert_true(m.radius_voxel[2] > 3.3 && m.se_voxel[2] > 0.0); /* no fiber along z: that of all */
+        assert_true(m.se_voxel[0] > 0.0 && m.se_voxel[0] < 0.1);
+        if (check[k].per_axis) {
+            assert_true(fabs(m.radius_voxel[0] - 3.5) < 0.03 * 3.5);
+            assert_true(fabs(m.radius_voxel[1] - check[k].along_y) < 0.03 * check[k].along_y);
+        }
+        polyline_set_release(&lines);
+        volume_release(&v);
+    }
+    free(part);
+}
+
+static void test_alignment(void **state)
+{
+    (void)state;
+    struct axis_map map;
+    struct error err = {0};
+    assert_int_equal(axis_map_parse("-zxy", &map, &err), STATUS_OK);
+    assert_true(map.source[0] == 2 && map.flip[0] && map.source[1] == 0 && !map.flip[1] && map.source[2] == 1);
+    static const char *const bad[] = {"", "xy", "xxz", "xyzz", "xy-", "abc", "--xyz"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_int_equal(axis_map_parse(bad[i], &map, &err), STATUS_INVALID);
+    /* A shear brings a leaning cylinder upright: the one that goes along (0.25, 0, 1) */
+    const size_t n[3] = {40, 24, 32}, box[6] = {0, 0, 0, 40, 24, 32};
+    const double shear[9] = {1.0, 0.0, -0.25, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}, singular[9] = {1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    struct volume v, out;
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, &(struct test_cylinder){{20.0, 12.0, 16.0}, {0.25, 0.0, 1.0}, 3.0}, 1, 0.0, 1);
+    assert_int_equal(volume_resample(&v, shear, 2e-6, box, NULL, NULL, &out, NULL), STATUS_OK);
+    for (size_t k = 4; k < 28; k++) {
+        double sum = 0.0, mean = 0.0;
+        for (size_t j = 0; j < n[1]; j++)
+            for (size_t i = 0; i < n[0]; i++) {
+                float x = out.density[volume_index(n, i, j, k)];
+                if (!(x > 0.0f)) continue; /* what the shear brings in from outside is -infinity */
+                sum += (double)x;
+                mean += (double)x * ((double)i + 0.5);
+            }
+        assert_true(fabs(mean / sum - 20.0) < 0.05);
+    }
+    volume_release(&out);
+    assert_int_equal(volume_resample(&v, singular, 2e-6, box, NULL, NULL, &out, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "volume.matrix");
+    volume_release(&v);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_smoothing), cmocka_unit_test(test_linking_leaning_neighbours),
+        cmocka_unit_test(test_duplicates_and_joins), cmocka_unit_test(test_relax), cmocka_unit_test(test_axis_fit),
+        cmocka_unit_test(test_radius), cmocka_unit_test(test_radius_of_each_class),    cmocka_unit_test(test_alignment),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,159 @@
+/* `.vol` files: golden bytes, round trips, the quantised directions' error. */
+#include "base/rng.h"
+#include "geometry/volume/vol_file.h"
+#include "tests/support/cloth/scan_files.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static char folder[64], path[128];
+
+static int make_folder(void **state)
+{
+    (void)state;
+    test_make_folder(folder);
+    snprintf(path, sizeof path, "%s/a.vol", folder);
+    return 0;
+}
+
+static const uint8_t golden_density[] = {0x56, 0x4f, 0x4c, 3, 1, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+                                         0,    0,    0,    0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f,
+                                         0,    0,    0,    0, 0, 0, 0x80, 0x3f};
+
+static void check_bytes(const uint8_t *want, size_t n)
+{
+    uint8_t have[256];
+    FILE *f = fopen(path, "rb");
+    size_t m = fread(have, 1, sizeof have, f);
+    fclose(f);
+    assert_int_equal(m, n);
+    assert_memory_equal(have, want, n);
+}
+
+/* A box of 1 mm: 2 x 1 x 1 voxels of 0.5 x 1 x 1 mm. */
+static const size_t shape[3] = {2, 1, 1};
+static const double size_m[3] = {0.5e-3, 1e-3, 1e-3};
+
+static void test_golden(void **state)
+{
+    (void)state;
+    struct volume v;
+    struct direction_volume d;
+    uint8_t quantised[52];
+    const float up[3] = {1.0f, 0.0f, 0.0061599f}; /* theta = 127 pi / 255 */
+    assert_int_equal(volume_init(&v, shape, size_m, NULL), STATUS_OK);
+    v.density[1] = 1.0f;
+    assert_int_equal(vol_write_density(path, &v, VOL_FLOAT32, NULL), STATUS_OK);
+    check_bytes(golden_density, sizeof golden_density);
+    memcpy(quantised, golden_density, 48);
+    quantised[4] = 4;
+    quantised[20] = 3;
+    memcpy(quantised + 48, (const uint8_t[4]){0xff, 0xff, 0x7f, 0x00}, 4);
+    assert_int_equal(direction_volume_init(&d, shape, size_m, NULL), STATUS_OK);
+    d.density[1] = 200;
+    direction_volume_set(&d, 1, up);
+    assert_int_equal(vol_write_direction(path, &d, VOL_QUANTISED, NULL), STATUS_OK);
+    check_bytes(quantised, sizeof quantised);
+    assert_int_equal(vol_write_direction(path, &d, VOL_UINT8, NULL), STATUS_INVALID);
+    assert_int_equal(vol_write_density(path, &v, VOL_QUANTISED, NULL), STATUS_INVALID);
+    volume_release(&v);
+    direction_volume_release(&d);
+}
+
+static void random_direction(struct rng *r, float d[3])
+{
+    double z = 2.0 * rng_double(r) - 1.0, phi = 2.0 * M_PI * rng_double(r), s = sqrt(1.0 - z * z);
+    d[0] = (float)(s * cos(phi));
+    d[1] = (float)(s * sin(phi));
+    d[2] = (float)z;
+}
+
+static double angle_deg(const float a[3], const float b[3])
+{
+    double c[3] = {(double)a[1] * b[2] - (double)a[2] * b[1], (double)a[2] * b[0] - (double)a[0] * b[2], (double)a[0] * b[1] - (double)a[1] * b[0]};
+    double dot = (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
+    return atan2(sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]), fabs(dot)) * 180.0 / M_PI;
+}
+
+static void test_round_trips(void **state)
+{
+    (void)state;
+    enum { N = 9 };
+    const size_t n[3] = {N, N, N};
+    const double voxel_m[3] = {2e-6, 2e-6, 3e-6};
+    struct volume v, back;
+    struct direction_volume d;
+    struct rng r;
+    rng_start(&r, &(struct rng_key){.seed = 3}, 0, 0);
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    assert_int_equal(direction_volume_init(&d, n, voxel_m, NULL), STATUS_OK);
+    for (size_t i = 0; i < N * N * N; i++) {
+        float x[3];
+        v.density[i] = rng_float(&r);
+        random_direction(&r, x);
+        d.density[i] = i % 3 == 0 ? 0 : 255;
+        direction_volume_set(&d, i, x);
+    }
+    for (int encoding = VOL_FLOAT32; encoding <= VOL_UINT8; encoding += 2) {
+        float allowed = encoding == VOL_FLOAT32 ? 0.0f : 0.5f / 255.0f + 1e-6f;
+        assert_int_equal(vol_write_density(path, &v, (enum vol_encoding)encoding, NULL), STATUS_OK);
+        assert_int_equal(vol_read_density(path, &back, NULL), STATUS_OK);
+        for (size_t i = 0; i < N * N * N; i++) assert_true(fabsf(back.density[i] - v.density[i]) <= allowed);
+        assert_true(fabs(back.voxel_size_m[2] - 3e-6) < 1e-11);
+        volume_release(&back);
+    }
+    double sum = 0.0, worst = 0.0, n_kept = 0.0;
+    for (int encoding = VOL_FLOAT32; encoding <= VOL_QUANTISED; encoding += 3) {
+        struct vol_header h;
+        float *x = NULL;
+        assert_int_equal(vol_write_direction(path, &d, (enum vol_encoding)encoding, NULL), STATUS_OK);
+        assert_int_equal(vol_read_direction(path, &h, &x, NULL), STATUS_OK);
+        for (size_t i = 0; i < N * N * N; i++) {
+            float want[3];
+            direction_volume_get(&d, i, want);
+            double angle = angle_deg(want, x + 3 * i), length = hypot(hypot((double)x[3 * i], (double)x[3 * i + 1]), (double)x[3 * i + 2]);
+            assert_true(fabs(length - (d.density[i] > 0 ? 1.0 : 0.0)) < 1e-5);
+            if (d.density[i] == 0) continue;
+            assert_true(angle < (encoding == VOL_FLOAT32 ? 0.001 : 0.8));
+            if (encoding != VOL_QUANTISED) continue;
+            sum += angle;
+            worst = fmax(worst, angle);
+            n_kept += 1.0;
+        }
+        free(x);
+    }
+    assert_true(sum / n_kept > 0.25 && sum / n_kept < 0.45); /* 0.36 over the sphere */
+    volume_release(&v);
+    direction_volume_release(&d);
+}
+
+static void test_octahedral(void **state)
+{
+    (void)state;
+    struct direction_volume d;
+    struct rng r;
+    rng_start(&r, &(struct rng_key){.seed = 4}, 0, 0);
+    assert_int_equal(direction_volume_init(&d, shape, size_m, NULL), STATUS_OK);
+    for (int i = 0; i < 20000; i++) {
+        float want[3], have[3];
+        random_direction(&r, want);
+        if (i < 6) want[0] = want[1] = want[2] = 0.0f, want[i / 2] = i % 2 ? -1.0f : 1.0f;
+        direction_volume_set(&d, 0, want);
+        direction_volume_get(&d, 0, have);
+        assert_true(angle_deg(want, have) < 0.005);
+    }
+    direction_volume_release(&d);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_golden), cmocka_unit_test(test_round_trips),
+                                       cmocka_unit_test(test_octahedral)};
+    return cmocka_run_group_tests(tests, make_folder, NULL);
+}

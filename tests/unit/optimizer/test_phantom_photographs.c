@@ -1,0 +1,189 @@
+/* Photographs of a phantom: the table of configurations, the parameters, and what is written. */
+#include "optimizer/phantom/phantom_photographs.h"
+#include "optimizer/phantom/phantom_view_table.h"
+#include "geometry/fibers/fiber_set.h"
+#include "renderer/image/image.h"
+#include "tests/support/scratch_folder.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static void test_builtin_views(void **state)
+{
+    (void)state;
+    static struct phantom_view_table t;
+    phantom_view_table_builtin(&t);
+    assert_int_equal(t.n, 40);
+    for (size_t i = 0; i < t.n; i++) {
+        assert_int_equal(t.view[i].set, i < 16 ? JOB_SET_FIT : JOB_SET_HELD_OUT);
+        assert_true(job_file_name_valid(t.view[i].file));
+        assert_true(t.view[i].light_theta_deg < 90 && t.view[i].camera_theta_deg < 90);
+        for (size_t j = 0; j < i; j++) assert_string_not_equal(t.view[i].file, t.view[j].file);
+    }
+    assert_string_equal(t.view[0].file, "fit-00.exr");
+    assert_string_equal(t.view[39].file, "held-out-23.exr");
+}
+
+static void test_builtin_views_are_those_of_the_measurements(void **state)
+{
+    (void)state;
+    static struct phantom_view_table builtin, read;
+    const char *data = getenv("SELVEDGE_DATA");
+    char path[1024];
+    snprintf(path, sizeof path, "%s/measured-reflectance/merl-blue-fabric.csv", data != NULL ? data : "../shared/data");
+    if (access(path, R_OK) != 0) {
+        print_message("skipped: no '%s'\n", path);
+        skip();
+    }
+    phantom_view_table_builtin(&builtin);
+    assert_int_equal(phantom_view_table_read(&read, path, NULL), STATUS_OK);
+    assert_int_equal(read.n, builtin.n);
+    assert_memory_equal(read.view, builtin.view, read.n * sizeof *read.view);
+}
+
+static void expect_bad_table(void **state, const char *text, const char *says)
+{
+    static struct phantom_view_table t;
+    const char *path = scratch_path(state, "bad.csv");
+    struct error err = {0};
+    scratch_write(path, text, strlen(text));
+    assert_int_equal(phantom_view_table_read(&t, path, &err), STATUS_FORMAT);
+    if (strstr(err.text, says) == NULL) fail_msg("'%s' does not say '%s'", err.text, says);
+}
+
+static void test_bad_tables(void **state)
+{
+    expect_bad_table(state, "", "no rows");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg\n", "camera_phi_deg");
+    expect_bad_table(state, "#\nset,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,2,3\n", "line 3");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,2,x,4\n", "camera_theta_deg 'x'");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,nan,3,4\n", "light_phi_deg");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\ntest,1,2,3,4\n", "'test'");
+}
+
+static void test_parameters(void **state)
+{
+    (void)state;
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    double param[SCATTERING_MAX_PARAM] = {0};
+    struct error err;
+    assert_non_null(m);
+    assert_int_equal(phantom_param_parse(m, "C_TT=0.1,0.2,0.3", param, NULL), STATUS_OK);
+    assert_true(param[scattering_param_index(m, "C_TT.g")] == 0.2);
+    assert_int_equal(phantom_param_parse(m, "C_R=0.25", param, NULL), STATUS_OK);
+    assert_true(param[scattering_param_index(m, "C_R.r")] == 0.25 && param[scattering_param_index(m, "C_R.b")] == 0.25);
+    assert_int_equal(phantom_param_parse(m, "C_R.b=0.5", param, NULL), STATUS_OK);
+    assert_true(param[scattering_param_index(m, "C_R.b")] == 0.5);
+    assert_int_equal(phantom_param_parse(m, "beta_R=6", param, NULL), STATUS_OK);
+    assert_true(fabs(param[scattering_param_index(m, "beta_R")] - 6.0 * M_PI / 180.0) < 1e-12);
+    const char *const bad[] = {"C_R", "C_R=", "C_R=1,2", "C_R=0.1,0.2,0.3,0.4", "C_R=x", "beta_R=5,5,5", "C_X=1", "C_R=2", "=1", ""};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) assert_int_equal(phantom_param_parse(m, bad[i], param, &err), STATUS_INVALID);
+}
+
+/* Sixteen touching fibers along x: a little carpet. */
+static void write_carpet(const char *path)
+{
+    struct fiber_set f;
+    fiber_set_init(&f);
+    f.tile_size_m[0] = f.tile_size_m[1] = 1.6e-4;
+    assert_int_equal(fiber_set_reserve(&f, 16, 32, NULL), STATUS_OK);
+    for (size_t i = 0; i < 16; i++) {
+        for (size_t k = 0; k < 2; k++) {
+            f.position_m[3 * (2 * i + k)] = k == 0 ? 0.0f : 1.6e-4f;
+            f.position_m[3 * (2 * i + k) + 1] = 1e-5f * ((float)i + 0.5f);
+            f.position_m[3 * (2 * i + k) + 2] = i % 2 ? 5e-6f : 9e-6f;
+        }
+        f.radius_m[i] = 5.5e-6f;
+        f.first_vertex[i + 1] = 2 * i + 2;
+    }
+    assert_int_equal(fiber_set_write_hair(&f, path, NULL), STATUS_OK);
+    fiber_set_release(&f);
+}
+
+static void test_what_is_written(void **state)
+{
+    static const char table[] = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg\n"
+                                "fit,45,0,45,180,0\nheld-out,30,0,10,90,90\nfit,60,0,0,0,45\n";
+    char fibers[1024], csv[1024], folder[1024];
+    struct phantom_photograph_option o;
+    struct error err = {0};
+    snprintf(fibers, sizeof fibers, "%s", scratch_path(state, "carpet.hair"));
+    snprintf(csv, sizeof csv, "%s", scratch_path(state, "views.csv"));
+    snprintf(folder, sizeof folder, "%s", scratch_path(state, "photographs"));
+    write_carpet(fibers);
+    scratch_write(csv, table, sizeof table - 1);
+    phantom_photograph_option_default(&o);
+    o.fiber_file = fibers;
+    o.table_file = csv;
+    o.folder = folder;
+    o.model = scattering_find("two_lobe.v1");
+    for (size_t i = 0; i < o.model->n_param; i++) o.param[i] = o.model->param[i].start;
+    o.px = 8;
+    o.n_path = 64 * 20;
+    o.noise = 0.01;
+    if (phantom_photographs_make(&o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(scratch_count_entries(folder), 5);
+    json_t *list = json_load_file(scratch_path(state, "photographs/photographs.json"), 0, NULL);
+    json_t *truth = json_load_file(scratch_path(state, "photographs/truth.json"), 0, NULL);
+    assert_int_equal(json_array_size(list), 3);
+    assert_string_equal(json_string_value(json_object_get(json_array_get(list, 2), "file")), "fit-01.exr");
+    for (size_t i = 0; i < 3; i++) { /* the pictures' means are the told ones with the told error */
+        const json_t *row = json_array_get(json_object_get(truth, "photographs"), i);
+        const char *file = json_string_value(json_object_get(row, "file"));
+        char path[2048];
+        struct image im;
+        snprintf(path, sizeof path, "%s/%s", folder, file);
+        assert_int_equal(image_read_exr(&im, path, 1000, &err), STATUS_OK);
+        assert_true(im.width == 8 && im.height == 8);
+        for (size_t c = 0; c < 3; c++) {
+            double mean = 0, told = json_real_value(json_array_get(json_object_get(row, "mean_rgb"), c));
+            double gain = json_real_value(json_array_get(json_object_get(row, "gain_rgb"), c));
+            for (size_t k = 0; k < 64; k++) mean += (double)im.pixel[3 * k + c] / 64.0;
+            assert_true(told > 0.0 && fabs(gain - 1.0) < 0.06 && gain != 1.0);
+            assert_true(fabs(mean - told * gain) < 1e-5 * told);
+        }
+        image_release(&im);
+    }
+    json_decref(list);
+    json_decref(truth);
+    o.px = 0;
+    assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
+    o.px = 8;
+    static const char *const bad[][2] = {{"fit,45,0,95,180,0\n", "fit-00.exr' makes no sense"},
+                                         {"fit,45,0,45,180,0\nfit,120,0,0,0,0\n", "fit-01.exr' would be black"}};
+    for (size_t i = 0; i < 3; i++) {
+        char text[300];
+        snprintf(text, sizeof text, "%.*s%s", (int)(strchr(table, '\n') + 1 - table), table, i < 2 ? bad[i][0] : "fit,45,0,45,180,0\n");
+        scratch_write(csv, text, strlen(text));
+        o.crop_cm = i < 2 ? 1.0 : -1.0;
+        assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
+        assert_non_null(strstr(err.text, i < 2 ? bad[i][1] : "fit-00.exr' makes no sense"));
+    }
+    o.crop_cm = 1.0;
+    o.n_path = 1; /* one path a pixel at most, and an error all the same */
+    if (phantom_photographs_make(&o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
+    truth = json_load_file(scratch_path(state, "photographs/truth.json"), 0, NULL);
+    const json_t *first = json_array_get(json_object_get(truth, "photographs"), 0);
+    assert_true(json_real_value(json_array_get(json_object_get(first, "mean_rgb_se"), 0)) > 0.0);
+    json_decref(truth);
+    o.fiber_file = "absent.hair";
+    assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_NOT_FOUND);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_builtin_views), cmocka_unit_test(test_builtin_views_are_those_of_the_measurements),
+        cmocka_unit_test(test_bad_tables),    cmocka_unit_test(test_parameters),
+        cmocka_unit_test(test_what_is_written),
+    };
+    return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
+}

@@ -1,0 +1,231 @@
+/* The worker's plumbing: checkpoint files, the hold on a job folder, the series across resumes, the inputs. */
+#include "base/durable.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/work_file.h"
+#include "optimizer/worker/worker_series.h"
+#include "tests/support/tracer/fake_estimator.h"
+#include "tests/support/scratch_folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static void test_work_file(void **state)
+{
+    const char *path = scratch_path(state, "a.bin");
+    double fixed = 3.25;
+    char text[] = "sections of any length";
+    struct work_section out[] = {{&fixed, sizeof fixed}, {text, sizeof text}, {NULL, 0}};
+    struct error err;
+    assert_int_equal(work_file_read(path, "t.1", out, 3, &err), STATUS_NOT_FOUND);
+    assert_int_equal(work_file_write(path, "t.1", out, 3, NULL), STATUS_OK);
+    double back = 0.0;
+    struct work_section in[] = {{&back, sizeof back}, {NULL, 0}, {NULL, 0}};
+    assert_int_equal(work_file_read(path, "t.1", in, 3, NULL), STATUS_OK);
+    assert_true(back == fixed && in[1].n_bytes == sizeof text && in[2].n_bytes == 0);
+    assert_string_equal(in[1].data, text);
+    free(in[1].data);
+    free(in[2].data);
+    size_t n;
+    char *bytes = scratch_read(path, &n);
+    for (size_t i = 0; i < n; i++) { /* every flipped bit and every cut is noticed, and nothing leaks */
+        struct work_section damaged[] = {{&back, sizeof back}, {NULL, 0}, {NULL, 0}};
+        bytes[i] ^= 16;
+        scratch_write(path, bytes, n);
+        assert_int_not_equal(work_file_read(path, "t.1", damaged, 3, NULL), STATUS_OK);
+        bytes[i] ^= 16;
+        scratch_write(path, bytes, i);
+        assert_int_not_equal(work_file_read(path, "t.1", damaged, 3, NULL), STATUS_OK);
+        assert_null(damaged[1].data);
+    }
+    assert_true(back == fixed); /* what the caller has stays as it was */
+    scratch_write(path, bytes, n);
+    struct work_section other[] = {{&back, sizeof back}, {NULL, 0}, {NULL, 0}};
+    assert_int_equal(work_file_read(path, "t.2", other, 3, NULL), STATUS_FORMAT);
+    free(bytes);
+}
+
+/* As many sections as a job of the most models has, and not one more. */
+static void test_work_file_of_many_sections(void **state)
+{
+    const char *path = scratch_path(state, "many.bin");
+    size_t in[WORK_FILE_MAX_SECTION], out[WORK_FILE_MAX_SECTION + 1];
+    struct work_section to[WORK_FILE_MAX_SECTION + 1], from[WORK_FILE_MAX_SECTION];
+    for (size_t i = 0; i <= WORK_FILE_MAX_SECTION; i++) {
+        out[i] = 100 + i;
+        to[i] = (struct work_section){&out[i], sizeof out[i]};
+        if (i < WORK_FILE_MAX_SECTION) from[i] = (struct work_section){&in[i], sizeof in[i]};
+    }
+    assert_int_equal(work_file_write(path, "m.1", to, WORK_FILE_MAX_SECTION, NULL), STATUS_OK);
+    assert_int_equal(work_file_read(path, "m.1", from, WORK_FILE_MAX_SECTION, NULL), STATUS_OK);
+    for (size_t i = 0; i < WORK_FILE_MAX_SECTION; i++) assert_int_equal(in[i], out[i]);
+    assert_int_equal(work_file_write(path, "m.1", to, WORK_FILE_MAX_SECTION + 1, NULL), STATUS_INTERNAL);
+    assert_int_equal(work_file_read(path, "m.1", to, WORK_FILE_MAX_SECTION + 1, NULL), STATUS_INTERNAL);
+}
+
+static void test_folder(void **state)
+{
+    struct worker_folder a, b;
+    struct error err;
+    assert_int_equal(worker_folder_open(&a, scratch_path(state, "absent"), &err), STATUS_NOT_FOUND);
+    assert_int_equal(durable_make_folder(scratch_path(state, "job"), NULL), STATUS_OK);
+    const char *attempt = "{\"attempt\":3,\"token\":\"abc\"}";
+    scratch_write(scratch_path(state, "job/attempt.json"), attempt, strlen(attempt));
+    char path[2000];
+    snprintf(path, sizeof path, "%s/", scratch_path(state, "job")); /* a slash at the end does no harm */
+    assert_int_equal(worker_folder_open(&a, path, NULL), STATUS_OK);
+    assert_int_equal(a.attempt, 3);
+    assert_int_equal(worker_folder_open(&b, scratch_path(state, "job"), &err), STATUS_STALE);
+    assert_int_equal(worker_folder_check(&a, NULL), STATUS_OK);
+    assert_false(worker_folder_stage_done(&a, "fit"));
+    assert_int_equal(worker_folder_mark_stage(&a, "fit", NULL), STATUS_OK);
+    assert_true(worker_folder_stage_done(&a, "fit"));
+    attempt = "{\"attempt\":4,\"token\":\"def\"}";
+    scratch_write(scratch_path(state, "job/attempt.json"), attempt, strlen(attempt));
+    assert_int_equal(worker_folder_check(&a, &err), STATUS_STALE);
+    assert_int_equal(worker_folder_mark_stage(&a, "validation", NULL), STATUS_STALE);
+    assert_false(worker_folder_stage_done(&a, "validation"));
+    worker_folder_close(&a);
+    assert_int_equal(worker_folder_open(&b, scratch_path(state, "job"), NULL), STATUS_OK);
+    assert_int_equal(b.attempt, 4);
+    worker_folder_close(&b);
+}
+
+static bool count_record(void *context, const char *json, size_t n_json)
+{
+    size_t *n = context, step;
+    char want[40];
+    (void)n_json;
+    assert_int_equal(sscanf(json, "{\"step\":%zu", &step), 1);
+    snprintf(want, sizeof want, "{\"step\":%zu,", *n);
+    assert_memory_equal(json, want, strlen(want));
+    (*n)++;
+    return true;
+}
+
+static void add_steps(struct worker_series *s, size_t first, size_t n, bool replayed)
+{
+    static struct estimate estimate[2];
+    double param[FAKE_N_PARAM] = {0};
+    struct appearance appearance = {.id = "fake", .n_param = FAKE_N_PARAM};
+    struct fit_parameter parameter[FAKE_N_PARAM] = {{0.0, 1.0, 0.5, false}};
+    const struct worker_series_model model = {&appearance, parameter, 0, 0};
+    memcpy(appearance.param, fake_param, sizeof fake_param);
+    for (size_t i = first; i < first + n; i++) {
+        struct fit_step step = {.step = i,
+                                .phase = "p",
+                                .n_param = FAKE_N_PARAM,
+                                .n_configuration = 1,
+                                .param = param,
+                                .replica = {&estimate[0], &estimate[1]}};
+        assert_int_equal(worker_series_add(s, &step, &model, replayed, NULL), STATUS_OK);
+    }
+}
+
+/* A resumed fit passes through its old steps again: none is written twice, what is behind the resumption is cut, a torn
+ * record too. */
+static void test_series(void **state)
+{
+    struct worker_folder f;
+    struct worker_series *s = NULL;
+    const char *folder = scratch_path(state, "series");
+    assert_int_equal(durable_make_folder(folder, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_open(&f, folder, NULL), STATUS_OK);
+    static const struct {
+        size_t n_replayed, n_new, n_after;
+    } attempt[] = {{0, 5, 5}, {5, 2, 7}, {3, 1, 4}, {4, 0, 4}, {2, 3, 5}};
+    for (size_t k = 0; k < sizeof attempt / sizeof attempt[0]; k++) {
+        size_t n = 0;
+        assert_int_equal(worker_series_open(&f, &s, NULL), STATUS_OK);
+        add_steps(s, 0, attempt[k].n_replayed, true);
+        add_steps(s, attempt[k].n_replayed, attempt[k].n_new, false);
+        worker_series_close(s);
+        assert_int_equal(record_read(scratch_path(state, "series/series.rec"), 0, count_record, &n, NULL, NULL),
+                         STATUS_OK);
+        assert_int_equal(n, attempt[k].n_after);
+        FILE *torn = fopen(scratch_path(state, "series/series.rec"), "ab");
+        assert_non_null(torn);
+        fputs("0123abcd {\"step\":99", torn);
+        fclose(torn);
+    }
+    worker_folder_close(&f);
+}
+
+static void check_input_error(void **state, const char *document, const char *field)
+{
+    struct worker_folder f;
+    struct pipeline_context c;
+    struct error err = {0};
+    assert_int_equal(durable_make_folder(scratch_path(state, "inputs/input"), NULL), STATUS_OK);
+    scratch_write(scratch_path(state, "inputs/job.json"), document, strlen(document));
+    assert_int_equal(worker_folder_open(&f, scratch_path(state, "inputs"), NULL), STATUS_OK);
+    pipeline_context_init(&c);
+    c.folder = &f;
+    assert_int_not_equal(pipeline_read_inputs(&c, &err), STATUS_OK);
+    assert_string_equal(err.field, field);
+    pipeline_context_release(&c);
+    worker_folder_close(&f);
+}
+
+static void test_inputs(void **state)
+{
+    check_input_error(state,
+                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"measurements\":{\"file\":\"absent.csv\"}}",
+                      "measurements.file");
+    check_input_error(state,
+                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"measurements\":{\"file\":\"a.csv\"},"
+                      "\"fit\":{\"model\":\"x\"}}",
+                      "fit.model");
+    check_input_error(state,
+                      "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"},\"photographs\":[{\"file\":\"p.exr\",\"light_"
+                      "theta_deg\":1,\"light_phi_deg\":1,"
+                      "\"camera_theta_deg\":1,\"camera_phi_deg\":1}]}",
+                      "photographs[0].file");
+}
+
+/* Radii as if in micrometres: refused before the ends on the faces are paired, each with each. */
+static void test_fibers_wider_than_the_tile(void **state)
+{
+    static const char document[] = "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.txt\",\"tile_mm\":[1,2]},"
+                                   "\"measurements\":{\"file\":\"a.csv\"}}";
+    static const char rows[] = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b\n"
+                               "fit,20,0,20,180,.1,.1,.1\nfit,30,0,20,180,.1,.1,.1\nfit,40,0,20,180,.1,.1,.1\n"
+                               "fit,50,0,20,180,.1,.1,.1\nfit,60,0,20,180,.1,.1,.1\nfit,70,0,20,180,.1,.1,.1\n";
+    static const char *const fibers[2] = {"0 0.5 0 0.499\n1 0.5 0 0.499\n",
+                                          "0 0.5 0 0.01\n1 0.5 0 0.01\n\n0 0.5 0 0.501\n1 0.5 0 0.501\n"};
+    assert_int_equal(durable_make_folder(scratch_path(state, "wide/input"), NULL), STATUS_OK);
+    scratch_write(scratch_path(state, "wide/job.json"), document, sizeof document - 1);
+    scratch_write(scratch_path(state, "wide/input/a.csv"), rows, sizeof rows - 1);
+    for (int i = 0; i < 2; i++) {
+        struct worker_folder f;
+        struct pipeline_context c;
+        struct error err = {0};
+        scratch_write(scratch_path(state, "wide/input/a.txt"), fibers[i], strlen(fibers[i]));
+        assert_int_equal(worker_folder_open(&f, scratch_path(state, "wide"), NULL), STATUS_OK);
+        pipeline_context_init(&c);
+        c.folder = &f;
+        if (pipeline_read_inputs(&c, &err) != STATUS_OK) fail_msg("%s", err.text);
+        assert_int_equal(stage_fibers(&c, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
+        if (i == 1) {
+            assert_string_equal(err.field, "fibers.file");
+            assert_non_null(strstr(err.text, "'a.txt': fiber 1 has a radius of 0.501 mm, the tile is 1 x 2 mm: the unit may be wrong"));
+        }
+        pipeline_context_release(&c);
+        worker_folder_close(&f);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_work_file_of_many_sections),
+                                       cmocka_unit_test(test_folder),
+                                       cmocka_unit_test(test_series), cmocka_unit_test(test_inputs),
+                                       cmocka_unit_test(test_fibers_wider_than_the_tile)};
+    return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
+}

@@ -1,0 +1,101 @@
+/* The worker's status: its warnings when there are many, and texts that would not go into JSON. */
+#include "base/durable.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/worker_status.h"
+#include "tests/support/scratch_folder.h"
+
+#include <jansson.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct desk {
+    const char *folder;
+    struct worker_folder hold;
+    struct log *log;
+    struct worker_status *status;
+};
+
+static void start(struct desk *d, void **state)
+{
+    struct error err = {0};
+    char path[512];
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    sigaddset(&set, SIGINT);
+    sigprocmask(SIG_BLOCK, &set, NULL);
+    d->folder = *state;
+    assert_int_equal(worker_folder_open(&d->hold, d->folder, &err), STATUS_OK);
+    snprintf(path, sizeof path, "%s/log.txt", d->folder);
+    assert_int_equal(log_open(path, NULL, LOG_LEVEL_INFO, &d->log, &err), STATUS_OK);
+    assert_int_equal(worker_status_start(&d->hold, d->log, &d->status, &err), STATUS_OK);
+}
+
+/* Ends it, and gives status.json. */
+static json_t *finish(struct desk *d, const struct error *error)
+{
+    struct error err = {0};
+    char path[512];
+    assert_int_equal(worker_status_finish(d->status, "failed", error, &err), STATUS_OK);
+    snprintf(path, sizeof path, "%s/%s", d->folder, JOB_FILE_STATUS);
+    json_t *json = json_load_file(path, 0, NULL);
+    assert_non_null(json);
+    worker_status_free(d->status);
+    log_close(d->log);
+    worker_folder_close(&d->hold);
+    return json;
+}
+
+static void test_warnings_beyond_the_list_are_counted(void **state)
+{
+    struct desk d = {0};
+    char text[64];
+    start(&d, state);
+    for (int i = 0; i < 60; i++) {
+        snprintf(text, sizeof text, "warning %d", i);
+        worker_status_warn(d.status, text);
+        worker_status_warn(d.status, "warning 0"); /* known: not counted again */
+    }
+    assert_int_equal(worker_status_n_warning(d.status), 50);
+    assert_true(worker_status_warning(d.status, 48, text, sizeof text));
+    assert_string_equal(text, "warning 48");
+    assert_true(worker_status_warning(d.status, 49, text, sizeof text));
+    assert_string_equal(text, "11 more warnings are in the job's log");
+    assert_false(worker_status_warning(d.status, 50, text, sizeof text));
+    json_decref(finish(&d, NULL));
+}
+
+static void test_texts_that_are_no_utf8(void **state)
+{
+    struct desk d = {0};
+    char longer[600];
+    start(&d, state);
+    memset(longer, 'x', sizeof longer);
+    for (size_t i = 1; i + 2 < sizeof longer; i += 2) memcpy(longer + i, "\xc3\xa4", 2);
+    longer[599] = '\0';
+    struct error error = {.code = STATUS_FORMAT};
+    snprintf(error.text, sizeof error.text, "x%s", longer);
+    worker_status_warn(d.status, error.text); /* the limits of warnings and of messages cut a character in two */
+    worker_status_warn(d.status, "gr\xf6\xdf" "e");
+    json_t *json = finish(&d, &error);
+    assert_string_equal(json_string_value(json_object_get(json, "state")), "failed");
+    assert_int_equal(strlen(json_string_value(json_array_get(json_object_get(json, "warnings"), 0))), 511);
+    assert_string_equal(json_string_value(json_array_get(json_object_get(json, "warnings"), 1)), "gr??e");
+    assert_int_equal(strlen(json_string_value(json_object_get(json, "message"))), 299);
+    json_decref(json);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_warnings_beyond_the_list_are_counted, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_texts_that_are_no_utf8, scratch_folder_setup, scratch_folder_teardown)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

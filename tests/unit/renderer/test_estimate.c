@@ -1,0 +1,345 @@
+/* estimate_run: the same bits for any number of threads, honest variances, cancellation, bad requests. */
+#include "base/clock.h"
+#include "renderer/transport/estimate.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/statistics_test.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static struct scene *scene;
+static double start[SCATTERING_MAX_PARAM];
+static struct configuration configuration[16];
+
+static int set_up(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    for (size_t p = 0; p < m->n_param; p++) start[p] = m->param[p].start;
+    orbit_configurations_16(configuration);
+    hand_weave_small(&f);
+    status st = scene_new(&f, &(struct scene_option){true}, &scene, NULL);
+    fiber_set_release(&f);
+    return st != STATUS_OK;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    scene_free(scene);
+    return 0;
+}
+
+static struct estimate_request request(const size_t *n_path, size_t n_configuration)
+{
+    return (struct estimate_request){
+        scene, scattering_find("two_lobe.v1"), start, configuration, n_configuration, n_path, 17, 3, 1, true};
+}
+
+static void run(const struct estimate_request *q, size_t n_thread, struct estimate *e)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
+    if (estimate_run(q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    thread_pool_free(pool);
+}
+
+static void same_bits_for_any_threads(void **state)
+{
+    (void)state;
+    const size_t n_path[4] = {1000, 256, 0, 2500};
+    struct estimate_request q = request(n_path, 4);
+    struct estimate one[4], more[4];
+    run(&q, 1, one);
+    assert_int_equal(one[0].n_path, 1024);
+    assert_int_equal(one[2].n_path, 0);
+    assert_true(one[2].mean[0] == 0 && one[0].mean[0] > 0 && one[0].n_vertex > 1024);
+    for (size_t t = 2; t <= 3; t++) {
+        run(&q, t, more);
+        assert_memory_equal(one, more, sizeof one);
+    }
+    /* configurations are independent of what else is asked for; other keys give other numbers */
+    const size_t only_last[4] = {0, 0, 0, 2500};
+    struct estimate_request alone = request(only_last, 4);
+    run(&alone, 2, more);
+    assert_memory_equal(&one[3], &more[3], sizeof one[3]);
+    alone.replica = 2;
+    run(&alone, 2, more);
+    assert_true(more[3].mean[0] != one[3].mean[0]);
+    /* without derivatives the same radiance */
+    q.want_jacobian = false;
+    run(&q, 1, more);
+    for (int c = 0; c < 3; c++)
+        assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
+}
+
+/* The stated variance of the mean against the scatter of repeated estimates. */
+static void variances_are_honest(void **state)
+{
+    (void)state;
+    enum { N = 60 };
+    const size_t n_path[1] = {2048};
+    struct sample_mean mean = {0}, jac = {0};
+    double var = 0, jac_var = 0;
+    for (uint32_t i = 0; i < N; i++) {
+        struct estimate e;
+        struct estimate_request q = request(n_path, 1);
+        q.iteration = i;
+        run(&q, 1, &e);
+        sample_mean_add(&mean, e.mean[0]);
+        sample_mean_add(&jac, e.jac[3]); /* C_TT.r on r */
+        var += e.var[0] / N;
+        jac_var += e.jac_var[3] / N;
+    }
+    /* a sample variance of 60 has a relative standard error of 0.18 for normal deviates, a little more for these */
+    double ratio = mean.m2 / (N - 1) / var, jac_ratio = jac.m2 / (N - 1) / jac_var;
+    if (fabs(ratio - 1) > 0.65 || fabs(jac_ratio - 1) > 0.65) fail_msg("variance ratios %g, %g", ratio, jac_ratio);
+}
+
+/* The same random numbers: only rays that graze an edge may fare differently. */
+static void agrees_without_avx512(void **state)
+{
+    (void)state;
+    const size_t n_path[2] = {65536, 65536};
+    struct fiber_set f;
+    struct error err = {0};
+    struct scene *plain = NULL;
+    struct estimate with[2], without[2];
+    struct estimate_request q = request(n_path, 2);
+    hand_weave_small(&f);
+    if (scene_new(&f, &(struct scene_option){.black_sheet = true, .no_avx512 = true}, &plain, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
+    assert_int_equal(estimate_run(&q, NULL, NULL, with, &err), STATUS_OK);
+    q.scene = plain;
+    assert_int_equal(estimate_run(&q, NULL, NULL, without, &err), STATUS_OK);
+    for (int i = 0; i < 2; i++)
+        for (int c = 0; c < 3; c++) {
+            double se = sqrt(with[i].var[c]), off = fabs(with[i].mean[c] - without[i].mean[c]);
+            if (!(off < 0.3 * se)) fail_msg("configuration %d, channel %d: %g, without %g", i, c, with[i].mean[c], without[i].mean[c]);
+        }
+    scene_free(plain);
+    fiber_set_release(&f);
+}
+
+/* Shared paths: the same means and derivatives as separate ones within their errors, the same bits for any threads. */
+static void shared_paths_agree_with_separate_ones(void **state)
+{
+    (void)state;
+    enum { N = 5, N_PARAM = 9 };
+    const size_t n_path[N] = {16384, 8192, 0, 4096, 16384};
+    struct configuration c[N];
+    struct estimate separate[N], shared[N], again[N];
+    struct estimate_request q = request(n_path, N);
+    for (int i = 0; i < N; i++) {
+        c[i] = configuration[i == 3 ? 4 : 0]; /* one of them with the cloth turned: alone in its group */
+        c[i].light_theta_rad = 0.2 + 0.25 * i;
+        c[i].light_phi_rad = 2.0 + 0.7 * i;
+    }
+    c[4].environment_rgb[1] = 0.1; /* differs in more than its lamp: alone, too */
+    q.configuration = c;
+    run(&q, 2, separate);
+    q.share_camera_paths = true;
+    run(&q, 2, shared);
+    run(&q, 1, again);
+    assert_memory_equal(shared, again, sizeof shared);
+    assert_int_equal(shared[2].n_path, 0);
+    assert_int_equal(shared[1].n_path, 16384); /* as many as configuration 0 asks for */
+    for (int i = 0; i < N; i++)
+        for (int k = 0; k < 3 && i != 2; k++) {
+            double se = sqrt(separate[i].var[k] + shared[i].var[k]);
+            if (!(fabs(separate[i].mean[k] - shared[i].mean[k]) < 4 * se && shared[i].mean[k] > 0))
+                fail_msg("configuration %d, channel %d: %g and %g, +- %g", i, k, separate[i].mean[k], shared[i].mean[k], se);
+            for (int p = 0; p < N_PARAM; p++) {
+                double jac_se = sqrt(separate[i].jac_var[k * N_PARAM + p] + shared[i].jac_var[k * N_PARAM + p]);
+                if (fabs(separate[i].jac[k * N_PARAM + p] - shared[i].jac[k * N_PARAM + p]) > 4.5 * jac_se)
+                    fail_msg("configuration %d, derivative %d of channel %d: %g and %g, +- %g", i, p, k, separate[i].jac[k * N_PARAM + p], shared[i].jac[k * N_PARAM + p], jac_se);
+            }
+        }
+    /* a group of one has the paths of its own estimate when it is first: same key, same numbers */
+    q.n_configuration = 1;
+    run(&q, 1, again);
+    q.share_camera_paths = false;
+    run(&q, 1, separate);
+    assert_memory_equal(&again[0].mean, &separate[0].mean, sizeof again[0].mean);
+    assert_memory_equal(&again[0].jac, &separate[0].jac, sizeof again[0].jac);
+}
+
+/* Without a lamp there is nothing to share: an environment alone gives what separate paths give. */
+static void shared_paths_without_a_lamp(void **state)
+{
+    (void)state;
+    const size_t n_path[2] = {4096, 4096};
+    struct configuration c[2] = {configuration[0], configuration[0]};
+    struct estimate separate[2], shared[2];
+    struct estimate_request q = request(n_path, 2);
+    for (int i = 0; i < 2; i++) {
+        c[i].light = LIGHT_NO_LAMP;
+        c[i].environment_rgb[0] = c[i].environment_rgb[1] = c[i].environment_rgb[2] = 0.5 + i;
+    }
+    q.configuration = c;
+    run(&q, 2, separate);
+    q.share_camera_paths = true;
+    run(&q, 2, shared);
+    assert_memory_equal(shared[0].mean, separate[0].mean, sizeof shared[0].mean); /* first in the order: same key, same numbers */
+    for (int k = 0; k < 3; k++) {
+        double se = sqrt(separate[1].var[k] + shared[1].var[k]);
+        if (!(fabs(shared[1].mean[k] - separate[1].mean[k]) < 4 * se && shared[1].mean[k] > 0))
+            fail_msg("channel %d: %g, alone %g, +- %g", k, shared[1].mean[k], separate[1].mean[k], se);
+    }
+}
+
+struct canceller {
+    atomic_bool flag;
+    double at_s;
+};
+
+static void *cancel_soon(void *canceller)
+{
+    struct canceller *c = canceller;
+    usleep(60000);
+    c->at_s = clock_monotonic_s();
+    atomic_store(&c->flag, true);
+    return NULL;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* White fibers: the longest paths there are. The median of five, so that one late turn of a loaded machine's scheduler
+ * does not count. */
+static void cancels_within_100_ms(void **state)
+{
+    (void)state;
+    const double white[9] = {0.001, 0.001, 0.001, 0.999, 0.999, 0.999, 0.1, 0.4, 0.4};
+    const size_t n_path[1] = {200000000};
+    struct estimate_request q = request(n_path, 1);
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    double late_s[5];
+    q.param = white;
+    assert_int_equal(thread_pool_new(2, &pool, &err), STATUS_OK);
+    for (int k = 0; k < 5; k++) {
+        struct estimate e;
+        struct canceller c = {.at_s = 0};
+        struct progress progress = {NULL, NULL, &c.flag};
+        pthread_t thread;
+        pthread_create(&thread, NULL, cancel_soon, &c);
+        assert_int_equal(estimate_run(&q, pool, &progress, &e, &err), STATUS_CANCELLED);
+        double back_s = clock_monotonic_s();
+        pthread_join(thread, NULL);
+        late_s[k] = back_s - c.at_s;
+    }
+    thread_pool_free(pool);
+    qsort(late_s, 5, sizeof *late_s, by_size);
+    print_message("cancelled in %.1f ms (median), %.1f ms at most\n", 1e3 * late_s[2], 1e3 * late_s[4]);
+    if (late_s[2] > 0.1) fail_msg("took %.3f s after the flag", late_s[2]);
+}
+
+static void bad_requests(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {256};
+    struct estimate e;
+    struct error err = {0};
+    struct estimate_request q = request(n_path, 1);
+    double param[SCATTERING_MAX_PARAM];
+    memcpy(param, start, sizeof param);
+    param[6] = NAN;
+    q.param = param;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "beta_R");
+    q = request(n_path, 1);
+    struct configuration c = configuration[0];
+    c.camera_theta_rad = M_PI_2;
+    q.configuration = &c;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
+    q = request(n_path, 1);
+    q.iteration = 70000;
+    assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
+}
+
+/* A model that fails in one direction in a thousand: found and named. */
+static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3],
+                             const float *weight, float rgb[3], float *score)
+{
+    float pdf = scattering_find("isotropic.v1")->eval_pdf(s, wi, wo, weight, rgb, score);
+    if (score != NULL && fabsf(wi[0]) > 0.99f) score[1] = NAN;
+    return pdf;
+}
+
+static void nan_is_named(void **state)
+{
+    (void)state;
+    const size_t n_path[2] = {0, 4096}; /* the first is not traced */
+    struct scattering_model broken = *scattering_find("isotropic.v1");
+    broken.id = "broken.v1";
+    broken.eval_pdf = broken_eval_pdf;
+    const double param[3] = {0.5, 0.5, 0.5};
+    struct estimate e[2];
+    struct error err = {0};
+    struct estimate_request q = request(n_path, 2);
+    q.model = &broken;
+    q.param = param;
+    assert_int_equal(estimate_run(&q, NULL, NULL, e, &err), STATUS_NUMERIC);
+    assert_non_null(strstr(err.text, "broken.v1"));
+    char view[CONFIGURATION_TEXT];
+    configuration_describe(&q.configuration[1], view);
+    if (strstr(err.text, view) == NULL) fail_msg("'%s' does not name %s", err.text, view);
+    assert_string_equal(err.field, "C.g");
+}
+
+/* Numbers are rounded: one sample in 2^24 may come out along the fiber, where density and S are 0. That ends a path;
+ * it is no failure of the model. */
+static float rounding_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3],
+                               const float *weight, float rgb[3], float *score)
+{
+    float pdf = scattering_find("isotropic.v1")->eval_pdf(s, wi, wo, weight, rgb, score);
+    if (fabsf(wi[0]) <= 0.99f) return pdf;
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    return 0;
+}
+
+static void samples_without_density(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {4096};
+    struct scattering_model rounding = *scattering_find("isotropic.v1");
+    rounding.eval_pdf = rounding_eval_pdf;
+    const double param[3] = {0.5, 0.5, 0.5};
+    struct estimate e;
+    struct error err = {0};
+    struct estimate_request q = request(n_path, 1);
+    q.model = &rounding;
+    q.param = param;
+    if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_true(e.mean[0] > 0 && isfinite(e.jac[0]));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(same_bits_for_any_threads),
+        cmocka_unit_test(variances_are_honest),
+        cmocka_unit_test(shared_paths_agree_with_separate_ones),
+        cmocka_unit_test(shared_paths_without_a_lamp),
+        cmocka_unit_test(agrees_without_avx512),
+        cmocka_unit_test(cancels_within_100_ms),
+        cmocka_unit_test(bad_requests),
+        cmocka_unit_test(nan_is_named),
+        cmocka_unit_test(samples_without_density),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,150 @@
+/* render_run: agrees with estimate_run, the same bits for any number of threads, layers and names, back light. */
+#include "renderer/transport/render.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static double start[SCATTERING_MAX_PARAM];
+static struct configuration configuration[16];
+
+static int set_up(void **state)
+{
+    (void)state;
+    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    for (size_t p = 0; p < m->n_param; p++) start[p] = m->param[p].start;
+    orbit_configurations_16(configuration);
+    return 0;
+}
+
+static struct scene *small_cloth(bool black_sheet)
+{
+    struct fiber_set f;
+    struct scene *scene = NULL;
+    struct error err = {0};
+    hand_weave_small(&f);
+    if (scene_new(&f, &(struct scene_option){black_sheet}, &scene, &err) != STATUS_OK) fail_msg("%s", err.text);
+    fiber_set_release(&f);
+    return scene;
+}
+
+static void render(const struct render_request *q, size_t n_thread, struct image *im)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
+    if (render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
+    thread_pool_free(pool);
+}
+
+static struct render_request request(const struct scene *scene, const struct configuration *c)
+{
+    return (struct render_request){scene, scattering_find("two_lobe.v1"), start, c, 24, 20, 32, 5, 0, true};
+}
+
+static void layers_and_threads(void **state)
+{
+    (void)state;
+    struct scene *scene = small_cloth(true);
+    struct render_request q = request(scene, &configuration[1]);
+    struct image one, two;
+    render(&q, 1, &one);
+    render(&q, 2, &two);
+    assert_int_equal(one.n_channel, 6 + 27);
+    assert_memory_equal(one.pixel, two.pixel, one.width * one.height * one.n_channel * sizeof(float));
+    assert_string_equal(one.channel_name[2], "B");
+    assert_string_equal(one.channel_name[4], "var.G");
+    assert_string_equal(one.channel_name[6], "d_C_R.r.R");
+    assert_string_equal(one.channel_name[6 + 3 * 8 + 2], "d_gamma_TT.B");
+    double jac = 0, wrong = 0;
+    for (size_t i = 0; i < one.width * one.height; i++) {
+        jac += (double)one.pixel[i * one.n_channel + 6 + 3 * 3];       /* d_C_TT.r.R */
+        wrong += (double)one.pixel[i * one.n_channel + 6 + 3 * 3 + 1]; /* d_C_TT.r.G */
+    }
+    assert_true(jac > 0 && wrong == 0);
+    image_release(&one);
+    image_release(&two);
+    scene_free(scene);
+}
+
+/* Mean over the pixels = the crop's mean, within the two standard errors that both state. */
+static void agrees_with_estimate(void **state)
+{
+    (void)state;
+    struct scene *scene = small_cloth(true);
+    const size_t n_path[1] = {60000};
+    for (int k = 0; k < 3; k++) {
+        struct render_request q = request(scene, &configuration[k]);
+        struct image im;
+        struct estimate e;
+        struct error err = {0};
+        q.n_sample = 100;
+        render(&q, 2, &im);
+        struct estimate_request r = {scene, q.model, start, &configuration[k], 1, n_path, 6, 0, 0, false};
+        if (estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+        double mean = 0, var = 0, n = (double)(im.width * im.height);
+        for (size_t i = 0; i < im.width * im.height; i++) {
+            mean += (double)im.pixel[i * im.n_channel + 1] / n;
+            var += (double)im.pixel[i * im.n_channel + 4] / (n * n);
+        }
+        double se = sqrt(var + e.var[1]);
+        if (fabs(mean - e.mean[1]) > 4 * se) fail_msg("render %g, estimate %g, standard error %g", mean, e.mean[1], se);
+        image_release(&im);
+    }
+    scene_free(scene);
+}
+
+/* A lamp below: nothing through a black sheet, light through the cloth and between its fibers without it. */
+static void back_light(void **state)
+{
+    (void)state;
+    struct configuration c = configuration[0];
+    c.light_theta_rad = M_PI;
+    c.camera_theta_rad = 0.1;
+    const size_t n_path[1] = {4096};
+    for (int sheet = 0; sheet < 2; sheet++) {
+        struct scene *scene = small_cloth(sheet);
+        struct estimate e;
+        struct estimate_request q = {scene, scattering_find("two_lobe.v1"), start, &c, 1, n_path, 6, 0, 0, false};
+        assert_int_equal(estimate_run(&q, NULL, NULL, &e, NULL), STATUS_OK);
+        if (sheet)
+            assert_true(e.mean[0] == 0);
+        else
+            assert_true(e.mean[0] > 0.01);
+        scene_free(scene);
+    }
+}
+
+static void bad_requests(void **state)
+{
+    (void)state;
+    struct scene *scene = small_cloth(true);
+    struct render_request q = request(scene, &configuration[0]);
+    struct image im;
+    struct error err = {0};
+    q.n_sample = 0;
+    assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    q = request(scene, &configuration[0]);
+    atomic_bool flag = true;
+    struct progress cancelled = {NULL, NULL, &flag};
+    assert_int_equal(render_run(&q, NULL, &cancelled, &im, &err), STATUS_CANCELLED);
+    assert_null(im.pixel);
+    scene_free(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(layers_and_threads),
+        cmocka_unit_test(agrees_with_estimate),
+        cmocka_unit_test(back_light),
+        cmocka_unit_test(bad_requests),
+    };
+    return cmocka_run_group_tests(tests, set_up, NULL);
+}

@@ -1,0 +1,244 @@
+/* volume_render_run: agrees with volume_estimate_run, the same bits for any number of threads, layers and names, files,
+ * progress and cancellation; and the renderings of both kinds of cloth through appearance_render_run. */
+#include "renderer/transport/appearance_render.h"
+#include "renderer/transport/volume_render.h"
+#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/scratch_folder.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+static double param[SCATTERING_MAX_PARAM];
+static struct configuration configuration[16];
+static struct volume_scene scene;
+
+static int set_up(void **state)
+{
+    (void)state;
+    const size_t n[3] = {30, 34, 13};
+    struct direction_volume v;
+    const struct phase_model *m = phase_find("phase_two_lobe.v1");
+    for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
+    orbit_configurations_16(configuration);
+    hand_volume_weave(&v, n, 8e-6, 0.4);
+    if (volume_scene_init(&scene, &v, &(struct volume_scene_option){true}, NULL) != STATUS_OK) return 1;
+    direction_volume_release(&v);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    volume_scene_release(&scene);
+    return 0;
+}
+
+static struct volume_render_request request(const struct configuration *c)
+{
+    return (struct volume_render_request){.scene = &scene,
+                                          .model = phase_find("phase_two_lobe.v1"),
+                                          .param = param,
+                                          .multiplier_per_m = 4e4,
+                                          .configuration = c,
+                                          .width = 24,
+                                          .height = 20,
+                                          .n_sample = 32,
+                                          .seed = 5,
+                                          .want_derivative = true};
+}
+
+static void render(const struct volume_render_request *q, size_t n_thread, struct image *im)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
+    if (volume_render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
+    thread_pool_free(pool);
+}
+
+static void layers_and_threads(void **state)
+{
+    (void)state;
+    struct volume_render_request q = request(&configuration[1]);
+    struct image im[3];
+    for (size_t i = 0; i < 3; i++) render(&q, i + 1, &im[i]);
+    assert_int_equal(im[0].n_channel, 6 + 39);
+    for (size_t i = 1; i < 3; i++)
+        assert_memory_equal(im[0].pixel, im[i].pixel, 24 * 20 * im[0].n_channel * sizeof(float));
+    assert_string_equal(im[0].channel_name[4], "var.G");
+    assert_string_equal(im[0].channel_name[6 + 3 * 9], "d_alpha.r.R");
+    assert_string_equal(im[0].channel_name[6 + 3 * 12 + 2], "d_density_multiplier.B");
+    for (size_t i = 0; i < 3; i++) image_release(&im[i]);
+}
+
+/* Mean over the pixels = the crop's mean, within the standard errors that both state; derivatives by alpha and d too,
+ * whose pixels state none: their estimate's error counts twice over, for its equal number of paths. */
+static void agrees_with_estimate(void **state)
+{
+    (void)state;
+    enum { N_PATH = 61440 };
+    const size_t n_path[1] = {N_PATH};
+    for (int k = 0; k < 16; k += 6) {
+        struct volume_render_request q = request(&configuration[k]);
+        struct image im;
+        struct estimate e;
+        struct error err = {0};
+        q.n_sample = N_PATH / (24 * 20);
+        render(&q, 2, &im);
+        const struct volume_estimate_request r = {&scene, q.model, param, 4e4, &configuration[k], 1, n_path, 6, 0, 0, true};
+        if (volume_estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+        double mean = 0, var = 0, by_alpha = 0, by_d = 0, n = 24 * 20;
+        for (size_t i = 0; i < 24 * 20; i++) {
+            const float *pixel = im.pixel + i * im.n_channel;
+            mean += (double)pixel[1] / n;
+            var += (double)pixel[4] / (n * n);
+            by_alpha += (double)pixel[6 + 3 * 10 + 1] / n;
+            by_d += (double)pixel[6 + 3 * 12 + 1] / n;
+        }
+        double se = sqrt(var + e.var[1]);
+        if (fabs(mean - e.mean[1]) > 4 * se) fail_msg("render %g, estimate %g, standard error %g", mean, e.mean[1], se);
+        const size_t at[2] = {13 + 10, 13 + 12};
+        const double got[2] = {by_alpha, by_d};
+        for (int i = 0; i < 2; i++)
+            if (fabs(got[i] - e.jac[at[i]]) > 4 * sqrt(2 * e.jac_var[at[i]]))
+                fail_msg("derivative %d: render %g, estimate %g +- %g", i, got[i], e.jac[at[i]], sqrt(e.jac_var[at[i]]));
+        image_release(&im);
+    }
+}
+
+static void files(void **state)
+{
+    struct volume_render_request q = request(&configuration[2]);
+    struct image im, back;
+    struct error err = {0};
+    const char *exr = scratch_path(state, "v.exr"), *png = scratch_path(state, "v.png");
+    render(&q, 1, &im);
+    if (image_write_exr(&im, exr, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (image_write_png(&im, 2, png, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (image_read_exr(&back, exr, 1000, &err) != STATUS_OK) fail_msg("%s", err.text);
+    for (size_t i = 0; i < 24 * 20; i++)
+        assert_memory_equal(back.pixel + 3 * i, im.pixel + im.n_channel * i, 3 * sizeof(float));
+    image_release(&im);
+    image_release(&back);
+}
+
+struct watch {
+    atomic_bool cancel;
+    struct timespec cancelled;
+    double fraction;
+    bool falling;
+};
+
+static void listen(void *context, double fraction)
+{
+    struct watch *w = context;
+    w->falling |= fraction < w->fraction;
+    w->fraction = fraction;
+}
+
+static void *cancel_soon(void *context)
+{
+    struct watch *w = context;
+    nanosleep(&(struct timespec){0, 150000000}, NULL);
+    clock_gettime(CLOCK_MONOTONIC, &w->cancelled);
+    atomic_store(&w->cancel, true);
+    return NULL;
+}
+
+/* A picture of many seconds, from a single pixel to many, ends within 100 ms (of three tries, for a busy machine). */
+static void cancelled_soon(void **state)
+{
+    (void)state;
+    const size_t size[2] = {1, 200};
+    for (int k = 0; k < 2; k++) {
+        double waited = 1;
+        for (int attempt = 0; attempt < 3 && waited > 0.1; attempt++) {
+            struct watch w = {.cancel = false};
+            const struct progress progress = {listen, &w, &w.cancel};
+            struct volume_render_request q = request(&configuration[3]);
+            struct thread_pool *pool = NULL;
+            struct timespec now;
+            struct image im;
+            pthread_t thread;
+            q.width = q.height = size[k];
+            q.n_sample = 40000000 / (size[k] * size[k]);
+            assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
+            assert_int_equal(pthread_create(&thread, NULL, cancel_soon, &w), 0);
+            assert_int_equal(volume_render_run(&q, pool, &progress, &im, NULL), STATUS_CANCELLED);
+            clock_gettime(CLOCK_MONOTONIC, &now);
+            pthread_join(thread, NULL);
+            thread_pool_free(pool);
+            assert_null(im.pixel);
+            assert_false(w.falling);
+            waited = (double)(now.tv_sec - w.cancelled.tv_sec) + 1e-9 * (double)(now.tv_nsec - w.cancelled.tv_nsec);
+        }
+        if (waited > 0.1) fail_msg("%zu x %zu pixels: cancelled after %.3f s", size[k], size[k], waited);
+    }
+    struct watch w = {.cancel = false};
+    const struct progress progress = {listen, &w, &w.cancel};
+    struct volume_render_request q = request(&configuration[3]);
+    struct image im;
+    assert_int_equal(volume_render_run(&q, NULL, &progress, &im, NULL), STATUS_OK);
+    assert_true(w.fraction == 1 && !w.falling);
+    image_release(&im);
+}
+
+static void bad_requests(void **state)
+{
+    (void)state;
+    struct volume_render_request q = request(&configuration[0]);
+    struct configuration c = configuration[0];
+    struct image im;
+    struct error err = {0};
+    q.n_sample = 0;
+    assert_int_equal(volume_render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    q = request(&c);
+    c.crop_m = -1;
+    assert_int_equal(volume_render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    q = request(&configuration[0]);
+    q.multiplier_per_m = 0;
+    assert_int_equal(volume_render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "d");
+}
+
+static void through_the_appearance(void **state)
+{
+    (void)state;
+    struct appearance a;
+    struct image im, straight;
+    double flat[SCATTERING_MAX_PARAM];
+    assert_true(appearance_find("phase_two_lobe.v1", &a));
+    memcpy(flat, param, sizeof flat);
+    flat[a.n_param - 1] = 4e4;
+    struct appearance_render_request q = {.scene = {NULL, &scene}, .model = &a, .param = flat,
+                                          .configuration = &configuration[1], .width = 24, .height = 20,
+                                          .n_sample = 32, .seed = 5, .want_derivative = true};
+    assert_int_equal(appearance_render_run(&q, NULL, NULL, &im, NULL), STATUS_OK);
+    struct volume_render_request r = request(&configuration[1]);
+    render(&r, 1, &straight);
+    assert_int_equal(im.n_channel, straight.n_channel);
+    assert_memory_equal(im.pixel, straight.pixel, 24 * 20 * im.n_channel * sizeof(float));
+    image_release(&im);
+    image_release(&straight);
+    assert_true(appearance_find("two_lobe.v1", &a));
+    assert_int_equal(appearance_render_run(&q, NULL, NULL, &im, NULL), STATUS_INVALID);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(layers_and_threads), cmocka_unit_test(agrees_with_estimate),
+        cmocka_unit_test_setup_teardown(files, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test(cancelled_soon),
+        cmocka_unit_test(bad_requests),       cmocka_unit_test(through_the_appearance),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
