@@ -48,7 +48,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llapacke $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lopenblas -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps deps-test build-tests test check bench demo clean help layers format asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
+.PHONY: all deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -194,8 +194,13 @@ fuzz: | deps       ## every parser under libFuzzer for FUZZ_SECONDS (600) each
 		SANITIZE=fuzzer-no-link,address,undefined,float-cast-overflow CFLAGS=-fno-sanitize-recover=all fuzz-programs
 	@tests/fuzz/run_fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ)
 
-format:            ## clang-format the C sources
-	@find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp' | xargs clang-format -i
+# clang-format 14, that of Debian 12: other versions break lines elsewhere
+FORMATTED = $(shell find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp')
+format:            ## format the C sources with clang-format 14
+	@clang-format-14 -i $(FORMATTED)
+
+format-check:      ## fails when a C source is not formatted as `make format` would
+	@clang-format-14 --dry-run -Werror $(FORMATTED) && echo "format ok"
 
 clean:             ## remove build/
 	rm -rf build

@@ -38,9 +38,12 @@ status durable_sync_folder_of(const char *path, struct error *err)
     int n = snprintf(folder, sizeof folder, "%s", path);
     if (n < 0 || (size_t)n >= sizeof folder) return too_long(path, err);
     char *slash = strrchr(folder, '/');
-    if (slash == NULL) snprintf(folder, sizeof folder, ".");
-    else if (slash == folder) folder[1] = '\0';
-    else *slash = '\0';
+    if (slash == NULL)
+        snprintf(folder, sizeof folder, ".");
+    else if (slash == folder)
+        folder[1] = '\0';
+    else
+        *slash = '\0';
     int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return error_set_errno(err, "cannot open folder '%s'", folder);
     status s = STATUS_OK;
@@ -166,7 +169,8 @@ out:
 status record_append(const char *path, const char *json, bool sync, struct error *err)
 {
     size_t n_json = strlen(json);
-    if (n_json == 0 || strchr(json, '\n') != NULL) return error_set(err, STATUS_INVALID, "cannot append to '%s': a record is one line of text", path);
+    if (n_json == 0 || strchr(json, '\n') != NULL)
+        return error_set(err, STATUS_INVALID, "cannot append to '%s': a record is one line of text", path);
     char *line = malloc(n_json + 16);
     if (line == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot append to '%s': out of memory", path);
     unsigned long sum = crc32(0, (const unsigned char *)json, (unsigned)n_json);
@@ -181,7 +185,8 @@ status record_append(const char *path, const char *json, bool sync, struct error
     before = lseek(fd, 0, SEEK_END);
     if (write_all(fd, line, (size_t)n) != STATUS_OK || (sync && fdatasync(fd) != 0)) {
         s = error_set_errno(err, "cannot append to '%s'", path);
-        if (before >= 0 && ftruncate(fd, before) != 0) { /* the torn tail is found by its checksum */ }
+        if (before >= 0 && ftruncate(fd, before) != 0) { /* the torn tail is found by its checksum */
+        }
     } else if (sync && before == 0) {
         s = durable_sync_folder_of(path, err);
     }
@@ -230,7 +235,8 @@ out:
 enum { SEEK_SPAN_BYTES = 64 * 1024 };
 
 /* The first record that begins behind `at`: its offset, and whether it is a good one that `before` holds for. */
-static bool record_behind(FILE *f, uint64_t at, char **line, size_t *capacity, record_visitor before, void *context, uint64_t *begin)
+static bool record_behind(FILE *f, uint64_t at, char **line, size_t *capacity, record_visitor before, void *context,
+                          uint64_t *begin)
 {
     if (fseeko(f, (off_t)at, SEEK_SET) != 0) return false;
     ssize_t rest = getline(line, capacity, f), n = rest > 0 ? getline(line, capacity, f) : -1;

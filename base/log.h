@@ -14,8 +14,7 @@ struct log;
 status log_open(const char *path, FILE *also, enum log_level least, struct log **log, struct error *err);
 void log_close(struct log *log);
 /* A newline in the text is written as a space, so one call is one line. log == NULL: nothing happens. */
-void log_write(struct log *log, enum log_level level, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
+void log_write(struct log *log, enum log_level level, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
 #define log_info(log, ...) log_write((log), LOG_LEVEL_INFO, __VA_ARGS__)
 #define log_warning(log, ...) log_write((log), LOG_LEVEL_WARNING, __VA_ARGS__)

@@ -11,7 +11,7 @@
 struct progress {
     void (*report)(void *context, double fraction); /* NULL: nobody listens */
     void *context;
-    const atomic_bool *cancel;                      /* NULL: cannot be cancelled */
+    const atomic_bool *cancel; /* NULL: cannot be cancelled */
 };
 
 /* These accept p == NULL. */
@@ -46,7 +46,8 @@ static inline void progress_report_part(void *part, double fraction)
 /* What the part's computation takes; part may be changed as long as it lives. */
 static inline struct progress progress_of_part(struct progress_part *part)
 {
-    return (struct progress){.report = progress_report_part, .context = part, .cancel = part->outer != NULL ? part->outer->cancel : NULL};
+    return (struct progress){
+        .report = progress_report_part, .context = part, .cancel = part->outer != NULL ? part->outer->cancel : NULL};
 }
 
 #endif

@@ -27,7 +27,7 @@ struct scratch_space {
     int statm_fd; /* -1: residence is not known, every call drops */
     pthread_mutex_t lock;
     struct array *array;
-    size_t memory_bytes;         /* of arrays that are not in files */
+    size_t memory_bytes; /* of arrays that are not in files */
     atomic_size_t file_bytes;
     atomic_bool dropping;
 };
@@ -36,7 +36,8 @@ status scratch_space_new(const char *folder, size_t limit_bytes, struct scratch_
 {
     *space = NULL;
     if (limit_bytes < LEAST_LIMIT)
-        return error_set(err, STATUS_INVALID, "a memory limit of %zu bytes is too small: at least %d are needed", limit_bytes, LEAST_LIMIT);
+        return error_set(err, STATUS_INVALID, "a memory limit of %zu bytes is too small: at least %d are needed",
+                         limit_bytes, LEAST_LIMIT);
     struct scratch_space *s = calloc(1, sizeof *s);
     if (s != NULL) s->folder = strdup(folder);
     if (s == NULL || s->folder == NULL) {
@@ -68,7 +69,8 @@ static status map_file(struct scratch_space *s, size_t n_bytes, const char *what
     status st = STATUS_OK;
     char path[4096];
     int fd = open(s->folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    if (fd < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == ENOENT || errno == EINVAL)) { /* file systems without O_TMPFILE */
+    if (fd < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == ENOENT ||
+                   errno == EINVAL)) { /* file systems without O_TMPFILE */
         snprintf(path, sizeof path, "%s/scratch-XXXXXX", s->folder);
         fd = mkostemp(path, O_CLOEXEC);
         if (fd >= 0) unlink(path);
@@ -80,7 +82,9 @@ static status map_file(struct scratch_space *s, size_t n_bytes, const char *what
         st = error_set_errno(err, "cannot reserve %zu MB on disk for %s in '%s'", n_bytes / 1000000, what, s->folder);
     } else {
         *address = mmap(NULL, n_bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-        if (*address == MAP_FAILED) st = error_set_errno(err, "cannot map %zu MB for %s (limit of the address space?)", n_bytes / 1000000, what);
+        if (*address == MAP_FAILED)
+            st =
+                error_set_errno(err, "cannot map %zu MB for %s (limit of the address space?)", n_bytes / 1000000, what);
     }
     close(fd);
     return st;
@@ -101,10 +105,13 @@ status scratch_new(struct scratch_space *s, size_t n_bytes, const char *what, vo
     if (n_bytes == 0) n_bytes = 1;
     if (s == NULL) {
         *result = calloc(n_bytes, 1);
-        return *result != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
+        return *result != NULL ? STATUS_OK
+                               : error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory",
+                                           n_bytes / 1000000, what);
     }
     struct array *a = calloc(1, sizeof *a);
-    if (a == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
+    if (a == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
     a->n_bytes = n_bytes;
     pthread_mutex_lock(&s->lock);
     a->in_file = n_bytes > s->limit_bytes / 2 || s->memory_bytes > s->limit_bytes / 2 - n_bytes;
@@ -139,8 +146,10 @@ void scratch_release(struct scratch_space *s, void *address)
     if (found != NULL) {
         *at = found->next;
         munmap(found->address, found->n_bytes);
-        if (found->in_file) atomic_fetch_sub(&s->file_bytes, found->n_bytes);
-        else s->memory_bytes -= found->n_bytes;
+        if (found->in_file)
+            atomic_fetch_sub(&s->file_bytes, found->n_bytes);
+        else
+            s->memory_bytes -= found->n_bytes;
     }
     pthread_mutex_unlock(&s->lock);
     free(found);
@@ -170,6 +179,9 @@ void scratch_keep_within(struct scratch_space *s)
     atomic_store(&s->dropping, false);
 }
 
-size_t scratch_buffer_bytes(const struct scratch_space *s) { return s == NULL ? (size_t)256 << 20 : s->limit_bytes / 8; }
+size_t scratch_buffer_bytes(const struct scratch_space *s)
+{
+    return s == NULL ? (size_t)256 << 20 : s->limit_bytes / 8;
+}
 
 size_t scratch_file_bytes(struct scratch_space *s) { return s == NULL ? 0 : atomic_load(&s->file_bytes); }

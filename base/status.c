@@ -24,10 +24,7 @@ static const char *const name[STATUS_COUNT] = {
     [STATUS_INTERNAL] = "internal",
 };
 
-const char *status_name(status code)
-{
-    return (unsigned)code < STATUS_COUNT ? name[code] : "unknown";
-}
+const char *status_name(status code) { return (unsigned)code < STATUS_COUNT ? name[code] : "unknown"; }
 
 static void fill(struct error *err, status code, int errno_value, const char *where, const char *field,
                  const char *format, va_list args)
@@ -46,8 +43,7 @@ static void fill(struct error *err, status code, int errno_value, const char *wh
     memcpy(err->field, field_copy, sizeof field_copy);
 }
 
-status error_set_at(struct error *err, status code, const char *where, const char *field,
-                    const char *format, ...)
+status error_set_at(struct error *err, status code, const char *where, const char *field, const char *format, ...)
 {
     if (err == NULL) return code;
     va_list args;
@@ -61,8 +57,8 @@ status error_set_errno_at(struct error *err, const char *where, const char *fiel
 {
     int saved = errno;
     status code = saved == ENOSPC || saved == EDQUOT ? STATUS_DISK_FULL
-                : saved == ENOMEM                    ? STATUS_NO_MEMORY
-                : saved == ENOENT                    ? STATUS_NOT_FOUND
+                  : saved == ENOMEM                  ? STATUS_NO_MEMORY
+                  : saved == ENOENT                  ? STATUS_NOT_FOUND
                                                      : STATUS_IO;
     if (err == NULL) return code;
     va_list args;

@@ -169,7 +169,8 @@ static status run_in_caller(size_t n_task, task_function run, void *context, con
     return STATUS_OK;
 }
 
-static status run_in_all(struct thread_pool *p, size_t n_task, task_function run, void *context, const struct progress *progress)
+static status run_in_all(struct thread_pool *p, size_t n_task, task_function run, void *context,
+                         const struct progress *progress)
 {
     pthread_mutex_lock(&p->lock);
     p->run = run;
@@ -196,7 +197,8 @@ status thread_pool_run(struct thread_pool *p, size_t n_task, task_function run, 
 {
     unsigned long mode = float_mode();
     set_flush_to_zero();
-    status s = p == NULL ? run_in_caller(n_task, run, context, progress) : run_in_all(p, n_task, run, context, progress);
+    status s =
+        p == NULL ? run_in_caller(n_task, run, context, progress) : run_in_all(p, n_task, run, context, progress);
     set_float_mode(mode);
     return s;
 }

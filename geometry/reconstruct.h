@@ -22,21 +22,21 @@
 /* Options of geometry; NaN (or 0 for counts) means "choose from the data". Chosen values are written back. */
 struct reconstruct_option {
     struct volume_raw_declaration raw; /* n[0] == 0 (default): the file has a header */
-    double voxel_size_m[3];      /* required unless the file states it; NaN: take the file's */
-    char axes[8];                /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
-    double matrix[9];            /* rotation/shear applied after `axes`, row-major; identity by default */
-    size_t crop_voxel[6];        /* x0 y0 z0 x1 y1 z1 after the matrix; all 0: everything */
-    bool align;                  /* estimate the matrix (main_directions.h); one that is given wins */
-    bool crop;                   /* choose the box that tiles best (tile_crop.h); one that is given wins */
-    double crop_keep;            /* least share of its edges that is kept, 0.5 by default */
+    double voxel_size_m[3];            /* required unless the file states it; NaN: take the file's */
+    char axes[8];                     /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
+    double matrix[9];                 /* rotation/shear applied after `axes`, row-major; identity by default */
+    size_t crop_voxel[6];             /* x0 y0 z0 x1 y1 z1 after the matrix; all 0: everything */
+    bool align;                       /* estimate the matrix (main_directions.h); one that is given wins */
+    bool crop;                        /* choose the box that tiles best (tile_crop.h); one that is given wins */
+    double crop_keep;                 /* least share of its edges that is kept, 0.5 by default */
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
-    double s, t;                 /* filter widths, per square voxel (thesis Table 5.2) */
-    size_t h;                    /* edge of the filter's cube, voxels */
+    double s, t;                      /* filter widths, per square voxel (thesis Table 5.2) */
+    size_t h;                         /* edge of the filter's cube, voxels */
     double eps_d, eps_j;
-    double link_sigma_voxel;     /* 5 in the thesis */
-    size_t min_vertex;           /* 10 in the thesis */
-    double smooth_alpha;         /* 0.1 in the thesis */
-    double radius_m[3];          /* per axis class; NaN: determine */
+    double link_sigma_voxel;      /* 5 in the thesis */
+    size_t min_vertex;            /* 10 in the thesis */
+    double smooth_alpha;          /* 0.1 in the thesis */
+    double radius_m[3];           /* per axis class; NaN: determine */
     enum radius_rule radius_rule; /* automatic by default (radius.h) */
 };
 
@@ -46,12 +46,12 @@ void reconstruct_option_default(struct reconstruct_option *o);
 struct reconstruct_report {
     size_t n[3];
     double voxel_size_m[3];
-    double file_voxel_size_m[3];           /* as the file states it, NaN where it does not */
-    struct main_directions main;           /* with option "align" only, as the next */
+    double file_voxel_size_m[3]; /* as the file states it, NaN where it does not */
+    struct main_directions main; /* with option "align" only, as the next */
     struct alignment align;
-    bool aligned;                          /* the estimated matrix was used: it is in the options */
-    struct tile_crop tile;                 /* with option "crop", or when a matrix was used; else all zero */
-    struct seam_density seam_density;      /* of the volume that is used */
+    bool aligned;                             /* the estimated matrix was used: it is in the options */
+    struct tile_crop tile;                    /* with option "crop", or when a matrix was used; else all zero */
+    struct seam_density seam_density;         /* of the volume that is used */
     struct fiber_seam seam_found, seam_fiber; /* of the fibers as found, and as used (ends joined) */
     size_t n_seam_joined;
     double density_low, density_high;      /* scanner values */
@@ -65,20 +65,20 @@ struct reconstruct_report {
     size_t n_fiber, n_vertex;
     double total_length_m;
     double radius_m[3], radius_score[3];
-    double radius_se_m[3];                 /* standard error; NaN where the radius was given */
-    bool radius_per_axis;                  /* one radius for each class */
-    double dice;                           /* of fibers (radius r) against kept voxels */
-    double direction_noise_deg[2];         /* direction_noise.h, before and after the transfer */
-    double direction_change_mean_deg;      /* between filtered and transferred directions */
+    double radius_se_m[3];            /* standard error; NaN where the radius was given */
+    bool radius_per_axis;             /* one radius for each class */
+    double dice;                      /* of fibers (radius r) against kept voxels */
+    double direction_noise_deg[2];    /* direction_noise.h, before and after the transfer */
+    double direction_change_mean_deg; /* between filtered and transferred directions */
 };
 
 /* Step "volume": read the file(s), honour axes/matrix/crop, map densities to [0, 1]. path: as for volume_source_open_declared. Errors name
  * the file, and the field of the job document as
  * "volume.<field>": STATUS_FORMAT (truncated, pages of different size or depth), STATUS_INVALID (NaN voxels, empty: nothing
  * above the threshold, constant), STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; the same for all steps). space NULL: memory, without a limit. */
-status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, struct scratch_space *space,
-                        struct thread_pool *pool, const struct progress *progress, struct volume *v,
-                        struct reconstruct_report *report, struct error *err);
+status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
+                        struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
+                        struct volume *v, struct reconstruct_report *report, struct error *err);
 
 /* Step "orientation": the line filter (orientation/line_filter.h; structure tensor start, local refinement of J), v -> d.
  * STATUS_INVALID, field "volume.eps_d", when no voxel is kept. */

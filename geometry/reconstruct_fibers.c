@@ -1,29 +1,30 @@
 /* Step "fibers": subvolumes, centers, chains, joins, smoothing, radius. */
 #include "geometry/reconstruct.h"
 
-#include "geometry/fibers/shape/axis_fit.h"
-#include "geometry/fibers/slices/centers.h"
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/growing.h"
 #include "geometry/fibers/lines/joining.h"
 #include "geometry/fibers/lines/kinks.h"
 #include "geometry/fibers/lines/linking.h"
+#include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/fibers/shape/relax.h"
 #include "geometry/fibers/shape/smoothing.h"
+#include "geometry/fibers/slices/centers.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum {
-    MIN_PIECE = 4, /* centers in a chain before joining */
-    N_MEND = 2,    /* rounds of growing and cutting */
-    N_FIT = 4,     /* rounds of fitting axes to the scan */
+    MIN_PIECE = 4,  /* centers in a chain before joining */
+    N_MEND = 2,     /* rounds of growing and cutting */
+    N_FIT = 4,      /* rounds of fitting axes to the scan */
     MAX_GROWTH = 64 /* voxels that an end may grow */
 };
 
-#define OVER_USUAL_TURN 2.1 /* kinks; less cuts fibers of plain weaves to pieces, more leaves changes from fiber to fiber */
+#define OVER_USUAL_TURN                                                                                                \
+    2.1 /* kinks; less cuts fibers of plain weaves to pieces, more leaves changes from fiber to fiber */
 #define END_DIAMETERS 1.0 /* as far as an end may be astray */
 #define MAX_DISAGREEMENT_RAD (30.0 * M_PI / 180.0)
 
@@ -35,7 +36,7 @@ struct fiber_job {
     struct reconstruct_report *report;
     struct progress inner;
     struct progress_part part; /* what inner reports to */
-    double diameter; /* voxels */
+    double diameter;           /* voxels */
 };
 
 static void enter_part(struct fiber_job *job, double from, double to)
@@ -169,7 +170,8 @@ static status mend(struct fiber_job *job, struct polyline_set *in, bool grow, st
 
 static status relax(struct fiber_job *job, struct polyline_set *lines, int n_round, struct error *err)
 {
-    return polylines_relax(lines, job->v, (float)(0.6 * job->diameter), n_round, job->o->smooth_alpha, job->pool, &job->inner, err);
+    return polylines_relax(lines, job->v, (float)(0.6 * job->diameter), n_round, job->o->smooth_alpha, job->pool,
+                           &job->inner, err);
 }
 
 static bool is_inside(const struct fiber_job *job, const float x[3])
@@ -180,7 +182,8 @@ static bool is_inside(const struct fiber_job *job, const float x[3])
 }
 
 /* Lines without the vertices at their ends that lie outside of the volume. */
-static status keep_inside(const struct fiber_job *job, const struct polyline_set *in, struct polyline_set *out, struct error *err)
+static status keep_inside(const struct fiber_job *job, const struct polyline_set *in, struct polyline_set *out,
+                          struct error *err)
 {
     status s = STATUS_OK;
     for (size_t l = 0; l < in->n_line && s == STATUS_OK; l++) {
@@ -217,7 +220,8 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, int n_
 }
 
 /* Lines without their kinks, where they change over to another fiber; the last time without ends that go astray, too. */
-static status straighten(struct fiber_job *job, struct polyline_set *lines, bool last, size_t min_vertex, struct error *err)
+static status straighten(struct fiber_job *job, struct polyline_set *lines, bool last, size_t min_vertex,
+                         struct error *err)
 {
     struct polyline_set out;
     size_t n_cut;
@@ -229,7 +233,8 @@ static status straighten(struct fiber_job *job, struct polyline_set *lines, bool
         polyline_set_init(&out);
     }
     if (s == STATUS_OK && last)
-        s = polylines_trim_disagreeing(lines, job->d, MAX_DISAGREEMENT_RAD, (size_t)(END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, &n_cut, err);
+        s = polylines_trim_disagreeing(lines, job->d, MAX_DISAGREEMENT_RAD,
+                                       (size_t)(END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, &n_cut, err);
     if (s == STATUS_OK && last) {
         polyline_set_release(lines);
         *lines = out;
@@ -270,7 +275,9 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     if (s == STATUS_OK) s = relax(job, lines, 2, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
-    if (s == STATUS_OK) s = mend(job, lines, true, &part[1], &counts, err); /* lines on their axes are easier to tell apart and to join */
+    if (s == STATUS_OK)
+        s = mend(job, lines, true, &part[1], &counts,
+                 err); /* lines on their axes are easier to tell apart and to join */
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
@@ -280,7 +287,8 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         finish_lines(job, lines);
         if (lines->n_line == 0)
             s = error_set_field(err, STATUS_INVALID, "volume.files",
-                                "cannot find fibers: none of the chains of centers has %zu vertices", job->o->min_vertex);
+                                "cannot find fibers: none of the chains of centers has %zu vertices",
+                                job->o->min_vertex);
     }
     for (int i = 0; i < 3; i++) polyline_set_release(&part[i]);
     return s;
@@ -294,8 +302,8 @@ static status find_radius(struct fiber_job *job, const struct polyline_set *line
     double voxel_m = job->v->voxel_size_m[0];
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     enter_part(job, 0.65, 1.0);
-    status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool, &job->inner,
-                                          part, err);
+    status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
+                                          &job->inner, part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);
     if (s == STATUS_OK) {
         all = part + RADIUS_PARTS;

@@ -32,13 +32,13 @@ struct orientation_job {
     struct line_filter *filter;
     struct tensor_window window;
     float eps_d, eps_j;
-    double j_full;         /* J in solid material */
-    int n_climb;           /* steps to the ridge */
+    double j_full; /* J in solid material */
+    int n_climb;   /* steps to the ridge */
     struct line_bound bound;
-    uint16_t *ridge;       /* per voxel of material: offset of its ridge voxel, packed */
+    uint16_t *ridge;           /* per voxel of material: offset of its ridge voxel, packed */
     _Atomic uint16_t *j_ridge; /* per voxel: 0 for no ridge; at ridges J in J_UNIT * j_full, at least 1 */
     struct consensus consensus;
-    float *scratch;        /* per thread */
+    float *scratch; /* per thread */
     size_t scratch_per_thread;
     size_t *n_material, *n_kept; /* per band, per slice */
     ptrdiff_t neighbour[26];     /* offsets in the volume, in rising order */
@@ -204,7 +204,8 @@ static float descend(const struct orientation_job *o, const struct line_filter_s
 }
 
 /* J, as a share of that in solid material, at ridge voxel x: downhill from the node nearest to `start`; the direction in d. */
-static double descend_at(const struct orientation_job *o, const size_t x[3], const float start[3], float *scratch, float d[3])
+static double descend_at(const struct orientation_job *o, const size_t x[3], const float start[3], float *scratch,
+                         float d[3])
 {
     struct line_filter_site site = line_filter_at(o->filter, &o->blurred, x[0], x[1], x[2], scratch);
     return (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, start), d) / o->j_full;
@@ -233,7 +234,10 @@ static void find_direction(struct orientation_job *o, const size_t x[3], size_t 
     direction_volume_set(o->d, at, d);
 }
 
-static void ridge_band(void *context, size_t i_task, size_t i_thread) { each_ridge(context, i_task, i_thread, find_direction); }
+static void ridge_band(void *context, size_t i_task, size_t i_thread)
+{
+    each_ridge(context, i_task, i_thread, find_direction);
+}
 
 /* One layer of cells of the consensus. */
 static void collect_layer(void *context, size_t layer, size_t i_thread)
@@ -269,7 +273,8 @@ static void agree(struct orientation_job *o, const size_t x[3], size_t at, float
 
 static void agree_band(void *context, size_t i_task, size_t i_thread) { each_ridge(context, i_task, i_thread, agree); }
 
-static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, const struct progress *progress, struct error *err)
+static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, const struct progress *progress,
+                             struct error *err)
 {
     status s = thread_pool_run(pool, o->consensus.n[2], collect_layer, o, NULL);
     if (s == STATUS_OK) s = consensus_blur(&o->consensus, N_CONSENSUS_BLUR, pool, err);
@@ -291,7 +296,8 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
         kept++;
         long byte = lrintf(255.0f * density);
         o->d->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
-        if (get_j(o, at) == 0) memcpy(o->d->octahedral + 2 * at, o->d->octahedral + 2 * top, 2 * sizeof *o->d->octahedral);
+        if (get_j(o, at) == 0)
+            memcpy(o->d->octahedral + 2 * at, o->d->octahedral + 2 * top, 2 * sizeof *o->d->octahedral);
     }
     o->n_kept[k] = kept;
 }
@@ -325,7 +331,8 @@ static status check_parameters(const struct reconstruct_option *o, struct error 
 {
     if (o->t > 0.5 * o->s) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "volume.filter.t",
-                           "cannot find fibers: the direction filter's t, %g, must be above half of its s, %g", o->t, o->s);
+                           "cannot find fibers: the direction filter's t, %g, must be above half of its s, %g", o->t,
+                           o->s);
 }
 
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
@@ -357,7 +364,8 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
     if (o->n_climb > MAX_CLIMB) o->n_climb = MAX_CLIMB;
     for (ptrdiff_t c = 0, m = 0; c < 27; c++)
-        if (c != 13) o->neighbour[m++] = c % 3 - 1 + (c / 3 % 3 - 1) * (ptrdiff_t)n[0] + (c / 9 - 1) * (ptrdiff_t)(n[0] * n[1]);
+        if (c != 13)
+            o->neighbour[m++] = c % 3 - 1 + (c / 3 % 3 - 1) * (ptrdiff_t)n[0] + (c / 9 - 1) * (ptrdiff_t)(n[0] * n[1]);
     return STATUS_OK;
 }
 
@@ -376,7 +384,8 @@ static void release(struct orientation_job *o)
 }
 
 /* All passes over the volume; their progress goes on from that of the blur. */
-static status search(struct orientation_job *o, struct thread_pool *pool, const struct progress *inner, struct progress_part *part, struct error *err)
+static status search(struct orientation_job *o, struct thread_pool *pool, const struct progress *inner,
+                     struct progress_part *part, struct error *err)
 {
     size_t n_slice = o->v->n[2];
     *part = (struct progress_part){part->outer, 0.3, 0.2};
@@ -389,8 +398,8 @@ static status search(struct orientation_job *o, struct thread_pool *pool, const 
     return s == STATUS_CANCELLED ? error_set(err, s, "finding fiber directions was cancelled") : s;
 }
 
-static status count_voxels(const struct orientation_job *o, const struct reconstruct_option *option, struct reconstruct_report *report,
-                           struct error *err)
+static status count_voxels(const struct orientation_job *o, const struct reconstruct_option *option,
+                           struct reconstruct_report *report, struct error *err)
 {
     size_t n_slice = o->v->n[2];
     report->n_material_voxel = report->n_kept_voxel = 0;
@@ -421,7 +430,8 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     part = (struct progress_part){progress, 0.1, 0.2};
     s = line_filter_blur(v, option->s, option->t, pool, &inner, &o.blurred, err);
     if (s == STATUS_OK) /* the climb, half a line, and the taps of its interpolation */
-        s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2, -option->eps_j / (double)option->h, pool, err);
+        s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2,
+                            -option->eps_j / (double)option->h, pool, err);
     if (s != STATUS_OK) goto out;
     s = search(&o, pool, &inner, &part, err);
     if (s == STATUS_OK) s = count_voxels(&o, option, report, err);

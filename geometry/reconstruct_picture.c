@@ -21,7 +21,8 @@ static void put_red(const struct canvas *c, long x, long y)
 
 static void cross(const struct canvas *c, double u, double v)
 {
-    long x = lround(u * (double)c->zoom - 0.5), y = (long)c->height - 1 - lround(v * (double)c->zoom - 0.5), arm = (long)c->zoom;
+    long x = lround(u * (double)c->zoom - 0.5), y = (long)c->height - 1 - lround(v * (double)c->zoom - 0.5),
+         arm = (long)c->zoom;
     for (long i = -arm; i <= arm; i++) {
         put_red(c, x + i, y);
         put_red(c, x, y + i);

@@ -38,8 +38,8 @@ struct plan {
     double spacing_m[3];                     /* stored axes */
     double voxel_m;                          /* cubic, of the result */
     bool resample;
-    size_t box[6];                           /* of the result */
-    size_t box_stored[6];                    /* part of the stored grid that is kept in memory */
+    size_t box[6];        /* of the result */
+    size_t box_stored[6]; /* part of the stored grid that is kept in memory */
 };
 
 static bool is_identity(const double m[9])
@@ -58,8 +58,9 @@ static status plan_voxel_size(const struct volume_source_info *info, struct reco
     for (int a = 0; a < 3; a++) {
         double w = o->voxel_size_m[a];
         if (isnan(w))
-            return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
-                                   "cannot use the volume: its voxel size is not given, and the file does not state it");
+            return error_set_field(
+                err, STATUS_INVALID, "volume.voxel_size_um",
+                "cannot use the volume: its voxel size is not given, and the file does not state it");
         if (!(w >= 1e-9) || !(w <= 1e-2))
             return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
                                    "cannot use the volume: a voxel size of %g um makes no sense", w * 1e6);
@@ -69,8 +70,8 @@ static status plan_voxel_size(const struct volume_source_info *info, struct reco
     }
     if (most > 20.0 * least)
         return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
-                               "cannot use the volume: voxels of %g x %g x %g um are too far from cubes", o->voxel_size_m[0] * 1e6,
-                               o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
+                               "cannot use the volume: voxels of %g x %g x %g um are too far from cubes",
+                               o->voxel_size_m[0] * 1e6, o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
     p->voxel_m = least;
     p->resample = most > 1.0001 * least || !is_identity(o->matrix) || o->align;
     return STATUS_OK;
@@ -85,15 +86,16 @@ static status plan_crop(const struct reconstruct_option *o, struct plan *p, stru
         p->box[3 + a] = all ? p->n_all[a] : o->crop_voxel[3 + a];
         if (p->box[3 + a] > p->n_all[a] || p->box[a] >= p->box[3 + a])
             return error_set_field(err, STATUS_INVALID, "volume.crop_voxel",
-                                   "cannot crop the volume: %c from %zu to %zu, the aligned volume has 0 to %zu", "xyz"[a],
-                                   p->box[a], p->box[3 + a], p->n_all[a]);
+                                   "cannot crop the volume: %c from %zu to %zu, the aligned volume has 0 to %zu",
+                                   "xyz"[a], p -> box[a], p -> box[3 + a], p -> n_all[a]);
         p->box_stored[a] = p->resample ? 0 : p->box[a];
         p->box_stored[3 + a] = p->resample ? p->n_stored[a] : p->box[3 + a];
     }
     return STATUS_OK;
 }
 
-static status plan_read(const struct volume_source_info *info, struct reconstruct_option *o, struct plan *p, struct error *err)
+static status plan_read(const struct volume_source_info *info, struct reconstruct_option *o, struct plan *p,
+                        struct error *err)
 {
     *p = (struct plan){0};
     status s = axis_map_parse(o->axes, &p->map, err);
@@ -121,7 +123,8 @@ static void scatter_slices(const struct plan *p, const float *block, size_t i_sl
     }
     size_t k0 = i_slice > from[2] ? i_slice : from[2], k1 = i_slice + n_slice < to[2] ? i_slice + n_slice : to[2];
     size_t n_row = p->n_file[0], n_page = n_row * p->n_file[1];
-    bool inwards = p->map.source[0] == 2; /* the file's slices lie across rows: a row at a time of all of them keeps the writes together */
+    bool inwards = p->map.source[0] ==
+                   2; /* the file's slices lie across rows: a row at a time of all of them keeps the writes together */
     for (size_t outer = inwards ? from[1] : k0; outer < (inwards ? to[1] : k1); outer++) {
         scratch_keep_within(v->space);
         for (size_t i = from[0]; inwards && i < to[0]; i++) {
@@ -149,10 +152,13 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
     for (size_t k = 0; k < p->n_file[2] && s == STATUS_OK; k += n_block) {
         size_t n = k + n_block <= p->n_file[2] ? n_block : p->n_file[2] - k;
         for (size_t i = 0; i < n && s == STATUS_OK; i++) {
-            if (progress_cancelled(progress)) s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
-            else s = volume_source_read(source, k + i, 1, block + i * n_page, err);
+            if (progress_cancelled(progress))
+                s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
+            else
+                s = volume_source_read(source, k + i, 1, block + i * n_page, err);
         }
-        for (size_t i = 0; i < n * n_page && s == STATUS_OK; i++) /* a value of the file's own is not VOLUME_OUTSIDE: refused later as any infinite one */
+        for (size_t i = 0; i < n * n_page && s == STATUS_OK;
+             i++) /* a value of the file's own is not VOLUME_OUTSIDE: refused later as any infinite one */
             if (block[i] == VOLUME_OUTSIDE) block[i] = INFINITY;
         if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
         progress_report(progress, 0.8 * (double)(k + n) / (double)p->n_file[2]);
@@ -177,20 +183,21 @@ static status estimate_alignment(const struct volume *stored, struct reconstruct
     struct alignment *a = &report->align;
     alignment_from_directions(&report->main, a);
     double least_deg = fmax(0.1, 2.0 * a->se_deg), least_tilt_deg = fmax(0.1, 2.0 * a->tilt_se_deg);
-    report->aligned = a->outcome == ALIGN_DONE &&
-                      (fabs(a->rotation_deg) > least_deg || fabs(a->shear_deg) > least_deg || a->tilt_deg > least_tilt_deg);
+    report->aligned = a->outcome == ALIGN_DONE && (fabs(a->rotation_deg) > least_deg ||
+                                                   fabs(a->shear_deg) > least_deg || a->tilt_deg > least_tilt_deg);
     if (report->aligned) memcpy(o->matrix, a->matrix, sizeof o->matrix);
     return STATUS_OK;
 }
 
 /* With option "crop" the box that tiles best; after any matrix, how much of the tile lies in the scan. */
-static status choose_crop(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool, const struct progress *progress,
-                          struct reconstruct_report *report, struct error *err)
+static status choose_crop(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
+                          const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     struct density_modes m;
     if (!o->crop && is_identity(o->matrix)) return STATUS_OK;
     status s = density_modes_find(v, &m, err);
-    if (s == STATUS_OK) s = tile_crop_find(v, m.half, m.low, o->crop ? o->crop_keep : 1.0, pool, progress, &report->tile, err);
+    if (s == STATUS_OK)
+        s = tile_crop_find(v, m.half, m.low, o->crop ? o->crop_keep : 1.0, pool, progress, &report->tile, err);
     if (s != STATUS_OK || !o->crop) return s;
     memcpy(o->crop_voxel, report->tile.box, sizeof o->crop_voxel);
     volume_crop(v, o->crop_voxel);
@@ -216,8 +223,8 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     }
     if (n_above == 0)
         return error_set_field(err, STATUS_INVALID, "volume.files",
-                               "cannot use the volume: it is empty, no density reaches %g (scanner value %g)", threshold,
-                               o->density_low + threshold * (o->density_high - o->density_low));
+                               "cannot use the volume: it is empty, no density reaches %g (scanner value %g)",
+                               threshold, o->density_low + threshold * (o->density_high - o->density_low));
     report->density_low = o->density_low;
     report->density_high = o->density_high;
     report->separability = m.separability;
@@ -226,9 +233,9 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     return STATUS_OK;
 }
 
-status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o, struct scratch_space *space,
-                        struct thread_pool *pool, const struct progress *progress, struct volume *v,
-                        struct reconstruct_report *report, struct error *err)
+status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
+                        struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
+                        struct volume *v, struct reconstruct_report *report, struct error *err)
 {
     struct volume_source *source = NULL;
     struct volume stored = {0};

@@ -18,10 +18,11 @@ struct transfer_job {
     struct brick_sum {
         double angle_deg;
         size_t n_changed, n_both, n_fiber, n_kept;
-    } *sum; /* per brick */
+    } * sum; /* per brick */
 };
 
-static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size_t at, float distance2, uint32_t nearest)
+static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size_t at, float distance2,
+                           uint32_t nearest)
 {
     bool kept = job->d->density[at] > 0;
     sum->n_kept += kept;

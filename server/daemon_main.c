@@ -20,27 +20,31 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char usage[] =
-    "usage: selvedged [options]\n"
-    "  --config FILE     settings (see config/selvedge.conf)\n"
-    "  --data DIR        folder of the database and of all jobs\n"
-    "  --port N          TCP port; 0 picks a free one\n"
-    "  --listen ADDRESS  a loopback address (default 127.0.0.1)\n"
-    "  --worker PATH     the worker program (default: selvedge-worker beside this program)\n"
-    "  --web DIR         the dashboard's folder\n"
-    "  --set KEY=VALUE   any setting, for example --set jobs.workers=2\n"
-    "  --print-config    print every setting with its default and an explanation\n"
-    "  --version, --help\n";
+static const char usage[] = "usage: selvedged [options]\n"
+                            "  --config FILE     settings (see config/selvedge.conf)\n"
+                            "  --data DIR        folder of the database and of all jobs\n"
+                            "  --port N          TCP port; 0 picks a free one\n"
+                            "  --listen ADDRESS  a loopback address (default 127.0.0.1)\n"
+                            "  --worker PATH     the worker program (default: selvedge-worker beside this program)\n"
+                            "  --web DIR         the dashboard's folder\n"
+                            "  --set KEY=VALUE   any setting, for example --set jobs.workers=2\n"
+                            "  --print-config    print every setting with its default and an explanation\n"
+                            "  --version, --help\n";
 
 static const struct {
     const char *option, *key;
-} option_key[] = {{"data", "server.data"}, {"port", "server.port"}, {"listen", "server.listen"}, {"worker", "jobs.worker"}, {"web", "server.web"}};
+} option_key[] = {{"data", "server.data"},
+                  {"port", "server.port"},
+                  {"listen", "server.listen"},
+                  {"worker", "jobs.worker"},
+                  {"web", "server.web"}};
 
 static status set_pair(struct settings *s, const char *pair, struct error *err)
 {
     char key[128];
     const char *equal = strchr(pair, '=');
-    if (equal == NULL || (size_t)(equal - pair) >= sizeof key) return error_set(err, STATUS_INVALID, "--set wants KEY=VALUE, not '%.100s'", pair);
+    if (equal == NULL || (size_t)(equal - pair) >= sizeof key)
+        return error_set(err, STATUS_INVALID, "--set wants KEY=VALUE, not '%.100s'", pair);
     snprintf(key, sizeof key, "%.*s", (int)(equal - pair), pair);
     return settings_set(s, key, equal + 1, err);
 }
@@ -48,9 +52,10 @@ static status set_pair(struct settings *s, const char *pair, struct error *err)
 /* Returns -1 to go on, or the exit code. The file is read first, whatever the order of the options. */
 static int read_options(int argc, char **argv, struct settings *s, struct error *err)
 {
-    static const struct option option[] = {{"config", 1, NULL, 'c'}, {"data", 1, NULL, 0},   {"port", 1, NULL, 1},       {"listen", 1, NULL, 2}, {"worker", 1, NULL, 3},
-                                           {"web", 1, NULL, 4},      {"set", 1, NULL, 's'}, {"print-config", 0, NULL, 'p'}, {"version", 0, NULL, 'v'}, {"help", 0, NULL, 'h'},
-                                           {NULL, 0, NULL, 0}};
+    static const struct option option[] = {
+        {"config", 1, NULL, 'c'},  {"data", 1, NULL, 0},   {"port", 1, NULL, 1},  {"listen", 1, NULL, 2},
+        {"worker", 1, NULL, 3},    {"web", 1, NULL, 4},    {"set", 1, NULL, 's'}, {"print-config", 0, NULL, 'p'},
+        {"version", 0, NULL, 'v'}, {"help", 0, NULL, 'h'}, {NULL, 0, NULL, 0}};
     for (int pass = 0; pass < 2; pass++) {
         optind = 1;
         for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
@@ -80,8 +85,10 @@ static void worker_path(const struct settings *s, char out[PATH_BYTES])
     program[n > 0 ? n : 0] = '\0';
     char *slash = strrchr(program, '/');
     if (slash != NULL) *slash = '\0';
-    if (s->worker[0] != '\0') snprintf(out, PATH_BYTES, "%s", s->worker);
-    else path_join(out, program, "selvedge-worker", NULL);
+    if (s->worker[0] != '\0')
+        snprintf(out, PATH_BYTES, "%s", s->worker);
+    else
+        path_join(out, program, "selvedge-worker", NULL);
 }
 
 static status lock_data(const struct settings *s, int *fd, struct error *err)
@@ -102,7 +109,8 @@ static status make_absolute(char path[SETTING_TEXT_BYTES], struct error *err)
     char full[PATH_BYTES];
     if (path[0] == '\0' || path[0] == '/') return STATUS_OK;
     if (getcwd(full, sizeof full) == NULL) return error_set_errno(err, "cannot find the present folder");
-    if (strlen(full) + strlen(path) + 2 > SETTING_TEXT_BYTES) return error_set(err, STATUS_INVALID, "path '%.200s' is too long", path);
+    if (strlen(full) + strlen(path) + 2 > SETTING_TEXT_BYTES)
+        return error_set(err, STATUS_INVALID, "path '%.200s' is too long", path);
     size_t n = strlen(full);
     snprintf(full + n, sizeof full - n, "/%s", path);
     snprintf(path, SETTING_TEXT_BYTES, "%.*s", SETTING_TEXT_BYTES - 1, full);

@@ -9,7 +9,7 @@
 struct setting {
     const char *section, *name;
     size_t offset;
-    const char *text;          /* default of a text setting; NULL: a number */
+    const char *text;           /* default of a text setting; NULL: a number */
     int64_t value, least, most; /* of a number */
     const char *help;
 };
@@ -35,24 +35,33 @@ static const struct setting table[] = {
     NUMBER("server", "threads", threads, 4, 1, 64, "threads that answer requests"),
     NUMBER("server", "max_connections", max_connections, 2048, 8, 60000, "open connections; more have to wait"),
     NUMBER("server", "idle_timeout_s", idle_timeout_s, 60, 1, 3600, "a silent connection is closed after this time"),
-    NUMBER("server", "header_deadline_s", header_deadline_s, 20, 1, 3600, "the head of a request must be complete after this time"),
-    NUMBER("server", "min_rate_bytes_per_s", min_rate_bytes_per_s, 1024, 0, GIB, "a body that comes slower than this for 10 s is cut off"),
+    NUMBER("server", "header_deadline_s", header_deadline_s, 20, 1, 3600,
+           "the head of a request must be complete after this time"),
+    NUMBER("server", "min_rate_bytes_per_s", min_rate_bytes_per_s, 1024, 0, GIB,
+           "a body that comes slower than this for 10 s is cut off"),
     NUMBER("server", "max_document_bytes", max_document_bytes, MIB, 1024, MIB, "largest JSON body"),
     NUMBER("upload", "max_file_bytes", max_file_bytes, 1024 * GIB, 1, INT64_MAX / 2, "largest input file"),
     NUMBER("upload", "max_patch_bytes", max_patch_bytes, 64 * MIB, MIB, GIB, "largest piece of an upload"),
     NUMBER("upload", "max_files_per_job", max_files_per_job, 8192, 1, 1000000, "input files of one job"),
-    NUMBER("upload", "commit_bytes", commit_bytes, 8 * MIB, 65536, GIB, "an upload is made durable at least this often"),
+    NUMBER("upload", "commit_bytes", commit_bytes, 8 * MIB, 65536, GIB,
+           "an upload is made durable at least this often"),
     NUMBER("jobs", "max_jobs", max_jobs, 10000, 1, 10000000, "jobs kept; more are refused until some are deleted"),
     NUMBER("jobs", "workers", workers, 1, 1, 64, "jobs that run at the same time"),
     TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside this program"),
     NUMBER("jobs", "nice", nice, 10, 0, 19, "scheduling priority of workers"),
-    NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2, "address space of a worker (files that it maps count, see volume_memory_bytes); 0: not limited"),
-    NUMBER("jobs", "volume_memory_bytes", volume_memory_bytes, 2 * GIB, 256 * MIB, INT64_MAX / 2, "resident memory for scans; what is larger is worked on in files under the job's folder, some 22 bytes a voxel"),
+    NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2,
+           "address space of a worker (files that it maps count, see volume_memory_bytes); 0: not limited"),
+    NUMBER("jobs", "volume_memory_bytes", volume_memory_bytes, 2 * GIB, 256 * MIB, INT64_MAX / 2,
+           "resident memory for scans; what is larger is worked on in files under the job's folder, some 22 bytes a "
+           "voxel"),
     NUMBER("jobs", "cancel_grace_s", cancel_grace_s, 10, 0, 3600, "from SIGTERM to SIGKILL when a worker has to stop"),
     NUMBER("jobs", "max_lost_attempts", max_lost_attempts, 3, 1, 100, "a job whose worker died this often has failed"),
-    NUMBER("jobs", "heartbeat_timeout_s", heartbeat_timeout_s, 300, 2, 86400, "a worker that is silent this long is killed (a lost attempt)"),
-    NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2, "free space under which new work is refused and running jobs pause"),
-    NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB, "space kept in a file and given up on a full disk, so that deleting still works"),
+    NUMBER("jobs", "heartbeat_timeout_s", heartbeat_timeout_s, 300, 2, 86400,
+           "a worker that is silent this long is killed (a lost attempt)"),
+    NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
+           "free space under which new work is refused and running jobs pause"),
+    NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,
+           "space kept in a file and given up on a full disk, so that deleting still works"),
 };
 enum { N_SETTING = sizeof table / sizeof table[0] };
 
@@ -66,8 +75,10 @@ void settings_init(struct settings *s)
 {
     memset(s, 0, sizeof *s);
     for (size_t i = 0; i < N_SETTING; i++) {
-        if (table[i].text != NULL) snprintf(text_of(s, &table[i]), SETTING_TEXT_BYTES, "%s", table[i].text);
-        else *number_of(s, &table[i]) = table[i].value;
+        if (table[i].text != NULL)
+            snprintf(text_of(s, &table[i]), SETTING_TEXT_BYTES, "%s", table[i].text);
+        else
+            *number_of(s, &table[i]) = table[i].value;
     }
 }
 
@@ -77,7 +88,8 @@ static status set_one(struct settings *s, const struct setting *t, const char *v
     snprintf(key, sizeof key, "%s.%s", t->section, t->name);
     if (t->text != NULL) {
         if (strlen(value) >= SETTING_TEXT_BYTES)
-            return error_set_field(err, STATUS_INVALID, key, "setting '%s' is longer than %d bytes", key, SETTING_TEXT_BYTES - 1);
+            return error_set_field(err, STATUS_INVALID, key, "setting '%s' is longer than %d bytes", key,
+                                   SETTING_TEXT_BYTES - 1);
         snprintf(text_of(s, t), SETTING_TEXT_BYTES, "%s", value);
         return STATUS_OK;
     }
@@ -124,7 +136,9 @@ status settings_read_file(struct settings *s, const char *path, struct error *er
     int line = ini_parse(path, on_entry, &r);
     if (r.result != STATUS_OK) return error_prefix(err, r.result, "cannot use '%s', line %d", path, line);
     if (line == -1) return error_set_errno(err, "cannot read configuration '%s'", path);
-    if (line != 0) return error_set(err, STATUS_INVALID, "cannot read configuration '%s': line %d is not 'name = value'", path, line);
+    if (line != 0)
+        return error_set(err, STATUS_INVALID, "cannot read configuration '%s': line %d is not 'name = value'", path,
+                         line);
     return STATUS_OK;
 }
 
@@ -137,8 +151,11 @@ void settings_print(FILE *out)
         if (strcmp(section, t->section) != 0) fprintf(out, "\n[%s]\n", t->section);
         section = t->section;
         fprintf(out, "; %s", t->help);
-        if (t->text == NULL && t->most < INT64_MAX / 2) fprintf(out, " (%lld..%lld)", (long long)t->least, (long long)t->most);
-        if (t->text != NULL) fprintf(out, "\n%s =%s%s\n", t->name, *t->text ? " " : "", t->text);
-        else fprintf(out, "\n%s = %lld\n", t->name, (long long)t->value);
+        if (t->text == NULL && t->most < INT64_MAX / 2)
+            fprintf(out, " (%lld..%lld)", (long long)t->least, (long long)t->most);
+        if (t->text != NULL)
+            fprintf(out, "\n%s =%s%s\n", t->name, *t->text ? " " : "", t->text);
+        else
+            fprintf(out, "\n%s = %lld\n", t->name, (long long)t->value);
     }
 }

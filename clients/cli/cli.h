@@ -8,7 +8,13 @@
 
 #include <stdio.h>
 
-enum cli_exit { CLI_EXIT_OK = 0, CLI_EXIT_ERROR = 1, CLI_EXIT_USAGE = 2, CLI_EXIT_CANCELLED = 3, CLI_EXIT_INTERRUPTED = 130 };
+enum cli_exit {
+    CLI_EXIT_OK = 0,
+    CLI_EXIT_ERROR = 1,
+    CLI_EXIT_USAGE = 2,
+    CLI_EXIT_CANCELLED = 3,
+    CLI_EXIT_INTERRUPTED = 130
+};
 
 struct cli {
     const struct cli_args *args;

@@ -3,32 +3,51 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { OPT_SERVER = 1, OPT_TOKEN = 2, OPT_INPUT = 4, OPT_WATCH = 8, OPT_RESUME = 16, OPT_JSON = 32, OPT_OUT = 64,
-       OPT_FOLLOW = 128, OPT_DRAFT = 256, OPT_HELP = 512, OPT_VERSION = 1024, OPT_ID_FILE = 2048 };
+enum {
+    OPT_SERVER = 1,
+    OPT_TOKEN = 2,
+    OPT_INPUT = 4,
+    OPT_WATCH = 8,
+    OPT_RESUME = 16,
+    OPT_JSON = 32,
+    OPT_OUT = 64,
+    OPT_FOLLOW = 128,
+    OPT_DRAFT = 256,
+    OPT_HELP = 512,
+    OPT_VERSION = 1024,
+    OPT_ID_FILE = 2048
+};
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
 static const struct cli_command {
     const char *name, *operand, *what, *more;
     int option;
 } command_table[CLI_N_COMMAND] = {
-    [CLI_SUBMIT] = {"submit", "JOB.json", "send a job document and its files, and start the job",
-                    "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
-                    "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
-                    "continues a submit that was interrupted. Prints the job's id on standard output.\n",
-                    OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE},
+    [CLI_SUBMIT] =
+        {"submit", "JOB.json", "send a job document and its files, and start the job",
+         "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
+         "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
+         "continues a submit that was interrupted. Prints the job's id on standard output.\n",
+         OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE},
     [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
-    [CLI_WATCH] = {"watch", "ID", "follow a job until it ends",
-                   "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
-                   "1 when it failed, 3 when it was cancelled.\n", 0},
+    [CLI_WATCH] =
+        {"watch", "ID", "follow a job until it ends",
+         "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
+         "1 when it failed, 3 when it was cancelled.\n",
+         0},
     [CLI_LIST] = {"list", NULL, "list the jobs, newest first", "", OPT_JSON},
     [CLI_CANCEL] = {"cancel", "ID", "stop a job; what it has computed so far is kept", "", 0},
     [CLI_RETRY] = {"retry", "ID", "start a failed or cancelled job again from its last checkpoint", "", 0},
-    [CLI_RESULTS] = {"results", "ID", "download the results",
-                     "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
-                     "files that are already whole are not fetched again.\n", OPT_OUT},
+    [CLI_RESULTS] =
+        {"results", "ID", "download the results",
+         "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
+         "files that are already whole are not fetched again.\n",
+         OPT_OUT},
     [CLI_LOG] = {"log", "ID", "print the job's log", "", OPT_FOLLOW},
-    [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "", OPT_JSON},
-    [CLI_DELETE] = {"delete", "ID", "remove a job and its files", "A running job is stopped; nothing of it is kept.\n", 0},
+    [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "",
+                    OPT_JSON},
+    [CLI_DELETE] = {"delete", "ID", "remove a job and its files", "A running job is stopped; nothing of it is kept.\n",
+                    0},
 };
 
 static const struct cli_option {
@@ -38,16 +57,18 @@ static const struct cli_option {
 } option_table[] = {
     {OPT_INPUT, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)"},
     {OPT_WATCH, 'w', "watch", NULL, "follow the job until it ends"},
-    {OPT_RESUME, 0, "resume", "ID", "continue an interrupted submit of job ID (JOB.json is then not needed\n"
-                                    "                      if the files are in the current folder or --input-dir)"},
+    {OPT_RESUME, 0, "resume", "ID",
+     "continue an interrupted submit of job ID (JOB.json is then not needed\n"
+     "                      if the files are in the current folder or --input-dir)"},
     {OPT_DRAFT, 0, "draft", NULL, "upload everything but do not start the job"},
     {OPT_ID_FILE, 0, "id-file", "FILE", "write the job's id to FILE as soon as there is one (for scripts)"},
     {OPT_JSON, 0, "json", NULL, "print the server's JSON"},
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
     {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")"},
-    {OPT_TOKEN, 0, "token", "TOKEN", "access token for a proxy in front of the daemon (default: SELVEDGE_TOKEN;\n"
-                                     "                      visible to other users in the process list, so prefer the variable)"},
+    {OPT_TOKEN, 0, "token", "TOKEN",
+     "access token for a proxy in front of the daemon (default: SELVEDGE_TOKEN;\n"
+     "                      visible to other users in the process list, so prefer the variable)"},
     {OPT_HELP, 'h', "help", NULL, "show this text"},
     {OPT_VERSION, 'V', "version", NULL, "show the version"},
 };
@@ -87,7 +108,8 @@ static status find_command(const char *word, enum cli_command_id *id, struct err
     }
     if (best == 0) return STATUS_OK;
     if (best <= 2)
-        return error_set(err, STATUS_INVALID, "unknown command '%s'; did you mean '%s'?", word, command_table[*id].name);
+        return error_set(err, STATUS_INVALID, "unknown command '%s'; did you mean '%s'?", word,
+                         command_table[*id].name);
     return error_set(err, STATUS_INVALID, "unknown command '%s'; `selvedge --help` lists them", word);
 }
 
@@ -114,18 +136,42 @@ static const struct cli_option *find_option(const char *word, const char **value
 static void apply(struct cli_args *a, int bit, const char *value)
 {
     switch (bit) {
-    case OPT_SERVER: a->server = value; break;
-    case OPT_TOKEN: a->token = value; break;
-    case OPT_INPUT: a->input_dir = value; break;
-    case OPT_RESUME: a->resume_id = value; break;
-    case OPT_OUT: a->out_dir = value; break;
-    case OPT_ID_FILE: a->id_file = value; break;
-    case OPT_WATCH: a->watch = true; break;
-    case OPT_JSON: a->json = true; break;
-    case OPT_FOLLOW: a->follow = true; break;
-    case OPT_DRAFT: a->draft = true; break;
-    case OPT_HELP: a->help = true; break;
-    default: a->version = true; break;
+    case OPT_SERVER:
+        a->server = value;
+        break;
+    case OPT_TOKEN:
+        a->token = value;
+        break;
+    case OPT_INPUT:
+        a->input_dir = value;
+        break;
+    case OPT_RESUME:
+        a->resume_id = value;
+        break;
+    case OPT_OUT:
+        a->out_dir = value;
+        break;
+    case OPT_ID_FILE:
+        a->id_file = value;
+        break;
+    case OPT_WATCH:
+        a->watch = true;
+        break;
+    case OPT_JSON:
+        a->json = true;
+        break;
+    case OPT_FOLLOW:
+        a->follow = true;
+        break;
+    case OPT_DRAFT:
+        a->draft = true;
+        break;
+    case OPT_HELP:
+        a->help = true;
+        break;
+    default:
+        a->version = true;
+        break;
     }
 }
 
@@ -137,10 +183,12 @@ static status parse_option(int argc, char *const *argv, int *i, struct cli_args 
     if (o->value == NULL && value != NULL)
         return error_set(err, STATUS_INVALID, "option '--%s' takes no value", o->name);
     if (o->value != NULL && value == NULL) {
-        if (*i + 1 >= argc) return error_set(err, STATUS_INVALID, "option '--%s' needs a value: --%s %s", o->name, o->name, o->value);
+        if (*i + 1 >= argc)
+            return error_set(err, STATUS_INVALID, "option '--%s' needs a value: --%s %s", o->name, o->name, o->value);
         value = argv[++*i];
     }
-    if (o->value != NULL && value[0] == '\0') return error_set(err, STATUS_INVALID, "option '--%s' has an empty value", o->name);
+    if (o->value != NULL && value[0] == '\0')
+        return error_set(err, STATUS_INVALID, "option '--%s' has an empty value", o->name);
     *given |= o->bit;
     apply(a, o->bit, value);
     return STATUS_OK;
@@ -157,7 +205,8 @@ static status check(const struct cli_args *a, int given, struct error *err)
     bool may_lack = a->command == CLI_SUBMIT && a->resume_id != NULL;
     if (c->operand != NULL && a->operand == NULL && !may_lack)
         return error_set(err, STATUS_INVALID, "'selvedge %s' needs %s: selvedge %s %s", c->name,
-                         a->command == CLI_SUBMIT ? "a job document" : "a job id (`selvedge list` shows them)", c->name, c->operand);
+                         a->command == CLI_SUBMIT ? "a job document" : "a job id (`selvedge list` shows them)", c->name,
+                         c->operand);
     if (c->operand == NULL && a->operand != NULL)
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
     if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0)
@@ -187,8 +236,9 @@ status cli_args_parse(int argc, char *const *argv, const char *server_env, const
         } else {
             s = error_set(err, STATUS_INVALID, "'selvedge %s' takes one %s, but '%s' follows '%s'",
                           command_table[args->command].name,
-                          command_table[args->command].operand == NULL ? "command" : command_table[args->command].operand, word,
-                          args->operand);
+                          command_table[args->command].operand == NULL ? "command"
+                                                                       : command_table[args->command].operand,
+                          word, args->operand);
         }
         if (s != STATUS_OK) return s;
     }
@@ -228,12 +278,14 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     if (args->has_command) {
         const struct cli_command *c = &command_table[args->command];
         put(text, n_bytes, &at, "usage: selvedge %s%s%s [options]\n\n%s%s.\n%s%s\noptions:\n", c->name,
-            c->operand == NULL ? "" : " ", c->operand == NULL ? "" : c->operand, "", c->what, c->more[0] == '\0' ? "" : "\n", c->more);
+            c->operand == NULL ? "" : " ", c->operand == NULL ? "" : c->operand, "", c->what,
+            c->more[0] == '\0' ? "" : "\n", c->more);
         put_options(c->option | OPT_EVERYWHERE, text, n_bytes, &at);
         return;
     }
-    put(text, n_bytes, &at, "selvedge: fit the scattering of a cloth's fibers, through a selvedged server\n\n"
-                            "usage: selvedge COMMAND [options]\n\ncommands:\n");
+    put(text, n_bytes, &at,
+        "selvedge: fit the scattering of a cloth's fibers, through a selvedged server\n\n"
+        "usage: selvedge COMMAND [options]\n\ncommands:\n");
     for (int i = 0; i < CLI_N_COMMAND; i++) {
         char left[32];
         const struct cli_command *c = &command_table[i];
@@ -242,6 +294,7 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     }
     put(text, n_bytes, &at, "\noptions of every command:\n");
     put_options(OPT_EVERYWHERE | OPT_VERSION, text, n_bytes, &at);
-    put(text, n_bytes, &at, "\n`selvedge COMMAND --help` tells more. docs/sample-preparation.md describes the job document.\n"
-                            "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
+    put(text, n_bytes, &at,
+        "\n`selvedge COMMAND --help` tells more. docs/sample-preparation.md describes the job document.\n"
+        "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
 }

@@ -34,7 +34,7 @@ struct cli_args {
     const char *resume_id; /* --resume */
     const char *id_file;   /* --id-file */
     bool watch, json, follow, draft;
-    bool help;             /* --help was given; has_command says whether for one command */
+    bool help; /* --help was given; has_command says whether for one command */
     bool version;
     bool has_command;
 };

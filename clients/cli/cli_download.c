@@ -41,7 +41,8 @@ static status download_open(struct download *d, const char *path, struct error *
     snprintf(d->etag_path, sizeof d->etag_path, "%s.etag", d->part);
     d->fd = open(d->part, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
     if (d->fd < 0) return error_set_errno(err, "cannot write '%s'", d->part);
-    if (fstat(d->fd, &info) == 0 && info.st_size > 0 && file_read_all(d->etag_path, sizeof d->etag - 1, &etag, &n, NULL) == STATUS_OK) {
+    if (fstat(d->fd, &info) == 0 && info.st_size > 0 &&
+        file_read_all(d->etag_path, sizeof d->etag - 1, &etag, &n, NULL) == STATUS_OK) {
         snprintf(d->etag, sizeof d->etag, "%s", etag);
         d->n_done = (uint64_t)info.st_size;
     }
@@ -54,19 +55,22 @@ static status restart(struct download *d, struct error *err)
     d->n_done = 0;
     d->n_total = 0;
     d->etag[0] = '\0';
-    if (ftruncate(d->fd, 0) != 0 || lseek(d->fd, 0, SEEK_SET) != 0) return error_set_errno(err, "cannot write '%s'", d->part);
+    if (ftruncate(d->fd, 0) != 0 || lseek(d->fd, 0, SEEK_SET) != 0)
+        return error_set_errno(err, "cannot write '%s'", d->part);
     return STATUS_OK;
 }
 
 /* Total from "Content-Range: bytes a-b/total" is not needed: a piece shorter than asked for is the last one. */
-static status take_piece(struct http *http, const char *url_path, struct download *d, bool *done, bool *broke, struct error *err)
+static status take_piece(struct http *http, const char *url_path, struct download *d, bool *done, bool *broke,
+                         struct error *err)
 {
     char range[96], if_range[200];
     const char *header[3] = {range, NULL, NULL};
     struct http_reply reply;
     *broke = false;
     if (lseek(d->fd, (off_t)d->n_done, SEEK_SET) < 0) return error_set_errno(err, "cannot write '%s'", d->part);
-    snprintf(range, sizeof range, "Range: bytes=%llu-%llu", (unsigned long long)d->n_done, (unsigned long long)d->n_done + PIECE_BYTES - 1);
+    snprintf(range, sizeof range, "Range: bytes=%llu-%llu", (unsigned long long)d->n_done,
+             (unsigned long long)d->n_done + PIECE_BYTES - 1);
     if (d->n_done > 0 && d->etag[0] != '\0') {
         snprintf(if_range, sizeof if_range, "If-Range: %s", d->etag);
         header[1] = if_range;
@@ -88,7 +92,8 @@ static status take_piece(struct http *http, const char *url_path, struct downloa
         *done = reply.n_body < PIECE_BYTES;
         if (reply.etag[0] != '\0' && strcmp(reply.etag, d->etag) != 0) {
             snprintf(d->etag, sizeof d->etag, "%s", reply.etag);
-            (void)durable_replace_volatile(d->etag_path, d->etag, strlen(d->etag), NULL); /* only makes continuing possible */
+            (void)durable_replace_volatile(d->etag_path, d->etag, strlen(d->etag),
+                                           NULL); /* only makes continuing possible */
         }
     } else {
         s = http_problem(&reply, err);
@@ -97,8 +102,8 @@ static status take_piece(struct http *http, const char *url_path, struct downloa
     return s;
 }
 
-status http_download(struct http *http, const char *url_path, const char *path, void (*got)(void *context, uint64_t n, uint64_t n_total),
-                     void *context, struct error *err)
+status http_download(struct http *http, const char *url_path, const char *path,
+                     void (*got)(void *context, uint64_t n, uint64_t n_total), void *context, struct error *err)
 {
     struct download d = {.fd = -1};
     bool done = false;

@@ -20,7 +20,8 @@ struct http {
     char why[CURL_ERROR_SIZE];
 };
 
-status http_new(const char *server, const char *token, const volatile sig_atomic_t *stop, struct http **http, struct error *err)
+status http_new(const char *server, const char *token, const volatile sig_atomic_t *stop, struct http **http,
+                struct error *err)
 {
     struct http *h = calloc(1, sizeof *h);
     if (h == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
@@ -166,7 +167,8 @@ static status perform(struct http *http, const char *const *header, struct http_
     if (code == CURLE_COULDNT_CONNECT || code == CURLE_COULDNT_RESOLVE_HOST) {
         reply->cut_off = reply->refused = true;
         return error_set(err, STATUS_IO,
-                         "cannot reach the server '%s': %s. Start it with `selvedged`, or say where it is with --server URL or SELVEDGE_SERVER",
+                         "cannot reach the server '%s': %s. Start it with `selvedged`, or say where it is with "
+                         "--server URL or SELVEDGE_SERVER",
                          http->server, http->why[0] != '\0' ? http->why : curl_easy_strerror(code));
     }
     reply->cut_off = code != CURLE_UNSUPPORTED_PROTOCOL && code != CURLE_URL_MALFORMAT && code != CURLE_WRITE_ERROR &&
@@ -177,8 +179,8 @@ static status perform(struct http *http, const char *const *header, struct http_
                      http->why[0] != '\0' ? http->why : curl_easy_strerror(code));
 }
 
-status http_call(struct http *http, const char *method, const char *path, const char *const *header, const void *body, size_t n_body,
-                 struct http_reply *reply, struct error *err)
+status http_call(struct http *http, const char *method, const char *path, const char *const *header, const void *body,
+                 size_t n_body, struct http_reply *reply, struct error *err)
 {
     status s = prepare(http, path, reply, err);
     if (s != STATUS_OK) return s;
@@ -205,8 +207,8 @@ static size_t give_file(char *out, size_t size, size_t n, void *context)
     return (size_t)got;
 }
 
-status http_patch(struct http *http, const char *path, const char *const *header, struct http_source *source, struct http_reply *reply,
-                  struct error *err)
+status http_patch(struct http *http, const char *path, const char *const *header, struct http_source *source,
+                  struct http_reply *reply, struct error *err)
 {
     status s = prepare(http, path, reply, err);
     if (s != STATUS_OK) return s;
@@ -224,14 +226,26 @@ status http_patch(struct http *http, const char *path, const char *const *header
 static status code_of(long http_code)
 {
     switch (http_code) {
-    case 400: case 422: return STATUS_INVALID;
-    case 404: case 410: return STATUS_NOT_FOUND;
-    case 409: case 412: case 423: return STATUS_CONFLICT;
-    case 413: return STATUS_TOO_LARGE;
-    case 415: return STATUS_FORMAT;
-    case 460: return STATUS_CHECKSUM;
-    case 507: return STATUS_DISK_FULL;
-    default: return STATUS_IO;
+    case 400:
+    case 422:
+        return STATUS_INVALID;
+    case 404:
+    case 410:
+        return STATUS_NOT_FOUND;
+    case 409:
+    case 412:
+    case 423:
+        return STATUS_CONFLICT;
+    case 413:
+        return STATUS_TOO_LARGE;
+    case 415:
+        return STATUS_FORMAT;
+    case 460:
+        return STATUS_CHECKSUM;
+    case 507:
+        return STATUS_DISK_FULL;
+    default:
+        return STATUS_IO;
     }
 }
 
@@ -259,8 +273,8 @@ static bool busy(const struct http_reply *reply)
     return (reply->code == 429 || reply->code == 503) && reply->retry_after_s >= 0.0;
 }
 
-status http_json(struct http *http, const char *method, const char *path, const char *key, const json_t *body, json_t **out,
-                 struct error *err)
+status http_json(struct http *http, const char *method, const char *path, const char *key, const json_t *body,
+                 json_t **out, struct error *err)
 {
     char key_line[160];
     const char *header[4] = {"Accept: application/json"};
@@ -290,7 +304,8 @@ status http_json(struct http *http, const char *method, const char *path, const 
         s = http_problem(&reply, err);
     } else if (out != NULL && reply.n_body > 0) {
         *out = json_loadb(reply.body, reply.n_body, 0, NULL);
-        if (*out == NULL) s = error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON", http->server);
+        if (*out == NULL)
+            s = error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON", http->server);
     }
 out:
     http_reply_release(&reply);

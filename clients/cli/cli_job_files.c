@@ -9,8 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static status add(struct cli_file_list *list, const char *folder, const json_t *name_json, const char *role, const char *field,
-                  struct error *err)
+static status add(struct cli_file_list *list, const char *folder, const json_t *name_json, const char *role,
+                  const char *field, struct error *err)
 {
     const char *name = json_string_value(name_json);
     if (name == NULL || name[0] == '\0')
@@ -42,7 +42,8 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
     status s = STATUS_OK;
     size_t i;
     json_t *item;
-    json_array_foreach(json_object_get(json_object_get(document, "volume"), "files"), i, item) {
+    json_array_foreach(json_object_get(json_object_get(document, "volume"), "files"), i, item)
+    {
         char field[64];
         snprintf(field, sizeof field, "volume.files[%zu]", i);
         if ((s = add(list, folder, item, "volume", field, err)) != STATUS_OK) goto out;
@@ -51,7 +52,8 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
     if (one != NULL && (s = add(list, folder, one, "fibers", "fibers.file", err)) != STATUS_OK) goto out;
     one = json_object_get(json_object_get(document, "measurements"), "file");
     if (one != NULL && (s = add(list, folder, one, "measurements", "measurements.file", err)) != STATUS_OK) goto out;
-    json_array_foreach(json_object_get(document, "photographs"), i, item) {
+    json_array_foreach(json_object_get(document, "photographs"), i, item)
+    {
         char field[64];
         snprintf(field, sizeof field, "photographs[%zu].file", i);
         if ((s = add(list, folder, json_object_get(item, "file"), "photograph", field, err)) != STATUS_OK) goto out;
@@ -71,7 +73,8 @@ void cli_job_files_release(struct cli_file_list *list)
     *list = (struct cli_file_list){0};
 }
 
-status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint64_t n_done), void *context, struct error *err)
+status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint64_t n_done), void *context,
+                     struct error *err)
 {
     enum { CHUNK = 1 << 20 };
     status s = STATUS_OK;
@@ -82,7 +85,8 @@ status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint6
     file->n_bytes = 0;
     int fd = open(file->path, O_RDONLY | O_CLOEXEC);
     if (fd < 0) {
-        s = errno == ENOENT ? error_set(err, STATUS_NOT_FOUND, "input file '%s' does not exist (the job document names it)", file->path)
+        s = errno == ENOENT ? error_set(err, STATUS_NOT_FOUND,
+                                        "input file '%s' does not exist (the job document names it)", file->path)
                             : error_set_errno(err, "cannot open input file '%s'", file->path);
         goto out;
     }

@@ -11,8 +11,8 @@
 enum { CLI_SHA256_HEX = 65 };
 
 struct cli_file {
-    char *name; /* as the document says, without a folder */
-    char *path; /* on this machine */
+    char *name;       /* as the document says, without a folder */
+    char *path;       /* on this machine */
     const char *role; /* "volume", "fibers", "measurements", "photograph" */
     uint64_t n_bytes;
     char sha256[CLI_SHA256_HEX];
@@ -30,6 +30,7 @@ void cli_job_files_release(struct cli_file_list *list);
 
 /* Size and SHA-256 of one file. changed() is called with bytes read so far (NULL allowed); it returns false to stop: STATUS_CANCELLED.
  * STATUS_NOT_FOUND, STATUS_IO naming the path. */
-status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint64_t n_done), void *context, struct error *err);
+status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint64_t n_done), void *context,
+                     struct error *err);
 
 #endif

@@ -11,7 +11,8 @@ status cli_job_path(const char *id, const char *tail, char *path, size_t n_path,
     size_t n = strlen(id);
     bool good = n > 0 && n < 80;
     for (size_t i = 0; i < n && good; i++)
-        good = (id[i] >= '0' && id[i] <= '9') || (id[i] >= 'a' && id[i] <= 'z') || (id[i] >= 'A' && id[i] <= 'Z') || id[i] == '-' || id[i] == '_';
+        good = (id[i] >= '0' && id[i] <= '9') || (id[i] >= 'a' && id[i] <= 'z') || (id[i] >= 'A' && id[i] <= 'Z') ||
+               id[i] == '-' || id[i] == '_';
     if (!good) return error_set(err, STATUS_INVALID, "'%.80s' is not a job id; `selvedge list` shows them", id);
     snprintf(path, n_path, "/v1/jobs/%s%s", id, tail);
     return STATUS_OK;
@@ -53,9 +54,11 @@ status cli_list(struct cli *cli, int *exit_code, struct error *err)
         json_t *page = NULL, *job;
         size_t i;
         if ((s = http_json(cli->http, "GET", path, NULL, NULL, &page, err)) != STATUS_OK) break;
-        json_array_foreach(json_object_get(page, "jobs"), i, job) {
+        json_array_foreach(json_object_get(page, "jobs"), i, job)
+        {
             if (cli->args->json) json_array_append(all, job);
-            if (!cli->args->json && n_job == 0) fprintf(cli->out, "%-36s  %-10s %6s %8s  %s\n", "id", "state", "done", "ETA", "sample");
+            if (!cli->args->json && n_job == 0)
+                fprintf(cli->out, "%-36s  %-10s %6s %8s  %s\n", "id", "state", "done", "ETA", "sample");
             if (!cli->args->json) report_summary(job, cli->out);
             n_job++;
         }
@@ -66,7 +69,8 @@ status cli_list(struct cli *cli, int *exit_code, struct error *err)
         if (!more) break;
     }
     if (s == STATUS_OK && cli->args->json) print_json(all, cli->out);
-    if (s == STATUS_OK && !cli->args->json && n_job == 0) fprintf(cli->note, "no jobs; `selvedge submit JOB.json` makes one\n");
+    if (s == STATUS_OK && !cli->args->json && n_job == 0)
+        fprintf(cli->note, "no jobs; `selvedge submit JOB.json` makes one\n");
     json_decref(all);
     return s;
 }
@@ -113,7 +117,8 @@ static status log_piece(struct cli *cli, int64_t *offset, size_t *n_new, struct 
     if (s == STATUS_OK && reply.code != 200 && reply.code != 204) s = http_problem(&reply, err);
     *n_new = 0;
     if (s == STATUS_OK && reply.n_body > 0) {
-        for (size_t i = 0; i < reply.n_body; i++) { /* a log may quote names of files: keep their escapes from the terminal */
+        for (size_t i = 0; i < reply.n_body;
+             i++) { /* a log may quote names of files: keep their escapes from the terminal */
             unsigned char c = (unsigned char)reply.body[i];
             fputc(c < 0x20 && c != '\n' && c != '\t' ? '?' : c, cli->out);
         }
@@ -131,7 +136,8 @@ static status job_lives(struct cli *cli, bool *lives, struct error *err)
     struct job_view view;
     status s = job_call(cli, "GET", "", &job, err);
     report_view(job, &view);
-    *lives = strcmp(view.state, "running") == 0 || strcmp(view.state, "queued") == 0 || strcmp(view.state, "paused") == 0;
+    *lives =
+        strcmp(view.state, "running") == 0 || strcmp(view.state, "queued") == 0 || strcmp(view.state, "paused") == 0;
     json_decref(job);
     return s;
 }
@@ -144,7 +150,8 @@ status cli_log(struct cli *cli, int *exit_code, struct error *err)
     for (;;) {
         size_t n_new;
         bool lives = false;
-        if (cli->args->follow && (s = job_lives(cli, &lives, err)) != STATUS_OK) break; /* asked first: what ends a job is in the log */
+        if (cli->args->follow && (s = job_lives(cli, &lives, err)) != STATUS_OK)
+            break; /* asked first: what ends a job is in the log */
         do {
             if ((s = log_piece(cli, &offset, &n_new, err)) != STATUS_OK) return s;
         } while (n_new > 0);
@@ -158,12 +165,17 @@ static void print_point(const json_t *point, FILE *out)
 {
     size_t i;
     const json_t *value;
-    fprintf(out, "%lld\t%s\t%s\t%.2f\t%.0f\t%.8g\t%.4g\t%.6g", (long long)json_integer_value(json_object_get(point, "step")),
-            json_string_value(json_object_get(point, "model")) == NULL ? "-" : json_string_value(json_object_get(point, "model")),
-            json_string_value(json_object_get(point, "phase")) == NULL ? "-" : json_string_value(json_object_get(point, "phase")),
-            json_number_value(json_object_get(point, "wall_s")), json_number_value(json_object_get(point, "n_path_total")),
-            json_number_value(json_object_get(point, "objective")), json_number_value(json_object_get(point, "objective_se")),
-            json_number_value(json_object_get(point, "rel_rms")));
+    fprintf(
+        out, "%lld\t%s\t%s\t%.2f\t%.0f\t%.8g\t%.4g\t%.6g",
+        (long long)json_integer_value(json_object_get(point, "step")),
+        json_string_value(json_object_get(point, "model")) == NULL ? "-"
+                                                                   : json_string_value(json_object_get(point, "model")),
+        json_string_value(json_object_get(point, "phase")) == NULL ? "-"
+                                                                   : json_string_value(json_object_get(point, "phase")),
+        json_number_value(json_object_get(point, "wall_s")), json_number_value(json_object_get(point, "n_path_total")),
+        json_number_value(json_object_get(point, "objective")),
+        json_number_value(json_object_get(point, "objective_se")),
+        json_number_value(json_object_get(point, "rel_rms")));
     json_array_foreach(json_object_get(point, "parameter"), i, value) fprintf(out, "\t%.7g", json_number_value(value));
     fputc('\n', out);
 }
@@ -182,9 +194,12 @@ status cli_series(struct cli *cli, int *exit_code, struct error *err)
         snprintf(tail, sizeof tail, "/series?after_step=%lld&max_points=5000", after);
         if ((s = job_call(cli, "GET", tail, &page, err)) != STATUS_OK) break;
         const json_t *points = json_object_get(page, "points");
-        json_array_foreach(points, i, point) {
+        json_array_foreach(points, i, point)
+        {
             if (cli->args->json) json_array_append(all, point);
-            if (!cli->args->json && first) fprintf(cli->out, "step\tmodel\tphase\twall_s\tn_path_total\tobjective\tobjective_se\trel_rms\tparameters\n");
+            if (!cli->args->json && first)
+                fprintf(cli->out,
+                        "step\tmodel\tphase\twall_s\tn_path_total\tobjective\tobjective_se\trel_rms\tparameters\n");
             if (!cli->args->json) print_point(point, cli->out);
             first = false;
         }

@@ -21,8 +21,9 @@ static void on_signal(int number)
 }
 
 static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) = {
-    [CLI_SUBMIT] = cli_submit,   [CLI_STATUS] = cli_status,   [CLI_WATCH] = cli_watch, [CLI_LIST] = cli_list,     [CLI_CANCEL] = cli_cancel,
-    [CLI_RETRY] = cli_retry,     [CLI_RESULTS] = cli_results, [CLI_LOG] = cli_log,     [CLI_SERIES] = cli_series, [CLI_DELETE] = cli_delete,
+    [CLI_SUBMIT] = cli_submit, [CLI_STATUS] = cli_status, [CLI_WATCH] = cli_watch,     [CLI_LIST] = cli_list,
+    [CLI_CANCEL] = cli_cancel, [CLI_RETRY] = cli_retry,   [CLI_RESULTS] = cli_results, [CLI_LOG] = cli_log,
+    [CLI_SERIES] = cli_series, [CLI_DELETE] = cli_delete,
 };
 
 static void print_error(const struct error *err)
@@ -45,7 +46,8 @@ static int execute(const struct cli_args *args)
     status s = http_new(args->server, args->token, &interrupted, &cli.http, &err);
     if (s == STATUS_OK) s = run[args->command](&cli, &exit_code, &err);
     http_free(cli.http);
-    if (s == STATUS_OK && (fflush(stdout) != 0 || ferror(stdout))) s = error_set(&err, STATUS_IO, "cannot write to standard output");
+    if (s == STATUS_OK && (fflush(stdout) != 0 || ferror(stdout)))
+        s = error_set(&err, STATUS_IO, "cannot write to standard output");
     if (s == STATUS_OK) return exit_code;
     print_error(&err);
     return s == STATUS_CANCELLED ? CLI_EXIT_INTERRUPTED : CLI_EXIT_ERROR;

@@ -46,7 +46,8 @@ static void print_time(const json_t *job, const char *key, const char *label, FI
     time_t seconds = (time_t)t;
     struct tm local;
     char text[64];
-    if (localtime_r(&seconds, &local) == NULL || strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S %Z", &local) == 0) return;
+    if (localtime_r(&seconds, &local) == NULL || strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S %Z", &local) == 0)
+        return;
     fprintf(out, "%-12s %s\n", label, text);
 }
 
@@ -63,7 +64,8 @@ static void print_files(const json_t *job, FILE *out)
     size_t i, n_complete = 0;
     const json_t *file, *files = json_object_get(job, "files"), *missing = json_object_get(job, "missing_files");
     json_array_foreach(files, i, file) n_complete += strcmp(member_text(file, "state"), "complete") == 0;
-    if (json_array_size(files) > 0) fprintf(out, "%-12s %zu of %zu uploaded\n", "files", n_complete, json_array_size(files));
+    if (json_array_size(files) > 0)
+        fprintf(out, "%-12s %zu of %zu uploaded\n", "files", n_complete, json_array_size(files));
     for (i = 0; i < json_array_size(missing) && i < 5; i++)
         print_text(i == 0 ? "missing" : "", json_string_value(json_array_get(missing, i)), out);
     if (json_array_size(missing) > 5) fprintf(out, "%-12s and %zu more\n", "", json_array_size(missing) - 5);
@@ -89,11 +91,11 @@ void report_job(const json_t *job, FILE *out)
     print_time(job, "finished_unix_s", "finished", out);
     if (member_count(job, "attempt") > 1) fprintf(out, "%-12s %ld\n", "attempt", member_count(job, "attempt"));
     print_files(job, out);
-    json_array_foreach(json_object_get(job, "warnings"), i, value)
-        if (json_is_string(value)) print_text("warning", json_string_value(value), out);
+    json_array_foreach(json_object_get(job, "warnings"), i, value) if (json_is_string(value))
+        print_text("warning", json_string_value(value), out);
     if (json_is_object(error)) {
-        snprintf(line, sizeof line, "%s%s%s", member_text(error, "field"), member_text(error, "field")[0] == '\0' ? "" : ": ",
-                 member_text(error, "text"));
+        snprintf(line, sizeof line, "%s%s%s", member_text(error, "field"),
+                 member_text(error, "field")[0] == '\0' ? "" : ": ", member_text(error, "text"));
         print_text("error", line, out);
     }
     report_result(job, out);
@@ -107,9 +109,11 @@ static void print_flags(const json_t *parameter, FILE *out)
         fputs("fixed", out);
         return;
     }
-    if (json_is_string(json_object_get(parameter, "tied_to"))) fprintf(out, "tied to %s  ", member_text(parameter, "tied_to"));
+    if (json_is_string(json_object_get(parameter, "tied_to")))
+        fprintf(out, "tied to %s  ", member_text(parameter, "tied_to"));
     if (json_is_object(json_object_get(parameter, "prior"))) fputs("with a prior  ", out);
-    if (json_is_string(at_bound)) fprintf(out, "at %s bound  ", strcmp(json_string_value(at_bound), "lower") == 0 ? "lower" : "upper");
+    if (json_is_string(at_bound))
+        fprintf(out, "at %s bound  ", strcmp(json_string_value(at_bound), "lower") == 0 ? "lower" : "upper");
     if (json_is_true(at_bound)) fputs("at a bound  ", out);
     if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined", out);
 }
@@ -154,8 +158,8 @@ static void print_models(const json_t *models, FILE *out)
         percent(m, gains ? "fit_rel_rms_with_gains" : "fit_rel_rms", fitted, sizeof fitted);
         percent(m, gains ? "heldout_rel_rms_with_gains" : "heldout_rel_rms", held_out, sizeof held_out);
         text_duration(member_number(m, "fit_wall_s"), time);
-        fprintf(out, "  %-22s %16s %16s %12.3g %8s  %s%s\n", id, fitted, held_out,
-                member_number(m, "n_path_fit"), time, json_is_true(json_object_get(m, "best")) ? "best " : "",
+        fprintf(out, "  %-22s %16s %16s %12.3g %8s  %s%s\n", id, fitted, held_out, member_number(m, "n_path_fit"), time,
+                json_is_true(json_object_get(m, "best")) ? "best " : "",
                 json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
     }
     fprintf(out, "%sof the best model:\n", gains ? "(errors: each photograph with its own gain)\n" : "");
@@ -200,5 +204,6 @@ void report_summary(const json_t *job, FILE *out)
     text_clean(member_text(job, "id"), id, sizeof id);
     text_clean(member_text(job, "sample"), sample, sizeof sample);
     text_duration(view.eta_s, eta);
-    fprintf(out, "%-36s  %-10s %4.0f %% %8s  %s\n", id, view.state, isnan(view.fraction) ? 0.0 : 100.0 * view.fraction, eta, sample);
+    fprintf(out, "%-36s  %-10s %4.0f %% %8s  %s\n", id, view.state, isnan(view.fraction) ? 0.0 : 100.0 * view.fraction,
+            eta, sample);
 }

@@ -44,7 +44,8 @@ static bool path_is_tame(const char *path)
 
 static status fetch(struct transfer *t, const char *folder, const json_t *file, size_t *n_fetched, struct error *err)
 {
-    const char *path = json_string_value(json_object_get(file, "path")), *url = json_string_value(json_object_get(file, "url"));
+    const char *path = json_string_value(json_object_get(file, "path")),
+               *url = json_string_value(json_object_get(file, "url"));
     uint64_t n_bytes = (uint64_t)json_integer_value(json_object_get(file, "size"));
     char target[4096], parent[4096];
     struct stat info;
@@ -64,7 +65,9 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
         s = http_download(t->cli->http, url, target, got, t, err);
         if (s != STATUS_OK) return error_prefix(err, s, "cannot download '%s'", path);
         /* the server's time of change, so that the next download knows the file whatever the clocks say */
-        struct timespec times[2] = {{.tv_nsec = UTIME_OMIT}, {.tv_sec = (time_t)modified, .tv_nsec = (long)(1e9 * (modified - floor(modified)))}};
+        struct timespec times[2] = {
+            {.tv_nsec = UTIME_OMIT},
+            {.tv_sec = (time_t)modified, .tv_nsec = (long)(1e9 * (modified - floor(modified)))}};
         (void)utimensat(AT_FDCWD, target, times, 0);
         (*n_fetched)++;
     }
@@ -84,7 +87,8 @@ status cli_results(struct cli *cli, int *exit_code, struct error *err)
     if (s != STATUS_OK) return s;
     const json_t *files = json_object_get(list, "files");
     if (json_array_size(files) == 0) {
-        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` tells when", cli->args->operand, cli->args->operand);
+        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` tells when",
+                      cli->args->operand, cli->args->operand);
         goto out;
     }
     if (cli->args->out_dir != NULL)
@@ -92,7 +96,8 @@ status cli_results(struct cli *cli, int *exit_code, struct error *err)
     else
         snprintf(folder, sizeof folder, "selvedge-%s", cli->args->operand);
     json_array_foreach(files, i, file) t.n_total += (uint64_t)json_integer_value(json_object_get(file, "size"));
-    json_array_foreach(files, i, file) {
+    json_array_foreach(files, i, file)
+    {
         if ((s = fetch(&t, folder, file, &n_fetched, err)) != STATUS_OK) break;
     }
     if (cli->note_is_terminal) fputs("\r\033[K", cli->note);

@@ -30,7 +30,8 @@ static void draw(struct submit *u, bool force)
     if (!u->cli->note_is_terminal || (!force && now - u->shown_s < 0.1)) return;
     u->shown_s = now;
     u->drawn = true;
-    char bar[40], done[CLI_SHORT_TEXT], total[CLI_SHORT_TEXT], rate[CLI_SHORT_TEXT], eta[CLI_SHORT_TEXT], name[48], line[400];
+    char bar[40], done[CLI_SHORT_TEXT], total[CLI_SHORT_TEXT], rate[CLI_SHORT_TEXT], eta[CLI_SHORT_TEXT], name[48],
+        line[400];
     double n = (double)(u->n_before + u->n_now), all = (double)u->n_total, speed = n / fmax(now - u->started_s, 1e-3);
     text_bar(all > 0.0 ? n / all : 1.0, 24, bar, sizeof bar);
     text_size(n, done);
@@ -38,7 +39,8 @@ static void draw(struct submit *u, bool force)
     text_size(speed, rate);
     text_duration(speed > 0.0 ? (all - n) / speed : NAN, eta);
     text_clean(u->name, name, sizeof name);
-    int len = snprintf(line, sizeof line, "%s %s  %s of %s  %s/s  ETA %s  %s", u->verb, bar, done, total, rate, eta, name);
+    int len =
+        snprintf(line, sizeof line, "%s %s  %s of %s  %s/s  ETA %s  %s", u->verb, bar, done, total, rate, eta, name);
     size_t width = cli_columns(u->cli);
     if (len > 0 && (size_t)len >= width && width > 1 && width < sizeof line) line[width - 1] = '\0';
     fprintf(u->cli->note, "\r\033[K%s", line);
@@ -75,8 +77,10 @@ static status read_document(struct submit *u, const char *path, struct error *er
     if (u->document == NULL && where.line <= 0)
         return error_set(err, STATUS_NOT_FOUND, "cannot read the job document: %s", where.text);
     if (u->document == NULL)
-        return error_set(err, STATUS_INVALID, "job document '%s', line %d, column %d: %s", path, where.line, where.column, where.text);
-    if (!json_is_object(u->document)) return error_set(err, STATUS_INVALID, "job document '%s' is not a JSON object", path);
+        return error_set(err, STATUS_INVALID, "job document '%s', line %d, column %d: %s", path, where.line,
+                         where.column, where.text);
+    if (!json_is_object(u->document))
+        return error_set(err, STATUS_INVALID, "job document '%s' is not a JSON object", path);
     return STATUS_OK;
 }
 
@@ -160,11 +164,12 @@ static status declare(struct submit *u, const struct cli_file *file, json_t **an
     char path[256];
     status s = cli_job_path(u->id, "/files", path, sizeof path, err);
     if (s != STATUS_OK) return s;
-    json_t *body = json_pack("{s:s, s:s, s:I, s:s}", "name", file->name, "role", file->role, "size", (json_int_t)file->n_bytes, "sha256",
-                             file->sha256);
+    json_t *body = json_pack("{s:s, s:s, s:I, s:s}", "name", file->name, "role", file->role, "size",
+                             (json_int_t)file->n_bytes, "sha256", file->sha256);
     if (body == NULL) return error_set(err, STATUS_INVALID, "file name '%s' is not UTF-8", file->name);
     s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
-    if (s == STATUS_CONFLICT && u->cli->args->resume_id != NULL) { /* the file has changed since: the new one replaces it */
+    if (s == STATUS_CONFLICT &&
+        u->cli->args->resume_id != NULL) { /* the file has changed since: the new one replaces it */
         char *escaped = path + strlen(path);
         snprintf(escaped, sizeof path - strlen(path), "/%s", file->name);
         s = http_json(u->cli->http, "DELETE", path, NULL, NULL, NULL, err);
@@ -207,8 +212,8 @@ static status send_files(struct submit *u, struct error *err)
     char size[CLI_SHORT_TEXT];
     text_size((double)u->n_before, size);
     if (s == STATUS_OK)
-        fprintf(u->cli->note, "%zu file%s in place (%s), %zu uploaded now, in %.1f s\n", u->list.n_file, u->list.n_file == 1 ? "" : "s", size,
-                n_sent, clock_monotonic_s() - u->started_s);
+        fprintf(u->cli->note, "%zu file%s in place (%s), %zu uploaded now, in %.1f s\n", u->list.n_file,
+                u->list.n_file == 1 ? "" : "s", size, n_sent, clock_monotonic_s() - u->started_s);
     return s;
 }
 
@@ -236,14 +241,15 @@ status cli_submit(struct cli *cli, int *exit_code, struct error *err)
     if (cli->args->draft)
         fprintf(cli->note, "not started; start it with: selvedge submit --resume %s\n", u.id);
     else if (!cli->args->watch)
-        fprintf(cli->note, "started; follow it with: selvedge watch %s, or at %s/#%s\n", u.id, http_server(cli->http), u.id);
+        fprintf(cli->note, "started; follow it with: selvedge watch %s, or at %s/#%s\n", u.id, http_server(cli->http),
+                u.id);
     else
         s = cli_watch_job(cli, u.id, exit_code, err);
 out:
     draw_end(&u);
     if (s != STATUS_OK && u.id[0] != '\0' && !(cli->args->watch && s == STATUS_CANCELLED))
-        fprintf(cli->note, "continue with: selvedge submit --resume %s%s%s\n", u.id, cli->args->operand == NULL ? "" : " ",
-                cli->args->operand == NULL ? "" : cli->args->operand);
+        fprintf(cli->note, "continue with: selvedge submit --resume %s%s%s\n", u.id,
+                cli->args->operand == NULL ? "" : " ", cli->args->operand == NULL ? "" : cli->args->operand);
     cli_job_files_release(&u.list);
     json_decref(u.document);
     json_decref(u.job);

@@ -44,7 +44,8 @@ static status ask_offset(struct upload *u, struct http_reply *reply, struct erro
 static status send_piece(struct upload *u, struct http_reply *reply, struct error *err)
 {
     char offset_line[64];
-    const char *const header[] = {"Tus-Resumable: 1.0.0", "Content-Type: application/offset+octet-stream", offset_line, NULL};
+    const char *const header[] = {"Tus-Resumable: 1.0.0", "Content-Type: application/offset+octet-stream", offset_line,
+                                  NULL};
     uint64_t left = u->file->n_bytes - u->offset;
     uint64_t n_bytes = left < u->piece_bytes ? left : u->piece_bytes;
     struct http_source source = {.fd = u->fd, .n_bytes = n_bytes, .sent = sent, .context = u};

@@ -83,7 +83,8 @@ static status take_answer(struct watch *w, const struct http_reply *reply, struc
     json_t *job = json_loadb(reply->body, reply->n_body, 0, NULL);
     if (!json_is_object(job)) {
         json_decref(job);
-        return error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON", http_server(w->cli->http));
+        return error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON",
+                         http_server(w->cli->http));
     }
     json_decref(w->job);
     w->job = job;
@@ -134,28 +135,32 @@ static status poll_once(struct watch *w, struct error *err)
 
 static bool ended(const struct job_view *v)
 {
-    return strcmp(v->state, "succeeded") == 0 || strcmp(v->state, "failed") == 0 || strcmp(v->state, "cancelled") == 0 ||
-           strcmp(v->state, "draft") == 0;
+    return strcmp(v->state, "succeeded") == 0 || strcmp(v->state, "failed") == 0 ||
+           strcmp(v->state, "cancelled") == 0 || strcmp(v->state, "draft") == 0;
 }
 
 static status tell_end(struct watch *w, int *exit_code, struct error *err)
 {
     const char *state = w->view.state;
     const json_t *problem = json_object_get(w->job, "error");
-    const char *text = json_string_value(json_object_get(problem, "text")), *field = json_string_value(json_object_get(problem, "field"));
+    const char *text = json_string_value(json_object_get(problem, "text")),
+               *field = json_string_value(json_object_get(problem, "field"));
     if (strcmp(state, "succeeded") == 0) {
         report_result(w->job, w->cli->out);
         fprintf(w->cli->note, "results: selvedge results %s, or %s/#%s\n", w->id, http_server(w->cli->http), w->id);
         return STATUS_OK;
     }
     if (strcmp(state, "draft") == 0)
-        return error_set(err, STATUS_CONFLICT, "job %s has not been started: selvedge submit --resume %s", w->id, w->id);
+        return error_set(err, STATUS_CONFLICT, "job %s has not been started: selvedge submit --resume %s", w->id,
+                         w->id);
     if (strcmp(state, "cancelled") == 0) {
-        fprintf(w->cli->note, "job %s was cancelled; `selvedge retry %s` goes on from its last checkpoint\n", w->id, w->id);
+        fprintf(w->cli->note, "job %s was cancelled; `selvedge retry %s` goes on from its last checkpoint\n", w->id,
+                w->id);
         *exit_code = CLI_EXIT_CANCELLED;
         return STATUS_OK;
     }
-    return error_set_field(err, STATUS_CONFLICT, field == NULL ? "" : field, "job %s failed: %s", w->id, text == NULL ? "no reason given" : text);
+    return error_set_field(err, STATUS_CONFLICT, field == NULL ? "" : field, "job %s failed: %s", w->id,
+                           text == NULL ? "no reason given" : text);
 }
 
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err)
@@ -166,7 +171,8 @@ status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct err
     status s = cli_job_path(id, "", w.path, sizeof w.path, err);
     while (s == STATUS_OK) {
         s = poll_once(&w, err);
-        if (http_stopped(cli->http)) s = error_set(err, STATUS_CANCELLED, "interrupted; the job goes on (selvedge cancel %s stops it)", id);
+        if (http_stopped(cli->http))
+            s = error_set(err, STATUS_CANCELLED, "interrupted; the job goes on (selvedge cancel %s stops it)", id);
         if (s != STATUS_OK) break;
         if (w.job != NULL && w.lost_s <= 0.0) draw(&w);
         if (w.job != NULL && ended(&w.view)) break;
@@ -178,4 +184,7 @@ status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct err
     return s;
 }
 
-status cli_watch(struct cli *cli, int *exit_code, struct error *err) { return cli_watch_job(cli, cli->args->operand, exit_code, err); }
+status cli_watch(struct cli *cli, int *exit_code, struct error *err)
+{
+    return cli_watch_job(cli, cli->args->operand, exit_code, err);
+}

@@ -56,20 +56,22 @@ static float get_f32(const uint8_t *from)
 static size_t n_strand_of(size_t n) { return (n - 2) / HAIR_MAX_SEGMENT + 1; }
 
 /* What the file will have; the vertex between two strands of a fiber is in both. */
-static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point, struct error *err)
+static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point,
+                            struct error *err)
 {
     *n_strand = 0;
     for (size_t i = 0; i < f->n_fiber; i++) {
         size_t n = f->first_vertex[i + 1] - f->first_vertex[i];
         if (n < 2)
-            return error_set(err, STATUS_INVALID, "cannot write fibers '%s': fiber %zu has %zu vertices, at least 2 make a fiber",
-                             name, i, n);
+            return error_set(err, STATUS_INVALID,
+                             "cannot write fibers '%s': fiber %zu has %zu vertices, at least 2 make a fiber", name, i,
+                             n);
         *n_strand += n_strand_of(n);
     }
     *n_point = f->n_vertex + (*n_strand - f->n_fiber);
     if (*n_point > UINT32_MAX) /* strands are fewer */
-        return error_set(err, STATUS_TOO_LARGE, "cannot write fibers '%s': %zu vertices, the format ends at %u", name, *n_point,
-                         UINT32_MAX);
+        return error_set(err, STATUS_TOO_LARGE, "cannot write fibers '%s': %zu vertices, the format ends at %u", name,
+                         *n_point, UINT32_MAX);
     return STATUS_OK;
 }
 
@@ -123,8 +125,8 @@ struct hair_header {
 static status check_header(const struct hair_header *h, uint64_t file_bytes, const char *name, struct error *err)
 {
     if ((h->flags & HAIR_POINTS) == 0 || (h->flags & ~(uint32_t)HAIR_KNOWN) != 0)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': flags 0x%x, points are missing or flags unknown", name,
-                         h->flags);
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': flags 0x%x, points are missing or flags unknown",
+                         name, h->flags);
     if (h->n_strand == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", name);
     uint64_t want = HAIR_HEADER_BYTES + 12 * (uint64_t)h->n_point;
     if (h->flags & HAIR_SEGMENTS) want += 2 * (uint64_t)h->n_strand;
@@ -137,10 +139,9 @@ static status check_header(const struct hair_header *h, uint64_t file_bytes, con
     if (2 * (uint64_t)h->n_strand > h->n_point)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers but only %u points", name, h->n_strand,
                          h->n_point);
-    if ((h->flags & HAIR_SEGMENTS) == 0 &&
-        (uint64_t)h->n_strand * ((uint64_t)h->default_segments + 1) != h->n_point)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers of %u segments do not make %u points", name,
-                         h->n_strand, h->default_segments, h->n_point);
+    if ((h->flags & HAIR_SEGMENTS) == 0 && (uint64_t)h->n_strand * ((uint64_t)h->default_segments + 1) != h->n_point)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers of %u segments do not make %u points",
+                         name, h->n_strand, h->default_segments, h->n_point);
     return STATUS_OK;
 }
 
@@ -173,8 +174,9 @@ static status get_radii(struct fiber_set *f, const struct hair_header *h, const 
             sum += thickness == NULL ? h->default_thickness : get_f32(thickness + 4 * k);
         f->radius_m[i] = (float)(0.5e-3 * sum / (double)n);
         if (!(f->radius_m[i] > 0.0f) || !isfinite(f->radius_m[i]))
-            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': fiber %zu has no thickness, and neither does the header",
-                             name, i);
+            return error_set(err, STATUS_FORMAT,
+                             "cannot read fibers '%s': fiber %zu has no thickness, and neither does the header", name,
+                             i);
     }
     return STATUS_OK;
 }
@@ -201,7 +203,8 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
 {
     if (n_bytes < HAIR_HEADER_BYTES || memcmp(data, "HAIR", 4) != 0)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", name);
-    struct hair_header h = {get_u32(data + 4), get_u32(data + 8), get_u32(data + 12), get_u32(data + 16), get_f32(data + 20)};
+    struct hair_header h = {get_u32(data + 4), get_u32(data + 8), get_u32(data + 12), get_u32(data + 16),
+                            get_f32(data + 20)};
     status s = check_header(&h, n_bytes, name, err);
     if (s == STATUS_OK) s = fiber_set_reserve(f, h.n_strand, h.n_point, err);
     if (s != STATUS_OK) return s;
@@ -217,7 +220,8 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
     for (size_t k = 0; k < 3 * (size_t)h.n_point; k++) {
         f->position_m[k] = 1e-3f * get_f32(points + 4 * k);
         if (!isfinite(f->position_m[k]))
-            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", name, k / 3);
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", name,
+                             k / 3);
     }
     get_tile(f, data);
     fiber_set_classify(f);

@@ -9,14 +9,14 @@ static const double FADE_RADII = 8.0, JOIN_RADII = 2.0, SAME_COSINE = 0.7071;
 
 struct end {
     size_t i_fiber;
-    bool last;            /* of the fiber's two ends */
-    double p[3], t[3];    /* t: unit, outwards */
+    bool last;         /* of the fiber's two ends */
+    double p[3], t[3]; /* t: unit, outwards */
     double radius;
 };
 
 struct pair {
     double distance;
-    size_t low, high;     /* indices of ends at face 0 and at the opposite one */
+    size_t low, high; /* indices of ends at face 0 and at the opposite one */
 };
 
 struct seam {
@@ -24,7 +24,7 @@ struct seam {
     int axis;
     struct end *end[2];
     size_t n[2];
-    struct pair *pair;    /* matched, nearest first */
+    struct pair *pair; /* matched, nearest first */
     size_t n_pair;
 };
 
@@ -76,8 +76,10 @@ static status collect_ends(struct seam *s, struct error *err)
     for (size_t i = 0; i < s->f->n_fiber; i++)
         for (int last = 0; last < 2; last++) {
             struct end e = end_of(s->f, i, last == 1);
-            if (e.p[s->axis] <= e.radius && e.t[s->axis] < 0.0) s->end[0][s->n[0]++] = e;
-            else if (e.p[s->axis] >= tile - e.radius && e.t[s->axis] > 0.0) s->end[1][s->n[1]++] = e;
+            if (e.p[s->axis] <= e.radius && e.t[s->axis] < 0.0)
+                s->end[0][s->n[0]++] = e;
+            else if (e.p[s->axis] >= tile - e.radius && e.t[s->axis] > 0.0)
+                s->end[1][s->n[1]++] = e;
         }
     for (int side = 0; side < 2; side++) qsort(s->end[side], s->n[side], sizeof *s->end[side], by_height);
     return STATUS_OK;
@@ -162,7 +164,9 @@ static void shift_end(struct fiber_set *f, const struct end *e, const double shi
     float before[3];
     for (size_t k = 0; k < n; k++) {
         float *p = f->position_m + 3 * (e->last ? first + n - 1 - k : first + k);
-        if (k > 0) along += sqrt(pow((double)(p[0] - before[0]), 2.0) + pow((double)(p[1] - before[1]), 2.0) + pow((double)(p[2] - before[2]), 2.0));
+        if (k > 0)
+            along += sqrt(pow((double)(p[0] - before[0]), 2.0) + pow((double)(p[1] - before[1]), 2.0) +
+                          pow((double)(p[2] - before[2]), 2.0));
         if (along >= fade) return;
         memcpy(before, p, sizeof before);
         double weight = 0.5 + 0.5 * cos(M_PI * along / fade);
@@ -195,7 +199,8 @@ status fiber_seam_join(struct fiber_set *f, size_t *n_joined, struct error *err)
         struct seam s = {.f = f, .axis = axis};
         st = collect_ends(&s, err);
         if (st == STATUS_OK) st = match(&s, JOIN_RADII, err);
-        for (size_t i = 0; i < s.n_pair && st == STATUS_OK; i++) join_pair(f, &s, &s.end[0][s.pair[i].low], &s.end[1][s.pair[i].high]);
+        for (size_t i = 0; i < s.n_pair && st == STATUS_OK; i++)
+            join_pair(f, &s, &s.end[0][s.pair[i].low], &s.end[1][s.pair[i].high]);
         *n_joined += s.n_pair;
         seam_release(&s);
     }

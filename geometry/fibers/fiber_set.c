@@ -40,7 +40,8 @@ static status validate_fiber(const struct fiber_set *f, size_t i, struct error *
     if (end > f->n_vertex || end < first || end - first < 2)
         return error_set(err, STATUS_INVALID, "fiber %zu has fewer than two vertices", i);
     if (!(f->radius_m[i] > 0.0f) || !isfinite(f->radius_m[i]))
-        return error_set(err, STATUS_INVALID, "fiber %zu has radius %g m, it must be positive", i, (double)f->radius_m[i]);
+        return error_set(err, STATUS_INVALID, "fiber %zu has radius %g m, it must be positive", i,
+                         (double)f->radius_m[i]);
     if (f->axis_class[i] > 2)
         return error_set(err, STATUS_INVALID, "fiber %zu has axis class %u, it must be 0, 1 or 2", i,
                          (unsigned)f->axis_class[i]);
@@ -56,7 +57,7 @@ status fiber_set_validate(const struct fiber_set *f, struct error *err)
     for (int a = 0; a < 2; a++)
         if (!(f->tile_size_m[a] > 0.0) || !isfinite(f->tile_size_m[a]))
             return error_set(err, STATUS_INVALID, "the tile size in %c is %g m, it must be positive", "xy"[a],
-                             f->tile_size_m[a]);
+                             f -> tile_size_m[a]);
     if (f->first_vertex[0] != 0 || f->first_vertex[f->n_fiber] != f->n_vertex)
         return error_set(err, STATUS_INVALID, "the fibers use %zu vertices, the set has %zu",
                          f->first_vertex[f->n_fiber] - f->first_vertex[0], f->n_vertex);

@@ -92,8 +92,8 @@ static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, 
 {
     size_t n = n_vertex - f->first_vertex[i_fiber];
     if (n < 2)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the fiber ending at line %zu has one point only", name,
-                         i_line);
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the fiber ending at line %zu has one point only",
+                         name, i_line);
     f->radius_m[i_fiber] = (float)(1e-3 * radius_sum / (double)n);
     f->first_vertex[i_fiber + 1] = n_vertex;
     return STATUS_OK;
@@ -116,7 +116,8 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
         if (kind == LINE_END) return STATUS_OK;
         if (kind == LINE_BLANK) continue;
         if (kind == LINE_TOO_LONG || !parse_point(line, value))
-            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu is not \"x y z radius\"", name, r.i_line);
+            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu is not \"x y z radius\"", name,
+                             r.i_line);
         for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * value[a]);
         radius_sum += value[3];
         n_vertex++;
@@ -132,7 +133,8 @@ status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *
     status s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
     if (s != STATUS_OK) return s;
     size_t n_vertex = count_points(data, n_bytes, &n_fiber);
-    if (n_fiber == 0) s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path_file_name(path));
+    if (n_fiber == 0)
+        s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path_file_name(path));
     if (s == STATUS_OK) s = fiber_set_reserve(&read, n_fiber, n_vertex, err);
     if (s == STATUS_OK) s = parse(&read, data, n_bytes, path_file_name(path), err);
     free(data);

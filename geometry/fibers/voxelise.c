@@ -120,8 +120,7 @@ static void draw_capsule(const struct job *job, struct slab *s, const struct cap
                 double distance = axis_distance(c, p);
                 if (distance < 0.0 || distance >= reach) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
-                add_share(s, volume_index(v->n, x, y, (size_t)(k - z_from)), c, distance,
-                          share_beyond(job, c, p, k));
+                add_share(s, volume_index(v->n, x, y, (size_t)(k - z_from)), c, distance, share_beyond(job, c, p, k));
             }
 }
 
@@ -167,7 +166,8 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     for (size_t i = 0; i < n; i++) s->distance[i] = INFINITY;
     for (size_t i = 0; i < f->n_fiber; i++) {
         double margin = (double)f->radius_m[i] + size[0] + size[1] + size[2];
-        double low = job->z_low_m + (double)z_from * size[2] - margin, high = job->z_low_m + (double)z_to * size[2] + margin;
+        double low = job->z_low_m + (double)z_from * size[2] - margin,
+               high = job->z_low_m + (double)z_to * size[2] + margin;
         for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
             struct capsule c;
             double z0 = (double)f->position_m[3 * k + 2], z1 = (double)f->position_m[3 * k + 5];

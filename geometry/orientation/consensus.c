@@ -4,12 +4,14 @@
 
 #include <string.h>
 
-status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space, struct error *err)
+status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space,
+                      struct error *err)
 {
     *c = (struct consensus){.cell = cell, .space = space};
     for (int a = 0; a < 3; a++) c->n[a] = (n_voxel[a] + cell - 1) / cell;
     void *tensor;
-    status s = scratch_new(space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor, "the directions of neighbourhoods", &tensor, err);
+    status s = scratch_new(space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor, "the directions of neighbourhoods",
+                           &tensor, err);
     c->tensor = tensor;
     return s;
 }
@@ -52,7 +54,8 @@ static void blur_layer(void *context, size_t layer, size_t i_thread)
     scratch_keep_within(c->space);
     for (size_t i = layer * n_layer; i < (layer + 1) * n_layer; i++) {
         size_t x = i / stride % c->n[job->axis];
-        const float *low = c->tensor[x > 0 ? i - stride : i], *high = c->tensor[x + 1 < c->n[job->axis] ? i + stride : i];
+        const float *low = c->tensor[x > 0 ? i - stride : i],
+                    *high = c->tensor[x + 1 < c->n[job->axis] ? i + stride : i];
         for (int m = 0; m < 6; m++) job->out[i][m] = 0.25f * low[m] + 0.5f * c->tensor[i][m] + 0.25f * high[m];
     }
 }
@@ -60,7 +63,8 @@ static void blur_layer(void *context, size_t layer, size_t i_thread)
 status consensus_blur(struct consensus *c, int n_pass, struct thread_pool *pool, struct error *err)
 {
     void *other;
-    status s = scratch_new(c->space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor, "the directions of neighbourhoods", &other, err);
+    status s = scratch_new(c->space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor,
+                           "the directions of neighbourhoods", &other, err);
     for (int pass = 0; pass < 3 * n_pass && s == STATUS_OK; pass++) {
         struct blur_job job = {c, other, pass % 3};
         s = thread_pool_run(pool, c->n[2], blur_layer, &job, NULL);

@@ -10,14 +10,15 @@
 #include <stddef.h>
 
 struct consensus {
-    size_t cell;        /* voxels */
-    size_t n[3];        /* cells */
-    float (*tensor)[6]; /* sum of weight d d^T: xx yy zz xy xz yz */
+    size_t cell;                 /* voxels */
+    size_t n[3];                 /* cells */
+    float (*tensor)[6];          /* sum of weight d d^T: xx yy zz xy xz yz */
     struct scratch_space *space; /* not owned; NULL: memory */
 };
 
 /* Cells of zeros over a volume of n_voxel. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
-status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space, struct error *err);
+status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space,
+                      struct error *err);
 void consensus_release(struct consensus *c);
 /* Adds to the cell of a voxel; threads keep to different layers of cells (k / cell). */
 void consensus_add(struct consensus *c, size_t i, size_t j, size_t k, const float d[3], float weight);

@@ -33,12 +33,13 @@ static void noise_slice(void *context, size_t k, size_t i_thread)
     job->sum[2 * k + 1] = count;
 }
 
-status direction_noise_measure(const struct direction_volume *d, struct thread_pool *pool, const struct progress *progress, double *mean_deg,
-                               struct error *err)
+status direction_noise_measure(const struct direction_volume *d, struct thread_pool *pool,
+                               const struct progress *progress, double *mean_deg, struct error *err)
 {
     struct noise_job job = {.d = d, .sum = malloc(2 * d->n[2] * sizeof(double))};
     double sum = 0.0, count = 0.0;
-    if (job.sum == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the noise of directions: out of memory");
+    if (job.sum == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot measure the noise of directions: out of memory");
     status s = thread_pool_run(pool, d->n[2], noise_slice, &job, progress);
     for (size_t k = 0; k < d->n[2] && s == STATUS_OK; k++) {
         sum += job.sum[2 * k];

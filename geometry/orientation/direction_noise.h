@@ -8,7 +8,7 @@
 /* Mean angle, degrees, between the direction of a kept voxel and that of the next voxel along its axis class, where that one is kept, too:
  * along a fiber directions hardly change from voxel to voxel. NaN without such pairs. Slice by slice.
  * STATUS_CANCELLED, STATUS_NO_MEMORY. */
-status direction_noise_measure(const struct direction_volume *d, struct thread_pool *pool, const struct progress *progress, double *mean_deg,
-                               struct error *err);
+status direction_noise_measure(const struct direction_volume *d, struct thread_pool *pool,
+                               const struct progress *progress, double *mean_deg, struct error *err);
 
 #endif

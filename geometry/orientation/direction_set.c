@@ -88,7 +88,8 @@ status direction_set_init(struct direction_set *s, size_t n, struct error *err)
     *s = (struct direction_set){0};
     if (n < 32 || n > UINT16_MAX) return error_set(err, STATUS_INVALID, "cannot make a set of %zu directions", n);
     s->node = calloc(n, sizeof *s->node);
-    if (s->node == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make a set of %zu directions: out of memory", n);
+    if (s->node == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot make a set of %zu directions: out of memory", n);
     s->n = n;
     const double golden = M_PI * (3.0 - sqrt(5.0));
     for (size_t i = 0; i < n; i++) {

@@ -10,10 +10,10 @@
 enum { DIRECTION_NEIGHBOURS = 8 };
 
 struct direction_node {
-    float d[3], e1[3], e2[3];                  /* e1, e2: tangent frame */
+    float d[3], e1[3], e2[3]; /* e1, e2: tangent frame */
     uint16_t neighbour[DIRECTION_NEIGHBOURS];
-    float fit[5][DIRECTION_NEIGHBOURS];        /* (f_i - f_0) -> g1 g2 h11 h12 h22 of f = f_0 + g.u + u.H.u / 2 */
-    float reach;                               /* distance to the farthest neighbour, radians */
+    float fit[5][DIRECTION_NEIGHBOURS]; /* (f_i - f_0) -> g1 g2 h11 h12 h22 of f = f_0 + g.u + u.H.u / 2 */
+    float reach;                        /* distance to the farthest neighbour, radians */
 };
 
 struct direction_set {

@@ -21,7 +21,7 @@ struct job {
     const struct volume *v;
     struct brick brick[MAX_BRICK];
     double noise_var[N_SCALE]; /* of the answer to white noise of variance 1 */
-    float *scratch; /* per thread: 2 bricks */
+    float *scratch;            /* per thread: 2 bricks */
     size_t scratch_per_thread;
 };
 
@@ -96,7 +96,8 @@ static double noise_variance(const float *a, const size_t n[3])
             for (size_t i = 1; i + 1 < n[0]; i++) {
                 float answer = 0.0f;
                 for (size_t m = 0; m < 27; m++)
-                    answer += d2[m % 3] * d2[m / 3 % 3] * d2[m / 9] * a[((k + m / 9 - 1) * n[1] + j + m / 3 % 3 - 1) * n[0] + i + m % 3 - 1];
+                    answer += d2[m % 3] * d2[m / 3 % 3] * d2[m / 9] *
+                              a[((k + m / 9 - 1) * n[1] + j + m / 3 % 3 - 1) * n[0] + i + m % 3 - 1];
                 sum += (double)(answer * answer);
                 count++;
             }
@@ -192,7 +193,8 @@ status fiber_diameter_measure(const struct volume *v, struct thread_pool *pool, 
     struct job job = {.v = v, .scratch_per_thread = 2 * EDGE * EDGE * EDGE};
     size_t n_brick = choose_bricks(v, job.brick);
     job.scratch = malloc(thread_pool_n_thread(pool) * job.scratch_per_thread * sizeof *job.scratch);
-    if (job.scratch == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber diameter: out of memory");
+    if (job.scratch == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber diameter: out of memory");
     answer_to_noise(job.scratch, job.scratch + EDGE * EDGE * EDGE, job.noise_var);
     status s = thread_pool_run(pool, n_brick, measure_brick, &job, progress);
     free(job.scratch);

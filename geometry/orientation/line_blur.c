@@ -17,9 +17,9 @@ struct blur_job {
     float *half_done, *out; /* blurred in x and y, slice k at k % n_ring; sum of both Gaussians */
     size_t n_ring, first;   /* first: slice of task 0 */
     struct kernel kernel;
-    float factor;           /* of this Gaussian in the sum */
+    float factor; /* of this Gaussian in the sum */
     bool add;
-    float *scratch;         /* a slice per thread */
+    float *scratch; /* a slice per thread */
     size_t scratch_per_thread;
 };
 
@@ -30,7 +30,8 @@ static bool make_kernel(double a, struct kernel *k)
     k->reach = (int)ceil(3.5 * sigma);
     if (k->reach > MAX_REACH) return false;
     for (int i = -k->reach; i <= k->reach; i++) sum += exp(-a * i * i);
-    for (int i = -k->reach; i <= k->reach; i++) k->weight[i + k->reach] = (float)(exp(-a * i * i) * sqrt(M_PI / a) / sum);
+    for (int i = -k->reach; i <= k->reach; i++)
+        k->weight[i + k->reach] = (float)(exp(-a * i * i) * sqrt(M_PI / a) / sum);
     return true;
 }
 
@@ -65,7 +66,8 @@ static void blur_slice(void *context, size_t i_task, size_t i_thread)
     }
     for (size_t j = 0; j < n[1]; j++)
         for (int t = -q->reach; t <= q->reach; t++)
-            add_scaled(out + j * n[0], rows + (size_t)clamp_index((ptrdiff_t)j + t, n[1]) * n[0], q->weight[t + q->reach], n[0]);
+            add_scaled(out + j * n[0], rows + (size_t)clamp_index((ptrdiff_t)j + t, n[1]) * n[0],
+                       q->weight[t + q->reach], n[0]);
 }
 
 static void blur_along_z(void *context, size_t i_task, size_t i_thread)
@@ -83,7 +85,8 @@ static void blur_along_z(void *context, size_t i_task, size_t i_thread)
         size_t n = from + PART <= n_slice ? PART : n_slice - from;
         for (int t = -q->reach; t <= q->reach; t++) {
             size_t slice = (size_t)clamp_index((ptrdiff_t)k + t, job->v->n[2]);
-            add_scaled(out + from, job->half_done + slice % job->n_ring * n_slice + from, job->factor * q->weight[t + q->reach], n);
+            add_scaled(out + from, job->half_done + slice % job->n_ring * n_slice + from,
+                       job->factor * q->weight[t + q->reach], n);
         }
     }
 }
@@ -119,7 +122,8 @@ status line_filter_blur(const struct volume *v, double s, double t, struct threa
     status st = volume_init_in(out, v->n, v->voxel_size_m, v->space, err);
     if (st != STATUS_OK) return st;
     job.out = out->density;
-    job.n_ring = n_slab + 2 * (size_t)job.kernel.reach < v->n[2] ? n_slab + 2 * (size_t)job.kernel.reach : v->n[2]; /* of the wider Gaussian */
+    job.n_ring = n_slab + 2 * (size_t)job.kernel.reach < v->n[2] ? n_slab + 2 * (size_t)job.kernel.reach
+                                                                 : v->n[2]; /* of the wider Gaussian */
     job.scratch_per_thread = n_slice + v->n[0] + 2 * MAX_REACH;
     job.scratch = malloc(thread_pool_n_thread(pool) * job.scratch_per_thread * sizeof *job.scratch);
     job.half_done = malloc(job.n_ring * n_slice * sizeof *job.half_done);

@@ -52,8 +52,8 @@ static void dilate(const struct line_bound *b, int axis, size_t cells, const boo
     }
 }
 
-status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least, struct thread_pool *pool,
-                       struct error *err)
+status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least,
+                       struct thread_pool *pool, struct error *err)
 {
     *b = (struct line_bound){0};
     for (int a = 0; a < 3; a++) b->n[a] = (blurred->n[a] + LINE_BOUND_CELL - 1) / LINE_BOUND_CELL;

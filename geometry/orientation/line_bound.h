@@ -12,13 +12,13 @@
 enum { LINE_BOUND_CELL = 8 };
 
 struct line_bound {
-    size_t n[3];      /* cells */
+    size_t n[3]; /* cells */
     bool *reaches;
 };
 
 /* A cell reaches when L is at least `least` somewhere within `reach` voxels of it. STATUS_NO_MEMORY, STATUS_CANCELLED. */
-status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least, struct thread_pool *pool,
-                       struct error *err);
+status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least,
+                       struct thread_pool *pool, struct error *err);
 void line_bound_release(struct line_bound *b);
 
 static inline bool line_bound_reaches(const struct line_bound *b, size_t i, size_t j, size_t k)

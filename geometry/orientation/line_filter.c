@@ -8,8 +8,8 @@ enum { LANES = 8 };
 typedef float lanes __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
 
 struct line_filter {
-    size_t half;           /* offsets -half .. half */
-    size_t edge;           /* of the copied surroundings: 2 half + 1, in x padded to edge_x */
+    size_t half; /* offsets -half .. half */
+    size_t edge; /* of the copied surroundings: 2 half + 1, in x padded to edge_x */
     size_t edge_x;
     size_t n[3];
     size_t n_direction;
@@ -77,8 +77,7 @@ static size_t make_runs(struct line_filter *f, const float *cube, size_t at)
                     f->weight[(at + count) * LANES + l] = x + l < f->edge ? row[x + l] : 0.0f;
                 if (f->weight != NULL) {
                     f->offset[at + count] = (int32_t)((dz * (ptrdiff_t)f->n[1] + dy) * (ptrdiff_t)f->n[0] + dx);
-                    f->offset_local[at + count] =
-                        (int32_t)((dz * (ptrdiff_t)f->edge + dy) * (ptrdiff_t)f->edge_x + dx);
+                    f->offset_local[at + count] = (int32_t)((dz * (ptrdiff_t)f->edge + dy) * (ptrdiff_t)f->edge_x + dx);
                 }
                 count++;
                 x += LANES - 1;

@@ -39,8 +39,8 @@ struct line_filter_site {
     const float *centre;
     bool copied;
 };
-struct line_filter_site line_filter_at(const struct line_filter *filter, const struct volume *blurred, size_t i, size_t j,
-                                       size_t k, float *scratch);
+struct line_filter_site line_filter_at(const struct line_filter *filter, const struct volume *blurred, size_t i,
+                                       size_t j, size_t k, float *scratch);
 float line_filter_j(const struct line_filter *filter, const struct line_filter_site *site, size_t i_direction);
 
 #endif

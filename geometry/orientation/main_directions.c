@@ -8,24 +8,26 @@
 #include <string.h>
 
 enum {
-    BLUR = 2,                  /* reach of the blur of standard deviation 1 voxel */
-    WINDOW = 5,                /* reach of the tensor's window */
-    INNER = 16, STEP = 4,      /* places: every 4th voxel of 16 a side */
+    BLUR = 2,   /* reach of the blur of standard deviation 1 voxel */
+    WINDOW = 5, /* reach of the tensor's window */
+    INNER = 16,
+    STEP = 4, /* places: every 4th voxel of 16 a side */
     BUFFER = INNER + 2 * (WINDOW + 1 + BLUR),
     PER_BRICK = (INNER / STEP) * (INNER / STEP) * (INNER / STEP),
     MAX_BRICK = 1600,
-    N_BIN = 180, APART_BIN = 30, /* of the histogram: one degree each */
+    N_BIN = 180,
+    APART_BIN = 30, /* of the histogram: one degree each */
     N_ROUND = 30,
     LEAST_SAMPLE = 200
 };
 
-static const double LEAST_IN_PLANE = 0.5;       /* length of a direction's part in the plane: up to 60 degrees out of it */
-static const double WITHIN_RAD = 0.8727;        /* 50 degrees */
-static const double KERNEL_RAD = 0.1396;        /* 8 degrees */
-static const double LEAST_CONTRAST = 2.5;       /* of a peak over the valley beside it */
-static const double LEAST_SECOND = 0.12;        /* a lower second peak is no system of its own */
-static const double LEAST_SHARE = 0.12;         /* of what runs in the plane */
-static const double LEAST_Z = 0.35;             /* fibers along z where warp or weft is missing: the axes are wrong */
+static const double LEAST_IN_PLANE = 0.5; /* length of a direction's part in the plane: up to 60 degrees out of it */
+static const double WITHIN_RAD = 0.8727;  /* 50 degrees */
+static const double KERNEL_RAD = 0.1396;  /* 8 degrees */
+static const double LEAST_CONTRAST = 2.5; /* of a peak over the valley beside it */
+static const double LEAST_SECOND = 0.12;  /* a lower second peak is no system of its own */
+static const double LEAST_SHARE = 0.12;   /* of what runs in the plane */
+static const double LEAST_Z = 0.35;       /* fibers along z where warp or weft is missing: the axes are wrong */
 
 struct sample {
     float d[3], weight;
@@ -34,10 +36,10 @@ struct sample {
 struct finder {
     const struct volume *v;
     float material;
-    size_t n_brick, *first;  /* corner voxels of bricks; x runs fastest, then y */
-    size_t n_column;         /* bricks side by side in x and y */
-    struct sample *sample;   /* PER_BRICK a brick; weight 0: none */
-    float *scratch;          /* per thread: two buffers */
+    size_t n_brick, *first; /* corner voxels of bricks; x runs fastest, then y */
+    size_t n_column;        /* bricks side by side in x and y */
+    struct sample *sample;  /* PER_BRICK a brick; weight 0: none */
+    float *scratch;         /* per thread: two buffers */
 };
 
 static const size_t EDGE = BUFFER, CUBE = (size_t)BUFFER * BUFFER * BUFFER;
@@ -58,7 +60,8 @@ static void copy_brick(const struct finder *f, const size_t corner[3], float *ou
     for (size_t k = 0; k < EDGE; k++)
         for (size_t j = 0; j < EDGE; j++)
             for (size_t i = 0; i < EDGE; i++) {
-                float x = f->v->density[volume_index(n, clamped(corner[0], i, n[0]), clamped(corner[1], j, n[1]), clamped(corner[2], k, n[2]))];
+                float x = f->v->density[volume_index(n, clamped(corner[0], i, n[0]), clamped(corner[1], j, n[1]),
+                                                     clamped(corner[2], k, n[2]))];
                 out[cube_index(i, j, k)] = x;
                 if (isfinite(x) && x < least) least = x;
             }
@@ -83,13 +86,15 @@ static void blur_brick(float *a, float *b)
 
 /* Direction of least change around a place of the buffer; its weight is how clearly it is one line. The window is cut at the faces of the
  * volume: repeated voxels beyond them do not change along one axis. */
-static void tensor_sample(const struct finder *f, const size_t corner[3], const float *a, const size_t at[3], struct sample *s)
+static void tensor_sample(const struct finder *f, const size_t corner[3], const float *a, const size_t at[3],
+                          struct sample *s)
 {
     const size_t stride[3] = {1, EDGE, EDGE * EDGE}, shift = WINDOW + 1 + BLUR;
     double sum[6] = {0.0}, scale[3];
     size_t from[3], to[3];
     for (int c = 0; c < 3; c++) {
-        size_t end = f->v->n[c] + shift > corner[c] + 1 ? f->v->n[c] + shift - corner[c] - 1 : 0; /* one before the last inner voxel */
+        size_t end = f->v->n[c] + shift > corner[c] + 1 ? f->v->n[c] + shift - corner[c] - 1
+                                                        : 0; /* one before the last inner voxel */
         from[c] = corner[c] + at[c] < shift + WINDOW + 1 ? shift + 1 - corner[c] : at[c] - WINDOW;
         to[c] = at[c] + WINDOW + 1 < end ? at[c] + WINDOW + 1 : end;
         scale[c] = f->v->voxel_size_m[0] / f->v->voxel_size_m[c];
@@ -128,7 +133,8 @@ static void sample_brick(void *context, size_t i_brick, size_t i_thread)
     for (at[2] = low; at[2] < low + INNER; at[2] += STEP)
         for (at[1] = low; at[1] < low + INNER; at[1] += STEP)
             for (at[0] = low; at[0] < low + INNER; at[0] += STEP)
-                if (a[cube_index(at[0], at[1], at[2])] >= f->material) tensor_sample(f, f->first + 3 * i_brick, a, at, &out[n++]);
+                if (a[cube_index(at[0], at[1], at[2])] >= f->material)
+                    tensor_sample(f, f->first + 3 * i_brick, a, at, &out[n++]);
 }
 
 /* Bricks side by side, or spread evenly where there are more than MAX_BRICK of them. */
@@ -147,7 +153,8 @@ static status place_bricks(struct finder *f, struct error *err)
     f->n_brick = f->n_column * n[2];
     f->first = malloc(3 * f->n_brick * sizeof *f->first);
     f->sample = calloc(f->n_brick * PER_BRICK, sizeof *f->sample);
-    if (f->first == NULL || f->sample == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot find main directions: out of memory");
+    if (f->first == NULL || f->sample == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot find main directions: out of memory");
     for (size_t b = 0; b < f->n_brick; b++) {
         const size_t i[3] = {b % n[0], b / n[0] % n[1], b / n[0] / n[1]};
         for (int a = 0; a < 3; a++) {
@@ -240,8 +247,10 @@ static void settle(const struct finder *f, double u[2][3], size_t n, struct vect
         for (size_t p = 0; p < n; p++) {
             total[p] = (struct vector_sum){.weight = 0.0};
             for (size_t b = 0; b < f->n_brick; b++) add_brick(f, b, u, n, p, &total[p]);
-            if (total[p].weight > 0.0) unit(total[p].v, next[p]);
-            else memcpy(next[p], u[p], sizeof next[p]);
+            if (total[p].weight > 0.0)
+                unit(total[p].v, next[p]);
+            else
+                memcpy(next[p], u[p], sizeof next[p]);
         }
         memcpy(u, next, n * sizeof *next);
     }
@@ -249,7 +258,8 @@ static void settle(const struct finder *f, double u[2][3], size_t n, struct vect
 
 /* Delete-a-block jackknife of the mean vector; a block is a column of bricks over the height of the cloth. se_deg: within the plane of x
  * and y, and out of it. */
-static void standard_error(const struct finder *f, double u[2][3], size_t n, size_t p, const struct vector_sum *total, double se_deg[2])
+static void standard_error(const struct finder *f, double u[2][3], size_t n, size_t p, const struct vector_sum *total,
+                           double se_deg[2])
 {
     double sum[2] = {0.0}, square[2] = {0.0}, used = 0.0, flat = hypot(u[p][0], u[p][1]);
     for (size_t column = 0; column < f->n_column; column++) {
@@ -267,14 +277,17 @@ static void standard_error(const struct finder *f, double u[2][3], size_t n, siz
         used += 1.0;
     }
     for (int a = 0; a < 2; a++)
-        se_deg[a] = used < 2.0 ? NAN : sqrt(fmax(0.0, (used - 1.0) * (square[a] / used - pow(sum[a] / used, 2.0)))) * 180.0 / M_PI;
+        se_deg[a] = used < 2.0
+                        ? NAN
+                        : sqrt(fmax(0.0, (used - 1.0) * (square[a] / used - pow(sum[a] / used, 2.0)))) * 180.0 / M_PI;
 }
 
 /* [0] shall be the one nearer to x; signs so that weft points along +x, warp along +y. */
 static void order(struct main_directions *m)
 {
     double(*u)[3] = m->direction;
-    bool swap = m->n == 2 ? fabs(u[0][0]) + fabs(u[1][1]) < fabs(u[0][1]) + fabs(u[1][0]) : fabs(u[0][0]) < fabs(u[0][1]);
+    bool swap =
+        m->n == 2 ? fabs(u[0][0]) + fabs(u[1][1]) < fabs(u[0][1]) + fabs(u[1][0]) : fabs(u[0][0]) < fabs(u[0][1]);
     if (swap) {
         struct main_directions t = *m;
         for (int p = 0; p < 2; p++) {
@@ -330,18 +343,20 @@ static void conclude(const struct finder *f, struct main_directions *m)
         m->tilt_se_deg[p] = se_deg[1];
     }
     double least = LEAST_SHARE * (1.0 - m->share_z);
-    if (n == 1 ? m->share[0] >= least : m->contrast >= LEAST_CONTRAST && fmin(m->share[0], m->share[1]) >= least) m->n = n;
+    if (n == 1 ? m->share[0] >= least : m->contrast >= LEAST_CONTRAST && fmin(m->share[0], m->share[1]) >= least)
+        m->n = n;
     if (m->n > 0) order(m);
 }
 
-status main_directions_find(const struct volume *v, double material, struct thread_pool *pool, const struct progress *progress,
-                            struct main_directions *m, struct error *err)
+status main_directions_find(const struct volume *v, double material, struct thread_pool *pool,
+                            const struct progress *progress, struct main_directions *m, struct error *err)
 {
     struct finder f = {.v = v, .material = (float)material};
     *m = (struct main_directions){.n = 0};
     status s = place_bricks(&f, err);
     f.scratch = malloc(thread_pool_n_thread(pool) * 2 * CUBE * sizeof *f.scratch);
-    if (s == STATUS_OK && f.scratch == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot find main directions: out of memory");
+    if (s == STATUS_OK && f.scratch == NULL)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot find main directions: out of memory");
     if (s == STATUS_OK) {
         s = thread_pool_run(pool, f.n_brick, sample_brick, &f, progress);
         if (s != STATUS_OK) error_set(err, s, "finding main directions was cancelled");

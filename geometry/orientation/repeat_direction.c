@@ -5,18 +5,18 @@
 
 enum { N_CELL = 128, N_HEIGHT = 8, N_FINE_HEIGHT = 128 };
 
-static const double CONE_RAD = 0.1047;        /* 6 degrees */
+static const double CONE_RAD = 0.1047;               /* 6 degrees */
 static const double SHORTEST = 0.25, LONGEST = 0.75; /* of the volume's extent along the direction */
 static const double LEAST_CORRELATION = 0.4;
-static const double MOST_RISE = 0.2;          /* 11 degrees out of the plane */
+static const double MOST_RISE = 0.2; /* 11 degrees out of the plane */
 static const double SYSTEMATIC_DEG = 1.0;
 
 struct cells {
     const struct volume *v;
     size_t n[2], block[3], n_z;
     double size_m[3];
-    float void_value;          /* of what lies outside of the scan */
-    float *value;              /* [(z * n[1] + y) * n[0] + x] */
+    float void_value; /* of what lies outside of the scan */
+    float *value;     /* [(z * n[1] + y) * n[0] + x] */
 };
 
 static void fill_height(void *context, size_t z, size_t i_thread)
@@ -32,7 +32,8 @@ static void fill_height(void *context, size_t z, size_t i_thread)
         for (size_t j = 0; j < c->n[1] * c->block[1]; j++) {
             const float *row = c->v->density + volume_index(n, 0, j, k);
             float *to_row = out + j / c->block[1] * c->n[0];
-            for (size_t i = 0; i < c->n[0] * c->block[0]; i++) to_row[i / c->block[0]] += isfinite(row[i]) ? row[i] : c->void_value;
+            for (size_t i = 0; i < c->n[0] * c->block[0]; i++)
+                to_row[i / c->block[0]] += isfinite(row[i]) ? row[i] : c->void_value;
         }
     }
     float scale = 1.0f / (float)(count * c->block[0] * c->block[1]);
@@ -62,13 +63,13 @@ static double correlation(const struct cells *c, long dx, long dy, long dz)
 
 struct search {
     const struct cells *c;
-    int axis;                  /* the shift's larger component */
+    int axis; /* the shift's larger component */
     double angle;
     long from;
     struct shift {
         double correlation;
         long d[2];
-    } *best;                   /* per length */
+    } * best; /* per length */
 };
 
 static double angle_between(double a, double b)
@@ -77,7 +78,10 @@ static double angle_between(double a, double b)
     return fabs(d - M_PI * round(d / M_PI));
 }
 
-static double shift_angle(const struct cells *c, double dx, double dy) { return atan2(dy * c->size_m[1], dx * c->size_m[0]); }
+static double shift_angle(const struct cells *c, double dx, double dy)
+{
+    return atan2(dy * c->size_m[1], dx * c->size_m[0]);
+}
 
 /* All shifts with one length along the main axis that lie in the cone. */
 static void try_length(void *context, size_t i, size_t i_thread)
@@ -134,8 +138,8 @@ static double rise_m(const struct cells *fine, const long d[2], double length_m)
     return ((double)best + off) * fine->size_m[2];
 }
 
-static status refine(const struct cells *c, const struct cells *fine, struct thread_pool *pool, size_t p, struct main_directions *m,
-                     struct error *err)
+static status refine(const struct cells *c, const struct cells *fine, struct thread_pool *pool, size_t p,
+                     struct main_directions *m, struct error *err)
 {
     double *u = m->direction[p];
     struct search s = {.c = c, .axis = fabs(u[0]) >= fabs(u[1]) ? 0 : 1, .angle = atan2(u[1], u[0])};
@@ -146,21 +150,26 @@ static status refine(const struct cells *c, const struct cells *fine, struct thr
     m->correlation[p] = fmax(0.0, best.correlation);
     if (best.correlation < LEAST_CORRELATION) return STATUS_OK;
     long across[2] = {s.axis == 1, s.axis == 0};
-    double before = correlation(c, best.d[0] - across[0], best.d[1] - across[1], 0), after = correlation(c, best.d[0] + across[0], best.d[1] + across[1], 0);
+    double before = correlation(c, best.d[0] - across[0], best.d[1] - across[1], 0),
+           after = correlation(c, best.d[0] + across[0], best.d[1] + across[1], 0);
     if (before >= best.correlation || after >= best.correlation) return STATUS_OK; /* the cone's edge */
     double off = peak_offset(before, best.correlation, after);
-    double d[3] = {((double)best.d[0] + off * (double)across[0]) * c->size_m[0], ((double)best.d[1] + off * (double)across[1]) * c->size_m[1]};
+    double d[3] = {((double)best.d[0] + off * (double)across[0]) * c->size_m[0],
+                   ((double)best.d[1] + off * (double)across[1]) * c->size_m[1]};
     double length = hypot(d[0], d[1]), sign = d[0] * u[0] + d[1] * u[1] < 0.0 ? -1.0 : 1.0;
     m->repeat_m[p] = length;
     m->se_deg[p] = 0.5 * c->size_m[1 - s.axis] / length * 180.0 / M_PI;
     d[2] = rise_m(fine, best.d, length);
-    if (isnan(d[2])) d[2] = sign * length * u[2] / hypot(u[0], u[1]);
-    else m->tilt_se_deg[p] = 0.5 * fine->size_m[2] / length * 180.0 / M_PI;
+    if (isnan(d[2]))
+        d[2] = sign * length * u[2] / hypot(u[0], u[1]);
+    else
+        m->tilt_se_deg[p] = 0.5 * fine->size_m[2] / length * 180.0 / M_PI;
     for (int a = 0; a < 3; a++) u[a] = sign * d[a] / hypot(length, d[2]);
     return STATUS_OK;
 }
 
-static status make_cells(const struct volume *v, double void_value, size_t n_height, struct thread_pool *pool, struct cells *c, struct error *err)
+static status make_cells(const struct volume *v, double void_value, size_t n_height, struct thread_pool *pool,
+                         struct cells *c, struct error *err)
 {
     *c = (struct cells){.v = v, .void_value = (float)void_value};
     for (int a = 0; a < 3; a++) {
@@ -176,7 +185,8 @@ static status make_cells(const struct volume *v, double void_value, size_t n_hei
     return s == STATUS_OK ? s : error_set(err, s, "finding the repeat was cancelled");
 }
 
-status repeat_directions_refine(const struct volume *v, double void_value, struct thread_pool *pool, struct main_directions *m, struct error *err)
+status repeat_directions_refine(const struct volume *v, double void_value, struct thread_pool *pool,
+                                struct main_directions *m, struct error *err)
 {
     struct cells coarse, fine = {.value = NULL};
     status s = make_cells(v, void_value, N_HEIGHT, pool, &coarse, err);

@@ -13,6 +13,7 @@
 /* Where the correlation reaches 0.4 and falls off to both sides, the direction is replaced, and its standard
  * errors become half a cell over the shift; repeat_m and correlation are set. Otherwise the direction stays, and a degree is added to its
  * standard error in quadrature. STATUS_NO_MEMORY. */
-status repeat_directions_refine(const struct volume *v, double void_value, struct thread_pool *pool, struct main_directions *m, struct error *err);
+status repeat_directions_refine(const struct volume *v, double void_value, struct thread_pool *pool,
+                                struct main_directions *m, struct error *err);
 
 #endif

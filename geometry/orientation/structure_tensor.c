@@ -10,7 +10,8 @@ void tensor_window_init(struct tensor_window *w, double sd_voxel)
 {
     *w = (struct tensor_window){.reach = (int)ceil(2.0 * sd_voxel)};
     if (w->reach > TENSOR_MAX_REACH) w->reach = TENSOR_MAX_REACH;
-    for (int i = -w->reach; i <= w->reach; i++) w->weight[i + w->reach] = (float)exp(-0.5 * i * i / (sd_voxel * sd_voxel));
+    for (int i = -w->reach; i <= w->reach; i++)
+        w->weight[i + w->reach] = (float)exp(-0.5 * i * i / (sd_voxel * sd_voxel));
 }
 
 static void add_scalar(const struct volume *v, size_t at, float weight, double sum[6])
@@ -33,7 +34,8 @@ static void add_row(const struct volume *v, size_t at, const float *w, int n, fl
     for (int x = 0; x < n; x += LANES) {
         const float *p = v->density + at + x;
         lanes weight = *(const lanes *)(w + x) * row_weight;
-        lanes gx = *(const lanes *)(p + 1) - *(const lanes *)(p - 1), gy = *(const lanes *)(p + sy) - *(const lanes *)(p - sy);
+        lanes gx = *(const lanes *)(p + 1) - *(const lanes *)(p - 1),
+              gy = *(const lanes *)(p + sy) - *(const lanes *)(p - sy);
         lanes gz = *(const lanes *)(p + sz) - *(const lanes *)(p - sz), wx = weight * gx, wy = weight * gy;
         sum[0] += wx * gx;
         sum[1] += wy * gy;
@@ -44,7 +46,8 @@ static void add_row(const struct volume *v, size_t at, const float *w, int n, fl
     }
 }
 
-static void collect_inner(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k, double sum[6])
+static void collect_inner(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k,
+                          double sum[6])
 {
     float padded[2 * TENSOR_MAX_REACH + 1 + LANES] = {0.0f};
     int r = w->reach, n = 2 * r + 1;
@@ -75,8 +78,8 @@ static void collect_border(const struct volume *v, const struct tensor_window *w
                     x[a] = (size_t)c;
                 }
                 if (inside)
-                    add_scalar(v, volume_index(v->n, x[0], x[1], x[2]), w->weight[o[0] + r] * w->weight[o[1] + r] * w->weight[o[2] + r],
-                               sum);
+                    add_scalar(v, volume_index(v->n, x[0], x[1], x[2]),
+                               w->weight[o[0] + r] * w->weight[o[1] + r] * w->weight[o[2] + r], sum);
             }
         }
 }
@@ -127,7 +130,8 @@ void symmetric_eigen(double m[3][3], float vector[3][3], float value[3])
     }
 }
 
-void structure_tensor_direction(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k, float d[3])
+void structure_tensor_direction(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k,
+                                float d[3])
 {
     double sum[6] = {0.0};
     size_t r = (size_t)w->reach + 1, centre[3] = {i, j, k};

@@ -9,15 +9,15 @@
 enum { TENSOR_MAX_REACH = 24 };
 
 struct tensor_window {
-    int reach; /* voxels */
+    int reach;                              /* voxels */
     float weight[2 * TENSOR_MAX_REACH + 1]; /* Gaussian along one axis */
 };
 
 /* Gaussian window of standard deviation sd_voxel, cut at 2 sd. */
 void tensor_window_init(struct tensor_window *w, double sd_voxel);
 /* Direction at voxel (i, j, k) of a blurred volume; the window is cut at the faces. */
-void structure_tensor_direction(const struct volume *blurred, const struct tensor_window *w, size_t i, size_t j, size_t k,
-                                float d[3]);
+void structure_tensor_direction(const struct volume *blurred, const struct tensor_window *w, size_t i, size_t j,
+                                size_t k, float d[3]);
 
 /* Unit eigenvectors (rows of vector) and eigenvalues, rising, of a symmetric matrix, which is destroyed. */
 void symmetric_eigen(double m[3][3], float vector[3][3], float value[3]);

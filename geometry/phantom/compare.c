@@ -11,9 +11,9 @@ static const double along_limit = 0.86602540378443865; /* cosine of 30 degrees *
 
 /* One voxel of a fiber, and what it met in the other set. */
 struct sample {
-    uint32_t fiber;      /* own */
-    uint32_t other;      /* fiber met, NONE when unmatched */
-    uint32_t voxel;      /* place met on the other fiber, in voxels from its start */
+    uint32_t fiber;              /* own */
+    uint32_t other;              /* fiber met, NONE when unmatched */
+    uint32_t voxel;              /* place met on the other fiber, in voxels from its start */
     uint32_t piece, other_piece; /* parts between faces, of own and other */
     float distance_m, cosine;
 };
@@ -32,7 +32,7 @@ struct job {
     const struct segment_grid *grid;
     const double *tile_m;
     const struct compare_option *o;
-    const double *arc_m; /* arc length at the vertices of the other set */
+    const double *arc_m;                 /* arc length at the vertices of the other set */
     const uint32_t *piece, *other_piece; /* per vertex */
     bool own_is_truth;
     double limit_m;
@@ -47,7 +47,8 @@ static bool near_face(const struct job *j, const double p[3])
     return false;
 }
 
-static void add_sample(const struct job *j, size_t i_fiber, size_t i_vertex, const double p[3], const double d[3], struct walk *w)
+static void add_sample(const struct job *j, size_t i_fiber, size_t i_vertex, const double p[3], const double d[3],
+                       struct walk *w)
 {
     if (near_face(j, p)) return;
     struct segment_hit hit;
@@ -120,7 +121,7 @@ static uint32_t *cut_at_faces(const struct fiber_set *f, const double tile_m[2],
     uint32_t *piece = malloc((f->n_vertex + 1) * sizeof *piece);
     *n_piece = 0;
     for (size_t i = 0; i < f->n_fiber && piece != NULL; i++) {
-        double corner[2] = {NAN, NAN}; /* of the tile that the fiber is in */
+        double corner[2] = {NAN, NAN};       /* of the tile that the fiber is in */
         size_t outside = f->first_vertex[i]; /* the first vertex since the fiber was last seen in it */
         for (size_t v = f->first_vertex[i]; v < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v;
@@ -204,8 +205,8 @@ static int by_pair(const void *a, const void *b)
 }
 
 /* What found samples tell. Changes their order. */
-static status from_found(const struct fiber_set *truth, const struct fiber_set *found, double voxel_size_m, struct walk *w,
-                         struct compare_report *r, struct error *err)
+static status from_found(const struct fiber_set *truth, const struct fiber_set *found, double voxel_size_m,
+                         struct walk *w, struct compare_report *r, struct error *err)
 {
     float *distance = calloc(w->n + 1, sizeof *distance), *angle = calloc(w->n + 1, sizeof *angle);
     size_t n = 0, n_second = 0;
@@ -241,7 +242,8 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
 }
 
 /* Fragments and merges: pairs (found, true) with enough samples. */
-static status count_fragments(const struct walk *of_truth, struct walk *w, size_t run_min, struct compare_report *r, struct error *err)
+static status count_fragments(const struct walk *of_truth, struct walk *w, size_t run_min, struct compare_report *r,
+                              struct error *err)
 {
     bool *seen = calloc(of_truth->n_piece, sizeof *seen);
     uint32_t *length = calloc(of_truth->n_piece, sizeof *length);
@@ -257,7 +259,8 @@ static status count_fragments(const struct walk *of_truth, struct walk *w, size_
     qsort(w->sample, w->n, sizeof *w->sample, by_pair);
     for (size_t i = 0, end; i < w->n; i = end) {
         const struct sample *s = &w->sample[i];
-        for (end = i + 1; end < w->n && by_pair(s, &w->sample[end]) == 0; end++) {}
+        for (end = i + 1; end < w->n && by_pair(s, &w->sample[end]) == 0; end++) {
+        }
         if (s->other == NONE || end - i < run_min || length[s->other_piece] < run_min) continue;
         n_pair++;
         if (s->piece != last_found) n_with_pair++;
@@ -348,7 +351,8 @@ status compare_fibers(const struct fiber_set *truth, const struct fiber_set *fou
     from_truth(&of_truth, &r);
     st = from_found(truth, found, o->voxel_size_m, &of_found, &r, err);
     if (st == STATUS_OK)
-        st = count_fragments(&of_truth, &of_found, (size_t)ceil(o->run_min_voxel > 0.0 ? o->run_min_voxel : 5.0), &r, err);
+        st = count_fragments(&of_truth, &of_found, (size_t)ceil(o->run_min_voxel > 0.0 ? o->run_min_voxel : 5.0), &r,
+                             err);
     if (st == STATUS_OK) *report = r;
 out:
     free(arc);

@@ -14,30 +14,35 @@
 
 struct compare_option {
     double voxel_size_m;
-    double margin_m;          /* samples nearer than this to a face of the tile in x or y are left out (a scan ends there); 0: none */
-    double run_min_voxel;     /* a found fiber counts as a fragment of a true one from this many samples on; 0: 5 */
+    double
+        margin_m; /* samples nearer than this to a face of the tile in x or y are left out (a scan ends there); 0: none */
+    double run_min_voxel; /* a found fiber counts as a fragment of a true one from this many samples on; 0: 5 */
 };
 
 struct compare_report {
-    size_t n_true, n_found;             /* fibers */
-    size_t n_true_piece;                /* true fibers as cut by the faces */
-    double fiber_diameter_voxel;        /* of the truth, mean weighted by length */
+    size_t n_true, n_found;      /* fibers */
+    size_t n_true_piece;         /* true fibers as cut by the faces */
+    double fiber_diameter_voxel; /* of the truth, mean weighted by length */
     double length_true_m, length_found_m;
 
-    double center_recall;               /* matched true samples / true samples */
-    double center_precision;            /* matched found samples, less second hits, / found samples. A second hit: another found fiber is
+    double center_recall; /* matched true samples / true samples */
+    double
+        center_precision; /* matched found samples, less second hits, / found samples. A second hit: another found fiber is
                                            matched nearer to the same voxel of the same true fiber */
-    double centerline_rms_voxel;        /* matched found samples to their true fiber */
+    double centerline_rms_voxel; /* matched found samples to their true fiber */
     double centerline_p95_voxel;
-    double length_recovered;            /* share of true samples whose nearest found point is within one radius AND runs within 30 degrees */
-    double longest_run;                 /* mean over true fibers of the longest stretch followed by one found fiber / the fiber's length */
-    double missed;                      /* share of true fibers without any fragment */
-    double fragments_per_fiber;         /* fragments / true fibers that have one */
-    double gaps_per_fiber;              /* runs of unmatched samples between matched ones / true fibers */
-    double merges_per_fiber;            /* sum over found fibers of (true fibers it has a fragment of - 1) / true fibers */
+    double
+        length_recovered; /* share of true samples whose nearest found point is within one radius AND runs within 30 degrees */
+    double
+        longest_run; /* mean over true fibers of the longest stretch followed by one found fiber / the fiber's length */
+    double missed;   /* share of true fibers without any fragment */
+    double fragments_per_fiber; /* fragments / true fibers that have one */
+    double gaps_per_fiber;      /* runs of unmatched samples between matched ones / true fibers */
+    double merges_per_fiber;    /* sum over found fibers of (true fibers it has a fragment of - 1) / true fibers */
     double direction_mean_deg, direction_p95_deg; /* matched found samples, to the true polyline's direction there */
-    double orientation_frobenius;       /* of the difference of the mean orientation tensors (mean of d d^T over all samples) */
-    double radius_bias_percent;         /* mean over matched found samples of found / true radius - 1 */
+    double
+        orientation_frobenius;  /* of the difference of the mean orientation tensors (mean of d d^T over all samples) */
+    double radius_bias_percent; /* mean over matched found samples of found / true radius - 1 */
 };
 
 /* Figures without any sample to take them from are NaN. STATUS_INVALID (invalid sets, no voxel size), STATUS_NO_MEMORY. The found set's

@@ -9,12 +9,15 @@ static const struct {
     const char *name;
     size_t repeat;
 } weave_info[PHANTOM_WEAVE_COUNT] = {
-    [PHANTOM_PLAIN] = {"plain", 2},     [PHANTOM_TWILL_2_2] = {"twill", 4}, [PHANTOM_TWILL_3_1] = {"twill31", 4},
-    [PHANTOM_SATIN_5] = {"satin", 5},   [PHANTOM_VELVET] = {"velvet", 2},   [PHANTOM_KNIT] = {"knit", 1},
+    [PHANTOM_PLAIN] = {"plain", 2},   [PHANTOM_TWILL_2_2] = {"twill", 4}, [PHANTOM_TWILL_3_1] = {"twill31", 4},
+    [PHANTOM_SATIN_5] = {"satin", 5}, [PHANTOM_VELVET] = {"velvet", 2},   [PHANTOM_KNIT] = {"knit", 1},
     [PHANTOM_FELT] = {"felt", 1},
 };
 
-const char *phantom_weave_name(enum phantom_weave w) { return (unsigned)w < PHANTOM_WEAVE_COUNT ? weave_info[w].name : "?"; }
+const char *phantom_weave_name(enum phantom_weave w)
+{
+    return (unsigned)w < PHANTOM_WEAVE_COUNT ? weave_info[w].name : "?";
+}
 
 status phantom_weave_find(const char *name, enum phantom_weave *w, struct error *err)
 {
@@ -23,15 +26,26 @@ status phantom_weave_find(const char *name, enum phantom_weave *w, struct error 
             *w = (enum phantom_weave)i;
             return STATUS_OK;
         }
-    return error_set_field(err, STATUS_INVALID, "weave", "unknown weave '%s': plain, twill, twill31, satin, velvet, knit or felt", name);
+    return error_set_field(err, STATUS_INVALID, "weave",
+                           "unknown weave '%s': plain, twill, twill31, satin, velvet, knit or felt", name);
 }
 
 void phantom_option_default(struct phantom_option *o, enum phantom_weave weave)
 {
-    *o = (struct phantom_option){.weave = weave, .seed = 1, .voxel_size_m = 2e-6,
-                                 .fiber_radius_m = {7e-6, 7e-6, 7e-6}, .n_fiber_per_yarn = 19, .packing = 0.7,
-                                 .flatness = 1.8, .cover = 1.05, .twist_turns = 1.0 / 3.0, .migration = 0.05,
-                                 .pile_height_m = 2e-4, .felt_tile_m = 3.2e-4, .felt_thickness_m = 1.2e-4, .n_relax = 300};
+    *o = (struct phantom_option){.weave = weave,
+                                 .seed = 1,
+                                 .voxel_size_m = 2e-6,
+                                 .fiber_radius_m = {7e-6, 7e-6, 7e-6},
+                                 .n_fiber_per_yarn = 19,
+                                 .packing = 0.7,
+                                 .flatness = 1.8,
+                                 .cover = 1.05,
+                                 .twist_turns = 1.0 / 3.0,
+                                 .migration = 0.05,
+                                 .pile_height_m = 2e-4,
+                                 .felt_tile_m = 3.2e-4,
+                                 .felt_thickness_m = 1.2e-4,
+                                 .n_relax = 300};
     if (weave == PHANTOM_VELVET) o->n_fiber_per_yarn = 7;
     if (weave == PHANTOM_FELT) o->n_fiber_per_yarn = 60;
     if (weave == PHANTOM_KNIT) {
@@ -43,20 +57,22 @@ void phantom_option_default(struct phantom_option *o, enum phantom_weave weave)
 static status check_range(const char *field, double value, double lower, double upper, struct error *err)
 {
     if (value >= lower && value <= upper) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, field, "phantom option '%s' is %g, it must lie between %g and %g", field, value, lower,
-                           upper);
+    return error_set_field(err, STATUS_INVALID, field, "phantom option '%s' is %g, it must lie between %g and %g",
+                           field, value, lower, upper);
 }
 
 /* Fill in what was left open and check the rest. */
 static status check(struct phantom_option *o, struct error *err)
 {
-    if ((unsigned)o->weave >= PHANTOM_WEAVE_COUNT) return error_set_field(err, STATUS_INVALID, "weave", "unknown weave");
+    if ((unsigned)o->weave >= PHANTOM_WEAVE_COUNT)
+        return error_set_field(err, STATUS_INVALID, "weave", "unknown weave");
     size_t repeat = weave_info[o->weave].repeat;
     for (int k = 0; k < 2; k++) {
         if (o->n_yarn[k] == 0) o->n_yarn[k] = o->weave == PHANTOM_KNIT ? 2 : repeat;
         if (o->n_yarn[k] % repeat != 0 || o->n_yarn[k] > 1000)
-            return error_set_field(err, STATUS_INVALID, "n_yarn", "%zu yarns a tile: a %s wants a multiple of %zu, at most 1000",
-                                   o->n_yarn[k], weave_info[o->weave].name, repeat);
+            return error_set_field(err, STATUS_INVALID, "n_yarn",
+                                   "%zu yarns a tile: a %s wants a multiple of %zu, at most 1000", o->n_yarn[k],
+                                   weave_info[o->weave].name, repeat);
     }
     if (o->yarn.n_ply > 0 && (o->weave == PHANTOM_FELT || o->weave == PHANTOM_VELVET))
         return error_set_field(err, STATUS_INVALID, "yarn", "a %s takes no plied yarn", weave_info[o->weave].name);
@@ -94,13 +110,17 @@ static status check(struct phantom_option *o, struct error *err)
 static status make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
 {
     switch (o->weave) {
-    case PHANTOM_FELT: return felt_make(s, o, err);
-    case PHANTOM_KNIT: return knit_make(s, o, r, err);
-    default: return weave_make(s, o, r, err);
+    case PHANTOM_FELT:
+        return felt_make(s, o, err);
+    case PHANTOM_KNIT:
+        return knit_make(s, o, r, err);
+    default:
+        return weave_make(s, o, r, err);
     }
 }
 
-static status report_fill(const struct phantom_option *o, const struct fiber_set *f, struct phantom_report *r, struct error *err)
+static status report_fill(const struct phantom_option *o, const struct fiber_set *f, struct phantom_report *r,
+                          struct error *err)
 {
     double low, high, volume = 0.0;
     fiber_set_z_range_m(f, &low, &high);
@@ -138,11 +158,13 @@ status phantom_generate(const struct phantom_option *option, struct thread_pool 
     return st;
 }
 
-status phantom_pad(struct fiber_set *f, struct phantom_report *report, double voxel_size_m, size_t n_slice, struct error *err)
+status phantom_pad(struct fiber_set *f, struct phantom_report *report, double voxel_size_m, size_t n_slice,
+                   struct error *err)
 {
     size_t *n = &report->n_voxel[2];
     if (n_slice < *n || n_slice > 1000000)
-        return error_set_field(err, STATUS_INVALID, "voxels_z", "the cloth needs %zu slices, %zu are asked for", *n, n_slice);
+        return error_set_field(err, STATUS_INVALID, "voxels_z", "the cloth needs %zu slices, %zu are asked for", *n,
+                               n_slice);
     float rise_m = (float)((double)((n_slice - *n) / 2) * voxel_size_m);
     for (size_t i = 0; i < f->n_vertex; i++) f->position_m[3 * i + 2] += rise_m;
     *n = n_slice;

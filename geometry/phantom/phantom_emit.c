@@ -11,8 +11,8 @@ struct emitter {
     const struct strand *strand;
     struct fiber_set *f; /* NULL: count */
     size_t n_fiber, n_vertex;
-    size_t n_here;       /* vertices of the piece under way */
-    long cell[2];        /* tile that the piece under way is in */
+    size_t n_here; /* vertices of the piece under way */
+    long cell[2];  /* tile that the piece under way is in */
 };
 
 static void put_vertex(struct emitter *e, const double p[3])
@@ -57,7 +57,9 @@ static bool advance(struct emitter *e, const double a[3], const double b[3])
         int axis = -1;
         for (int k = 0; k < 2; k++) {
             long there = cell_of(e, b, k);
-            if ((e->strand->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 || e->strand->n_period == 0 || there == e->cell[k]) continue;
+            if ((e->strand->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 || e->strand->n_period == 0 ||
+                there == e->cell[k])
+                continue;
             double face = (double)(there > e->cell[k] ? e->cell[k] + 1 : e->cell[k]) * e->tile_m[k];
             double w = b[k] != from[k] ? (face - from[k]) / (b[k] - from[k]) : 0.0;
             if (w < nearest) {
@@ -114,12 +116,14 @@ static void emit_strand(struct emitter *e, const struct strand_set *s, const str
 {
     e->strand = t;
     size_t from = first_cut(e, s, t), n_interval = t->n_period > 0 ? t->n : t->n - 1;
-    size_t n_sub = (size_t)fmax(1.0, ceil(t->radius_m / spacing_m)), per_period = t->n_period > 0 ? t->n / t->n_period : t->n;
+    size_t n_sub = (size_t)fmax(1.0, ceil(t->radius_m / spacing_m)),
+           per_period = t->n_period > 0 ? t->n / t->n_period : t->n;
     bool faces = t->n_period > 0 && (t->cut & CUT_FACE_XY) != 0, started = !faces;
     double a[3], b[3];
     curve_point(s, t, from, 0.0, a);
     /* one node outside a face belongs to the tile before; open strands stay whole in the tile of their first node */
-    for (int k = 0; k < 2; k++) e->cell[k] = faces && (t->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 ? 0 : cell_of(e, a, k);
+    for (int k = 0; k < 2; k++)
+        e->cell[k] = faces && (t->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 ? 0 : cell_of(e, a, k);
     if (started) put_vertex(e, a);
     /* with faces, once round and then to the first cut again */
     for (size_t i = 0; i < n_interval + (faces ? 1 : 0); i++) {
@@ -166,7 +170,8 @@ static void recentre(struct fiber_set *f)
         }
 }
 
-status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f, struct error *err)
+status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f,
+                   struct error *err)
 {
     double low = INFINITY;
     for (size_t i = 0; i < s->n_strand; i++)

@@ -17,7 +17,8 @@ void phantom_file_option_default(struct phantom_file_option *o)
 static status check(const struct phantom_file_option *o, const char *path, struct error *err)
 {
     if (o->bits != 8 && o->bits != 16)
-        return error_set_field(err, STATUS_INVALID, "bits", "cannot write '%s': %d bits a voxel, it must be 8 or 16", path, o->bits);
+        return error_set_field(err, STATUS_INVALID, "bits", "cannot write '%s': %d bits a voxel, it must be 8 or 16",
+                               path, o->bits);
     return STATUS_OK;
 }
 
@@ -28,8 +29,10 @@ static void encode(const float *from, size_t n, const struct phantom_file_option
     for (size_t i = 0; i < n; i++) {
         double value = round(o->void_value + (double)from[i] * (o->fiber_value - o->void_value));
         uint16_t u = (uint16_t)(value < 0.0 ? 0.0 : value > top ? top : value);
-        if (o->bits == 8) to[i] = (uint8_t)u;
-        else memcpy(to + 2 * i, &u, sizeof u);
+        if (o->bits == 8)
+            to[i] = (uint8_t)u;
+        else
+            memcpy(to + 2 * i, &u, sizeof u);
     }
 }
 
@@ -52,13 +55,15 @@ static int drop_message(TIFF *t, void *context, const char *module, const char *
 static bool write_page(TIFF *t, const struct volume *v, size_t k, const struct phantom_file_option *o, uint8_t *row)
 {
     uint32_t rows = v->n[1] < 64 ? (uint32_t)v->n[1] : 64;
-    bool ok = TIFFSetField(t, TIFFTAG_IMAGEWIDTH, (uint32_t)v->n[0]) && TIFFSetField(t, TIFFTAG_IMAGELENGTH, (uint32_t)v->n[1]) &&
+    bool ok = TIFFSetField(t, TIFFTAG_IMAGEWIDTH, (uint32_t)v->n[0]) &&
+              TIFFSetField(t, TIFFTAG_IMAGELENGTH, (uint32_t)v->n[1]) &&
               TIFFSetField(t, TIFFTAG_BITSPERSAMPLE, o->bits) && TIFFSetField(t, TIFFTAG_SAMPLESPERPIXEL, 1) &&
               TIFFSetField(t, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) &&
               TIFFSetField(t, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) &&
               TIFFSetField(t, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT) && TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, rows) &&
               TIFFSetField(t, TIFFTAG_COMPRESSION, o->deflate ? COMPRESSION_ADOBE_DEFLATE : COMPRESSION_NONE);
-    if (ok && o->deflate) ok = TIFFSetField(t, TIFFTAG_PREDICTOR, PREDICTOR_HORIZONTAL) && TIFFSetField(t, TIFFTAG_ZIPQUALITY, 3);
+    if (ok && o->deflate)
+        ok = TIFFSetField(t, TIFFTAG_PREDICTOR, PREDICTOR_HORIZONTAL) && TIFFSetField(t, TIFFTAG_ZIPQUALITY, 3);
     scratch_keep_within(v->space);
     for (size_t j = 0; j < v->n[1] && ok; j++) {
         encode(v->density + volume_index(v->n, 0, j, k), v->n[0], o, row);
@@ -67,7 +72,8 @@ static bool write_page(TIFF *t, const struct volume *v, size_t k, const struct p
     return ok && TIFFWriteDirectory(t) == 1;
 }
 
-status phantom_write_tiff(const struct volume *v, const struct phantom_file_option *o, const char *path, struct error *err)
+status phantom_write_tiff(const struct volume *v, const struct phantom_file_option *o, const char *path,
+                          struct error *err)
 {
     status st = check(o, path, err);
     if (st != STATUS_OK) return st;
@@ -90,8 +96,8 @@ status phantom_write_tiff(const struct volume *v, const struct phantom_file_opti
     for (size_t k = 0; k < v->n[2] && st == STATUS_OK; k++) {
         errno = 0;
         if (!write_page(t, v, k, o, row))
-            st = error_set(err, errno == ENOSPC ? STATUS_DISK_FULL : STATUS_IO, "cannot write volume '%s': page %zu: %s", path, k + 1,
-                           cause.text);
+            st = error_set(err, errno == ENOSPC ? STATUS_DISK_FULL : STATUS_IO,
+                           "cannot write volume '%s': page %zu: %s", path, k + 1, cause.text);
     }
     TIFFClose(t);
     if (st != STATUS_OK) unlink(path);
@@ -102,7 +108,8 @@ out:
 }
 
 /* Slice by slice under a temporary name. */
-static status write_raw(const struct volume *v, const struct phantom_file_option *o, const char *path, struct error *err)
+static status write_raw(const struct volume *v, const struct phantom_file_option *o, const char *path,
+                        struct error *err)
 {
     size_t n_slice = v->n[0] * v->n[1], slice_bytes = n_slice * (o->bits == 8 ? 1 : 2);
     char temporary[4096 + 8];
@@ -118,14 +125,16 @@ static status write_raw(const struct volume *v, const struct phantom_file_option
     }
     ok = ok && fflush(file) == 0 && fsync(fileno(file)) == 0;
     status st = ok ? STATUS_OK : error_set_errno(err, "cannot write volume '%s'", path);
-    if (file != NULL && fclose(file) != 0 && st == STATUS_OK) st = error_set_errno(err, "cannot write volume '%s'", path);
+    if (file != NULL && fclose(file) != 0 && st == STATUS_OK)
+        st = error_set_errno(err, "cannot write volume '%s'", path);
     if (st == STATUS_OK && rename(temporary, path) != 0) st = error_set_errno(err, "cannot write volume '%s'", path);
     if (st != STATUS_OK && file != NULL) unlink(temporary);
     free(data);
     return st;
 }
 
-status phantom_write_metaimage(const struct volume *v, const struct phantom_file_option *o, const char *path, struct error *err)
+status phantom_write_metaimage(const struct volume *v, const struct phantom_file_option *o, const char *path,
+                               struct error *err)
 {
     status st = check(o, path, err);
     if (st != STATUS_OK) return st;
@@ -138,11 +147,13 @@ status phantom_write_metaimage(const struct volume *v, const struct phantom_file
     base = base != NULL ? base + 1 : raw;
     st = write_raw(v, o, raw, err);
     if (st != STATUS_OK) return st;
-    int n = snprintf(header, sizeof header,
-                     "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
-                     "DimSize = %zu %zu %zu\nElementSpacing = %.9g %.9g %.9g\nElementType = %s\nElementDataFile = %s\n",
-                     v->n[0], v->n[1], v->n[2], 1e3 * v->voxel_size_m[0], 1e3 * v->voxel_size_m[1], 1e3 * v->voxel_size_m[2],
-                     o->bits == 8 ? "MET_UCHAR" : "MET_USHORT", base);
-    if (n < 0 || n >= (int)sizeof header) return error_set(err, STATUS_INVALID, "cannot write volume '%s': the name is too long", path);
+    int n = snprintf(
+        header, sizeof header,
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
+        "DimSize = %zu %zu %zu\nElementSpacing = %.9g %.9g %.9g\nElementType = %s\nElementDataFile = %s\n",
+        v->n[0], v->n[1], v->n[2], 1e3 * v->voxel_size_m[0], 1e3 * v->voxel_size_m[1], 1e3 * v->voxel_size_m[2],
+        o->bits == 8 ? "MET_UCHAR" : "MET_USHORT", base);
+    if (n < 0 || n >= (int)sizeof header)
+        return error_set(err, STATUS_INVALID, "cannot write volume '%s': the name is too long", path);
     return durable_replace(path, header, (size_t)n, err);
 }

@@ -17,16 +17,18 @@ static status add_felt_fiber(struct strand_set *s, const struct phantom_option *
     rng_start(&rng, &key, (uint32_t)i, 0);
     const int *turns = winding[rng_u32(&rng) % N_WINDING];
     double r = o->fiber_radius_m[0], depth = fmax(0.0, 0.5 * o->felt_thickness_m - r);
-    struct strand like = {.n_period = 1, .radius_m = r, .cut = CUT_FACE_XY, .axis_class = abs(turns[1]) > abs(turns[0]) ? 1 : 0};
+    struct strand like = {
+        .n_period = 1, .radius_m = r, .cut = CUT_FACE_XY, .axis_class = abs(turns[1]) > abs(turns[0]) ? 1 : 0};
     for (int a = 0; a < 2; a++) like.shift[a] = turns[a] * s->tile_m[a];
-    double length = hypot(like.shift[0], like.shift[1]), at[2], side[2] = {-like.shift[1] / length, like.shift[0] / length};
+    double length = hypot(like.shift[0], like.shift[1]), at[2],
+           side[2] = {-like.shift[1] / length, like.shift[0] / length};
     for (int a = 0; a < 2; a++) at[a] = rng_double(&rng) * s->tile_m[a];
     double level = depth * (2.0 * rng_double(&rng) - 1.0), wave[4], phase[4];
     for (int k = 0; k < 4; k++) {
         phase[k] = 2.0 * M_PI * rng_double(&rng);
         wave[k] = (k < 2 ? 0.06 * s->tile_m[0] : 0.4 * depth) * rng_double(&rng) / (1.0 + k % 2);
     }
-    double (*node)[3];
+    double(*node)[3];
     size_t n = (size_t)ceil(1.05 * length / r);
     status st = strand_add(s, &like, n, &node, err);
     if (st != STATUS_OK) return st;
@@ -64,7 +66,7 @@ static status add_tuft(struct strand_set *s, const struct phantom_option *o, con
         double height = ground_z_m + o->pile_height_m * (0.9 + 0.1 * rng_double(&rng));
         double lean[2] = {0.12 * wobble[0], 0.25 + 0.12 * wobble[1]}; /* slope at the top */
         struct strand like = {.radius_m = r, .axis_class = 2, .cut = CUT_NONE};
-        double (*node)[3];
+        double(*node)[3];
         size_t n = (size_t)ceil((height + ground_z_m) / r) + 2;
         status st = strand_add(s, &like, n, &node, err);
         if (st != STATUS_OK) return st;
@@ -82,7 +84,8 @@ status pile_add(struct strand_set *s, const struct phantom_option *o, double gro
 {
     for (size_t i = 0; i < o->n_yarn[0]; i++)
         for (size_t j = 0; j < o->n_yarn[1]; j++) {
-            double root[2] = {s->tile_m[0] * (double)j / (double)o->n_yarn[1], s->tile_m[1] * (double)i / (double)o->n_yarn[0]};
+            double root[2] = {s->tile_m[0] * (double)j / (double)o->n_yarn[1],
+                              s->tile_m[1] * (double)i / (double)o->n_yarn[0]};
             status st = add_tuft(s, o, root, (uint32_t)(i * o->n_yarn[1] + j), ground_z_m, err);
             if (st != STATUS_OK) return st;
         }

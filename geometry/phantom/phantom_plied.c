@@ -34,17 +34,18 @@ struct plied {
     const struct yarn *path;
     struct yarn_section section;
     double scale, distance_m, ellipse_m[2], ply_turns, fiber_turns; /* a tile */
-    size_t n_period;                                                 /* tiles until a ply meets itself */
+    size_t n_period;                                                /* tiles until a ply meets itself */
 };
 
 static void lay_out(struct plied *p, const struct phantom_option *o, const struct yarn *path)
 {
     const struct phantom_yarn_law *y = &o->yarn;
     *p = (struct plied){.o = o, .path = path, .scale = plied_scale(o, path->radius_m)};
-    p->section = (struct yarn_section){.wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = yarn_length_m(path)};
+    p->section = (struct yarn_section){
+        .wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = yarn_length_m(path)};
     for (int k = 0; k < 2; k++) p->ellipse_m[k] = p->scale * y->ellipse_m[k];
     p->distance_m = y->n_ply > 1 ? p->scale * y->ply_distance_m : 0.0;
-    double tile = p->section.length_m / p->scale; /* in the file's lengths */
+    double tile = p->section.length_m / p->scale;                        /* in the file's lengths */
     long long steps = llround(tile / y->ply_pitch_m * (double)y->n_ply); /* of one ply to the next */
     p->ply_turns = (double)steps / (double)y->n_ply;
     p->n_period = y->n_ply / greatest_divisor(y->n_ply, (size_t)llabs(steps));
@@ -55,9 +56,12 @@ static void lay_out(struct plied *p, const struct phantom_option *o, const struc
 static void ply_point(const struct plied *p, size_t i_ply, double s, double relative, double angle, double out[3])
 {
     double ply = 2.0 * M_PI * ((double)i_ply / (double)p->o->yarn.n_ply + p->ply_turns * s);
-    double own = angle + 2.0 * M_PI * p->fiber_turns * s - ply; /* in the frame of the ellipse, which turns with the ply */
-    double inward = p->distance_m + relative * p->ellipse_m[1] * cos(own), beside = relative * p->ellipse_m[0] * sin(own);
-    yarn_point(p->path, &p->section, s, inward * cos(ply) - beside * sin(ply), inward * sin(ply) + beside * cos(ply), out);
+    double own =
+        angle + 2.0 * M_PI * p->fiber_turns * s - ply; /* in the frame of the ellipse, which turns with the ply */
+    double inward = p->distance_m + relative * p->ellipse_m[1] * cos(own),
+           beside = relative * p->ellipse_m[0] * sin(own);
+    yarn_point(p->path, &p->section, s, inward * cos(ply) - beside * sin(ply), inward * sin(ply) + beside * cos(ply),
+               out);
 }
 
 static double density(const struct phantom_yarn_law *y, double r)
@@ -96,14 +100,17 @@ static void draw_apart(const struct plied *p, double (*place)[2], size_t n, stru
 
 /* A fiber of plies i, i + steps, ...: R wanders with a whole number of waves over its period. loop_m > 0: it stands out to that
  * distance once, over a quarter of a turn. */
-static status add_fiber(struct strand_set *s, const struct plied *p, size_t i_ply, const double place[2], double loop_m, struct rng *rng,
-                        struct error *err)
+static status add_fiber(struct strand_set *s, const struct plied *p, size_t i_ply, const double place[2], double loop_m,
+                        struct rng *rng, struct error *err)
 {
     const struct phantom_yarn_law *y = &p->o->yarn;
     size_t per_tile = (size_t)ceil(p->section.length_m / p->path->radius_m), n = per_tile * p->n_period;
     struct strand like = {.shift = {p->path->shift[0] * (double)p->n_period, p->path->shift[1] * (double)p->n_period},
-                          .n_period = p->n_period, .radius_m = p->path->radius_m, .axis_class = p->path->axis_class, .cut = p->path->cut};
-    double (*node)[3], phase = 2.0 * M_PI * rng_double(rng), loop_at = rng_double(rng);
+                          .n_period = p->n_period,
+                          .radius_m = p->path->radius_m,
+                          .axis_class = p->path->axis_class,
+                          .cut = p->path->cut};
+    double(*node)[3], phase = 2.0 * M_PI * rng_double(rng), loop_at = rng_double(rng);
     status st = strand_add(s, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     double waves = round(y->migration_waves * fabs(p->fiber_turns) * (double)p->n_period);
@@ -131,7 +138,8 @@ static status add_hair(struct strand_set *s, const struct plied *p, struct rng *
 {
     const struct phantom_yarn_law *y = &p->o->yarn;
     double mean_m = sqrt(p->ellipse_m[0] * p->ellipse_m[1]);
-    double start_m = p->scale * fmax(0.0, normal_of(rng, y->hair_start_m)), reach_m = p->scale * fmax(0.0, normal_of(rng, y->hair_reach_m));
+    double start_m = p->scale * fmax(0.0, normal_of(rng, y->hair_start_m)),
+           reach_m = p->scale * fmax(0.0, normal_of(rng, y->hair_reach_m));
     double along_m = p->scale * normal_of(rng, y->hair_length_m), turn = normal_of(rng, y->hair_turn_rad);
     double from = rng_double(rng) * (double)p->n_period, angle = 2.0 * M_PI * rng_double(rng);
     size_t i_ply = (size_t)(rng_double(rng) * (double)y->n_ply) % y->n_ply;
@@ -139,12 +147,13 @@ static status add_hair(struct strand_set *s, const struct plied *p, struct rng *
     if (length_m < 4.0 * p->path->radius_m) return STATUS_OK;
     size_t n = (size_t)ceil(length_m / p->path->radius_m) + 2;
     struct strand like = {.radius_m = p->path->radius_m, .axis_class = p->path->axis_class, .cut = CUT_NONE};
-    double (*node)[3];
+    double(*node)[3];
     status st = strand_add(s, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t k = 0; k < n; k++) {
         double w = (double)k / (double)(n - 1), at = from + w * along_m / p->section.length_m;
-        ply_point(p, i_ply, at, (start_m + w * reach_m) / mean_m, angle + w * turn - 2.0 * M_PI * p->fiber_turns * (at - from), node[k]);
+        ply_point(p, i_ply, at, (start_m + w * reach_m) / mean_m,
+                  angle + w * turn - 2.0 * M_PI * p->fiber_turns * (at - from), node[k]);
     }
     s->plied.n_hair++;
     return STATUS_OK;
@@ -159,14 +168,16 @@ static size_t count_of(const struct plied *p, double per_m)
 status plied_yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *path, struct error *err)
 {
     const struct phantom_yarn_law *y = &o->yarn;
-    const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN}, fly_key = {.seed = o->seed, .iteration = STREAM_FLYAWAY};
+    const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN},
+                         fly_key = {.seed = o->seed, .iteration = STREAM_FLYAWAY};
     struct plied p;
     struct rng rng;
     status st = STATUS_OK;
     lay_out(&p, o, path);
     if (!(p.section.length_m / path->radius_m * (double)p.n_period < 1e6))
-        return error_set_field(err, STATUS_INVALID, "yarn", "cannot make phantom: a fiber has over a million nodes; take thicker fibers");
-    double (*place)[2] = calloc(y->n_fiber, sizeof *place);
+        return error_set_field(err, STATUS_INVALID, "yarn",
+                               "cannot make phantom: a fiber has over a million nodes; take thicker fibers");
+    double(*place)[2] = calloc(y->n_fiber, sizeof *place);
     if (place == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
     rng_start(&rng, &key, path->number, 0);
     size_t n_start = y->n_ply / p.n_period, n_loop = count_of(&p, y->loop_per_m), n_strand = n_start * y->n_fiber;

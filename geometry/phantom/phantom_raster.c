@@ -26,23 +26,25 @@ struct scan {
     const struct fiber_set *f;
     const struct phantom_scan_option *o;
     struct volume *v;
-    size_t n_slab;    /* slices worked on together */
+    size_t n_slab;         /* slices worked on together */
     size_t first, n_drawn; /* slices of the slab */
-    float *drawn;     /* of the slab: shares of all fibers */
-    uint32_t *owner;  /* of the slab: fiber that last touched a voxel, + 1 */
-    float *share;     /* and its share */
-    float *blurred;   /* along x and y; slice k at k % n_held */
+    float *drawn;          /* of the slab: shares of all fibers */
+    uint32_t *owner;       /* of the slab: fiber that last touched a voxel, + 1 */
+    float *share;          /* and its share */
+    float *blurred;        /* along x and y; slice k at k % n_held */
     size_t n_held;
     float *kernel;
-    long reach;       /* of the blur */
-    float *ring;      /* by distance from the axis in voxels */
+    long reach;  /* of the blur */
+    float *ring; /* by distance from the axis in voxels */
     size_t n_ring;
 };
 
 struct capsule {
     double a[3], d[3], length2; /* voxels */
     double r, r_ramp, scale;    /* scale: below 1 for fibers thinner than the ramp */
-    double end[2][3], outward[2][3]; /* of the fiber: its ends are flat, so that what goes on in the next tile joins without a bulge */
+    double end[2][3],
+        outward[2]
+               [3]; /* of the fiber: its ends are flat, so that what goes on in the next tile joins without a bulge */
 };
 
 static double axis_distance(const struct capsule *c, const double p[3])
@@ -107,7 +109,8 @@ static void draw_capsule(struct scan *s, const struct capsule *c, uint32_t fiber
                 double share = 0.5 + c->r_ramp - axis_distance(c, p);
                 if (!(share > 0.0) || behind_an_end(c, p)) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
-                add_share(s, volume_index(s->v->n, x, y, (size_t)k - s->first), fiber, (float)(c->scale * fmin(share, 1.0)));
+                add_share(s, volume_index(s->v->n, x, y, (size_t)k - s->first), fiber,
+                          (float)(c->scale * fmin(share, 1.0)));
             }
 }
 
@@ -116,7 +119,8 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     struct scan *s = context;
     const struct fiber_set *f = s->f;
     double per_m = 1.0 / s->o->voxel_size_m;
-    long z_end = (long)(s->first + s->n_drawn), z_from = (long)(s->first + i_task * SLAB), z_to = z_from + SLAB < z_end ? z_from + SLAB : z_end;
+    long z_end = (long)(s->first + s->n_drawn), z_from = (long)(s->first + i_task * SLAB),
+         z_to = z_from + SLAB < z_end ? z_from + SLAB : z_end;
     size_t at = volume_index(s->v->n, 0, 0, i_task * SLAB), end = volume_index(s->v->n, 0, 0, (size_t)z_to - s->first);
     (void)i_thread;
     memset(s->drawn + at, 0, (end - at) * sizeof *s->drawn);
@@ -157,7 +161,8 @@ static void blur_slice(void *context, size_t i_task, size_t i_thread)
     for (size_t j = 0; j < n[1]; j++) {
         memset(row + j * n[0], 0, n[0] * sizeof *row);
         for (long m = -s->reach; m <= s->reach; m++) {
-            size_t shift = (size_t)((long)((size_t)s->reach * n[0]) + m) % n[0]; /* i + m, from 0 on again at the end of the row */
+            size_t shift =
+                (size_t)((long)((size_t)s->reach * n[0]) + m) % n[0]; /* i + m, from 0 on again at the end of the row */
             float w = s->kernel[m + s->reach];
             const float *in = from + j * n[0];
             float *out = row + j * n[0];
@@ -210,7 +215,9 @@ static void finish_slice(void *context, size_t i_task, size_t i_thread)
             double sum = 0.0;
             for (long m = -s->reach; m <= s->reach; m++) {
                 long z = (long)k + m;
-                if (z >= 0 && z < (long)n[2]) sum += (double)s->kernel[m + s->reach] * (double)s->blurred[volume_index(n, i, j, (size_t)z % s->n_held)];
+                if (z >= 0 && z < (long)n[2])
+                    sum += (double)s->kernel[m + s->reach] *
+                           (double)s->blurred[volume_index(n, i, j, (size_t)z % s->n_held)];
             }
             size_t at = volume_index(n, i, j, k);
             s->v->density[at] = (float)disturb(s, sum, at, i, j);
@@ -219,7 +226,8 @@ static void finish_slice(void *context, size_t i_task, size_t i_thread)
 
 static status scan_init(struct scan *s, struct error *err)
 {
-    size_t n_slice = s->v->n[0] * s->v->n[1], slice_bytes = n_slice * (sizeof *s->drawn + sizeof *s->owner + sizeof *s->share + sizeof *s->blurred);
+    size_t n_slice = s->v->n[0] * s->v->n[1],
+           slice_bytes = n_slice * (sizeof *s->drawn + sizeof *s->owner + sizeof *s->share + sizeof *s->blurred);
     double sd = s->o->blur_sd_voxel;
     s->reach = (long)ceil(4.0 * sd);
     s->n_slab = scratch_buffer_bytes(s->v->space) / slice_bytes;
@@ -235,7 +243,8 @@ static status scan_init(struct scan *s, struct error *err)
         s->ring = calloc(s->n_ring, sizeof *s->ring);
     }
     if (!s->drawn || !s->owner || !s->share || !s->blurred || !s->kernel || (s->n_ring > 0 && !s->ring))
-        return error_set(err, STATUS_NO_MEMORY, "cannot scan phantom of %zu voxels: out of memory", volume_n_voxel(s->v->n));
+        return error_set(err, STATUS_NO_MEMORY, "cannot scan phantom of %zu voxels: out of memory",
+                         volume_n_voxel(s->v->n));
     double sum = 0.0;
     for (long m = -s->reach; m <= s->reach; m++) sum += sd > 0.0 ? exp(-0.5 * (double)(m * m) / (sd * sd)) : 1.0;
     for (long m = -s->reach; m <= s->reach; m++)
@@ -253,16 +262,20 @@ static status scan_init(struct scan *s, struct error *err)
 
 static status check(const struct phantom_scan_option *o, struct error *err)
 {
-    if (!(o->voxel_size_m > 0.0)) return error_set_field(err, STATUS_INVALID, "voxel_size_m", "the voxel size must be positive");
+    if (!(o->voxel_size_m > 0.0))
+        return error_set_field(err, STATUS_INVALID, "voxel_size_m", "the voxel size must be positive");
     if (!(o->blur_sd_voxel >= 0.0 && o->blur_sd_voxel <= 10.0))
-        return error_set_field(err, STATUS_INVALID, "blur_sd_voxel", "blur of %g voxels: it must lie between 0 and 10", o->blur_sd_voxel);
+        return error_set_field(err, STATUS_INVALID, "blur_sd_voxel", "blur of %g voxels: it must lie between 0 and 10",
+                               o->blur_sd_voxel);
     if (!(o->snr >= 0.0) || !(o->poisson_count >= 0.0) || !(o->ring_amplitude >= 0.0) || !(fabs(o->gradient) <= 1.0))
-        return error_set_field(err, STATUS_INVALID, "snr", "noise options must not be negative, the gradient within -1 and 1");
+        return error_set_field(err, STATUS_INVALID, "snr",
+                               "noise options must not be negative, the gradient within -1 and 1");
     return STATUS_OK;
 }
 
 /* Slices from the end of the last slab on: drawn and blurred until those up to `wanted` are held. */
-static status hold_slices(struct scan *s, size_t *ready, size_t wanted, struct thread_pool *pool, const struct progress *quiet)
+static status hold_slices(struct scan *s, size_t *ready, size_t wanted, struct thread_pool *pool,
+                          const struct progress *quiet)
 {
     status st = STATUS_OK;
     while (*ready < wanted && st == STATUS_OK) {
@@ -275,8 +288,9 @@ static status hold_slices(struct scan *s, size_t *ready, size_t wanted, struct t
     return st;
 }
 
-status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct scratch_space *space,
-                       struct thread_pool *pool, const struct progress *progress, struct volume *v, struct error *err)
+status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o,
+                       struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
+                       struct volume *v, struct error *err)
 {
     status st = check(o, err);
     if (st != STATUS_OK) return st;
@@ -307,8 +321,8 @@ out:
     return st;
 }
 
-status phantom_scan(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o, struct thread_pool *pool,
-                    const struct progress *progress, struct volume *v, struct error *err)
+status phantom_scan(const struct fiber_set *f, const size_t n[3], const struct phantom_scan_option *o,
+                    struct thread_pool *pool, const struct progress *progress, struct volume *v, struct error *err)
 {
     return phantom_scan_in(f, n, o, NULL, pool, progress, v, err);
 }

@@ -18,9 +18,9 @@ static const double UNBEND = 0.5; /* share of a correction taken at once: correc
 
 struct relax {
     struct strand_set *s;
-    uint32_t *strand_of; /* node -> strand */
+    uint32_t *strand_of;           /* node -> strand */
     double (*move)[3], (*step)[3]; /* wanted by the overlaps, and taken last */
-    double *depth; /* deepest overlap of a node, over the sum of radii */
+    double *depth;                 /* deepest overlap of a node, over the sum of radii */
     double r_max, per_tile[2];
     size_t n_cell[3];
     double cell_m[3], z_low_m;
@@ -90,7 +90,8 @@ static void sort_into_cells(struct relax *r)
     memset(r->cell_first, 0, (n_cell + 2) * sizeof *r->cell_first);
     for (size_t k = 0; k < s->n_node; k++) {
         size_t c = (clamp_cell(s->p[k][2] - r->z_low_m, r->cell_m[2], r->n_cell[2]) * r->n_cell[1] +
-                    wrap_cell(s->p[k][1], r->cell_m[1], r->n_cell[1])) * r->n_cell[0] +
+                    wrap_cell(s->p[k][1], r->cell_m[1], r->n_cell[1])) *
+                       r->n_cell[0] +
                    wrap_cell(s->p[k][0], r->cell_m[0], r->n_cell[0]);
         r->cell_of[k] = (uint32_t)c;
         r->cell_first[c + 2]++;
@@ -162,7 +163,8 @@ static void look_from(struct relax *r, size_t i)
 {
     const struct strand_set *s = r->s;
     struct push push = {{0.0, 0.0, 0.0}, 0.0, 0};
-    size_t c = r->cell_of[i], at[3] = {c % r->n_cell[0], c / r->n_cell[0] % r->n_cell[1], c / (r->n_cell[0] * r->n_cell[1])};
+    size_t c = r->cell_of[i],
+           at[3] = {c % r->n_cell[0], c / r->n_cell[0] % r->n_cell[1], c / (r->n_cell[0] * r->n_cell[1])};
     size_t reach = r->n_cell[1] >= 3 ? 3 : r->n_cell[1];
     size_t z_from = at[2] > 0 ? at[2] - 1 : 0, z_to = at[2] + 1 < r->n_cell[2] ? at[2] + 1 : at[2];
     for (size_t z = z_from; z <= z_to; z++)
@@ -200,7 +202,12 @@ static void smooth(struct relax *r, double amount)
         const struct strand *t = &s->strand[i];
         for (size_t k = 0; k < t->n; k++) {
             bool first = k == 0, last = k + 1 == t->n;
-            size_t before = !first ? k - 1 : t->n_period > 0 ? t->n - 1 : k, after = !last ? k + 1 : t->n_period > 0 ? 0 : k;
+            size_t before = !first            ? k - 1
+                            : t->n_period > 0 ? t->n - 1
+                                              : k,
+                   after = !last             ? k + 1
+                           : t->n_period > 0 ? 0
+                                             : k;
             for (int a = 0; a < 3; a++) {
                 double own = r->move[t->first + k][a];
                 double mean = 0.5 * own + 0.25 * (r->move[t->first + before][a] + r->move[t->first + after][a]);
@@ -211,10 +218,13 @@ static void smooth(struct relax *r, double amount)
 }
 
 /* The bend at node i + step of a strand: second difference of the positions, and half of the chord squared. false behind open ends. */
-static bool bend_at(const struct strand_set *s, const struct strand *t, size_t i, long step, double bend[3], double *bend_m, double *chord2)
+static bool bend_at(const struct strand_set *s, const struct strand *t, size_t i, long step, double bend[3],
+                    double *bend_m, double *chord2)
 {
     double before[3], at[3], after[3], bend2 = 0.0;
-    if (!neighbour(t, i, step - 1, s->p, before) || !neighbour(t, i, step, s->p, at) || !neighbour(t, i, step + 1, s->p, after)) return false;
+    if (!neighbour(t, i, step - 1, s->p, before) || !neighbour(t, i, step, s->p, at) ||
+        !neighbour(t, i, step + 1, s->p, after))
+        return false;
     *chord2 = 0.0;
     for (int a = 0; a < 3; a++) {
         bend[a] = before[a] - 2.0 * at[a] + after[a];
@@ -262,7 +272,8 @@ static double strain_p95(struct relax *r)
     for (size_t i = 0; i < r->s->n_node; i++) {
         const struct strand *t = &r->s->strand[r->strand_of[i]];
         double bend[3], bend_m, chord2;
-        if (bend_at(r->s, t, i, 0, bend, &bend_m, &chord2) && chord2 > 0.0) r->depth[n++] = t->radius_m * bend_m / chord2;
+        if (bend_at(r->s, t, i, 0, bend, &bend_m, &chord2) && chord2 > 0.0)
+            r->depth[n++] = t->radius_m * bend_m / chord2;
     }
     qsort(r->depth, n, sizeof *r->depth, ascending);
     return n > 0 ? r->depth[(size_t)(0.95 * (double)(n - 1))] : 0.0;

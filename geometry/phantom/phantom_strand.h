@@ -12,9 +12,9 @@
 enum strand_cut { CUT_NONE, CUT_FACE_X = 1, CUT_FACE_Y = 2, CUT_FACE_XY = 3, CUT_PERIOD = 4 };
 
 struct strand {
-    size_t first, n;      /* nodes */
-    double shift[2];      /* of a closed strand; 0, 0 when open */
-    size_t n_period;      /* 0: open */
+    size_t first, n; /* nodes */
+    double shift[2]; /* of a closed strand; 0, 0 when open */
+    size_t n_period; /* 0: open */
     double radius_m;
     uint8_t axis_class;
     enum strand_cut cut;
@@ -25,8 +25,8 @@ struct strand_set {
     size_t n_strand, strand_capacity;
     struct strand *strand;
     size_t n_node, node_capacity;
-    double (*start)[3]; /* where the design put the node */
-    double (*p)[3];     /* where it is now */
+    double (*start)[3];         /* where the design put the node */
+    double (*p)[3];             /* where it is now */
     struct phantom_plied plied; /* what was made of a real yarn */
 };
 
@@ -40,17 +40,18 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
                     struct phantom_report *report, struct error *err);
 
 /* Cut, subdivide to the given spacing (Catmull-Rom through the nodes) and move to z_min = margin. */
-status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f, struct error *err);
+status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f,
+                   struct error *err);
 
 /* A yarn's path over one tile, closed on the torus: n points, point n = point 0 + shift. */
 struct yarn {
     size_t n;
     double (*point)[3];
     double shift[2];
-    double radius_m;     /* of its fibers */
+    double radius_m; /* of its fibers */
     uint8_t axis_class;
     enum strand_cut cut;
-    uint32_t number;     /* names its random stream */
+    uint32_t number; /* names its random stream */
 };
 
 /* How a section is mapped to space. */

@@ -51,7 +51,9 @@ status phantom_top_view(const struct fiber_set *f, double pixel_size_m, size_t s
     for (size_t i = 0; i < n; i++) {
         bool covered = height[i] > -INFINITY;
         n_covered += covered;
-        if (out != NULL) out[i] = covered ? (uint8_t)(40.0 + 215.0 * fmin(1.0, fmax(0.0, ((double)height[i] - low) / (high - low)))) : 0;
+        if (out != NULL)
+            out[i] =
+                covered ? (uint8_t)(40.0 + 215.0 * fmin(1.0, fmax(0.0, ((double)height[i] - low) / (high - low)))) : 0;
     }
     *cover = (double)n_covered / (double)n;
     if (grey != NULL) *grey = out;

@@ -10,10 +10,14 @@ enum { POINTS_PER_CROSSING = 32, POINTS_PER_LOOP = 160 };
 static bool weft_over(enum phantom_weave w, size_t i, size_t j)
 {
     switch (w) {
-    case PHANTOM_TWILL_2_2: return (j + 4 - i % 4) % 4 < 2;
-    case PHANTOM_TWILL_3_1: return (j + 4 - i % 4) % 4 == 3;
-    case PHANTOM_SATIN_5: return (j + 3 * i) % 5 == 0;
-    default: return (i + j) % 2 == 0;
+    case PHANTOM_TWILL_2_2:
+        return (j + 4 - i % 4) % 4 < 2;
+    case PHANTOM_TWILL_3_1:
+        return (j + 4 - i % 4) % 4 == 3;
+    case PHANTOM_SATIN_5:
+        return (j + 3 * i) % 5 == 0;
+    default:
+        return (i + j) % 2 == 0;
     }
 }
 
@@ -38,8 +42,10 @@ static status add_woven_yarn(struct strand_set *s, const struct weave *w, int cl
 {
     size_t n_cross = w->n_yarn[1 - class];
     int along = class, across = 1 - class;
-    struct yarn y = {.radius_m = w->o->fiber_radius_m[class], .axis_class = (uint8_t)class,
-                     .cut = class == 0 ? CUT_FACE_X : CUT_FACE_Y, .number = (uint32_t)(2 * i + (size_t)class)};
+    struct yarn y = {.radius_m = w->o->fiber_radius_m[class],
+                     .axis_class = (uint8_t) class,
+                     .cut = class == 0 ? CUT_FACE_X : CUT_FACE_Y,
+                     .number = (uint32_t)(2 * i + (size_t) class)};
     y.shift[along] = s->tile_m[along];
     status st = yarn_init(&y, n_cross * POINTS_PER_CROSSING, err);
     if (st != STATUS_OK) return st;
@@ -67,10 +73,11 @@ status weave_make(struct strand_set *s, const struct phantom_option *o, struct p
     struct weave w = {.o = o, .n_yarn = {o->n_yarn[0], o->n_yarn[1]}};
     /* the pile of a velvet rises between ground yarns, which leave it room */
     double cover = o->weave == PHANTOM_VELVET ? 0.7 * o->cover : o->cover, height_m = 0.0;
-    for (int class = 0; class < 2; class++) {
+    for (int class = 0; class < 2; class ++) {
         double section_m = yarn_section_radius_m(o, o->fiber_radius_m[class]);
         int across = 1 - class;
-        s->tile_m[across] = whole_voxels((double)o->n_yarn[class] * 2.0 * section_m * sqrt(o->flatness) / cover, o->voxel_size_m);
+        s->tile_m[across] =
+            whole_voxels((double)o->n_yarn[class] * 2.0 * section_m * sqrt(o->flatness) / cover, o->voxel_size_m);
         w.spacing_m[across] = s->tile_m[across] / (double)o->n_yarn[class];
         height_m += section_m / sqrt(o->flatness);
         if (class == 0) r->yarn_width_m = 2.0 * section_m * sqrt(o->flatness);
@@ -79,7 +86,7 @@ status weave_make(struct strand_set *s, const struct phantom_option *o, struct p
     w.amplitude_m = 0.5 * height_m;
     r->yarn_spacing_m[0] = w.spacing_m[0];
     r->yarn_spacing_m[1] = w.spacing_m[1];
-    for (int class = 0; class < 2; class++)
+    for (int class = 0; class < 2; class ++)
         for (size_t i = 0; i < o->n_yarn[class]; i++) {
             status st = add_woven_yarn(s, &w, class, i, err);
             if (st != STATUS_OK) return st;

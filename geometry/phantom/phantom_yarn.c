@@ -40,7 +40,10 @@ static size_t lattice_orbits(struct orbit *orbit, size_t n)
     return n;
 }
 
-static size_t n_orbit_of(const struct phantom_option *o) { return (o->n_fiber_per_yarn + LATTICE_FOLD - 2) / LATTICE_FOLD; }
+static size_t n_orbit_of(const struct phantom_option *o)
+{
+    return (o->n_fiber_per_yarn + LATTICE_FOLD - 2) / LATTICE_FOLD;
+}
 
 double yarn_section_radius_m(const struct phantom_option *o, double fiber_radius_m)
 {
@@ -65,8 +68,7 @@ static void path_at(const struct yarn *y, double s, double point[3], double b[3]
     for (int k = 0; k < 4; k++) { /* four points around, wrapped with the shift */
         long j = (long)i + k - 1, m = (long)y->n;
         long turn = j < 0 ? -1 : j >= m ? 1 : 0;
-        for (int a = 0; a < 3; a++)
-            q[k][a] = y->point[j - turn * m][a] + (a < 2 ? (double)turn * y->shift[a] : 0.0);
+        for (int a = 0; a < 3; a++) q[k][a] = y->point[j - turn * m][a] + (a < 2 ? (double)turn * y->shift[a] : 0.0);
     }
     double t[3], length = 0.0;
     for (int a = 0; a < 3; a++) {
@@ -109,24 +111,28 @@ void yarn_point(const struct yarn *y, const struct yarn_section *c, double s, do
 }
 
 /* A point at lattice position (rho_m, angle) of the section, s tiles along the yarn. */
-static void section_point(const struct yarn *y, const struct yarn_section *c, double s, double rho_m, double angle, double out[3])
+static void section_point(const struct yarn *y, const struct yarn_section *c, double s, double rho_m, double angle,
+                          double out[3])
 {
     double turned = angle + 2.0 * M_PI * c->twist_turns * s;
     yarn_point(y, c, s, rho_m * cos(turned), rho_m * sin(turned), out);
 }
 
 /* The strands that one orbit of lattice points makes: turning by k sixths a tile, a fiber meets itself after 6 / gcd(k, 6) tiles. */
-static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, const struct yarn_section *c,
-                        double rho_m, double angle, struct rng *rng, struct error *err)
+static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y,
+                        const struct yarn_section *c, double rho_m, double angle, struct rng *rng, struct error *err)
 {
     size_t fold = rho_m > 0.0 ? LATTICE_FOLD : 1;
     size_t sixths = (size_t)llabs(llround(LATTICE_FOLD * c->twist_turns));
     size_t n_period = fold / greatest_divisor(fold, sixths);
     size_t per_tile = (size_t)ceil(c->length_m / y->radius_m);
     struct strand like = {.shift = {y->shift[0] * (double)n_period, y->shift[1] * (double)n_period},
-                          .n_period = n_period, .radius_m = y->radius_m, .axis_class = y->axis_class, .cut = y->cut};
+                          .n_period = n_period,
+                          .radius_m = y->radius_m,
+                          .axis_class = y->axis_class,
+                          .cut = y->cut};
     for (size_t i = 0; i < fold / n_period; i++) {
-        double (*node)[3];
+        double(*node)[3];
         status st = strand_add(s, &like, per_tile * n_period, &node, err);
         if (st != STATUS_OK) return st;
         double phase = 2.0 * M_PI * rng_double(rng);
@@ -153,12 +159,13 @@ static status add_flyaway(struct strand_set *s, const struct yarn *y, const stru
     double side = rng_double(rng) < 0.5 ? -1.0 : 1.0;
     size_t n = (size_t)ceil(fabs(along) * c->length_m / y->radius_m) + FLYAWAY_NODES_MIN;
     struct strand like = {.radius_m = y->radius_m, .axis_class = y->axis_class, .cut = CUT_NONE};
-    double (*node)[3];
+    double(*node)[3];
     status st = strand_add(s, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t k = 0; k < n; k++) {
         double w = (double)k / (double)(n - 1);
-        section_point(y, c, from + side * along * w, section_radius_m + y->radius_m + reach * w * w, angle + curl * w, node[k]);
+        section_point(y, c, from + side * along * w, section_radius_m + y->radius_m + reach * w * w, angle + curl * w,
+                      node[k]);
     }
     return STATUS_OK;
 }
@@ -170,9 +177,12 @@ status yarn_add(struct strand_set *s, const struct phantom_option *o, const stru
     struct orbit *orbit = calloc(n_orbit + 1, sizeof *orbit);
     if (orbit == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
     n_orbit = lattice_orbits(orbit, n_orbit);
-    struct yarn_section c = {.wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = yarn_length_m(y),
-                        .twist_turns = round(LATTICE_FOLD * o->twist_turns) / LATTICE_FOLD};
-    const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN}, fly_key = {.seed = o->seed, .iteration = STREAM_FLYAWAY};
+    struct yarn_section c = {.wide = sqrt(o->flatness),
+                             .high = 1.0 / sqrt(o->flatness),
+                             .length_m = yarn_length_m(y),
+                             .twist_turns = round(LATTICE_FOLD * o->twist_turns) / LATTICE_FOLD};
+    const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN},
+                         fly_key = {.seed = o->seed, .iteration = STREAM_FLYAWAY};
     struct rng rng;
     rng_start(&rng, &key, y->number, 0);
     double turn = 2.0 * M_PI * rng_double(&rng), spacing_m = y->radius_m * lattice_spacing(o->packing);

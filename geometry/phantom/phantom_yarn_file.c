@@ -19,7 +19,8 @@ struct key {
 
 static status bad_line(const char *path, size_t line, struct error *err, const char *what, const char *subject)
 {
-    return error_set_field(err, STATUS_FORMAT, "yarn", "cannot read yarn '%s': line %zu: %s '%.60s'", path, line, what, subject);
+    return error_set_field(err, STATUS_FORMAT, "yarn", "cannot read yarn '%s': line %zu: %s '%.60s'", path, line, what,
+                           subject);
 }
 
 static status read_value(const struct key *k, const char *text, const char *path, size_t line, struct error *err)
@@ -33,10 +34,12 @@ static status read_value(const struct key *k, const char *text, const char *path
         k->to[i] = x * k->factor;
         text = end;
     }
-    return text[strspn(text, " \t\r\n")] == '\0' ? STATUS_OK : bad_line(path, line, err, "more than a value after", k->name);
+    return text[strspn(text, " \t\r\n")] == '\0' ? STATUS_OK
+                                                 : bad_line(path, line, err, "more than a value after", k->name);
 }
 
-static status read_lines(FILE *file, const struct key *key, size_t n_key, bool *seen, const char *path, struct error *err)
+static status read_lines(FILE *file, const struct key *key, size_t n_key, bool *seen, const char *path,
+                         struct error *err)
 {
     char text[512];
     for (size_t line = 1; fgets(text, sizeof text, file) != NULL; line++) {
@@ -84,8 +87,10 @@ status phantom_yarn_read(const char *path, struct phantom_yarn_law *yarn, struct
         {"flyaway_hair_pe", KIND_PAIR, false, y.hair_turn_rad, 1, -100, 100},
         {"flyaway_loop_density", KIND_NUMBER, false, &y.loop_per_m, per_cm, 0, 1e4},
         {"flyaway_loop_r1", KIND_PAIR, false, y.loop_radius_m, cm, 0, 10},
-        {"aabb_min", KIND_IGNORED, false, NULL, 0, 0, 0},   {"aabb_max", KIND_IGNORED, false, NULL, 0, 0, 0},
-        {"z_step_size", KIND_IGNORED, false, NULL, 0, 0, 0}, {"z_step_num", KIND_IGNORED, false, NULL, 0, 0, 0},
+        {"aabb_min", KIND_IGNORED, false, NULL, 0, 0, 0},
+        {"aabb_max", KIND_IGNORED, false, NULL, 0, 0, 0},
+        {"z_step_size", KIND_IGNORED, false, NULL, 0, 0, 0},
+        {"z_step_num", KIND_IGNORED, false, NULL, 0, 0, 0},
         {"fly_step_size", KIND_IGNORED, false, NULL, 0, 0, 0},
     };
     enum { N_KEY = sizeof key / sizeof *key };
@@ -95,7 +100,9 @@ status phantom_yarn_read(const char *path, struct phantom_yarn_law *yarn, struct
     status s = read_lines(file, key, N_KEY, seen, path, err);
     fclose(file);
     for (size_t k = 0; k < N_KEY && s == STATUS_OK; k++)
-        if (key[k].required && !seen[k]) s = error_set_field(err, STATUS_FORMAT, "yarn", "cannot read yarn '%s': '%s' is missing", path, key[k].name);
+        if (key[k].required && !seen[k])
+            s = error_set_field(err, STATUS_FORMAT, "yarn", "cannot read yarn '%s': '%s' is missing", path,
+                                key[k].name);
     if (s != STATUS_OK) return s;
     y.n_ply = (size_t)n_ply;
     y.n_fiber = (size_t)n_fiber;

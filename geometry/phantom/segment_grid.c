@@ -57,8 +57,10 @@ static void enter_segments(struct segment_grid *g, int pass)
                 for (long y = r.low[1]; y <= r.high[1]; y++)
                     for (long x = r.low[0]; x <= r.high[0]; x++) {
                         size_t c = cell_index(g, x, y, k);
-                        if (pass == 0) g->cell_first[c + 2]++;
-                        else g->cell_segment[g->cell_first[c + 1]++] = (uint32_t)v;
+                        if (pass == 0)
+                            g->cell_first[c + 2]++;
+                        else
+                            g->cell_segment[g->cell_first[c + 1]++] = (uint32_t)v;
                     }
         }
 }
@@ -140,7 +142,8 @@ bool segment_grid_nearest(const struct segment_grid *g, const double p_m[3], dou
         for (long j = r.low[1]; j <= r.high[1]; j++)
             for (long i = r.low[0]; i <= r.high[0]; i++) {
                 size_t c = cell_index(g, i, j, k);
-                for (size_t m = g->cell_first[c]; m < g->cell_first[c + 1]; m++) look_at(g, g->cell_segment[m], p_m, &best, &best2);
+                for (size_t m = g->cell_first[c]; m < g->cell_first[c + 1]; m++)
+                    look_at(g, g->cell_segment[m], p_m, &best, &best2);
             }
     if (best.i_vertex == SIZE_MAX) return false;
     best.i_fiber = g->fiber_of[best.i_vertex];

@@ -20,6 +20,7 @@ status segment_grid_new(const struct fiber_set *f, const double tile_m[2], doubl
                         struct error *err);
 void segment_grid_free(struct segment_grid *grid);
 /* False when nothing lies within limit_m (at most reach_m). */
-bool segment_grid_nearest(const struct segment_grid *grid, const double p_m[3], double limit_m, struct segment_hit *hit);
+bool segment_grid_nearest(const struct segment_grid *grid, const double p_m[3], double limit_m,
+                          struct segment_hit *hit);
 
 #endif

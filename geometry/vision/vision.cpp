@@ -5,7 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-namespace {
+namespace
+{
 
 /* Gaussian and its second derivative (times sigma^2, then scaled to second moment 2), sampled; sums are 1 and 0. */
 void gaussian_kernels(double sigma, std::vector<float> &smooth, std::vector<float> &second)
@@ -40,7 +41,8 @@ cv::Mat as_matrix(const float *image, size_t width, size_t height)
 
 status bad_size(size_t width, size_t height, double sigma, struct error *err)
 {
-    return error_set(err, STATUS_INVALID, "cannot filter a picture of %zu x %zu pixels with sigma %g", width, height, sigma);
+    return error_set(err, STATUS_INVALID, "cannot filter a picture of %zu x %zu pixels with sigma %g", width, height,
+                     sigma);
 }
 
 bool size_ok(size_t width, size_t height, double sigma)
@@ -55,14 +57,8 @@ bool size_ok(size_t width, size_t height, double sigma)
     {                                                                                                                  \
         return error_set(err, STATUS_NO_MEMORY, "cannot filter picture: out of memory");                               \
     }                                                                                                                  \
-    catch (const std::exception &e)                                                                                    \
-    {                                                                                                                  \
-        return error_set(err, STATUS_INTERNAL, "cannot filter picture: %s", e.what());                                 \
-    }                                                                                                                  \
-    catch (...)                                                                                                        \
-    {                                                                                                                  \
-        return error_set(err, STATUS_INTERNAL, "cannot filter picture: unknown exception");                            \
-    }
+    catch (const std::exception &e) { return error_set(err, STATUS_INTERNAL, "cannot filter picture: %s", e.what()); } \
+    catch (...) { return error_set(err, STATUS_INTERNAL, "cannot filter picture: unknown exception"); }
 
 status vision_init(struct error *err)
 {

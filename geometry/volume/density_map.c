@@ -38,15 +38,16 @@ static status check_values(const struct volume *v, float *least, float *most, st
         if (x == VOLUME_OUTSIDE) continue;
         if (!isfinite(x)) {
             size_t row = i / v->n[0];
-            return error_set_field(err, STATUS_INVALID, "volume.files", "cannot use the volume: voxel (%zu, %zu, %zu) is %s",
-                                   i % v->n[0], row % v->n[1], row / v->n[1], isnan(x) ? "NaN" : "infinite");
+            return error_set_field(err, STATUS_INVALID, "volume.files",
+                                   "cannot use the volume: voxel (%zu, %zu, %zu) is %s", i % v->n[0], row % v->n[1],
+                                   row / v->n[1], isnan(x) ? "NaN" : "infinite");
         }
         lo = fminf(lo, x);
         hi = fmaxf(hi, x);
     }
     if (!(hi > lo))
-        return error_set_field(err, STATUS_INVALID, "volume.files", "cannot use the volume: every voxel has the value %g",
-                               (double)hi);
+        return error_set_field(err, STATUS_INVALID, "volume.files",
+                               "cannot use the volume: every voxel has the value %g", (double)hi);
     *least = lo;
     *most = hi;
     return STATUS_OK;
@@ -197,9 +198,9 @@ static void map_slice(void *context, size_t k, size_t i_thread)
 status density_map_apply(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err)
 {
     if (!(high > low) || !isfinite(high - low))
-        return error_set_field(err, STATUS_INVALID, "volume.density",
-                               "cannot map densities: the value for solid material, %g, is not above the one for void, %g", high,
-                               low);
+        return error_set_field(
+            err, STATUS_INVALID, "volume.density",
+            "cannot map densities: the value for solid material, %g, is not above the one for void, %g", high, low);
     struct mapping m = {v, (float)low, (float)(1.0 / (high - low))};
     return thread_pool_run(pool, v->n[2], map_slice, &m, NULL);
 }

@@ -6,11 +6,12 @@
 #include "geometry/volume/volume.h"
 
 struct density_modes {
-    double low;           /* scanner value of void: the lower mode */
-    double high;          /* of solid material: 90 % of the values above the threshold are lower, but not under the upper mode */
-    double half;          /* midway between the two modes, where surfaces are */
-    double threshold;     /* Otsu's, between them */
-    double separability;  /* between-class over total variance, 0..1: 0.64 for one Gaussian, above 0.8 for two clear modes */
+    double low;  /* scanner value of void: the lower mode */
+    double high; /* of solid material: 90 % of the values above the threshold are lower, but not under the upper mode */
+    double half; /* midway between the two modes, where surfaces are */
+    double threshold; /* Otsu's, between them */
+    double
+        separability; /* between-class over total variance, 0..1: 0.64 for one Gaussian, above 0.8 for two clear modes */
 };
 
 /* From the values of v averaged over 3 x 3 x 3 voxels (which brings the noise down 5-fold, so that modes part) at up to about

@@ -14,7 +14,7 @@
 enum { MAX_HEADER_BYTES = 65536 };
 
 struct metaimage {
-    char *name;      /* of the header, for errors */
+    char *name; /* of the header, for errors */
     char *data_path;
     struct voxel_layout layout;
     double spacing[3], unit_m; /* of one unit of spacing */
@@ -24,15 +24,17 @@ struct metaimage {
 
 static status bad(const struct metaimage *m, struct error *err, const char *what, const char *value)
 {
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%s'", m->name, what, value);
+    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%s'", m->name, what,
+                           value);
 }
 
 static const struct {
     const char *name;
     enum sample_type type;
 } element[] = {
-    {"MET_UCHAR", SAMPLE_UINT8}, {"MET_CHAR", SAMPLE_INT8},     {"MET_USHORT", SAMPLE_UINT16}, {"MET_SHORT", SAMPLE_INT16},
-    {"MET_UINT", SAMPLE_UINT32}, {"MET_INT", SAMPLE_INT32},     {"MET_FLOAT", SAMPLE_FLOAT32}, {"MET_DOUBLE", SAMPLE_FLOAT64},
+    {"MET_UCHAR", SAMPLE_UINT8},   {"MET_CHAR", SAMPLE_INT8},      {"MET_USHORT", SAMPLE_UINT16},
+    {"MET_SHORT", SAMPLE_INT16},   {"MET_UINT", SAMPLE_UINT32},    {"MET_INT", SAMPLE_INT32},
+    {"MET_FLOAT", SAMPLE_FLOAT32}, {"MET_DOUBLE", SAMPLE_FLOAT64},
 };
 
 static status parse_element(struct metaimage *m, const char *value, struct error *err)
@@ -112,7 +114,8 @@ static bool is_true(const char *value) { return value[0] == 'T' || value[0] == '
 static status parse_line(struct metaimage *m, const char *header_path, const char *key, const char *value,
                          struct error *err)
 {
-    if (strcmp(key, "NDims") == 0) return strcmp(value, "3") == 0 ? STATUS_OK : bad(m, err, "NDims must be 3, not", value);
+    if (strcmp(key, "NDims") == 0)
+        return strcmp(value, "3") == 0 ? STATUS_OK : bad(m, err, "NDims must be 3, not", value);
     if (strcmp(key, "DimSize") == 0) return parse_size(m, value, err);
     if (strcmp(key, "ElementType") == 0) return parse_element(m, value, err);
     if (strcmp(key, "ElementSpacing") == 0) return parse_spacing(m, value, err);
@@ -133,7 +136,8 @@ static status parse_line(struct metaimage *m, const char *header_path, const cha
     if (strcmp(key, "HeaderSize") == 0) {
         char *end;
         m->layout.offset_bytes = strtoll(value, &end, 10);
-        return end != value && m->layout.offset_bytes >= -1 ? STATUS_OK : bad(m, err, "HeaderSize makes no sense:", value);
+        return end != value && m->layout.offset_bytes >= -1 ? STATUS_OK
+                                                            : bad(m, err, "HeaderSize makes no sense:", value);
     }
     if (strcmp(key, "ElementDataFile") == 0) return parse_data_file(m, header_path, value, err);
     return STATUS_OK; /* everything else says nothing about the voxels */
@@ -155,7 +159,10 @@ static status parse_header(struct metaimage *m, const char *path, FILE *file, st
         status s = parse_line(m, path, key, value, err);
         if (s != STATUS_OK) return s;
     }
-    const char *missing = !m->has_size ? "DimSize" : !m->has_type ? "ElementType" : !m->has_data ? "ElementDataFile" : NULL;
+    const char *missing = !m->has_size   ? "DimSize"
+                          : !m->has_type ? "ElementType"
+                          : !m->has_data ? "ElementDataFile"
+                                         : NULL;
     return missing == NULL ? STATUS_OK : bad(m, err, "the header lacks", missing);
 }
 
@@ -192,7 +199,8 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
     fclose(header);
     if (s == STATUS_OK && n_path > 1) /* uploads name the data file, too; nothing else makes sense */
         for (size_t i = 1; i < n_path && s == STATUS_OK; i++)
-            if (strcmp(path[i], m->data_path) != 0) s = bad(m, err, "its ElementDataFile is not", path_file_name(path[i]));
+            if (strcmp(path[i], m->data_path) != 0)
+                s = bad(m, err, "its ElementDataFile is not", path_file_name(path[i]));
     if (s == STATUS_OK) s = voxel_stream_open(m->name, m->data_path, &m->layout, &m->stream, err);
     if (s == STATUS_OK) s = voxel_stream_check_order(m->stream, err);
     if (s != STATUS_OK) goto fail;

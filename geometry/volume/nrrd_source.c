@@ -26,20 +26,42 @@ struct nrrd {
 
 static status bad(const struct nrrd *m, struct error *err, const char *what, const char *value)
 {
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%.100s'", m->name, what, value);
+    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%.100s'", m->name, what,
+                           value);
 }
 
 static const struct {
     const char *name;
     enum sample_type type;
 } type_name[] = {
-    {"uchar", SAMPLE_UINT8}, {"unsigned char", SAMPLE_UINT8}, {"uint8", SAMPLE_UINT8}, {"uint8_t", SAMPLE_UINT8},
-    {"signed char", SAMPLE_INT8}, {"int8", SAMPLE_INT8}, {"int8_t", SAMPLE_INT8},
-    {"ushort", SAMPLE_UINT16}, {"unsigned short", SAMPLE_UINT16}, {"unsigned short int", SAMPLE_UINT16}, {"uint16", SAMPLE_UINT16}, {"uint16_t", SAMPLE_UINT16},
-    {"short", SAMPLE_INT16}, {"short int", SAMPLE_INT16}, {"signed short", SAMPLE_INT16}, {"signed short int", SAMPLE_INT16}, {"int16", SAMPLE_INT16}, {"int16_t", SAMPLE_INT16},
-    {"uint", SAMPLE_UINT32}, {"unsigned int", SAMPLE_UINT32}, {"uint32", SAMPLE_UINT32}, {"uint32_t", SAMPLE_UINT32},
-    {"int", SAMPLE_INT32}, {"signed int", SAMPLE_INT32}, {"int32", SAMPLE_INT32}, {"int32_t", SAMPLE_INT32},
-    {"float", SAMPLE_FLOAT32}, {"double", SAMPLE_FLOAT64},
+    {"uchar", SAMPLE_UINT8},
+    {"unsigned char", SAMPLE_UINT8},
+    {"uint8", SAMPLE_UINT8},
+    {"uint8_t", SAMPLE_UINT8},
+    {"signed char", SAMPLE_INT8},
+    {"int8", SAMPLE_INT8},
+    {"int8_t", SAMPLE_INT8},
+    {"ushort", SAMPLE_UINT16},
+    {"unsigned short", SAMPLE_UINT16},
+    {"unsigned short int", SAMPLE_UINT16},
+    {"uint16", SAMPLE_UINT16},
+    {"uint16_t", SAMPLE_UINT16},
+    {"short", SAMPLE_INT16},
+    {"short int", SAMPLE_INT16},
+    {"signed short", SAMPLE_INT16},
+    {"signed short int", SAMPLE_INT16},
+    {"int16", SAMPLE_INT16},
+    {"int16_t", SAMPLE_INT16},
+    {"uint", SAMPLE_UINT32},
+    {"unsigned int", SAMPLE_UINT32},
+    {"uint32", SAMPLE_UINT32},
+    {"uint32_t", SAMPLE_UINT32},
+    {"int", SAMPLE_INT32},
+    {"signed int", SAMPLE_INT32},
+    {"int32", SAMPLE_INT32},
+    {"int32_t", SAMPLE_INT32},
+    {"float", SAMPLE_FLOAT32},
+    {"double", SAMPLE_FLOAT64},
 };
 
 static status parse_type(struct nrrd *m, const char *value, struct error *err)
@@ -83,7 +105,8 @@ static status parse_spacings(struct nrrd *m, const char *value, struct error *er
     for (int a = 0; a < 3; a++) {
         char *end;
         double w = strtod(p, &end);
-        if (end == p || (!isnan(w) && !(fabs(w) > 0.0 && isfinite(w)))) return bad(m, err, "spacings are not three positive numbers:", value);
+        if (end == p || (!isnan(w) && !(fabs(w) > 0.0 && isfinite(w))))
+            return bad(m, err, "spacings are not three positive numbers:", value);
         m->spacing[a] = fabs(w);
         p = end;
     }
@@ -103,7 +126,8 @@ static status parse_directions(struct nrrd *m, const char *value, struct error *
             double x = strtod(p, &end);
             bool given = end != p && isfinite(x);
             p = end + strspn(end, " \t");
-            if (!given || *p != (c < 2 ? ',' : ')')) return bad(m, err, "space directions are not three vectors:", value);
+            if (!given || *p != (c < 2 ? ',' : ')'))
+                return bad(m, err, "space directions are not three vectors:", value);
             p++;
             square += x * x;
         }
@@ -119,8 +143,20 @@ static status parse_units(struct nrrd *m, const char *value, struct error *err)
     static const struct {
         const char *name;
         double metre;
-    } unit[] = {{"mm", 1e-3}, {"millimeter", 1e-3}, {"millimeters", 1e-3}, {"um", 1e-6}, {"\xc2\xb5m", 1e-6}, {"\xce\xbcm", 1e-6},
-                {"micron", 1e-6}, {"microns", 1e-6}, {"micrometer", 1e-6}, {"micrometers", 1e-6}, {"nm", 1e-9}, {"cm", 1e-2}, {"m", 1.0}, {"", 1e-3}};
+    } unit[] = {{"mm", 1e-3},
+                {"millimeter", 1e-3},
+                {"millimeters", 1e-3},
+                {"um", 1e-6},
+                {"\xc2\xb5m", 1e-6},
+                {"\xce\xbcm", 1e-6},
+                {"micron", 1e-6},
+                {"microns", 1e-6},
+                {"micrometer", 1e-6},
+                {"micrometers", 1e-6},
+                {"nm", 1e-9},
+                {"cm", 1e-2},
+                {"m", 1.0},
+                {"", 1e-3}};
     const char *p = value;
     for (int a = 0; a < 3; a++) {
         const char *open = strchr(p, '"'), *close = open != NULL ? strchr(open + 1, '"') : NULL;
@@ -140,21 +176,23 @@ static status parse_encoding(struct nrrd *m, const char *value, struct error *er
     m->layout.compressed = strcasecmp(value, "gzip") == 0 || strcasecmp(value, "gz") == 0;
     if (m->layout.compressed || strcasecmp(value, "raw") == 0) return STATUS_OK;
     return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
-                           "cannot read volume '%s': encoding '%.40s' is not supported: save it as raw or gzip", m->name, value);
+                           "cannot read volume '%s': encoding '%.40s' is not supported: save it as raw or gzip",
+                           m->name, value);
 }
 
 static status parse_endian(struct nrrd *m, const char *value, struct error *err)
 {
     m->has_endian = true;
     m->big_endian = strcasecmp(value, "big") == 0;
-    return m->big_endian || strcasecmp(value, "little") == 0 ? STATUS_OK : bad(m, err, "endian must be little or big, not", value);
+    return m->big_endian || strcasecmp(value, "little") == 0 ? STATUS_OK
+                                                             : bad(m, err, "endian must be little or big, not", value);
 }
 
 static status parse_data_file(struct nrrd *m, const char *path, const char *value, struct error *err)
 {
     if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files", "cannot read volume '%s': data in a list of files is not supported",
-                               m->name);
+        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+                               "cannot read volume '%s': data in a list of files is not supported", m->name);
     if (strncmp(value, "./", 2) == 0) value += 2;
     if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not reach outside its own folder */
         return bad(m, err, "the data file must be beside the header, not", value);
@@ -168,7 +206,8 @@ static status parse_skip(struct nrrd *m, const char *value, long long least, lon
     char *end;
     errno = 0;
     *skip = strtoll(value, &end, 10);
-    if (end == value || *end != '\0' || errno != 0 || *skip < least || *skip > 1LL << 40) return bad(m, err, "a skip makes no sense:", value);
+    if (end == value || *end != '\0' || errno != 0 || *skip < least || *skip > 1LL << 40)
+        return bad(m, err, "a skip makes no sense:", value);
     return STATUS_OK;
 }
 
@@ -182,15 +221,22 @@ static status parse_field(struct nrrd *m, const char *path, const char *key, con
     if (strcasecmp(key, "space units") == 0 || strcasecmp(key, "units") == 0) return parse_units(m, value, err);
     if (strcasecmp(key, "encoding") == 0) return parse_encoding(m, value, err);
     if (strcasecmp(key, "endian") == 0) return parse_endian(m, value, err);
-    if (strcasecmp(key, "data file") == 0 || strcasecmp(key, "datafile") == 0) return parse_data_file(m, path, value, err);
-    if (strcasecmp(key, "line skip") == 0 || strcasecmp(key, "lineskip") == 0) return parse_skip(m, value, 0, &m->line_skip, err);
-    if (strcasecmp(key, "byte skip") == 0 || strcasecmp(key, "byteskip") == 0) return parse_skip(m, value, -1, &m->byte_skip, err);
+    if (strcasecmp(key, "data file") == 0 || strcasecmp(key, "datafile") == 0)
+        return parse_data_file(m, path, value, err);
+    if (strcasecmp(key, "line skip") == 0 || strcasecmp(key, "lineskip") == 0)
+        return parse_skip(m, value, 0, &m->line_skip, err);
+    if (strcasecmp(key, "byte skip") == 0 || strcasecmp(key, "byteskip") == 0)
+        return parse_skip(m, value, -1, &m->byte_skip, err);
     return STATUS_OK; /* everything else says nothing about the voxels */
 }
 
 static status check_complete(const struct nrrd *m, struct error *err)
 {
-    const char *missing = !m->has_dimension ? "dimension" : !m->has_size ? "sizes" : !m->has_type ? "type" : !m->has_encoding ? "encoding" : NULL;
+    const char *missing = !m->has_dimension  ? "dimension"
+                          : !m->has_size     ? "sizes"
+                          : !m->has_type     ? "type"
+                          : !m->has_encoding ? "encoding"
+                                             : NULL;
     if (missing == NULL && !m->has_endian && sample_bytes(m->layout.sample) > 1) missing = "endian";
     if (missing != NULL) return bad(m, err, "the header lacks", missing);
     if (m->layout.compressed && m->byte_skip < 0) return bad(m, err, "compressed data cannot have byte skip", "-1");
@@ -202,10 +248,12 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
 {
     char line[4096];
     bool ended = false;
-    if (fgets(line, sizeof line, file) == NULL || strncmp(line, "NRRD000", 7) != 0) return bad(m, err, "it does not begin with", "NRRD000");
+    if (fgets(line, sizeof line, file) == NULL || strncmp(line, "NRRD000", 7) != 0)
+        return bad(m, err, "it does not begin with", "NRRD000");
     while (!ended && fgets(line, sizeof line, file) != NULL) {
         size_t n = strlen(line);
-        if (n + 1 == sizeof line || ftell(file) > MAX_HEADER_BYTES) return bad(m, err, "the header does not end within", "65536 bytes");
+        if (n + 1 == sizeof line || ftell(file) > MAX_HEADER_BYTES)
+            return bad(m, err, "the header does not end within", "65536 bytes");
         while (n > 0 && strchr(" \t\r\n", line[n - 1]) != NULL) line[--n] = '\0';
         ended = n == 0;
         char *colon = strchr(line, ':');
@@ -214,7 +262,8 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
         status s = parse_field(m, path, line, colon + 1 + strspn(colon + 1, " \t"), err);
         if (s != STATUS_OK) return s;
     }
-    if (!ended && m->data_path == NULL) return bad(m, err, "no data: no empty line ends the header, and it names no", "data file");
+    if (!ended && m->data_path == NULL)
+        return bad(m, err, "no data: no empty line ends the header, and it names no", "data file");
     return check_complete(m, err);
 }
 
@@ -231,7 +280,9 @@ static status find_data(struct nrrd *m, FILE *header, struct error *err)
         if (c == EOF) break;
     }
     m->layout.offset_bytes = ftello(file);
-    status s = m->layout.offset_bytes >= 0 ? STATUS_OK : error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+    status s = m->layout.offset_bytes >= 0
+                   ? STATUS_OK
+                   : error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
     if (file != header) fclose(file);
     m->layout.skip_bytes = m->byte_skip > 0 ? m->byte_skip : 0;
     if (m->byte_skip == -1) m->layout.offset_bytes = -1;
@@ -258,7 +309,8 @@ static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path
     return s == STATUS_OK ? voxel_stream_check_order(m->stream, err) : s;
 }
 
-static status nrrd_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info, struct error *err)
+static status nrrd_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
+                        struct error *err)
 {
     struct nrrd *m = calloc(1, sizeof *m);
     if (m != NULL) m->name = strdup(path_file_name(path[0]));

@@ -71,7 +71,8 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     struct stat st;
     if (stat(h->path[i_path], &st) != 0) {
         if (errno == ENOENT)
-            return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file", name);
+            return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file",
+                                   name);
         return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
     }
     if (st.st_size == 0)
@@ -94,8 +95,9 @@ static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
         uint16_t format, bits;
         enum sample_type sample;
     } kind[] = {
-        {SAMPLEFORMAT_UINT, 8, SAMPLE_UINT8},      {SAMPLEFORMAT_UINT, 16, SAMPLE_UINT16},     {SAMPLEFORMAT_UINT, 32, SAMPLE_UINT32},
-        {SAMPLEFORMAT_INT, 8, SAMPLE_INT8},        {SAMPLEFORMAT_INT, 16, SAMPLE_INT16},       {SAMPLEFORMAT_INT, 32, SAMPLE_INT32},
+        {SAMPLEFORMAT_UINT, 8, SAMPLE_UINT8},      {SAMPLEFORMAT_UINT, 16, SAMPLE_UINT16},
+        {SAMPLEFORMAT_UINT, 32, SAMPLE_UINT32},    {SAMPLEFORMAT_INT, 8, SAMPLE_INT8},
+        {SAMPLEFORMAT_INT, 16, SAMPLE_INT16},      {SAMPLEFORMAT_INT, 32, SAMPLE_INT32},
         {SAMPLEFORMAT_IEEEFP, 32, SAMPLE_FLOAT32}, {SAMPLEFORMAT_IEEEFP, 64, SAMPLE_FLOAT64},
     };
     if (format == SAMPLEFORMAT_VOID) format = SAMPLEFORMAT_UINT;
@@ -112,11 +114,16 @@ static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
 static uint64_t most_expansion(uint16_t compression)
 {
     switch (compression) {
-    case COMPRESSION_NONE: return 1;
-    case COMPRESSION_LZMA: return 1 << 14;
-    case COMPRESSION_ZSTD: return 1 << 16;
-    case COMPRESSION_LERC: return 1 << 20;
-    default: return 1 << 12;
+    case COMPRESSION_NONE:
+        return 1;
+    case COMPRESSION_LZMA:
+        return 1 << 14;
+    case COMPRESSION_ZSTD:
+        return 1 << 16;
+    case COMPRESSION_LERC:
+        return 1 << 20;
+    default:
+        return 1 << 12;
     }
 }
 
@@ -141,7 +148,8 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
 {
     const char *name = path_file_name(h->path[h->i_open]);
     uint32_t width = 0, height = 0;
-    uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK, compression = COMPRESSION_NONE;
+    uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK,
+             compression = COMPRESSION_NONE;
     TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
     TIFFGetField(h->tiff, TIFFTAG_IMAGELENGTH, &height);
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_BITSPERSAMPLE, &bits);
@@ -150,24 +158,27 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
     TIFFGetField(h->tiff, TIFFTAG_PHOTOMETRIC, &photometric);
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_COMPRESSION, &compression);
     if (width == 0 || height == 0)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu has no pixels", name,
-                               i_page + 1);
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu has no pixels",
+                               name, i_page + 1);
     if (width > MAX_EDGE || height > MAX_EDGE)
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': page %zu has %u x %u pixels, the limit is %d an edge",
-                               name, i_page + 1, width, height, MAX_EDGE);
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files",
+                               "cannot read volume '%s': page %zu has %u x %u pixels, the limit is %d an edge", name,
+                               i_page + 1, width, height, MAX_EDGE);
     if (per_pixel != 1 || photometric == PHOTOMETRIC_PALETTE)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is a color image", name,
-                               i_page + 1);
-    if (photometric == PHOTOMETRIC_MINISWHITE) /* programs disagree whether the values or only their display are turned round */
+        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is a color image",
+                               name, i_page + 1);
+    if (photometric ==
+        PHOTOMETRIC_MINISWHITE) /* programs disagree whether the values or only their display are turned round */
         return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
-                               "cannot read volume '%s': page %zu has PhotometricInterpretation 0 (white is zero): save the stack with black as "
+                               "cannot read volume '%s': page %zu has PhotometricInterpretation 0 (white is zero): "
+                               "save the stack with black as "
                                "zero, so that denser material has higher values",
                                name, i_page + 1);
     enum sample_type t;
     if (!page_sample(bits, format, &t))
         return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
-                               "cannot read volume '%s': page %zu has %u-bit samples of an unsupported kind", name, i_page + 1,
-                               bits);
+                               "cannot read volume '%s': page %zu has %u-bit samples of an unsupported kind", name,
+                               i_page + 1, bits);
     if (i_page == 0) {
         h->width = width;
         h->height = height;
@@ -175,25 +186,26 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
     }
     if (width != h->width || height != h->height)
         return error_set_field(err, STATUS_FORMAT, "volume.files",
-                               "cannot read volume '%s': page %zu has %u x %u pixels, page 1 has %u x %u", name, i_page + 1,
-                               width, height, h->width, h->height);
+                               "cannot read volume '%s': page %zu has %u x %u pixels, page 1 has %u x %u", name,
+                               i_page + 1, width, height, h->width, h->height);
     if (t != h->sample && sample_bytes(t) != sample_bytes(h->sample))
         return error_set_field(err, STATUS_FORMAT, "volume.files",
                                "cannot read volume '%s': page %zu is %u-bit, page 1 is %zu-bit", name, i_page + 1, bits,
                                8 * sample_bytes(h->sample));
     if (t != h->sample)
         return error_set_field(err, STATUS_FORMAT, "volume.files",
-                               "cannot read volume '%s': page %zu is %s, page 1 is %s", name, i_page + 1, sample_name(t),
-                               sample_name(h->sample));
+                               "cannot read volume '%s': page %zu is %s, page 1 is %s", name, i_page + 1,
+                               sample_name(t), sample_name(h->sample));
     h->message[0] = '\0';
     uint64_t page_bytes = (uint64_t)width * height * sample_bytes(t);
     if (compression != COMPRESSION_NONE && page_bytes > UINT32_MAX) /* as in voxel_stream.c */
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': page %zu is compressed and over 4 GiB",
-                               name, i_page + 1);
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files",
+                               "cannot read volume '%s': page %zu is compressed and over 4 GiB", name, i_page + 1);
     if (!page_fits_file(h->tiff, compression, page_bytes, file_bytes))
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
-                               "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them",
-                               name, i_page + 1, width, height);
+        return error_set_field(
+            err, STATUS_FORMAT, "volume.files",
+            "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them", name,
+            i_page + 1, width, height);
     return STATUS_OK;
 }
 
@@ -219,7 +231,8 @@ static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, 
     if (s != STATUS_OK) return s;
     struct stat st;
     if (fstat(TIFFFileno(h->tiff), &st) != 0)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(h->path[i_path]));
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'",
+                                  path_file_name(h->path[i_path]));
     for (;;) {
         s = check_page(h, h->n_page, (uint64_t)st.st_size, err);
         if (s == STATUS_OK) s = add_page(h, capacity, err);
@@ -227,7 +240,8 @@ static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, 
         if (TIFFLastDirectory(h->tiff)) return STATUS_OK;
         h->message[0] = '\0';
         if (!TIFFReadDirectory(h->tiff))
-            return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is unreadable: %s",
+            return error_set_field(err, STATUS_FORMAT, "volume.files",
+                                   "cannot read volume '%s': page %zu is unreadable: %s",
                                    path_file_name(h->path[i_path]), h->n_page + 1, cause(h));
     }
 }

@@ -16,11 +16,11 @@ static const double SIZE_PENALTY = 0.05;
 struct profile {
     const struct volume *v;
     float material, void_value;
-    size_t block[3], n_block[3];        /* voxels a block, blocks along an axis */
-    size_t z_low, z_high;               /* where the material is: 99 % of it */
-    double *n_material;                 /* per z */
-    float *mean[2];                     /* [axis]: slice x block of the other in-plane axis x block of z */
-    _Atomic uint8_t *outside;           /* nx x ny: 1 where a cell of the column lies outside */
+    size_t block[3], n_block[3]; /* voxels a block, blocks along an axis */
+    size_t z_low, z_high;        /* where the material is: 99 % of it */
+    double *n_material;          /* per z */
+    float *mean[2];              /* [axis]: slice x block of the other in-plane axis x block of z */
+    _Atomic uint8_t *outside;    /* nx x ny: 1 where a cell of the column lies outside */
 };
 
 static void count_slice(void *context, size_t k, size_t i_thread)
@@ -39,7 +39,9 @@ static status find_z_range(struct profile *p, struct error *err)
     double total = 0.0, below = 0.0, above = 0.0;
     size_t n = p->v->n[2];
     for (size_t k = 0; k < n; k++) total += p->n_material[k];
-    if (!(total > 0.0)) return error_set_field(err, STATUS_INVALID, "volume.crop", "cannot crop the volume: no voxel reaches the density of material");
+    if (!(total > 0.0))
+        return error_set_field(err, STATUS_INVALID, "volume.crop",
+                               "cannot crop the volume: no voxel reaches the density of material");
     p->z_low = 0;
     p->z_high = n;
     while (p->z_low + 1 < n && (below += p->n_material[p->z_low]) < 0.005 * total) p->z_low++;
@@ -79,7 +81,8 @@ static void release(struct profile *p)
     free((void *)p->outside);
 }
 
-static status make_profile(struct profile *p, struct thread_pool *pool, const struct progress *progress, struct error *err)
+static status make_profile(struct profile *p, struct thread_pool *pool, const struct progress *progress,
+                           struct error *err)
 {
     const size_t *n = p->v->n;
     for (int a = 0; a < 3; a++) {
@@ -137,7 +140,9 @@ static status find_valid(const struct profile *p, size_t valid[4], struct error 
     }
     free(height);
     free(start);
-    if (!(best > 0.0)) return error_set_field(err, STATUS_INVALID, "volume.crop", "cannot crop the volume: nothing of it lies in the scan after alignment");
+    if (!(best > 0.0))
+        return error_set_field(err, STATUS_INVALID, "volume.crop",
+                               "cannot crop the volume: nothing of it lies in the scan after alignment");
     return STATUS_OK;
 }
 
@@ -146,15 +151,15 @@ static status find_valid(const struct profile *p, size_t valid[4], struct error 
 struct search {
     const struct profile *p;
     int axis;
-    size_t low, high;          /* slices that may be used */
-    size_t from, to;           /* entries of a slice that count */
-    size_t n_entry;            /* of a whole slice */
-    size_t least;              /* slices to keep */
-    float *difference;         /* n x n, n = high - low */
+    size_t low, high;  /* slices that may be used */
+    size_t from, to;   /* entries of a slice that count */
+    size_t n_entry;    /* of a whole slice */
+    size_t least;      /* slices to keep */
+    float *difference; /* n x n, n = high - low */
     struct candidate {
         double cost, mismatch;
         size_t x0, x1;
-    } *best;                   /* per first slice */
+    } * best; /* per first slice */
     double unrelated;
 };
 
@@ -208,8 +213,8 @@ static void find_unrelated(struct search *s)
 }
 
 /* box: x0 y0 x1 y1; the part of `axis` is replaced, the rest says which entries count. */
-static status search_axis(const struct profile *p, int axis, const size_t valid[4], double keep, struct thread_pool *pool, size_t box[4],
-                          double *least_mismatch, struct error *err)
+static status search_axis(const struct profile *p, int axis, const size_t valid[4], double keep,
+                          struct thread_pool *pool, size_t box[4], double *least_mismatch, struct error *err)
 {
     int other = 1 - axis;
     struct search s = {.p = p, .axis = axis, .low = valid[axis], .high = valid[2 + axis]};
@@ -222,7 +227,9 @@ static status search_axis(const struct profile *p, int axis, const size_t valid[
     if (n < 16 || s.least >= n) return STATUS_OK;
     s.difference = malloc(n * n * sizeof *s.difference);
     s.best = malloc(n * sizeof *s.best);
-    status st = s.difference == NULL || s.best == NULL ? error_set(err, STATUS_NO_MEMORY, "cannot crop the volume: out of memory") : STATUS_OK;
+    status st = s.difference == NULL || s.best == NULL
+                    ? error_set(err, STATUS_NO_MEMORY, "cannot crop the volume: out of memory")
+                    : STATUS_OK;
     if (st == STATUS_OK) st = thread_pool_run(pool, n, compare_slice, &s, NULL);
     if (st == STATUS_OK) find_unrelated(&s);
     if (st == STATUS_OK && s.unrelated > 0.0) st = thread_pool_run(pool, n - s.least + 1, try_first, &s, NULL);
@@ -250,7 +257,8 @@ status tile_crop_find(const struct volume *v, double material, double void_value
     if (s == STATUS_OK) s = find_valid(&p, crop->valid, err);
     size_t box[4];
     memcpy(box, crop->valid, sizeof box);
-    for (int round = 0; round < 2 && s == STATUS_OK && keep < 1.0; round++) /* again, with the other axis as it will be */
+    for (int round = 0; round < 2 && s == STATUS_OK && keep < 1.0;
+         round++) /* again, with the other axis as it will be */
         for (int axis = 0; axis < 2 && s == STATUS_OK; axis++)
             s = search_axis(&p, axis, crop->valid, keep, pool, box, &crop->mismatch[axis], err);
     for (int a = 0; a < 2; a++) {
@@ -282,7 +290,8 @@ void seam_density_measure(const struct volume *v, struct seam_density *s)
     for (size_t k = 0; k < n[2]; k++) {
         scratch_keep_within(v->space);
         for (size_t j = 0; j < n[1]; j++) {
-            const float *row = v->density + volume_index(n, 0, j, k), *next = j + 1 < n[1] ? row + n[0] : row - j * n[0];
+            const float *row = v->density + volume_index(n, 0, j, k),
+                        *next = j + 1 < n[1] ? row + n[0] : row - j * n[0];
             double in_x = 0.0, to_next = 0.0;
             for (size_t i = 0; i + 1 < n[0]; i++) in_x += (double)fabsf(row[i + 1] - row[i]);
             for (size_t i = 0; i < n[0]; i++) to_next += (double)fabsf(next[i] - row[i]);

@@ -17,9 +17,10 @@
 #define TILE_MOST_MISMATCH 0.6
 
 struct tile_crop {
-    size_t box[6];         /* x0 y0 z0 x1 y1 z1, ends excluded */
-    size_t valid[4];       /* x0 y0 x1 y1: largest box without cells from outside of the scan where there is material */
-    double mismatch[2];    /* of the best box across x and y, as above, whether it was used or not; NaN where an axis has too few slices to say */
+    size_t box[6];   /* x0 y0 z0 x1 y1 z1, ends excluded */
+    size_t valid[4]; /* x0 y0 x1 y1: largest box without cells from outside of the scan where there is material */
+    double mismatch
+        [2]; /* of the best box across x and y, as above, whether it was used or not; NaN where an axis has too few slices to say */
 };
 
 /* keep: least share of the valid box's edges that is kept, 0.1 .. 1 (1: only the valid box is cut out). material: value from which on a

@@ -149,7 +149,7 @@ static void encode_direction_quantised(const void *volume, size_t first, size_t 
 }
 
 static status write_slices(const char *path, const uint8_t header[HEADER_BYTES], const void *volume, const size_t n[3],
-                         struct scratch_space *space, size_t bytes_per_voxel, encode_slice encode, struct error *err)
+                           struct scratch_space *space, size_t bytes_per_voxel, encode_slice encode, struct error *err)
 {
     struct vol_writer w = {0};
     uint8_t *slice = malloc(n[0] * n[1] * bytes_per_voxel);
@@ -169,7 +169,8 @@ static status write_slices(const char *path, const uint8_t header[HEADER_BYTES],
 status vol_write_density(const char *path, const struct volume *v, enum vol_encoding encoding, struct error *err)
 {
     if (encoding != VOL_FLOAT32 && encoding != VOL_UINT8)
-        return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for densities", path, (int)encoding);
+        return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for densities", path,
+                         (int)encoding);
     uint8_t header[HEADER_BYTES];
     fill_header(header, encoding, v->n, 1, v->voxel_size_m);
     return encoding == VOL_FLOAT32 ? write_slices(path, header, v, v->n, v->space, 4, encode_density_f32, err)
@@ -180,7 +181,8 @@ status vol_write_direction(const char *path, const struct direction_volume *d, e
                            struct error *err)
 {
     if (encoding != VOL_FLOAT32 && encoding != VOL_QUANTISED)
-        return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for directions", path, (int)encoding);
+        return error_set(err, STATUS_INVALID, "cannot write '%s': encoding %d is not for directions", path,
+                         (int)encoding);
     uint8_t header[HEADER_BYTES];
     fill_header(header, encoding, d->n, 3, d->voxel_size_m);
     return encoding == VOL_FLOAT32 ? write_slices(path, header, d, d->n, d->space, 12, encode_direction_f32, err)
@@ -232,12 +234,13 @@ status vol_read_header(FILE *file, const char *name, struct vol_header *h, struc
     h->encoding = (enum vol_encoding)encoding;
     h->n_channel = n_channel;
     h->bytes_per_voxel = encoding == VOL_FLOAT32 ? 4 * n_channel : encoding == VOL_QUANTISED ? 2 : 1;
-    if (fstat(fileno(file), &st) != 0) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
+    if (fstat(fileno(file), &st) != 0)
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
     uint64_t have = (uint64_t)st.st_size - HEADER_BYTES, want = n_voxel * h->bytes_per_voxel;
     if (have < want || have - want >= h->n[0] * h->bytes_per_voxel) /* longer by a row: the header is of another file */
         return error_set_field(err, STATUS_FORMAT, "volume.files",
-                               "cannot read volume '%s': %zu x %zu x %zu voxels need %llu bytes, the file has %lld", name,
-                               h->n[0], h->n[1], h->n[2], (unsigned long long)(want + HEADER_BYTES),
+                               "cannot read volume '%s': %zu x %zu x %zu voxels need %llu bytes, the file has %lld",
+                               name, h->n[0], h->n[1], h->n[2], (unsigned long long)(want + HEADER_BYTES),
                                (long long)st.st_size);
     return STATUS_OK;
 }

@@ -15,7 +15,7 @@ enum vol_encoding { VOL_FLOAT32 = 1, VOL_UINT8 = 3, VOL_QUANTISED = 4 };
 struct vol_header {
     enum vol_encoding encoding;
     size_t n[3];
-    size_t n_channel;         /* 1 density, 3 direction (quantised directions, too) */
+    size_t n_channel;             /* 1 density, 3 direction (quantised directions, too) */
     float box_min[3], box_max[3]; /* as in the file: ours are millimetres */
     size_t bytes_per_voxel;
 };

@@ -7,15 +7,17 @@ static status check_shape(const size_t n[3], struct error *err)
 {
     size_t total = 1;
     for (int a = 0; a < 3; a++) {
-        if (n[a] == 0) return error_set(err, STATUS_INVALID, "cannot make volume: %zu x %zu x %zu voxels", n[0], n[1], n[2]);
+        if (n[a] == 0)
+            return error_set(err, STATUS_INVALID, "cannot make volume: %zu x %zu x %zu voxels", n[0], n[1], n[2]);
         if (__builtin_mul_overflow(total, n[a], &total) || total > SIZE_MAX / 16)
-            return error_set(err, STATUS_TOO_LARGE, "cannot make volume of %zu x %zu x %zu voxels: too large", n[0], n[1],
-                             n[2]);
+            return error_set(err, STATUS_TOO_LARGE, "cannot make volume of %zu x %zu x %zu voxels: too large", n[0],
+                             n[1], n[2]);
     }
     return STATUS_OK;
 }
 
-status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space, struct error *err)
+status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space,
+                      struct error *err)
 {
     *v = (struct volume){.space = space};
     status s = check_shape(n, err);
@@ -51,7 +53,8 @@ status direction_volume_init_in(struct direction_volume *v, const size_t n[3], c
     void *density = NULL, *octahedral = NULL;
     s = scratch_new(space, volume_n_voxel(n) * sizeof *v->density, "the densities of directions", &density, err);
     v->density = density;
-    if (s == STATUS_OK) s = scratch_new(space, 2 * volume_n_voxel(n) * sizeof *v->octahedral, "directions", &octahedral, err);
+    if (s == STATUS_OK)
+        s = scratch_new(space, 2 * volume_n_voxel(n) * sizeof *v->octahedral, "directions", &octahedral, err);
     v->octahedral = octahedral;
     if (s != STATUS_OK) direction_volume_release(v);
     return s;

@@ -23,7 +23,8 @@ struct volume {
 
 /* Voxels 0. STATUS_INVALID, STATUS_TOO_LARGE, STATUS_NO_MEMORY; with a space also STATUS_DISK_FULL. */
 status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err);
-status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space, struct error *err);
+status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space,
+                      struct error *err);
 void volume_release(struct volume *v);
 
 static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
@@ -35,7 +36,7 @@ struct direction_volume {
     size_t n[3];
     double voxel_size_m[3];
     uint8_t *density;
-    int16_t *octahedral; /* 2 per voxel */
+    int16_t *octahedral;         /* 2 per voxel */
     struct scratch_space *space; /* not owned */
 };
 

@@ -17,7 +17,8 @@ status axis_map_parse(const char *text, struct axis_map *map, struct error *err)
     }
     if (*p == '\0' && used[0] && used[1] && used[2]) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "volume.axes",
-                           "cannot use axes '%.16s': x, y and z are wanted once each, with '-' before a reversed one", text);
+                           "cannot use axes '%.16s': x, y and z are wanted once each, with '-' before a reversed one",
+                           text);
 }
 
 void volume_resampled_shape(const size_t n_in[3], const double voxel_size_m[3], double voxel_m, size_t n_out[3])
@@ -66,7 +67,8 @@ static void resample_slice(void *context, size_t k, size_t i_thread)
         for (size_t i = 0; i < n[0]; i++) {
             double x[3];
             for (int a = 0; a < 3; a++)
-                x[a] = r->start[a] + (double)i * r->column[0][a] + (double)j * r->column[1][a] + (double)k * r->column[2][a];
+                x[a] = r->start[a] + (double)i * r->column[0][a] + (double)j * r->column[1][a] +
+                       (double)k * r->column[2][a];
             r->out->density[volume_index(n, i, j, k)] = trilinear(r->in, x);
         }
     }
@@ -90,7 +92,8 @@ status volume_resample(const struct volume *in, const double matrix[9], double v
 {
     double inverse[9];
     if (!invert(matrix, inverse))
-        return error_set_field(err, STATUS_INVALID, "volume.matrix", "cannot align the volume: the matrix has no inverse");
+        return error_set_field(err, STATUS_INVALID, "volume.matrix",
+                               "cannot align the volume: the matrix has no inverse");
     size_t n_all[3], n[3];
     volume_resampled_shape(in->n, in->voxel_size_m, voxel_m, n_all);
     for (int a = 0; a < 3; a++) n[a] = box[3 + a] - box[a];

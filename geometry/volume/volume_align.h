@@ -24,7 +24,8 @@ status axis_map_parse(const char *text, struct axis_map *map, struct error *err)
  * smallest spacing of in). STATUS_INVALID, field "volume.matrix", for a matrix that cannot be inverted; STATUS_CANCELLED,
  * and as volume_init_in, whose scratch space is that of in. */
 status volume_resample(const struct volume *in, const double matrix[9], double voxel_m, const size_t box[6],
-                       struct thread_pool *pool, const struct progress *progress, struct volume *out, struct error *err);
+                       struct thread_pool *pool, const struct progress *progress, struct volume *out,
+                       struct error *err);
 /* Shape of the whole resampled grid: extents of in over voxel_m, rounded. */
 void volume_resampled_shape(const size_t n_in[3], const double voxel_size_m[3], double voxel_m, size_t n_out[3]);
 

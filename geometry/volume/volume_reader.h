@@ -26,7 +26,17 @@ size_t volume_reader_count(void);
 const volume_reader *volume_reader_at(size_t i);
 
 /* Little helpers that readers share. */
-enum sample_type { SAMPLE_UINT8, SAMPLE_INT8, SAMPLE_UINT16, SAMPLE_INT16, SAMPLE_UINT32, SAMPLE_INT32, SAMPLE_FLOAT32, SAMPLE_FLOAT64, SAMPLE_COUNT };
+enum sample_type {
+    SAMPLE_UINT8,
+    SAMPLE_INT8,
+    SAMPLE_UINT16,
+    SAMPLE_INT16,
+    SAMPLE_UINT32,
+    SAMPLE_INT32,
+    SAMPLE_FLOAT32,
+    SAMPLE_FLOAT64,
+    SAMPLE_COUNT
+};
 size_t sample_bytes(enum sample_type t);
 const char *sample_name(enum sample_type t);
 /* n samples of type t at data, byte order as the file's (swap: opposite to the machine's; data is changed), to floats. */

@@ -25,8 +25,8 @@ static const struct {
     const char *name;
     size_t n_byte;
 } sample[SAMPLE_COUNT] = {
-    [SAMPLE_UINT8] = {"uint8", 1},   [SAMPLE_INT8] = {"int8", 1},       [SAMPLE_UINT16] = {"uint16", 2},
-    [SAMPLE_INT16] = {"int16", 2},   [SAMPLE_UINT32] = {"uint32", 4},   [SAMPLE_INT32] = {"int32", 4},
+    [SAMPLE_UINT8] = {"uint8", 1},     [SAMPLE_INT8] = {"int8", 1},       [SAMPLE_UINT16] = {"uint16", 2},
+    [SAMPLE_INT16] = {"int16", 2},     [SAMPLE_UINT32] = {"uint32", 4},   [SAMPLE_INT32] = {"int32", 4},
     [SAMPLE_FLOAT32] = {"float32", 4}, [SAMPLE_FLOAT64] = {"float64", 8},
 };
 
@@ -55,15 +55,24 @@ void sample_to_float(enum sample_type t, bool swap, size_t n, void *data, float 
 {
     if (swap) swap_bytes(sample_bytes(t), n, data);
     switch (t) {
-    case SAMPLE_UINT8: CONVERT(uint8_t);
-    case SAMPLE_INT8: CONVERT(int8_t);
-    case SAMPLE_UINT16: CONVERT(uint16_t);
-    case SAMPLE_INT16: CONVERT(int16_t);
-    case SAMPLE_UINT32: CONVERT(uint32_t);
-    case SAMPLE_INT32: CONVERT(int32_t);
-    case SAMPLE_FLOAT32: CONVERT(float);
-    case SAMPLE_FLOAT64: CONVERT(double);
-    case SAMPLE_COUNT: break;
+    case SAMPLE_UINT8:
+        CONVERT(uint8_t);
+    case SAMPLE_INT8:
+        CONVERT(int8_t);
+    case SAMPLE_UINT16:
+        CONVERT(uint16_t);
+    case SAMPLE_INT16:
+        CONVERT(int16_t);
+    case SAMPLE_UINT32:
+        CONVERT(uint32_t);
+    case SAMPLE_INT32:
+        CONVERT(int32_t);
+    case SAMPLE_FLOAT32:
+        CONVERT(float);
+    case SAMPLE_FLOAT64:
+        CONVERT(double);
+    case SAMPLE_COUNT:
+        break;
     }
 }
 
@@ -80,7 +89,8 @@ static status read_first_bytes(const char *path, uint8_t first_byte[16], struct 
     size_t n = fread(first_byte, 1, 16, file);
     int failed = ferror(file);
     fclose(file);
-    if (failed) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(path));
+    if (failed)
+        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(path));
     if (n == 0)
         return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': the file is empty",
                                path_file_name(path));
@@ -99,10 +109,11 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
     for (size_t i = 0; i < volume_reader_count() && found == NULL; i++)
         if (reader[i]->recognise(first_byte, path[0])) found = reader[i];
     if (found == NULL)
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
-                               "cannot read volume '%s': neither TIFF nor MetaImage nor NRRD nor .vol (samples without a header are "
-                               "described by 'volume.raw')",
-                               path_file_name(path[0]));
+        return error_set_field(
+            err, STATUS_UNSUPPORTED, "volume.files",
+            "cannot read volume '%s': neither TIFF nor MetaImage nor NRRD nor .vol (samples without a header are "
+            "described by 'volume.raw')",
+            path_file_name(path[0]));
     struct volume_source *v = calloc(1, sizeof *v);
     if (v == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", path_file_name(path[0]));
@@ -132,8 +143,7 @@ void volume_source_close(struct volume_source *source)
 
 const struct volume_source_info *volume_source_describe(const struct volume_source *source) { return &source->info; }
 
-status volume_source_read(struct volume_source *source, size_t i_slice, size_t n_slice, float *value,
-                          struct error *err)
+status volume_source_read(struct volume_source *source, size_t i_slice, size_t n_slice, float *value, struct error *err)
 {
     if (i_slice > source->info.n[2] || n_slice > source->info.n[2] - i_slice)
         return error_set(err, STATUS_INTERNAL, "cannot read slices %zu..%zu of %zu", i_slice, i_slice + n_slice,

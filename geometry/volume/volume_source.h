@@ -16,8 +16,8 @@ struct volume_source;
 
 /* What a file without a header holds. n[0] == 0: nothing is declared, the file says itself. */
 struct volume_raw_declaration {
-    size_t n[3];         /* columns, rows, slices; x runs fastest */
-    char type[8];        /* "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64" */
+    size_t n[3];  /* columns, rows, slices; x runs fastest */
+    char type[8]; /* "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64" */
     bool big_endian;
     size_t header_bytes; /* to skip at the start of the file */
 };

@@ -79,16 +79,18 @@ static status check_size(struct voxel_stream *v, uint64_t size, struct error *er
     if (want > have) goto too_short;
     if (have - want >= l->n[0] * sample_bytes(l->sample))
         return error_set_field(err, STATUS_FORMAT, "volume.files",
-                               "cannot read volume '%s': %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s", v->name, l->n[0],
-                               l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want, path_file_name(v->data_path),
-                               (unsigned long long)have, types_that_fit(l, have, fits, sizeof fits));
+                               "cannot read volume '%s': %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s",
+                               v->name, l->n[0], l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want,
+                               path_file_name(v->data_path), (unsigned long long)have,
+                               types_that_fit(l, have, fits, sizeof fits));
     return STATUS_OK;
 too_short:
-    return error_set_field(err, STATUS_FORMAT, "volume.files",
-                           "cannot read volume '%s': the file is too short: %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s%s",
-                           v->name, l->n[0], l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want,
-                           path_file_name(v->data_path), (unsigned long long)have, l->compressed ? " (compressed)" : "",
-                           l->compressed ? "" : types_that_fit(l, have, fits, sizeof fits));
+    return error_set_field(
+        err, STATUS_FORMAT, "volume.files",
+        "cannot read volume '%s': the file is too short: %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s%s",
+        v->name, l->n[0], l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want,
+        path_file_name(v->data_path), (unsigned long long)have, l->compressed ? " (compressed)" : "",
+        l->compressed ? "" : types_that_fit(l, have, fits, sizeof fits));
 }
 
 static status open_data(struct voxel_stream *v, struct error *err)
@@ -97,19 +99,23 @@ static status open_data(struct voxel_stream *v, struct error *err)
     const struct voxel_layout *l = &v->layout;
     for (int a = 0; a < 3; a++)
         if (l->n[a] == 0 || l->n[a] > VOXEL_STREAM_MAX_EDGE)
-            return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': an impossible size, %zu x %zu x %zu voxels",
-                                   v->name, l->n[0], l->n[1], l->n[2]);
+            return error_set_field(err, STATUS_FORMAT, "volume.files",
+                                   "cannot read volume '%s': an impossible size, %zu x %zu x %zu voxels", v->name,
+                                   l->n[0], l->n[1], l->n[2]);
     v->slice_bytes = l->n[0] * l->n[1] * sample_bytes(l->sample);
     if (v->slice_bytes > UINT32_MAX)
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': a slice is over 4 GiB", v->name);
+        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': a slice is over 4 GiB",
+                               v->name);
     v->file = fopen(v->data_path, "rbe");
     if (v->file == NULL && errno == ENOENT)
-        return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': its data file '%s' is missing",
-                               v->name, path_file_name(v->data_path));
+        return error_set_field(err, STATUS_NOT_FOUND, "volume.files",
+                               "cannot read volume '%s': its data file '%s' is missing", v->name,
+                               path_file_name(v->data_path));
     if (v->file == NULL || fstat(fileno(v->file), &st) != 0)
         return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
     if (!S_ISREG(st.st_mode))
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': '%s' is not a regular file", v->name,
+        return error_set_field(err, STATUS_FORMAT, "volume.files",
+                               "cannot read volume '%s': '%s' is not a regular file", v->name,
                                path_file_name(v->data_path));
     status s = check_size(v, (uint64_t)st.st_size, err);
     if (s != STATUS_OK) return s;
@@ -139,8 +145,9 @@ status voxel_stream_open(const char *name, const char *data_path, const struct v
 static status short_data(const struct voxel_stream *v, size_t i_slice, struct error *err)
 {
     if (ferror(v->file)) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': '%s' ends or is damaged in slice %zu",
-                           v->name, path_file_name(v->data_path), i_slice + 1);
+    return error_set_field(err, STATUS_FORMAT, "volume.files",
+                           "cannot read volume '%s': '%s' ends or is damaged in slice %zu", v->name,
+                           path_file_name(v->data_path), i_slice + 1);
 }
 
 /* The next n_byte inflated bytes; gzip members that follow each other are one stream. */
@@ -202,8 +209,8 @@ static status check_end(struct voxel_stream *v, struct error *err)
     size_t row_bytes = l->n[0] * sample_bytes(l->sample);
     if (inflate_bytes(v, l->n[2], v->slice, row_bytes, NULL) != STATUS_OK) return STATUS_OK;
     return error_set_field(err, STATUS_FORMAT, "volume.files",
-                           "cannot read volume '%s': '%s' goes on behind the %zu x %zu x %zu %s voxels of its header", v->name,
-                           path_file_name(v->data_path), l->n[0], l->n[1], l->n[2], sample_name(l->sample));
+                           "cannot read volume '%s': '%s' goes on behind the %zu x %zu x %zu %s voxels of its header",
+                           v->name, path_file_name(v->data_path), l->n[0], l->n[1], l->n[2], sample_name(l->sample));
 }
 
 static status next_plain(struct voxel_stream *v, size_t i_slice, struct error *err)
@@ -260,9 +267,10 @@ status voxel_stream_check_order(struct voxel_stream *v, struct error *err)
     free(value);
     if (s != STATUS_OK) return s;
     if (correlation[0] < 0.1 && correlation[1] > 0.5)
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
-                               "cannot read volume '%s': its %s values are noise in the stated byte order and a picture in the other: the "
-                               "endianness is stated wrongly",
-                               v->name, sample_name(l->sample));
+        return error_set_field(
+            err, STATUS_FORMAT, "volume.files",
+            "cannot read volume '%s': its %s values are noise in the stated byte order and a picture in the other: the "
+            "endianness is stated wrongly",
+            v->name, sample_name(l->sample));
     return STATUS_OK;
 }

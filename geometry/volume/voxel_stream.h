@@ -8,12 +8,12 @@
 #include "geometry/volume/volume_reader.h"
 
 struct voxel_layout {
-    size_t n[3];             /* 1 .. VOXEL_STREAM_MAX_EDGE each */
+    size_t n[3]; /* 1 .. VOXEL_STREAM_MAX_EDGE each */
     enum sample_type sample;
-    bool swap;               /* byte order opposite to the machine's */
+    bool swap; /* byte order opposite to the machine's */
     bool compressed;
-    long long offset_bytes;  /* of the data in the file; -1: plain data at the file's end */
-    long long skip_bytes;    /* before the first voxel, counted after inflating */
+    long long offset_bytes; /* of the data in the file; -1: plain data at the file's end */
+    long long skip_bytes;   /* before the first voxel, counted after inflating */
 };
 
 enum { VOXEL_STREAM_MAX_EDGE = 1 << 20 };

@@ -1,6 +1,6 @@
 #include "optimizer/job/job_document.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/method_names.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -93,8 +93,8 @@ struct job_document {
     char axes[8];
     double matrix[9];
     size_t crop_voxel[6];
-    bool align, crop;         /* "auto"; false where matrix, crop_voxel are given */
-    double crop_keep;         /* NaN: not given */
+    bool align, crop; /* "auto"; false where matrix, crop_voxel are given */
+    double crop_keep; /* NaN: not given */
     bool join_seams;
     double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j; /* NaN: not given */
     size_t filter_h;                                                                  /* 0: not given */
@@ -117,15 +117,15 @@ struct job_document {
     struct job_model model[JOB_MAX_MODEL];
     char method[64];
     uint64_t seed;
-    size_t max_iteration;                              /* 0: the method's default */
-    uint64_t path_budget;                              /* 0: the method's default */
+    size_t max_iteration; /* 0: the method's default */
+    uint64_t path_budget; /* 0: the method's default */
     /* volume models: d is a parameter, the last one; its entries in fixed and start follow from these two */
     double density_multiplier_per_cm; /* NaN: the model's default */
     bool fit_density;
     bool fit_radius;
     double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
     double texture_block_mm, texture_weight; /* block 0: not asked for */
-    size_t n_candidate; /* for the next photograph; 0: not asked for */
+    size_t n_candidate;                      /* for the next photograph; 0: not asked for */
     struct job_candidate *candidate;
     size_t render_px, render_sample;
 };

@@ -14,12 +14,14 @@ static status make_grid(struct job_document *doc, struct error *err)
     doc->candidate = calloc(FRONT + BACK, sizeof *doc->candidate);
     if (doc->candidate == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     for (size_t i = 0; i < FRONT; i++) {
-        struct job_candidate c = {light_theta[i / 16], 0.0, camera_theta[i / 4 % 4], camera_phi[i / 2 % 2], rotation[i % 2]};
+        struct job_candidate c = {light_theta[i / 16], 0.0, camera_theta[i / 4 % 4], camera_phi[i / 2 % 2],
+                                  rotation[i % 2]};
         if (c.camera_theta_deg == 0.0 && c.camera_phi_deg != 180.0) continue; /* from above, phi means nothing */
         doc->candidate[doc->n_candidate++] = c;
     }
     for (size_t i = 0; i < BACK && !doc->black_sheet; i++)
-        doc->candidate[doc->n_candidate++] = (struct job_candidate){150.0, 0.0, i / 2 ? 45.0 : 0.0, 180.0, rotation[i % 2]};
+        doc->candidate[doc->n_candidate++] =
+            (struct job_candidate){150.0, 0.0, i / 2 ? 45.0 : 0.0, 180.0, rotation[i % 2]};
     return STATUS_OK;
 }
 

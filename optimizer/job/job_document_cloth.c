@@ -148,9 +148,10 @@ static status parse_filter(const struct json_field *f, struct job_document *doc,
     if (s == STATUS_OK) s = json_field_number(&filter, "eps_d", 0.0, 1.0, &doc->filter_eps_d, err);
     if (s == STATUS_OK) s = json_field_number(&filter, "eps_J", -1e6, 0.0, &doc->filter_eps_j, err);
     if (s == STATUS_OK && doc->filter_t <= 0.5 * doc->filter_s) /* false where one is NaN: left to the data */
-        s = error_set_field(err, STATUS_INVALID, "volume.filter.t",
-                            "'volume.filter.t' is %g: it must be above half of s (%g), or no direction answers to fibers", doc->filter_t,
-                            doc->filter_s);
+        s = error_set_field(
+            err, STATUS_INVALID, "volume.filter.t",
+            "'volume.filter.t' is %g: it must be above half of s (%g), or no direction answers to fibers",
+            doc->filter_t, doc->filter_s);
     return s;
 }
 
@@ -170,10 +171,24 @@ static status parse_alignment(const struct json_field *f, struct job_document *d
 
 status job_parse_volume(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"files",        "raw",         "voxel_size_um",   "axes",   "matrix",
-                                      "crop_voxel",   "density_low", "density_high",    "filter", "link_sigma_voxel",
-                                      "min_vertices", "radius_um",   "radius_per_axis", "align",  "crop",
-                                      "crop_keep",    "join_seams",  NULL};
+    static const char *const key[] = {"files",
+                                      "raw",
+                                      "voxel_size_um",
+                                      "axes",
+                                      "matrix",
+                                      "crop_voxel",
+                                      "density_low",
+                                      "density_high",
+                                      "filter",
+                                      "link_sigma_voxel",
+                                      "min_vertices",
+                                      "radius_um",
+                                      "radius_per_axis",
+                                      "align",
+                                      "crop",
+                                      "crop_keep",
+                                      "join_seams",
+                                      NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_files(f, doc, err);
     if (s == STATUS_OK) s = parse_raw(f, doc, err);

@@ -1,6 +1,6 @@
 /* The section "fit" of a job document: names and values are checked against the registries of models and methods. */
-#include "optimizer/job/method_names.h"
 #include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/method_names.h"
 #include "renderer/scattering/appearance.h"
 
 #include <math.h>
@@ -56,7 +56,8 @@ static status parse_models(const struct json_field *f, struct job_document *doc,
     }
     size_t i_model = MAX_LISTED;
     status s = json_field_choice(f, "model", name, &i_model, err);
-    if (s == STATUS_OK && i_model < MAX_LISTED) snprintf(doc->model[0].id, sizeof doc->model[0].id, "%s", name[i_model]);
+    if (s == STATUS_OK && i_model < MAX_LISTED)
+        snprintf(doc->model[0].id, sizeof doc->model[0].id, "%s", name[i_model]);
     return s;
 }
 
@@ -170,7 +171,8 @@ static status parse_density(const struct json_field *f, const struct appearance 
         bool given = !isnan(doc->density_multiplier_per_cm);
         double value = given ? doc->density_multiplier_per_cm : param_to_file_unit(d, d->start);
         if (!doc->fit_density) doc->model[i].fixed[model[i].n_param - 1] = value;
-        if (doc->fit_density && given) doc->model[i].start[model[i].n_param - 1] = value; /* else a prior's mean may be */
+        if (doc->fit_density && given)
+            doc->model[i].start[model[i].n_param - 1] = value; /* else a prior's mean may be */
         any_volume = true;
     }
     static const char *const key[] = {"density_multiplier_per_cm", "fit_density"};
@@ -210,10 +212,10 @@ static status parse_radius(const struct json_field *f, const struct appearance *
     }
     for (size_t i = 0; i < doc->n_model && doc->fit_radius; i++)
         if (model[i].kind == APPEARANCE_SURFACE) return STATUS_OK;
-    return doc->fit_radius ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
-                                             "'fit.fit_radius' needs a model of fibers' surfaces: '%s' sees a volume",
-                                             model[0].id)
-                           : STATUS_OK;
+    return doc->fit_radius
+               ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
+                                 "'fit.fit_radius' needs a model of fibers' surfaces: '%s' sees a volume", model[0].id)
+               : STATUS_OK;
 }
 
 static status check_free_parameters(const struct appearance *m, const struct job_model *given, struct error *err)
@@ -251,12 +253,12 @@ static status parse_parameters(const struct json_field *f, struct job_document *
 
 status job_parse_fit(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"model",     "models",         "method",
-                                      "seed",      "max_iterations", "path_budget",
-                                      "fixed",     "start",          "density_multiplier_per_cm",
-                                      "fit_density", "render_px",    "render_samples",
-                                      "tied",      "bounds",         "priors",
-                                      "starts",    "nuisance",       "fit_radius",
+    static const char *const key[] = {"model",       "models",         "method",
+                                      "seed",        "max_iterations", "path_budget",
+                                      "fixed",       "start",          "density_multiplier_per_cm",
+                                      "fit_density", "render_px",      "render_samples",
+                                      "tied",        "bounds",         "priors",
+                                      "starts",      "nuisance",       "fit_radius",
                                       "candidates",  "texture",        NULL};
     status s = json_field_check_keys(f, key, err);
     if (s == STATUS_OK) s = parse_models(f, doc, err);

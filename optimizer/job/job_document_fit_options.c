@@ -1,6 +1,6 @@
 /* Ties, bounds, priors, starts and nuisance terms of the section "fit" (job_fit_option.h). */
-#include "optimizer/job/method_names.h"
 #include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/method_names.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -56,7 +56,8 @@ static status read_tie(const struct json_field *f, struct tie *t, struct error *
     bool list = json_is_array(f->object);
     if (!list && !json_is_object(f->object))
         return error_set_field(err, STATUS_INVALID, f->path,
-                               "'%s' must be a list of parameter names, or an object of names and proportions", f->path);
+                               "'%s' must be a list of parameter names, or an object of names and proportions",
+                               f->path);
     size_t n = list ? json_array_size(f->object) : json_object_size(f->object);
     if (n > JOB_MAX_PARAM)
         return error_set_field(err, STATUS_INVALID, f->path, "'%s' names %zu parameters: allowed are %d", f->path, n,
@@ -64,7 +65,8 @@ static status read_tie(const struct json_field *f, struct tie *t, struct error *
     void *iter = list ? NULL : json_object_iter((json_t *)(uintptr_t)f->object);
     for (t->n_name = 0; t->n_name < n; t->n_name++) {
         t->share[t->n_name] = 1.0;
-        t->name[t->n_name] = list ? json_string_value(json_array_get(f->object, t->n_name)) : json_object_iter_key(iter);
+        t->name[t->n_name] =
+            list ? json_string_value(json_array_get(f->object, t->n_name)) : json_object_iter_key(iter);
         if (t->name[t->n_name] == NULL)
             return error_set_field(err, STATUS_INVALID, f->path, "'%s' must be a list of parameter names", f->path);
         if (list) continue;
@@ -255,8 +257,7 @@ static status check_method(const struct job_document *doc, struct error *err)
 {
     bool has_prior = false;
     for (size_t i = 0; i < doc->n_model; i++)
-        for (size_t p = 0; p < JOB_MAX_PARAM; p++)
-            has_prior = has_prior || !isnan(doc->model[i].option.prior_mean[p]);
+        for (size_t p = 0; p < JOB_MAX_PARAM; p++) has_prior = has_prior || !isnan(doc->model[i].option.prior_mean[p]);
     const struct job_fit_option *o = &doc->model[0].option;
     const char *path = has_prior ? "fit.priors" : o->gain != JOB_GAIN_NONE || o->stray_light ? "fit.nuisance" : NULL;
     if (path == NULL || strcmp(doc->method, METHOD_GAUSS_NEWTON) == 0) return STATUS_OK;
@@ -336,9 +337,10 @@ static status group_bounds(const struct param_info *info, size_t n_param, const 
         *upper = fmin(*upper, b / o->ratio[p]);
     }
     if (*lower < *upper) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "fit.tied",
-                           "'fit.tied' leaves no room for '%s': the bounds of the parameters tied to it exclude each other",
-                           info[leader].name);
+    return error_set_field(
+        err, STATUS_INVALID, "fit.tied",
+        "'fit.tied' leaves no room for '%s': the bounds of the parameters tied to it exclude each other",
+        info[leader].name);
 }
 
 /* Stated by keys of its own, density_multiplier_per_cm and fit_density. */
@@ -358,12 +360,14 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
         if (o->leader[p] != leader || isnan(o->prior_mean[p])) continue;
         if (held)
             return error_set_field(err, STATUS_INVALID, "fit.priors", "'fit.priors' has '%s', which %s", info[p].name,
-                                   is_density(&info[p]) ? "is fitted only with 'fit.fit_density'" : "'fit.fixed' holds fixed");
+                                   is_density(&info[p]) ? "is fitted only with 'fit.fit_density'"
+                                                        : "'fit.fixed' holds fixed");
         double mean = o->prior_mean[p] / o->ratio[p];
         if (mean < lower - slack || mean > upper + slack)
-            return error_set_field(err, STATUS_INVALID, "fit.priors",
-                                   "'fit.priors' has '%s' at %g, which 'fit.tied' makes '%s' at %g: allowed are %g and %g",
-                                   info[p].name, o->prior_mean[p], info[leader].name, mean, lower, upper);
+            return error_set_field(
+                err, STATUS_INVALID, "fit.priors",
+                "'fit.priors' has '%s' at %g, which 'fit.tied' makes '%s' at %g: allowed are %g and %g", info[p].name,
+                o->prior_mean[p], info[leader].name, mean, lower, upper);
         if (fmax(bound[0] - mean, mean - bound[1]) > most_se * o->prior_se[p] / o->ratio[p])
             return error_set_field(err, STATUS_INVALID, "fit.priors",
                                    "'fit.priors' has '%s' at %g +- %g, its bounds are %g and %g: no value agrees with "
@@ -383,16 +387,18 @@ static size_t stated_member(const struct job_fit_option *o, size_t n_param, cons
 }
 
 /* Of the member of the group that the document speaks of; lower and upper are the leader's. */
-static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o, size_t leader,
-                             const char *field, const double *given, double lower, double upper, struct error *err)
+static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o,
+                             size_t leader, const char *field, const double *given, double lower, double upper,
+                             struct error *err)
 {
     size_t p = stated_member(o, n_param, given, leader);
     if (is_density(&info[p])) /* neither in 'fit.fixed' nor in 'fit.start' */
         return error_set_field(err, STATUS_INVALID, "fit.density_multiplier_per_cm",
                                "'fit.density_multiplier_per_cm' is %g%s: 'fit.bounds' has %g and %g", given[p],
-                               strcmp(field, "fit.fixed") == 0 ? ", and held there without 'fit.fit_density'" : "", lower, upper);
-    return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g%s", field, info[p].name,
-                           given[p], lower * o->ratio[p], upper * o->ratio[p],
+                               strcmp(field, "fit.fixed") == 0 ? ", and held there without 'fit.fit_density'" : "",
+                               lower, upper);
+    return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g%s", field,
+                           info[p].name, given[p], lower * o->ratio[p], upper * o->ratio[p],
                            is_tied(o, n_param, p) ? ", with those of what 'fit.tied' ties it to" : "");
 }
 
@@ -429,8 +435,8 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     value = fmin(fmax(value, lower), upper);
     for (size_t p = 0; p < n_param; p++) {
         if (o->leader[p] != leader) continue;
-        out[p] = (struct job_fit_parameter){lower * o->ratio[p], upper * o->ratio[p], value * o->ratio[p],
-                                            !isnan(held)};
+        out[p] =
+            (struct job_fit_parameter){lower * o->ratio[p], upper * o->ratio[p], value * o->ratio[p], !isnan(held)};
     }
     return STATUS_OK;
 }

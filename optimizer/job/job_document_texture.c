@@ -20,8 +20,8 @@ static status check_use(const struct job_document *doc, struct error *err)
 {
     const char *const field = "fit.texture";
     if (doc->measurement_file[0] != '\0')
-        return error_set_field(err, STATUS_INVALID, field,
-                               "'%s' needs photographs: a table of means has no texture", field);
+        return error_set_field(err, STATUS_INVALID, field, "'%s' needs photographs: a table of means has no texture",
+                               field);
     if (doc->texture_weight > 0.0 && strcmp(doc->method, METHOD_GAUSS_NEWTON) != 0)
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' with a weight needs the method '%s': '%s' has no such terms", field,

@@ -13,7 +13,8 @@
 static const char photograph_usage[] =
     "selvedge-phantom photograph --fibers FILE --out DIR [options]\n"
     "\n"
-    "Renders one OpenEXR picture per configuration: DIR/fit-00.exr ... DIR/held-out-23.exr, DIR/photographs.json (the array \"photographs\" of a\n"
+    "Renders one OpenEXR picture per configuration: DIR/fit-00.exr ... DIR/held-out-23.exr, DIR/photographs.json (the "
+    "array \"photographs\" of a\n"
     "job document) and DIR/truth.json (the parameters, and each picture's mean without noise).\n"
     "\n"
     "  --fibers FILE           .hair, or text \"x y z radius\" together with --tile-mm X,Y\n"
@@ -63,7 +64,8 @@ static bool wants_help(int argc, char **argv, const char *usage)
     return false;
 }
 
-static status parse_photograph(struct phantom_photograph_option *o, size_t *n_thread, bool *quiet, int argc, char **argv, struct error *err)
+static status parse_photograph(struct phantom_photograph_option *o, size_t *n_thread, bool *quiet, int argc,
+                               char **argv, struct error *err)
 {
     const char *model = "two_lobe.v1";
     struct param_text param = {.n = 0};
@@ -89,11 +91,13 @@ static status parse_photograph(struct phantom_photograph_option *o, size_t *n_th
     };
     status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st != STATUS_OK) return st;
-    if (o->fiber_file == NULL || o->folder == NULL) return error_set(err, STATUS_INVALID, "--fibers and --out are needed");
+    if (o->fiber_file == NULL || o->folder == NULL)
+        return error_set(err, STATUS_INVALID, "--fibers and --out are needed");
     o->model = scattering_find(model);
     if (o->model == NULL) return error_set(err, STATUS_INVALID, "unknown scattering model '%s'", model);
     for (size_t i = 0; i < o->model->n_param; i++) o->param[i] = o->model->param[i].start;
-    for (size_t i = 0; i < param.n && st == STATUS_OK; i++) st = phantom_param_parse(o->model, param.text[i], o->param, err);
+    for (size_t i = 0; i < param.n && st == STATUS_OK; i++)
+        st = phantom_param_parse(o->model, param.text[i], o->param, err);
     return st;
 }
 
@@ -126,7 +130,8 @@ int phantom_command_photograph(int argc, char **argv)
 static status load(const char *path, const double tile_mm[2], struct fiber_set *f, struct error *err)
 {
     size_t n = strlen(path);
-    status st = n > 5 && strcmp(path + n - 5, ".hair") == 0 ? fiber_set_read_hair(f, path, err) : fiber_set_read_text(f, path, err);
+    status st = n > 5 && strcmp(path + n - 5, ".hair") == 0 ? fiber_set_read_hair(f, path, err)
+                                                            : fiber_set_read_text(f, path, err);
     for (int a = 0; a < 2 && st == STATUS_OK; a++)
         if (tile_mm[a] > 0.0) f->tile_size_m[a] = 1e-3 * tile_mm[a];
     return st;
@@ -188,7 +193,8 @@ int phantom_command_compare(int argc, char **argv)
     fiber_set_init(&found);
     if (wants_help(argc, argv, compare_usage)) return 0;
     status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, &err);
-    if (st == STATUS_OK && (truth_file == NULL || found_file == NULL)) st = error_set(&err, STATUS_INVALID, "--truth and --fibers are needed");
+    if (st == STATUS_OK && (truth_file == NULL || found_file == NULL))
+        st = error_set(&err, STATUS_INVALID, "--truth and --fibers are needed");
     if (st != STATUS_OK) {
         fprintf(stderr, "selvedge-phantom compare: %s\n", err.text);
         return 2;

@@ -12,18 +12,23 @@
 static const char usage[] =
     "selvedge-phantom cloth --out DIR [options]\n"
     "\n"
-    "Writes DIR/scan.tif (the CT volume), DIR/truth.hair and DIR/truth.txt (the fibers), DIR/phantom.json (all numbers), and the pictures\n"
+    "Writes DIR/scan.tif (the CT volume), DIR/truth.hair and DIR/truth.txt (the fibers), DIR/phantom.json (all "
+    "numbers), and the pictures\n"
     "DIR/top.png (heights from above) and DIR/slice-x.png, slice-y.png, slice-z.png (through the middle).\n"
     "\n"
     "cloth\n"
     "  --weave NAME            plain, twill (2/2), twill31, satin, velvet, knit, felt                     [twill]\n"
     "  --voxel-um V            edge of a voxel                                                            [2]\n"
     "  --diameter-voxel D      fiber diameter in voxels; WEFT,WARP,PILE where they differ                 [7]\n"
-    "  --yarns WEFT,WARP       yarns a tile (knit: courses,wales), multiples of the repeat                [one repeat]\n"
-    "  --fibers-per-yarn N     rounded up to 1 + 6 k; felt: fibers in all                                 [19; velvet 7, felt 60]\n"
+    "  --yarns WEFT,WARP       yarns a tile (knit: courses,wales), multiples of the repeat                [one "
+    "repeat]\n"
+    "  --fibers-per-yarn N     rounded up to 1 + 6 k; felt: fibers in all                                 [19; velvet "
+    "7, felt 60]\n"
     "  --packing P             share of a yarn's section that is fiber, 0.3 .. 0.9                        [0.7]\n"
-    "  --flatness F            width over height of a yarn, 1 .. 4                                        [1.8; knit 1]\n"
-    "  --cover C               yarn width over spacing, 0.5 .. 1.3                                        [1.05; knit 1]\n"
+    "  --flatness F            width over height of a yarn, 1 .. 4                                        [1.8; knit "
+    "1]\n"
+    "  --cover C               yarn width over spacing, 0.5 .. 1.3                                        [1.05; knit "
+    "1]\n"
     "  --twist T               turns a tile, rounded to sixths                                            [0.333]\n"
     "  --migration M           relative radial wandering of fibers, 0 .. 0.5                              [0.05]\n"
     "  --yarn FILE             plied yarns by a file of measured parameters, in place of --fibers-per-yarn,\n"
@@ -41,7 +46,8 @@ static const char usage[] =
     "  --bits 8|16             depth of scan.tif                                                          [16]\n"
     "  --no-deflate            write scan.tif uncompressed\n"
     "  --metaimage             write DIR/scan.mhd and scan.raw as well\n"
-    "  --voxels-z N            slices in all, the cloth in the middle of them                             [as many as it needs]\n"
+    "  --voxels-z N            slices in all, the cloth in the middle of them                             [as many as "
+    "it needs]\n"
     "other\n"
     "  --seed N                everything random follows from it                                          [1]\n"
     "  --threads N             0: one per processor                                                       [0]\n"
@@ -63,7 +69,8 @@ struct cloth {
 static status path_in(const char *folder, const char *name, char path[4096], struct error *err)
 {
     int n = snprintf(path, 4096, "%s/%s", folder, name);
-    return n < 0 || n >= 4096 ? error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", folder) : STATUS_OK;
+    return n < 0 || n >= 4096 ? error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", folder)
+                              : STATUS_OK;
 }
 
 static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *err)
@@ -193,30 +200,33 @@ static json_t *describe(const struct cloth *c)
     const struct phantom_option *o = &c->phantom;
     const struct phantom_report *r = &c->report;
     double um = 1e6;
-    json_t *cloth = json_pack("{s:s,s:f,s:[f,f,f],s:i,s:f,s:f,s:f,s:f,s:f,s:i,s:f,s:f}", "weave", phantom_weave_name(o->weave), "voxel_size_um",
-                              um * o->voxel_size_m, "fiber_radius_um", um * o->fiber_radius_m[0], um * o->fiber_radius_m[1],
-                              um * o->fiber_radius_m[2], "fibers_per_yarn", (int)r->n_fiber_per_yarn, "packing", o->packing, "flatness",
-                              o->flatness, "cover_designed", o->cover, "twist_turns", r->twist_turns, "migration", o->migration,
-                              "flyaways_per_yarn", (int)o->n_flyaway_per_yarn, "fiber_diameter_voxel",
+    json_t *cloth = json_pack("{s:s,s:f,s:[f,f,f],s:i,s:f,s:f,s:f,s:f,s:f,s:i,s:f,s:f}", "weave",
+                              phantom_weave_name(o->weave), "voxel_size_um", um * o->voxel_size_m, "fiber_radius_um",
+                              um * o->fiber_radius_m[0], um * o->fiber_radius_m[1], um * o->fiber_radius_m[2],
+                              "fibers_per_yarn", (int)r->n_fiber_per_yarn, "packing", o->packing, "flatness",
+                              o->flatness, "cover_designed", o->cover, "twist_turns", r->twist_turns, "migration",
+                              o->migration, "flyaways_per_yarn", (int)o->n_flyaway_per_yarn, "fiber_diameter_voxel",
                               2.0 * o->fiber_radius_m[0] / o->voxel_size_m, "yarn_width_um", um * r->yarn_width_m);
-    json_t *scan = json_pack("{s:f,s:f,s:f,s:f,s:f,s:i,s:f,s:f}", "snr", c->scan.snr, "blur_sd_voxel", c->scan.blur_sd_voxel,
-                             "poisson_count", c->scan.poisson_count, "ring_amplitude", c->scan.ring_amplitude, "gradient",
-                             c->scan.gradient, "bits", c->file.bits, "void_value", c->file.void_value, "fiber_value",
-                             c->file.fiber_value);
-    json_t *size = json_pack("{s:[i,i,i],s:[f,f],s:[f,f],s:i,s:i,s:f,s:f,s:f,s:f,s:f,s:f}", "n_voxel", (int)r->n_voxel[0], (int)r->n_voxel[1],
-                             (int)r->n_voxel[2], "tile_mm", 1e3 * c->fibers.tile_size_m[0], 1e3 * c->fibers.tile_size_m[1],
-                             "yarn_spacing_um", um * r->yarn_spacing_m[0], um * r->yarn_spacing_m[1], "n_fiber", (int)c->fibers.n_fiber,
-                             "n_vertex", (int)c->fibers.n_vertex, "length_mm", 1e3 * fiber_set_length_m(&c->fibers), "cover", r->cover,
-                             "volume_fraction", r->volume_fraction, "overlap_mean", r->overlap_mean, "overlap_max", r->overlap_max,
-                             "strain_p95", r->strain_p95);
+    json_t *scan = json_pack("{s:f,s:f,s:f,s:f,s:f,s:i,s:f,s:f}", "snr", c->scan.snr, "blur_sd_voxel",
+                             c->scan.blur_sd_voxel, "poisson_count", c->scan.poisson_count, "ring_amplitude",
+                             c->scan.ring_amplitude, "gradient", c->scan.gradient, "bits", c->file.bits, "void_value",
+                             c->file.void_value, "fiber_value", c->file.fiber_value);
+    json_t *size = json_pack("{s:[i,i,i],s:[f,f],s:[f,f],s:i,s:i,s:f,s:f,s:f,s:f,s:f,s:f}", "n_voxel",
+                             (int)r->n_voxel[0], (int)r->n_voxel[1], (int)r->n_voxel[2], "tile_mm",
+                             1e3 * c->fibers.tile_size_m[0], 1e3 * c->fibers.tile_size_m[1], "yarn_spacing_um",
+                             um * r->yarn_spacing_m[0], um * r->yarn_spacing_m[1], "n_fiber", (int)c->fibers.n_fiber,
+                             "n_vertex", (int)c->fibers.n_vertex, "length_mm", 1e3 * fiber_set_length_m(&c->fibers),
+                             "cover", r->cover, "volume_fraction", r->volume_fraction, "overlap_mean", r->overlap_mean,
+                             "overlap_max", r->overlap_max, "strain_p95", r->strain_p95);
     const struct phantom_plied *p = &r->plied;
     if (o->yarn.n_ply > 0 && cloth != NULL) {
         json_object_del(cloth, "migration"); /* of the lattice yarn */
         json_object_del(cloth, "flyaways_per_yarn");
         json_object_set_new(cloth, "yarn",
-                            json_pack("{s:s,s:i,s:i,s:f,s:[f,f],s:[f,f],s:[f,f],s:i,s:i}", "file", path_name(c->yarn), "plies", (int)o->yarn.n_ply,
-                                      "fibers_per_ply", (int)o->yarn.n_fiber, "scale", p->scale, "ply_turns", p->ply_turns[0], p->ply_turns[1],
-                                      "ply_turns_unrounded", p->wanted_ply_turns[0], p->wanted_ply_turns[1], "fiber_turns", p->fiber_turns[0],
+                            json_pack("{s:s,s:i,s:i,s:f,s:[f,f],s:[f,f],s:[f,f],s:i,s:i}", "file", path_name(c->yarn),
+                                      "plies", (int)o->yarn.n_ply, "fibers_per_ply", (int)o->yarn.n_fiber, "scale",
+                                      p->scale, "ply_turns", p->ply_turns[0], p->ply_turns[1], "ply_turns_unrounded",
+                                      p->wanted_ply_turns[0], p->wanted_ply_turns[1], "fiber_turns", p->fiber_turns[0],
                                       p->fiber_turns[1], "hairs", (int)p->n_hair, "loops", (int)p->n_loop));
     }
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
@@ -265,7 +275,8 @@ int phantom_command_cloth(int argc, char **argv)
     status st = thread_pool_new(c.n_thread, &pool, &err);
     if (st == STATUS_OK) st = durable_make_folder(c.out, &err);
     if (st == STATUS_OK) st = phantom_generate(&c.phantom, pool, NULL, &c.fibers, &c.report, &err);
-    if (st == STATUS_OK && c.n_slice > 0) st = phantom_pad(&c.fibers, &c.report, c.phantom.voxel_size_m, c.n_slice, &err);
+    if (st == STATUS_OK && c.n_slice > 0)
+        st = phantom_pad(&c.fibers, &c.report, c.phantom.voxel_size_m, c.n_slice, &err);
     if (st == STATUS_OK) st = scratch_space_new(c.out, c.memory_mib << 20, &space, &err);
     if (st == STATUS_OK) st = phantom_scan_in(&c.fibers, c.report.n_voxel, &c.scan, space, pool, NULL, &c.volume, &err);
     if (st == STATUS_OK) st = write_files(&c, &err);

@@ -46,20 +46,36 @@ static status set_option(const struct command_option *o, const char *value, stru
     size_t n = o->n > 0 ? o->n : 1;
     bool ok = true;
     switch (o->kind) {
-    case OPTION_TEXT: *(const char **)o->to = value; break;
-    case OPTION_NUMBER: ok = parse_list(value, o->to, 1); break;
-    case OPTION_NUMBER_LIST: ok = parse_list(value, o->to, n); break;
-    case OPTION_COUNT: ok = parse_counts(value, o->to, n); break;
-    case OPTION_U64: ok = parse_u64(value, o->to); break;
-    case OPTION_FLAG: *(bool *)o->to = true; break;
-    case OPTION_FALSE: *(bool *)o->to = false; break;
-    case OPTION_CALL: return o->call(o->to, value, err);
+    case OPTION_TEXT:
+        *(const char **)o->to = value;
+        break;
+    case OPTION_NUMBER:
+        ok = parse_list(value, o->to, 1);
+        break;
+    case OPTION_NUMBER_LIST:
+        ok = parse_list(value, o->to, n);
+        break;
+    case OPTION_COUNT:
+        ok = parse_counts(value, o->to, n);
+        break;
+    case OPTION_U64:
+        ok = parse_u64(value, o->to);
+        break;
+    case OPTION_FLAG:
+        *(bool *)o->to = true;
+        break;
+    case OPTION_FALSE:
+        *(bool *)o->to = false;
+        break;
+    case OPTION_CALL:
+        return o->call(o->to, value, err);
     }
     if (ok) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, o->name, "option --%s does not take '%s'", o->name, value);
 }
 
-status command_options_parse(int argc, char **argv, const struct command_option *option, size_t n_option, struct error *err)
+status command_options_parse(int argc, char **argv, const struct command_option *option, size_t n_option,
+                             struct error *err)
 {
     for (int i = 1; i < argc; i++) {
         const struct command_option *found = NULL;
@@ -67,7 +83,8 @@ status command_options_parse(int argc, char **argv, const struct command_option 
         if (strncmp(argv[i], "--", 2) == 0) {
             size_t n_name = strcspn(argv[i] + 2, "=");
             for (size_t k = 0; k < n_option && found == NULL; k++)
-                if (strlen(option[k].name) == n_name && strncmp(option[k].name, argv[i] + 2, n_name) == 0) found = &option[k];
+                if (strlen(option[k].name) == n_name && strncmp(option[k].name, argv[i] + 2, n_name) == 0)
+                    found = &option[k];
             if (argv[i][2 + n_name] == '=') value = argv[i] + 3 + n_name;
         }
         if (found == NULL) return error_set(err, STATUS_INVALID, "unknown option '%s'", argv[i]);

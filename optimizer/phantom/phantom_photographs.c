@@ -3,8 +3,8 @@
 #include "base/durable.h"
 #include "base/rng.h"
 #include "geometry/fibers/fiber_set.h"
-#include "optimizer/phantom/phantom_view_table.h"
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/phantom/phantom_view_table.h"
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 
@@ -16,8 +16,14 @@
 
 void phantom_photograph_option_default(struct phantom_photograph_option *o)
 {
-    *o = (struct phantom_photograph_option){.n_path = 1 << 17, .px = 64, .seed = 1, .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0,
-                                            .camera_distance_cm = 100.0, .crop_cm = 1.0, .black_sheet = true};
+    *o = (struct phantom_photograph_option){.n_path = 1 << 17,
+                                            .px = 64,
+                                            .seed = 1,
+                                            .lamp_side_cm = 10.0,
+                                            .lamp_distance_cm = 61.0,
+                                            .camera_distance_cm = 100.0,
+                                            .crop_cm = 1.0,
+                                            .black_sheet = true};
 }
 
 /* Comma-separated numbers, at most three. Returns how many, 0 for anything else. */
@@ -48,15 +54,18 @@ status phantom_param_parse(const struct scattering_model *model, const char *tex
         if (!whole && !group) continue;
         size_t wanted = group && p->channel >= 0 ? 3 : 1;
         if (n_value != 1 && n_value != wanted)
-            return error_set_field(err, STATUS_INVALID, "param", "parameter '%s': it takes %s", text, wanted == 3 ? "1 or 3 values" : "1 value");
+            return error_set_field(err, STATUS_INVALID, "param", "parameter '%s': it takes %s", text,
+                                   wanted == 3 ? "1 or 3 values" : "1 value");
         double v = param_from_file_unit(p, n_value == 3 ? value[p->channel] : value[0]);
         if (!(v >= p->lower && v <= p->upper))
-            return error_set_field(err, STATUS_INVALID, "param", "parameter '%s': it must lie between %g and %g %s", text,
-                                   param_to_file_unit(p, p->lower), param_to_file_unit(p, p->upper), p->unit);
+            return error_set_field(err, STATUS_INVALID, "param", "parameter '%s': it must lie between %g and %g %s",
+                                   text, param_to_file_unit(p, p->lower), param_to_file_unit(p, p->upper), p->unit);
         param[i] = v;
         n_match++;
     }
-    if (n_match == 0) return error_set_field(err, STATUS_INVALID, "param", "model '%s' has no parameter '%.*s'", model->id, (int)n_name, text);
+    if (n_match == 0)
+        return error_set_field(err, STATUS_INVALID, "param", "model '%s' has no parameter '%.*s'", model->id,
+                               (int)n_name, text);
     return STATUS_OK;
 }
 
@@ -66,7 +75,8 @@ static bool ends_with(const char *text, const char *end)
     return n >= m && strcmp(text + n - m, end) == 0;
 }
 
-static status load_scene(const struct phantom_photograph_option *o, struct scene **scene, json_t *truth, struct error *err)
+static status load_scene(const struct phantom_photograph_option *o, struct scene **scene, json_t *truth,
+                         struct error *err)
 {
     struct fiber_set f;
     fiber_set_init(&f);
@@ -94,8 +104,8 @@ static json_t *param_json(const struct scattering_model *model, const double *pa
 }
 
 /* Mean and its standard error per channel, then the whole photograph's error is put on and the rgb planes are written. */
-static status finish_picture(const struct phantom_photograph_option *o, const struct image *im, size_t number, const char *path,
-                             json_t *row, struct error *err)
+static status finish_picture(const struct phantom_photograph_option *o, const struct image *im, size_t number,
+                             const char *path, json_t *row, struct error *err)
 {
     static const char *const rgb_name[] = {"R", "G", "B"};
     const struct rng_key key = {.seed = o->seed, .iteration = 65534};
@@ -126,50 +136,66 @@ static status finish_picture(const struct phantom_photograph_option *o, const st
     return st;
 }
 
-static struct configuration view_configuration(const struct phantom_photograph_option *o, const struct job_photograph *v)
+static struct configuration view_configuration(const struct phantom_photograph_option *o,
+                                               const struct job_photograph *v)
 {
-    const struct job_document set_up = {.lamp_side_cm = o->lamp_side_cm, .lamp_distance_cm = o->lamp_distance_cm,
-                                        .camera_distance_cm = o->camera_distance_cm, .crop_cm = o->crop_cm};
-    return observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg, v->camera_phi_deg,
-                                     v->cloth_rotation_deg);
+    const struct job_document set_up = {.lamp_side_cm = o->lamp_side_cm,
+                                        .lamp_distance_cm = o->lamp_distance_cm,
+                                        .camera_distance_cm = o->camera_distance_cm,
+                                        .crop_cm = o->crop_cm};
+    return observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
+                                     v->camera_phi_deg, v->cloth_rotation_deg);
 }
 
 static status check_view(const struct phantom_photograph_option *o, const struct job_photograph *v, struct error *err)
 {
     const struct configuration c = view_configuration(o, v);
-    if (estimate_check_configurations(&c, 1, 0, 0, NULL) != STATUS_OK || !(v->light_theta_deg >= 0.0 && v->light_theta_deg <= 180.0))
-        return error_set(err, STATUS_INVALID,
-                         "photograph '%s' makes no sense: camera_theta_deg must be 0 to below 90, light_theta_deg 0 to 180, and "
-                         "distances, lamp and crop above 0",
-                         v->file);
+    if (estimate_check_configurations(&c, 1, 0, 0, NULL) != STATUS_OK ||
+        !(v->light_theta_deg >= 0.0 && v->light_theta_deg <= 180.0))
+        return error_set(
+            err, STATUS_INVALID,
+            "photograph '%s' makes no sense: camera_theta_deg must be 0 to below 90, light_theta_deg 0 to 180, and "
+            "distances, lamp and crop above 0",
+            v->file);
     if (o->black_sheet && v->light_theta_deg >= 90.0)
-        return error_set(err, STATUS_INVALID,
-                         "photograph '%s' would be black: the lamp at %g degrees is behind the black sheet (--no-black-sheet)", v->file,
-                         v->light_theta_deg);
+        return error_set(
+            err, STATUS_INVALID,
+            "photograph '%s' would be black: the lamp at %g degrees is behind the black sheet (--no-black-sheet)",
+            v->file, v->light_theta_deg);
     return STATUS_OK;
 }
 
-static status make_photograph(const struct phantom_photograph_option *o, const struct scene *scene, const struct job_photograph *v,
-                              size_t number, struct thread_pool *pool, const struct progress *progress, json_t *photographs,
-                              json_t *truth_rows, struct error *err)
+static status make_photograph(const struct phantom_photograph_option *o, const struct scene *scene,
+                              const struct job_photograph *v, size_t number, struct thread_pool *pool,
+                              const struct progress *progress, json_t *photographs, json_t *truth_rows,
+                              struct error *err)
 {
     char path[4096];
     struct image im = {0};
     const struct configuration c = view_configuration(o, v);
     const size_t n_pixel = o->px * o->px, n_sample = (size_t)((o->n_path + n_pixel - 1) / n_pixel);
-    const struct render_request q = {.scene = scene, .model = o->model, .param = o->param, .configuration = &c, .width = o->px,
-                                     .height = o->px, .n_sample = n_sample > 2 ? n_sample : 2, /* one has no error */
-                                     .seed = o->seed, .stream = (uint32_t)number};
+    const struct render_request q = {.scene = scene,
+                                     .model = o->model,
+                                     .param = o->param,
+                                     .configuration = &c,
+                                     .width = o->px,
+                                     .height = o->px,
+                                     .n_sample = n_sample > 2 ? n_sample : 2, /* one has no error */
+                                     .seed = o->seed,
+                                     .stream = (uint32_t)number};
     status st = render_run(&q, pool, progress, &im, err);
     if (st != STATUS_OK) return st;
-    json_t *row = json_pack("{s:s,s:s,s:f,s:f,s:f,s:f,s:f,s:f}", "file", v->file, "set", v->set == JOB_SET_FIT ? "fit" : "held-out",
-                            "light_theta_deg", v->light_theta_deg, "light_phi_deg", v->light_phi_deg, "camera_theta_deg",
-                            v->camera_theta_deg, "camera_phi_deg", v->camera_phi_deg, "cloth_rotation_deg", v->cloth_rotation_deg,
-                            "scale", v->scale);
+    json_t *row =
+        json_pack("{s:s,s:s,s:f,s:f,s:f,s:f,s:f,s:f}", "file", v->file, "set",
+                  v->set == JOB_SET_FIT ? "fit" : "held-out", "light_theta_deg", v->light_theta_deg, "light_phi_deg",
+                  v->light_phi_deg, "camera_theta_deg", v->camera_theta_deg, "camera_phi_deg", v->camera_phi_deg,
+                  "cloth_rotation_deg", v->cloth_rotation_deg, "scale", v->scale);
     json_t *told = json_pack("{s:s}", "file", v->file);
     int n = snprintf(path, sizeof path, "%s/%s", o->folder, v->file);
-    if (n < 0 || (size_t)n >= sizeof path) st = error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", o->folder);
-    else st = finish_picture(o, &im, number, path, told, err);
+    if (n < 0 || (size_t)n >= sizeof path)
+        st = error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", o->folder);
+    else
+        st = finish_picture(o, &im, number, path, told, err);
     json_array_append_new(photographs, row);
     json_array_append_new(truth_rows, told);
     image_release(&im);
@@ -180,7 +206,8 @@ static status write_json(const json_t *j, const char *folder, const char *name, 
 {
     char path[4096];
     int n = snprintf(path, sizeof path, "%s/%s", folder, name);
-    if (n < 0 || (size_t)n >= sizeof path) return error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", folder);
+    if (n < 0 || (size_t)n >= sizeof path)
+        return error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", folder);
     char *text = json_dumps(j, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(9));
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     status st = durable_replace(path, text, strlen(text), err);
@@ -203,8 +230,10 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
         st = error_set(err, STATUS_INVALID, "a photograph needs 1 to 4096 pixels a side and at least one path");
         goto out;
     }
-    if (o->table_file == NULL) phantom_view_table_builtin(t);
-    else st = phantom_view_table_read(t, o->table_file, err);
+    if (o->table_file == NULL)
+        phantom_view_table_builtin(t);
+    else
+        st = phantom_view_table_read(t, o->table_file, err);
     for (size_t i = 0; i < t->n && st == STATUS_OK; i++) st = check_view(o, &t->view[i], err);
     if (st == STATUS_OK) st = durable_make_folder(o->folder, err);
     if (st == STATUS_OK) st = load_scene(o, &scene, truth, err);
@@ -220,8 +249,10 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
     json_object_set_new(truth, "n_path", json_integer((json_int_t)o->n_path));
     json_object_set_new(truth, "noise", json_real(o->noise));
     json_object_set_new(truth, "black_sheet", json_boolean(o->black_sheet));
-    json_object_set_new(truth, "lamp", json_pack("{s:f,s:f}", "side_cm", o->lamp_side_cm, "distance_cm", o->lamp_distance_cm));
-    json_object_set_new(truth, "camera", json_pack("{s:f,s:f}", "distance_cm", o->camera_distance_cm, "crop_cm", o->crop_cm));
+    json_object_set_new(truth, "lamp",
+                        json_pack("{s:f,s:f}", "side_cm", o->lamp_side_cm, "distance_cm", o->lamp_distance_cm));
+    json_object_set_new(truth, "camera",
+                        json_pack("{s:f,s:f}", "distance_cm", o->camera_distance_cm, "crop_cm", o->crop_cm));
     json_object_set(truth, "photographs", rows);
     st = write_json(photographs, o->folder, "photographs.json", err);
     if (st == STATUS_OK) st = write_json(truth, o->folder, "truth.json", err);

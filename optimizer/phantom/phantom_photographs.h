@@ -7,15 +7,16 @@
 #include "renderer/scattering/scattering.h"
 
 struct phantom_photograph_option {
-    const char *fiber_file;       /* .hair, or text "x y z radius" with tile_mm */
-    double tile_mm[2];            /* 0: as the file states */
-    const char *table_file;       /* CSV with the angle columns of a measurement table; NULL: the built-in 16 + 24 configurations */
-    const char *folder;           /* made if needed */
+    const char *fiber_file; /* .hair, or text "x y z radius" with tile_mm */
+    double tile_mm[2];      /* 0: as the file states */
+    const char
+        *table_file; /* CSV with the angle columns of a measurement table; NULL: the built-in 16 + 24 configurations */
+    const char *folder; /* made if needed */
     const struct scattering_model *model;
     double param[SCATTERING_MAX_PARAM]; /* internal units */
-    uint64_t n_path;              /* per photograph */
-    size_t px;                    /* edge of the square picture */
-    double noise;                 /* relative standard deviation of an error that a whole photograph has, drawn per channel */
+    uint64_t n_path;                    /* per photograph */
+    size_t px;                          /* edge of the square picture */
+    double noise; /* relative standard deviation of an error that a whole photograph has, drawn per channel */
     uint64_t seed;
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
     bool black_sheet;

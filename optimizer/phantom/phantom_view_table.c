@@ -29,8 +29,11 @@ static void append(struct phantom_view_table *t, enum job_set set, const struct 
     for (size_t turn = 0; turn < 2; turn++)
         for (size_t i = 0; i < n; i++) {
             struct job_photograph *v = &t->view[t->n++];
-            *v = (struct job_photograph){.set = set, .light_theta_deg = a[i].light_theta, .light_phi_deg = a[i].light_phi,
-                                         .camera_theta_deg = a[i].camera_theta, .camera_phi_deg = a[i].camera_phi,
+            *v = (struct job_photograph){.set = set,
+                                         .light_theta_deg = a[i].light_theta,
+                                         .light_phi_deg = a[i].light_phi,
+                                         .camera_theta_deg = a[i].camera_theta,
+                                         .camera_phi_deg = a[i].camera_phi,
                                          .cloth_rotation_deg = 90.0 * (double)turn};
             name_view(v, turn * n + i);
         }
@@ -43,10 +46,19 @@ void phantom_view_table_builtin(struct phantom_view_table *t)
     append(t, JOB_SET_HELD_OUT, held_out_angles, sizeof held_out_angles / sizeof *held_out_angles);
 }
 
-enum { COLUMN_SET, COLUMN_LIGHT_THETA, COLUMN_LIGHT_PHI, COLUMN_CAMERA_THETA, COLUMN_CAMERA_PHI, COLUMN_ROTATION, N_COLUMN, CELLS_MAX = 64 };
+enum {
+    COLUMN_SET,
+    COLUMN_LIGHT_THETA,
+    COLUMN_LIGHT_PHI,
+    COLUMN_CAMERA_THETA,
+    COLUMN_CAMERA_PHI,
+    COLUMN_ROTATION,
+    N_COLUMN,
+    CELLS_MAX = 64
+};
 
-static const char *const column_name[N_COLUMN] = {"set",              "light_theta_deg", "light_phi_deg",
-                                                  "camera_theta_deg", "camera_phi_deg",  "cloth_rotation_deg"};
+static const char *const column_name[N_COLUMN] = {
+    "set", "light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg", "cloth_rotation_deg"};
 
 /* Cut a line at its commas, in place. */
 static size_t split(char *line, char *cell[CELLS_MAX])
@@ -69,34 +81,37 @@ static status read_columns(char **cell, size_t n, long place[N_COLUMN], const ch
         for (size_t i = 0; i < n; i++)
             if (strcmp(cell[i], column_name[c]) == 0) place[c] = (long)i;
         if (place[c] < 0 && c != COLUMN_ROTATION)
-            return error_set(err, STATUS_FORMAT, "cannot read table '%s': column '%s' is missing", path, column_name[c]);
+            return error_set(err, STATUS_FORMAT, "cannot read table '%s': column '%s' is missing", path,
+                             column_name[c]);
     }
     return STATUS_OK;
 }
 
-static status read_row(char **cell, size_t n, const long place[N_COLUMN], struct job_photograph *v, const char *path, size_t i_line,
-                       struct error *err)
+static status read_row(char **cell, size_t n, const long place[N_COLUMN], struct job_photograph *v, const char *path,
+                       size_t i_line, struct error *err)
 {
-    double *to[N_COLUMN] = {NULL, &v->light_theta_deg, &v->light_phi_deg, &v->camera_theta_deg, &v->camera_phi_deg,
-                            &v->cloth_rotation_deg};
+    double *to[N_COLUMN] = {
+        NULL, &v->light_theta_deg, &v->light_phi_deg, &v->camera_theta_deg, &v->camera_phi_deg, &v->cloth_rotation_deg};
     *v = (struct job_photograph){0};
     for (int c = 0; c < N_COLUMN; c++) {
         if (place[c] < 0) continue;
         if ((size_t)place[c] >= n)
-            return error_set(err, STATUS_FORMAT, "cannot read table '%s': line %zu has no '%s'", path, i_line, column_name[c]);
+            return error_set(err, STATUS_FORMAT, "cannot read table '%s': line %zu has no '%s'", path, i_line,
+                             column_name[c]);
         const char *text = cell[place[c]];
         if (c == COLUMN_SET) {
             if (strcmp(text, "fit") != 0 && strcmp(text, "held-out") != 0)
-                return error_set(err, STATUS_FORMAT, "cannot read table '%s': line %zu: set '%s' is neither fit nor held-out", path,
-                                 i_line, text);
+                return error_set(err, STATUS_FORMAT,
+                                 "cannot read table '%s': line %zu: set '%s' is neither fit nor held-out", path, i_line,
+                                 text);
             v->set = strcmp(text, "fit") == 0 ? JOB_SET_FIT : JOB_SET_HELD_OUT;
             continue;
         }
         char *end;
         *to[c] = strtod(text, &end);
         if (end == text || *end != '\0' || !isfinite(*to[c]))
-            return error_set(err, STATUS_FORMAT, "cannot read table '%s': line %zu: %s '%s' is no number", path, i_line, column_name[c],
-                             text);
+            return error_set(err, STATUS_FORMAT, "cannot read table '%s': line %zu: %s '%s' is no number", path, i_line,
+                             column_name[c], text);
     }
     return STATUS_OK;
 }
@@ -122,14 +137,16 @@ status phantom_view_table_read(struct phantom_view_table *t, const char *path, s
             continue;
         }
         if (t->n == JOB_MAX_PHOTOGRAPH) {
-            st = error_set(err, STATUS_TOO_LARGE, "cannot read table '%s': more than %d rows", path, JOB_MAX_PHOTOGRAPH);
+            st =
+                error_set(err, STATUS_TOO_LARGE, "cannot read table '%s': more than %d rows", path, JOB_MAX_PHOTOGRAPH);
             break;
         }
         struct job_photograph *v = &t->view[t->n++];
         st = read_row(cell, n, place, v, path, i_line, err);
         if (st == STATUS_OK) name_view(v, count[v->set == JOB_SET_HELD_OUT]++);
     }
-    if (st == STATUS_OK && t->n == 0) st = error_set(err, STATUS_FORMAT, "cannot read table '%s': it has no rows", path);
+    if (st == STATUS_OK && t->n == 0)
+        st = error_set(err, STATUS_FORMAT, "cannot read table '%s': it has no rows", path);
     free(text);
     return st;
 }

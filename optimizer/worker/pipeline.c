@@ -1,11 +1,11 @@
 /* The stage table's computing side: runs what is not done, loads what is. */
-#include "optimizer/job/stage_table.h"
 #include "base/clock.h"
 #include "base/durable.h"
-#include "optimizer/job/job_folder.h"
 #include "optimizer/fit/photographs/observation_check.h"
-#include "optimizer/worker/stages/pipeline_budget.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/job/stage_table.h"
 #include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/pipeline_budget.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -110,7 +110,8 @@ size_t pipeline_best_model(const struct pipeline_context *c)
 {
     size_t best = 0;
     for (size_t i = 1; i < c->n_model; i++)
-        if (pipeline_judged_error(&c->model[i])->rel_square < pipeline_judged_error(&c->model[best])->rel_square) best = i;
+        if (pipeline_judged_error(&c->model[i])->rel_square < pipeline_judged_error(&c->model[best])->rel_square)
+            best = i;
     return best;
 }
 
@@ -164,10 +165,8 @@ static status set_parameters(const struct job_model *given, struct pipeline_mode
         /* degrees to radians may step over a bound by one rounding */
         double lower = fmin(fmax(param_from_file_unit(info, k[p].lower), info->lower), info->upper);
         double upper = fmin(fmax(param_from_file_unit(info, k[p].upper), lower), info->upper);
-        m->parameter[p] = (struct fit_parameter){.lower = lower,
-                                                 .upper = upper,
-                                                 .start = param_from_file_unit(info, k[p].start),
-                                                 .fixed = k[p].fixed};
+        m->parameter[p] = (struct fit_parameter){
+            .lower = lower, .upper = upper, .start = param_from_file_unit(info, k[p].start), .fixed = k[p].fixed};
         m->parameter[p].start = fmin(fmax(m->parameter[p].start, lower), upper);
     }
     return STATUS_OK;
@@ -240,7 +239,8 @@ static status claim_inputs(struct pipeline_context *c, struct error *err)
     bool changed;
     job_document_visit_files(c->doc, add_input, &input);
     status s = worker_folder_claim_inputs(c->folder, c->fingerprint << 32 | input.sum, &changed, err);
-    if (s == STATUS_OK && changed) log_info(c->log, "the inputs, or the program, have changed since the last run: starting anew");
+    if (s == STATUS_OK && changed)
+        log_info(c->log, "the inputs, or the program, have changed since the last run: starting anew");
     return s;
 }
 

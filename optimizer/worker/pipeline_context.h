@@ -12,10 +12,10 @@
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume.h"
 #include "optimizer/fit/descent/descent.h"
-#include "optimizer/job/job_document.h"
 #include "optimizer/fit/objective/next_photograph.h"
 #include "optimizer/fit/objective/noisy_minimum.h"
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/job/job_document.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/worker_folder.h"
 #include "optimizer/worker/worker_status.h"
@@ -29,7 +29,8 @@ struct validation {
     struct estimate *replica[2];
     struct estimate *contrast[2]; /* of pipeline_context.contrast, as many as observations; unused without one */
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
-    struct objective_value fit_with_gains, held_out_with_gains; /* each row with its own gain; NaN unless the job asks for that */
+    struct objective_value fit_with_gains,
+        held_out_with_gains; /* each row with its own gain; NaN unless the job asks for that */
     double
         worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
 };
@@ -47,16 +48,16 @@ struct pipeline_model {
     const struct job_fit_option *option; /* of the document */
     struct fit_result fit;
     struct validation validation;
-    struct derivative_check certificate; /* of the free parameters at the result; filled in before the report */
+    struct derivative_check certificate;  /* of the free parameters at the result; filled in before the report */
     struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */
 };
 
 /* What the search for the fiber radius gave (pipeline_radius.h). */
 struct pipeline_radius {
-    size_t i_model, n_step;               /* the model that was fitted at each radius; records of the series */
-    double start_m, radius_m, se_m;       /* mean radius before and after; its standard error */
+    size_t i_model, n_step;         /* the model that was fitted at each radius; records of the series */
+    double start_m, radius_m, se_m; /* mean radius before and after; its standard error */
     double lower_m, upper_m;
-    struct noisy_minimum curve;           /* u = ln of the radius in metres; f: objective of the fit there */
+    struct noisy_minimum curve; /* u = ln of the radius in metres; f: objective of the fit there */
     uint64_t n_path;
     double wall_s;
 };
@@ -66,9 +67,9 @@ struct pipeline_context {
     struct worker_status *status;
     struct log *log;
     struct thread_pool *pool;
-    size_t memory_limit_bytes;          /* of the geometry stages; 0: none */
-    struct scratch_space *space;        /* of volumes: JOB/work beyond that limit; NULL without one */
-    struct progress progress; /* of the running stage */
+    size_t memory_limit_bytes;   /* of the geometry stages; 0: none */
+    struct scratch_space *space; /* of volumes: JOB/work beyond that limit; NULL without one */
+    struct progress progress;    /* of the running stage */
 
     struct job_document *doc;
     uint64_t fingerprint;               /* of the job document's text and this build of the program */
@@ -77,7 +78,7 @@ struct pipeline_context {
     struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */
     struct observation_set contrast;    /* of all observations, in their order; empty when not asked for */
     size_t n_model;
-    struct pipeline_model *model; /* in the order of the document */
+    struct pipeline_model *model;  /* in the order of the document */
     struct pipeline_radius radius; /* when the job has the radius fitted */
 
     struct reconstruct_option option;

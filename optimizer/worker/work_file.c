@@ -37,8 +37,8 @@ static size_t chunk(const struct work_section *s, size_t at)
 
 static status too_many(const char *path, size_t n_section, struct error *err)
 {
-    return error_set(err, STATUS_INTERNAL, "checkpoint '%s' would have %zu sections: there is room for %d", path, n_section,
-                     WORK_FILE_MAX_SECTION);
+    return error_set(err, STATUS_INTERNAL, "checkpoint '%s' would have %zu sections: there is room for %d", path,
+                     n_section, WORK_FILE_MAX_SECTION);
 }
 
 status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section,
@@ -72,8 +72,8 @@ status work_file_write(const char *path, const char *tag, const struct work_sect
 
 /* Memory for what is read: the section's own, or a copy aside of what the caller has (such sections are small), which is to
  * stay as it is when the checksum is wrong. */
-static status open_section(const char *path, const struct work_section *section, size_t n_bytes, struct work_section *read,
-                           struct error *err)
+static status open_section(const char *path, const struct work_section *section, size_t n_bytes,
+                           struct work_section *read, struct error *err)
 {
     *read = *section;
     read->n_bytes = n_bytes;
@@ -82,7 +82,8 @@ static status open_section(const char *path, const struct work_section *section,
         return error_set(err, STATUS_FORMAT, "cannot read checkpoint '%s': it is of another program version", path);
     read->space = NULL;
     read->data = malloc(n_bytes > 0 ? n_bytes : 1);
-    return read->data != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read checkpoint '%s': out of memory", path);
+    return read->data != NULL ? STATUS_OK
+                              : error_set(err, STATUS_NO_MEMORY, "cannot read checkpoint '%s': out of memory", path);
 }
 
 static status read_sections(FILE *f, const char *path, const struct work_header *h, const struct work_section *section,

@@ -136,7 +136,8 @@ status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t finger
     if (s == STATUS_OK) s = empty_folder(f, JOB_FOLDER_WORK, err);
     if (s == STATUS_OK) s = empty_folder(f, JOB_FOLDER_RESULTS, err);
     worker_folder_path(f, JOB_FILE_SERIES, NULL, series);
-    if (s == STATUS_OK && unlink(series) != 0 && errno != ENOENT) s = error_set_errno(err, "cannot remove '%s'", series);
+    if (s == STATUS_OK && unlink(series) != 0 && errno != ENOENT)
+        s = error_set_errno(err, "cannot remove '%s'", series);
     return s == STATUS_OK ? worker_folder_replace(f, path, want, strlen(want), err) : s;
 }
 

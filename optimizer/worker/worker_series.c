@@ -105,20 +105,20 @@ static char *record_text(const struct fit_step *step, const struct worker_series
             json_array_append_new(rgb, json_number(0.5 * (step->replica[0][i].mean[c] + step->replica[1][i].mean[c])));
         json_array_append_new(rendered, rgb);
     }
-    json_t *json = json_pack("{s:I, s:s, s:I, s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}",
-                             "step", (json_int_t)(model->step_base + step->step), "model", model->appearance->id,
-                             "i_model", (json_int_t)model->i_model, "model_step", (json_int_t)step->step, "phase",
-                             step->phase, "wall_s", step->wall_s, "n_path", (json_int_t)step->n_path, "n_path_total",
-                             (json_int_t)step->n_path_total, "objective", json_number(step->objective.value),
-                             "objective_se", json_number(step->objective.se), "parameter", parameter, "parameter_se",
-                             parameter_se, "rel_rms", json_number(step->objective.rel_rms), "rendered", rendered, "damping",
-                             json_number(step->damping), "noise", json_number(step->noise), "note",
-                             step->note != NULL ? step->note : "");
+    json_t *json = json_pack(
+        "{s:I, s:s, s:I, s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}", "step",
+        (json_int_t)(model->step_base + step->step), "model", model->appearance->id, "i_model",
+        (json_int_t)model->i_model, "model_step", (json_int_t)step->step, "phase", step->phase, "wall_s", step->wall_s,
+        "n_path", (json_int_t)step->n_path, "n_path_total", (json_int_t)step->n_path_total, "objective",
+        json_number(step->objective.value), "objective_se", json_number(step->objective.se), "parameter", parameter,
+        "parameter_se", parameter_se, "rel_rms", json_number(step->objective.rel_rms), "rendered", rendered, "damping",
+        json_number(step->damping), "noise", json_number(step->noise), "note", step->note != NULL ? step->note : "");
     if (json != NULL && step->step == 0) json_object_set_new(json, "parameters", parameters_json(model));
     if (json != NULL) {
         json_t *paths = json_array(); /* of both replicas, a row */
         for (size_t i = 0; i < step->n_configuration; i++)
-            json_array_append_new(paths, json_integer((json_int_t)(step->replica[0][i].n_path + step->replica[1][i].n_path)));
+            json_array_append_new(paths,
+                                  json_integer((json_int_t)(step->replica[0][i].n_path + step->replica[1][i].n_path)));
         json_object_set_new(json, "n_path_row", paths);
         json_object_set_new(json, "step_length", json_number(step->step_length));
         json_object_set_new(json, "step_limit", json_number(step->step_limit));
@@ -127,8 +127,9 @@ static char *record_text(const struct fit_step *step, const struct worker_series
     if (json != NULL && step->nuisance != NULL) {
         json_t *nuisance = json_object();
         for (size_t i = 0; i < step->nuisance->n; i++)
-            json_object_set_new(nuisance, step->nuisance->name[i],
-                                json_pack("[o, o]", json_number(step->nuisance->value[i]), json_number(step->nuisance->se[i])));
+            json_object_set_new(
+                nuisance, step->nuisance->name[i],
+                json_pack("[o, o]", json_number(step->nuisance->value[i]), json_number(step->nuisance->se[i])));
         json_object_set_new(json, "nuisance", nuisance);
     }
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(9) | JSON_COMPACT) : NULL;

@@ -168,7 +168,8 @@ static status read_header(struct reader *rd, size_t limit_pixel, struct error *e
     struct stat file;
     if (stat(rd->path, &file) != 0) return error_set_errno(err, "cannot read image '%s'", rd->path);
     if ((uint64_t)width * (uint64_t)height / 4096 > (uint64_t)file.st_size)
-        return error_set(err, STATUS_FORMAT, "cannot read image '%s': its header promises %lld x %lld pixels, the file has %lld bytes",
+        return error_set(err, STATUS_FORMAT,
+                         "cannot read image '%s': its header promises %lld x %lld pixels, the file has %lld bytes",
                          rd->path, (long long)width, (long long)height, (long long)file.st_size);
     rd->width = (int32_t)width;
     rd->height = (int32_t)height;

@@ -25,7 +25,8 @@ enum {
     CONFIGURATION_MAX_CELLS = 32,
     CONFIGURATION_MAX_COUNT = 4096, /* of one estimate: so many have random numbers of their own; a mean over rotations
                                        counts as many times as it has rotations */
-    CONFIGURATION_ALL_ROTATIONS = 9 /* n_rotation of a measurement that is a mean over all: odd, so that a weave, which looks nearly
+    CONFIGURATION_ALL_ROTATIONS =
+        9 /* n_rotation of a measurement that is a mean over all: odd, so that a weave, which looks nearly
                                        the same after a quarter turn, is seen every 10 degrees */
 };
 
@@ -44,15 +45,15 @@ struct configuration {
     double camera_distance_m; /* perspective camera; default 1.0 */
     double crop_m; /* 0.01: edge of the square crop, measured at the orbit centre perpendicular to the view */
 
-    double crop_aspect; /* width over height of the crop, whose width is crop_m; 0: 1 */
-    double environment_rgb[3]; /* radiance of a constant environment, besides the lamp; 0: none */
+    double crop_aspect;                    /* width over height of the crop, whose width is crop_m; 0: 1 */
+    double environment_rgb[3];             /* radiance of a constant environment, besides the lamp; 0: none */
     const struct environment *environment; /* an image around the scene, fixed to the world (not turned with the cloth),
                                               besides the lamp; not owned; NULL: none */
     enum configuration_light light;
     enum configuration_camera camera;
     uint32_t contrast_cells; /* 0: estimates are of the crop's mean radiance; 2 or more: of the contrast between so many
                                 equal parts of the crop a side (transport/contrast_blocks.h) */
-    uint32_t n_rotation;     /* 0 or 1: the cloth lies at cloth_rotation_rad; more: estimates are of the mean over so many
+    uint32_t n_rotation; /* 0 or 1: the cloth lies at cloth_rotation_rad; more: estimates are of the mean over so many
                                 rotations, equally spaced from there on (appearance_estimate.h; pictures show the first) */
 };
 

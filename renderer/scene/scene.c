@@ -55,8 +55,8 @@ static double n_piece(const float *p, const float *q, float radius_m)
 static status too_far(const double mm[2], int axis, double tile_mm, struct error *err)
 {
     return error_set(err, STATUS_INVALID,
-                     "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm", mm[0],
-                     mm[1], axis == 0 ? "x" : "y", tile_mm);
+                     "cannot build scene: fibers reach from %g to %g mm along %s, too far beyond the tile of %g mm",
+                     mm[0], mm[1], axis == 0 ? "x" : "y", tile_mm);
 }
 
 /* Axes that reach farther than the widest block (choose_block), before their segments are cut into pieces. */
@@ -144,7 +144,8 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
         for (; v + 1 < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v, *q = p + 3;
             size_t pieces = (size_t)n_piece(p, q, f->radius_m[i]);
-            for (size_t k = 1; k <= pieces; k++) add_vertex(s, first, p, q, (double)k / (double)pieces, z_max_m, radius);
+            for (size_t k = 1; k <= pieces; k++)
+                add_vertex(s, first, p, q, (double)k / (double)pieces, z_max_m, radius);
         }
         if (s->n_vertex - first < 2)
             s->n_vertex = first;

@@ -17,10 +17,10 @@ struct scene;
 enum { SCENE_MAX_GROUP = 8 };
 
 struct scene_option {
-    bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
+    bool black_sheet;         /* true: light that passes the cloth downwards is absorbed and none comes from below */
     bool group_by_axis_class; /* group = the fiber's axis class (weft, warp, pile); otherwise all fibers are group 0 */
     const uint8_t *fiber_group; /* n_fiber groups below SCENE_MAX_GROUP instead; copied; NULL: none given */
-    bool no_avx512; /* Embree may use AVX2 at most: what a machine without AVX-512 does */
+    bool no_avx512;             /* Embree may use AVX2 at most: what a machine without AVX-512 does */
 };
 
 /* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_TOO_LARGE; STATUS_INVALID,

@@ -38,7 +38,8 @@ static status estimate_volume(const struct appearance_request *q, struct thread_
     return volume_estimate_run(&request, pool, progress, out, err);
 }
 
-status appearance_scene_check(const struct appearance_scene *scene, const struct appearance *model, const char *what, struct error *err)
+status appearance_scene_check(const struct appearance_scene *scene, const struct appearance *model, const char *what,
+                              struct error *err)
 {
     bool surface = model->kind == APPEARANCE_SURFACE;
     if (surface ? scene->fibers != NULL : scene->volume != NULL) return STATUS_OK;
@@ -46,8 +47,8 @@ status appearance_scene_check(const struct appearance_scene *scene, const struct
                            surface ? "fibers" : "density volume");
 }
 
-static status estimate_any(const struct appearance_request *q, struct thread_pool *pool, const struct progress *progress,
-                           struct estimate *out, struct error *err)
+static status estimate_any(const struct appearance_request *q, struct thread_pool *pool,
+                           const struct progress *progress, struct estimate *out, struct error *err)
 {
     return q->model->kind == APPEARANCE_SURFACE ? estimate_surface(q, pool, progress, out, err)
                                                 : estimate_volume(q, pool, progress, out, err);
@@ -73,7 +74,8 @@ status appearance_estimate_run(const struct appearance_request *q, struct thread
 {
     status s = appearance_scene_check(&q->scene, q->model, "render", err);
     if (s != STATUS_OK) return s;
-    if (rotation_mean_wanted(q->configuration, q->n_configuration)) return estimate_rotations(q, pool, progress, out, err);
+    if (rotation_mean_wanted(q->configuration, q->n_configuration))
+        return estimate_rotations(q, pool, progress, out, err);
     return estimate_any(q, pool, progress, out, err);
 }
 
@@ -81,6 +83,7 @@ size_t appearance_n_path(const struct configuration *c, size_t n_path)
 {
     size_t n_cell = (size_t)c->contrast_cells * c->contrast_cells, n_rotation = c->n_rotation > 1 ? c->n_rotation : 1;
     size_t n_part = n_cell > 0 ? n_cell : n_rotation, part = (n_path + n_part - 1) / n_part;
-    if (n_cell > 0) return n_cell * (part > 4 ? part + part % 2 : 4); /* two sets of two paths at least: contrast_plan_init */
+    if (n_cell > 0)
+        return n_cell * (part > 4 ? part + part % 2 : 4); /* two sets of two paths at least: contrast_plan_init */
     return n_rotation * ((part + ESTIMATE_BLOCK_PATHS - 1) / ESTIMATE_BLOCK_PATHS * ESTIMATE_BLOCK_PATHS);
 }

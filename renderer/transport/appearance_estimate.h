@@ -15,7 +15,8 @@ struct appearance_scene {
 };
 
 /* STATUS_INVALID, field "model", when the cloth lacks the form that the model needs; what: "render", "check". */
-status appearance_scene_check(const struct appearance_scene *scene, const struct appearance *model, const char *what, struct error *err);
+status appearance_scene_check(const struct appearance_scene *scene, const struct appearance *model, const char *what,
+                              struct error *err);
 
 struct appearance_request {
     struct appearance_scene scene;

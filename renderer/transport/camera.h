@@ -11,7 +11,7 @@
 #include <stdbool.h>
 
 struct camera {
-    double eye_mm[3]; /* far-field: the middle of the plane that the rays start from */
+    double eye_mm[3];             /* far-field: the middle of the plane that the rays start from */
     double right_mm[3], up_mm[3]; /* full edges of the crop */
     bool far_field;
 };

@@ -93,7 +93,7 @@ static double mean_covariance(double x, double y, double xy, double n) { return 
 
 /* What one cell has to say about channel `channel` and one derivative of it (value `k`; its own channel: none). */
 struct cell {
-    double value[2], slope[2];     /* means less those of the crop */
+    double value[2], slope[2]; /* means less those of the crop */
     double var[2], slope_var[2], covariance[2];
 };
 
@@ -154,8 +154,8 @@ static void reduce_derivative(const struct contrast_plan *c, double mean[2][3 + 
             var += by_slope * by_slope * k.slope_var[s] + by_value * by_value * k.var[s] +
                    2.0 * by_slope * by_value * k.covariance[s];
         }
-        shared += scale * scale * (k.var[0] * k.slope_var[1] + k.slope_var[0] * k.var[1] +
-                                   2.0 * k.covariance[0] * k.covariance[1]);
+        shared += scale * scale *
+                  (k.var[0] * k.slope_var[1] + k.slope_var[0] * k.var[1] + 2.0 * k.covariance[0] * k.covariance[1]);
     }
     e->jac[j] = slope - contrast * (relative[0] + relative[1]);
     e->jac_var[j] = fmax(var - shared, 0.5 * fabs(shared));

@@ -19,7 +19,7 @@
 #include "renderer/transport/estimate_blocks.h"
 
 struct contrast_plan {
-    size_t n_side, n_cell, n_half;   /* cells a side, cells, paths of each of a cell's two sets */
+    size_t n_side, n_cell, n_half; /* cells a side, cells, paths of each of a cell's two sets */
     size_t n_task, cells_per_task, blocks_per_task;
     size_t n_jac;
     double *sum; /* owned */

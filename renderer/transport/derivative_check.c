@@ -73,7 +73,9 @@ static status prepare_points(struct check *k, struct error *err)
         double moved[SCATTERING_MAX_PARAM], v = q->param[p];
         double least = info->channel >= 0 ? least_scale_of_colour : least_scale;
         k->h[p] = relative_step * fmax(fabs(v), least * (info->upper - info->lower));
-        k->stencil[p] = v - 2.0 * k->h[p] < info->lower ? &upwards : v + 2.0 * k->h[p] > info->upper ? &downwards : &middle;
+        k->stencil[p] = v - 2.0 * k->h[p] < info->lower   ? &upwards
+                        : v + 2.0 * k->h[p] > info->upper ? &downwards
+                                                          : &middle;
         if (q->skip != NULL && q->skip[p]) continue;
         k->out->checked[p] = true;
         memcpy(moved, q->param, q->model->n_param * sizeof *moved);
@@ -289,7 +291,8 @@ status derivative_check_run(const struct derivative_check_request *q, const stru
     memset(out, 0, sizeof *out);
     out->n_param = q->model->n_param;
     status s = appearance_scene_check(&q->scene, q->model, "check", err);
-    if (s == STATUS_OK) s = estimate_check_configurations(q->configuration, q->n_configuration, q->iteration, q->replica, err);
+    if (s == STATUS_OK)
+        s = estimate_check_configurations(q->configuration, q->n_configuration, q->iteration, q->replica, err);
     if (s != STATUS_OK) return s;
     struct check *k = calloc(1, sizeof *k);
     size_t n = q->model->n_param, n_path = q->n_path / (q->n_configuration > 0 ? q->n_configuration : 1);

@@ -76,7 +76,8 @@ static status make_groups(struct run *r, struct error *err)
     r->n_path = calloc(n + 1, sizeof *r->n_path);
     r->e = malloc((n + 1) * sizeof *r->e);
     bool *taken = calloc(n + 1, sizeof *taken);
-    if (r->group == NULL || r->member == NULL || r->lamp == NULL || r->n_path == NULL || r->e == NULL || taken == NULL) {
+    if (r->group == NULL || r->member == NULL || r->lamp == NULL || r->n_path == NULL || r->e == NULL ||
+        taken == NULL) {
         free(taken);
         return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: out of memory");
     }
@@ -124,13 +125,14 @@ static void take_apart(const struct run *r, struct estimate *out)
     }
 }
 
-static status numeric_error(const struct scattering_model *m, const struct configuration *c, size_t i_value, struct error *err)
+static status numeric_error(const struct scattering_model *m, const struct configuration *c, size_t i_value,
+                            struct error *err)
 {
     const char *name = i_value < 3 ? "" : m->param[(i_value - 3) % m->n_param].name;
     char view[CONFIGURATION_TEXT];
     configuration_describe(c, view);
-    return error_set_field(err, STATUS_NUMERIC, name, "scattering model '%s' gave a value that is not finite (%s; %s)", m->id,
-                           name[0] != '\0' ? name : "radiance", view);
+    return error_set_field(err, STATUS_NUMERIC, name, "scattering model '%s' gave a value that is not finite (%s; %s)",
+                           m->id, name[0] != '\0' ? name : "radiance", view);
 }
 
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,

@@ -23,7 +23,7 @@ struct estimate_request {
     uint64_t seed;
     uint32_t iteration, replica; /* rng.h; configuration i uses stream configuration = i */
     bool want_jacobian;
-    size_t n_set; /* parameter sets for the scene's material groups; 0 and 1: one set for all fibers */
+    size_t n_set;   /* parameter sets for the scene's material groups; 0 and 1: one set for all fibers */
     bool no_probes; /* plain paths without probes towards the lamp (path_tracer.h): same means, more variance */
     bool share_camera_paths; /* configurations that differ in their lamp only are estimated from the same paths
                                 (as many as the one that asks for most): 1.4 to 1.9 times the paths in the same time
@@ -33,8 +33,8 @@ struct estimate_request {
 
 /* rgb means in radiance units; for a configuration with contrast_cells its contrast and the derivatives of that. */
 struct estimate {
-    double mean[3], var[3];               /* var: of the mean */
-    double jac[3 * SCATTERING_MAX_FLAT];  /* d mean[c] / d flat param p at [c * n_flat + p], by internal unit, with
+    double mean[3], var[3];              /* var: of the mean */
+    double jac[3 * SCATTERING_MAX_FLAT]; /* d mean[c] / d flat param p at [c * n_flat + p], by internal unit, with
                                              n_flat = n_param of the model * number of sets */
     double jac_var[3 * SCATTERING_MAX_FLAT];
     uint64_t n_path, n_vertex;

@@ -21,7 +21,7 @@ struct run {
     const struct progress *progress;
     struct task *task;
     size_t n_task;
-    struct task_sum *sum; /* per task */
+    struct task_sum *sum;           /* per task */
     struct contrast_plan *contrast; /* per configuration; n_cell 0: its mean is wanted */
     double *sum_storage;
 };

@@ -10,7 +10,7 @@ enum { ESTIMATE_BLOCK_PATHS = 256 };
 
 struct estimate_blocks {
     size_t n_configuration;
-    const size_t *n_path; /* per configuration; rounded up to whole blocks; 0: skip */
+    const size_t *n_path;                      /* per configuration; rounded up to whole blocks; 0: skip */
     const struct configuration *configuration; /* those with contrast_cells give a contrast (contrast_blocks.h) in place
                                                   of a mean; NULL: none does */
     uint64_t seed;
@@ -20,8 +20,7 @@ struct estimate_blocks {
     uint32_t (*trace)(void *context, size_t i_configuration, double x, double y, struct rng *rng, float *value);
     /* In place of that, a whole block at once: xy[ESTIMATE_BLOCK_PATHS][2], a generator for each path (may be changed),
      * value[ESTIMATE_BLOCK_PATHS][3 + n_jac] preset to 0; result: number of vertices. NULL: one by one. */
-    uint64_t (*trace_block)(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng,
-                            float *value);
+    uint64_t (*trace_block)(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng, float *value);
     void *context;
 };
 

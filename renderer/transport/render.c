@@ -2,8 +2,8 @@
 
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate_blocks.h"
-#include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/render_pixels.h"
+#include "renderer/transport/surface/path_tracer.h"
 
 #include <stdio.h>
 #include <string.h>

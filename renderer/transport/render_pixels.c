@@ -53,8 +53,7 @@ static void render_pixel(struct run *r, size_t i_pixel)
         out[k] = (float)mean;
         out[3 + k] = p->n_sample > 1 ? (float)(fmax(0, x2[k] - x[k] * mean) / (n * (n - 1))) : INFINITY;
     }
-    for (size_t k = 0; k < 3 * p->n_flat; k++)
-        out[6 + 3 * (k % p->n_flat) + k / p->n_flat] = (float)(x[3 + k] / n);
+    for (size_t k = 0; k < 3 * p->n_flat; k++) out[6 + 3 * (k % p->n_flat) + k / p->n_flat] = (float)(x[3 + k] / n);
 }
 
 static void run_task(void *context, size_t i_task, size_t i_thread)

@@ -8,11 +8,11 @@
 #include "renderer/transport/estimate.h"
 
 struct rotation_mean {
-    size_t n, n_turned;              /* configurations wanted, and with their rotations taken apart */
-    struct configuration *turned;    /* in the order wanted; n_rotation 0 */
-    size_t *n_path;                  /* of turned */
-    size_t *first;                   /* n + 1: the turned ones of i are first[i] .. first[i + 1] - 1 */
-    struct estimate *estimate;       /* of turned: to be filled in */
+    size_t n, n_turned;           /* configurations wanted, and with their rotations taken apart */
+    struct configuration *turned; /* in the order wanted; n_rotation 0 */
+    size_t *n_path;               /* of turned */
+    size_t *first;                /* n + 1: the turned ones of i are first[i] .. first[i + 1] - 1 */
+    struct estimate *estimate;    /* of turned: to be filled in */
 };
 
 /* True when any configuration asks for more than one rotation: then, and only then, is the rest needed. */

@@ -15,8 +15,8 @@ struct run {
 static uint64_t trace(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng, float *value)
 {
     const struct run *r = context;
-    return volume_trace_camera(&r->setting[i_configuration], &r->camera[i_configuration], ESTIMATE_BLOCK_PATHS, xy,
-                               rng, value);
+    return volume_trace_camera(&r->setting[i_configuration], &r->camera[i_configuration], ESTIMATE_BLOCK_PATHS, xy, rng,
+                               value);
 }
 
 static status numeric_error(const struct volume_estimate_request *q, size_t i_configuration, size_t i_value,
@@ -29,8 +29,8 @@ static status numeric_error(const struct volume_estimate_request *q, size_t i_co
     }
     char view[CONFIGURATION_TEXT];
     configuration_describe(&q->configuration[i_configuration], view);
-    return error_set_field(err, STATUS_NUMERIC, name, "phase function '%s' gave a value that is not finite (%s; %s)", q->model->id,
-                           name[0] != '\0' ? name : "radiance", view);
+    return error_set_field(err, STATUS_NUMERIC, name, "phase function '%s' gave a value that is not finite (%s; %s)",
+                           q->model->id, name[0] != '\0' ? name : "radiance", view);
 }
 
 status volume_check_multiplier(double multiplier_per_m, struct error *err)

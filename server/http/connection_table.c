@@ -10,8 +10,9 @@
 #include <sys/socket.h>
 
 enum { RATE_GRACE_S = 10, GONE_GRACE_S = 2 };
-static const char too_slow_body[] = "{\"type\":\"urn:selvedge:problem:too_slow\",\"title\":\"The request came too slowly\",\"status\":408,"
-                                    "\"code\":\"too_slow\",\"detail\":\"the head or the body of the request came too slowly\"}";
+static const char too_slow_body[] =
+    "{\"type\":\"urn:selvedge:problem:too_slow\",\"title\":\"The request came too slowly\",\"status\":408,"
+    "\"code\":\"too_slow\",\"detail\":\"the head or the body of the request came too slowly\"}";
 
 enum phase { PHASE_HEAD, PHASE_BODY, PHASE_REPLY };
 
@@ -33,7 +34,8 @@ struct connection_table {
     double min_rate_bytes_per_s;
 };
 
-status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **out, struct error *err)
+status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **out,
+                            struct error *err)
 {
     struct connection_table *t = calloc(1, sizeof *t);
     if (t == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the table of connections: out of memory");
@@ -79,8 +81,10 @@ void connection_closed(struct connection_table *t, struct connection_entry *e)
 {
     if (e == NULL) return;
     pthread_mutex_lock(&t->lock);
-    if (e->before != NULL) e->before->next = e->next;
-    else t->first = e->next;
+    if (e->before != NULL)
+        e->before->next = e->next;
+    else
+        t->first = e->next;
     if (e->next != NULL) e->next->before = e->before;
     t->n--;
     pthread_mutex_unlock(&t->lock);
@@ -112,7 +116,8 @@ static bool too_slow(const struct connection_table *t, const struct connection_e
     double age_s = now - e->since_s;
     /* between requests a connection may rest three times as long: it is the client's pool */
     if (e->phase == PHASE_HEAD) return age_s > t->header_deadline_s * (e->served ? 3 : 1);
-    if (e->phase == PHASE_BODY) return age_s > RATE_GRACE_S && (double)atomic_load(&e->n_received) < t->min_rate_bytes_per_s * age_s;
+    if (e->phase == PHASE_BODY)
+        return age_s > RATE_GRACE_S && (double)atomic_load(&e->n_received) < t->min_rate_bytes_per_s * age_s;
     return false;
 }
 
@@ -121,14 +126,16 @@ static bool too_slow(const struct connection_table *t, const struct connection_e
 static bool client_gone(const struct connection_entry *e, double now)
 {
     struct pollfd p = {.fd = e->fd, .events = POLLRDHUP};
-    return e->phase == PHASE_HEAD && now - e->since_s > GONE_GRACE_S && poll(&p, 1, 0) == 1 && (p.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+    return e->phase == PHASE_HEAD && now - e->since_s > GONE_GRACE_S && poll(&p, 1, 0) == 1 &&
+           (p.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
 }
 
 void connection_table_reap(struct connection_table *t)
 {
     char answer[512];
     int n_answer = snprintf(answer, sizeof answer,
-                            "HTTP/1.1 408 Request Timeout\r\nContent-Type: application/problem+json\r\nConnection: close\r\nContent-Length: %zu\r\n\r\n%s",
+                            "HTTP/1.1 408 Request Timeout\r\nContent-Type: application/problem+json\r\nConnection: "
+                            "close\r\nContent-Length: %zu\r\n\r\n%s",
                             sizeof too_slow_body - 1, too_slow_body);
     double now = clock_monotonic_s();
     pthread_mutex_lock(&t->lock);

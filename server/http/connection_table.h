@@ -11,7 +11,8 @@ struct connection_table;
 struct connection_entry;
 
 /* min_rate 0: any rate will do */
-status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **table, struct error *err);
+status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **table,
+                            struct error *err);
 void connection_table_free(struct connection_table *table);
 size_t connection_table_count(struct connection_table *table);
 /* Answers 408 to connections that are too slow and shuts them down. */

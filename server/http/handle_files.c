@@ -17,8 +17,10 @@ void handle_list_files(struct http_request *r)
     status s = job_get(r->service, r->param[0], &row, &err);
     if (s == STATUS_OK) s = job_view_files(r->service, &row, &view, &err);
     job_row_release(&row);
-    if (s != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_json_tagged(r, view);
+    if (s != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_json_tagged(r, view);
 }
 
 static status member_text(const json_t *j, const char *name, char *out, size_t n_out, bool optional, struct error *err)
@@ -37,15 +39,19 @@ static status read_declaration(const json_t *j, struct file_row *row, struct err
     static const char *const known[] = {"name", "role", "size", "sha256"};
     const char *key;
     json_t *value;
-    if (!json_is_object(j)) return error_set(err, STATUS_INVALID, "a file declaration is an object {name, role, size, sha256}");
+    if (!json_is_object(j))
+        return error_set(err, STATUS_INVALID, "a file declaration is an object {name, role, size, sha256}");
     json_object_foreach((json_t *)(uintptr_t)j, key, value)
     {
         bool found = false;
         for (size_t i = 0; i < 4; i++) found = found || strcmp(key, known[i]) == 0;
-        if (!found) return error_set_field(err, STATUS_INVALID, key, "a file declaration has no member '%.80s': name, role, size, sha256", key);
+        if (!found)
+            return error_set_field(err, STATUS_INVALID, key,
+                                   "a file declaration has no member '%.80s': name, role, size, sha256", key);
     }
     const json_t *size = json_object_get(j, "size");
-    if (!json_is_integer(size)) return error_set_field(err, STATUS_INVALID, "size", "member 'size' has to be a whole number of bytes");
+    if (!json_is_integer(size))
+        return error_set_field(err, STATUS_INVALID, "size", "member 'size' has to be a whole number of bytes");
     row->size_bytes = json_integer_value(size);
     status s = member_text(j, "name", row->name, sizeof row->name, false, err);
     if (s == STATUS_OK) s = member_text(j, "role", row->role, sizeof row->role, false, err);
@@ -62,7 +68,8 @@ void handle_declare_file(struct http_request *r)
     char upload[80], text[256];
     json_t *j = json_loadb(r->body, r->n_body, JSON_REJECT_DUPLICATES, &where);
     if (j == NULL) {
-        snprintf(text, sizeof text, "the body is not JSON: line %d, column %d: %s", where.line, where.column, where.text);
+        snprintf(text, sizeof text, "the body is not JSON: line %d, column %d: %s", where.line, where.column,
+                 where.text);
         reply_code(r, "malformed", "", text);
         return;
     }
@@ -89,7 +96,8 @@ void handle_get_file(struct http_request *r)
     job_row_release(&job);
     /* the name only selects a row; the path is made of what the row says */
     if (s == STATUS_OK) s = store_file_find(r->service->store, r->param[0], r->param[1], &file, &err);
-    if (s == STATUS_OK && file.state != FILE_COMPLETE) s = error_set(&err, STATUS_CONFLICT, "file '%s' is not complete", file.name);
+    if (s == STATUS_OK && file.state != FILE_COMPLETE)
+        s = error_set(&err, STATUS_CONFLICT, "file '%s' is not complete", file.name);
     if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
         return;
@@ -109,6 +117,8 @@ void handle_get_file(struct http_request *r)
 void handle_delete_file(struct http_request *r)
 {
     struct error err = {0};
-    if (job_delete_file(r->service, r->param[0], r->param[1], &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_empty(r, MHD_HTTP_NO_CONTENT);
+    if (job_delete_file(r->service, r->param[0], r->param[1], &err) != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_empty(r, MHD_HTTP_NO_CONTENT);
 }

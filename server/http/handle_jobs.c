@@ -74,8 +74,10 @@ void handle_create_job(struct http_request *r)
         return;
     }
     if (!body_is_json(r)) return;
-    if (job_create(r->service, r->body, r->n_body, key, id, &replayed, &refusal, &err) != STATUS_OK) reply_refusal(r, &refusal, &err);
-    else reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
+    if (job_create(r->service, r->body, r->n_body, key, id, &replayed, &refusal, &err) != STATUS_OK)
+        reply_refusal(r, &refusal, &err);
+    else
+        reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
 }
 
 void handle_get_job(struct http_request *r) { reply_job(r, r->param[0], 0, false, false); }
@@ -96,7 +98,8 @@ static status check_tag(void *context, const struct job_row *row, struct error *
     json_tag(view, tag);
     json_decref(view);
     p->failed = !tag_matches(p->wanted, tag);
-    return p->failed ? error_set_field(err, STATUS_CONFLICT, "If-Match", "the job has changed since: get it again") : STATUS_OK;
+    return p->failed ? error_set_field(err, STATUS_CONFLICT, "If-Match", "the job has changed since: get it again")
+                     : STATUS_OK;
 }
 
 void handle_put_document(struct http_request *r)
@@ -104,16 +107,21 @@ void handle_put_document(struct http_request *r)
     struct error err = {0};
     struct precondition p = {.request = r, .wanted = request_header(r, "If-Match")};
     if (!body_is_json(r)) return;
-    status s = job_replace_document(r->service, r->param[0], r->body, r->n_body, p.wanted != NULL ? check_tag : NULL, &p, &err);
-    if (s != STATUS_OK) reply_problem(r, p.failed ? "precondition" : NULL, &err, NULL);
-    else reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
+    status s = job_replace_document(r->service, r->param[0], r->body, r->n_body, p.wanted != NULL ? check_tag : NULL,
+                                    &p, &err);
+    if (s != STATUS_OK)
+        reply_problem(r, p.failed ? "precondition" : NULL, &err, NULL);
+    else
+        reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
 }
 
 void handle_delete_job(struct http_request *r)
 {
     struct error err = {0};
-    if (job_delete(r->service, r->param[0], &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_empty(r, MHD_HTTP_NO_CONTENT);
+    if (job_delete(r->service, r->param[0], &err) != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_empty(r, MHD_HTTP_NO_CONTENT);
 }
 
 void handle_start_job(struct http_request *r)
@@ -121,8 +129,10 @@ void handle_start_job(struct http_request *r)
     bool changed;
     struct job_refusal refusal = {0};
     struct error err = {0};
-    if (job_start(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK) reply_refusal(r, &refusal, &err);
-    else reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
+    if (job_start(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK)
+        reply_refusal(r, &refusal, &err);
+    else
+        reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
 }
 
 void handle_retry_job(struct http_request *r)
@@ -130,16 +140,20 @@ void handle_retry_job(struct http_request *r)
     bool changed;
     struct job_refusal refusal = {0};
     struct error err = {0};
-    if (job_retry(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK) reply_refusal(r, &refusal, &err);
-    else reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
+    if (job_retry(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK)
+        reply_refusal(r, &refusal, &err);
+    else
+        reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
 }
 
 void handle_cancel_job(struct http_request *r)
 {
     bool running;
     struct error err = {0};
-    if (job_cancel(r->service, r->param[0], &running, &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_job(r, r->param[0], running ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
+    if (job_cancel(r->service, r->param[0], &running, &err) != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_job(r, r->param[0], running ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
 }
 
 static bool read_query(struct http_request *r, struct job_query *q)
@@ -155,7 +169,9 @@ static bool read_query(struct http_request *r, struct job_query *q)
         return false;
     }
     if (text != NULL) q->state = (int)state;
-    if (!query_integer(r, "limit", 1, LIST_MOST, LIST_USUAL, &limit) || !query_integer(r, "cursor", 1, INT64_MAX, 0, &cursor)) return false;
+    if (!query_integer(r, "limit", 1, LIST_MOST, LIST_USUAL, &limit) ||
+        !query_integer(r, "cursor", 1, INT64_MAX, 0, &cursor))
+        return false;
     q->limit = (size_t)limit + 1; /* one more: is there another page? */
     q->before_serial = cursor;
     return true;
@@ -184,5 +200,6 @@ void handle_list_jobs(struct http_request *r)
         reply_problem(r, NULL, &err, NULL);
         return;
     }
-    reply_json_tagged(r, json_pack("{s:o,s:o}", "jobs", list, "next_cursor", cursor[0] ? json_string(cursor) : json_null()));
+    reply_json_tagged(
+        r, json_pack("{s:o,s:o}", "jobs", list, "next_cursor", cursor[0] ? json_string(cursor) : json_null()));
 }

@@ -32,7 +32,9 @@ void handle_series(struct http_request *r)
     json_t *view = NULL;
     long long after, most;
     const char *rendered = MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, "rendered");
-    if (!query_integer(r, "after_step", -1, INT64_MAX, -1, &after) || !query_integer(r, "max_points", 2, SERIES_MOST, SERIES_USUAL, &most)) return;
+    if (!query_integer(r, "after_step", -1, INT64_MAX, -1, &after) ||
+        !query_integer(r, "max_points", 2, SERIES_MOST, SERIES_USUAL, &most))
+        return;
     if (rendered != NULL && strcmp(rendered, "all") != 0 && strcmp(rendered, "last") != 0) {
         error_set_field(&err, STATUS_INVALID, "rendered", "query parameter 'rendered' has to be 'last' or 'all'");
         reply_problem(r, NULL, &err, NULL);
@@ -41,8 +43,10 @@ void handle_series(struct http_request *r)
     if (!find_job(r, &row)) return;
     status s = series_view(r->service, &row, after, (size_t)most, rendered != NULL && rendered[0] == 'a', &view, &err);
     job_row_release(&row);
-    if (s != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_json_tagged(r, view);
+    if (s != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_json_tagged(r, view);
 }
 
 /* Reads at most n_most bytes from *offset on, which is brought into the file first. */
@@ -71,13 +75,16 @@ void handle_log(struct http_request *r)
     struct job_row row;
     long long offset, most, size;
     char path[PATH_BYTES];
-    if (!query_integer(r, "offset", INT64_MIN, INT64_MAX, 0, &offset) || !query_integer(r, "max_bytes", 1, LOG_MOST_BYTES, LOG_USUAL_BYTES, &most)) return;
+    if (!query_integer(r, "offset", INT64_MIN, INT64_MAX, 0, &offset) ||
+        !query_integer(r, "max_bytes", 1, LOG_MOST_BYTES, LOG_USUAL_BYTES, &most))
+        return;
     if (!find_job(r, &row)) return;
     path_join(path, r->service->settings->data, "jobs", row.id, JOB_FILE_LOG, NULL);
     job_row_release(&row);
     char *text = malloc((size_t)most);
     ssize_t n = text == NULL ? -1 : read_log(path, &offset, &size, text, (size_t)most);
-    if (n < 0) reply_code(r, "internal", "", "the log cannot be read");
+    if (n < 0)
+        reply_code(r, "internal", "", "the log cannot be read");
     else {
         reply_text(r, MHD_HTTP_OK, "text/plain; charset=utf-8", text, (size_t)n);
         reply_header_int(r, "Selvedge-Next-Offset", offset + n);
@@ -104,8 +111,10 @@ void handle_list_results(struct http_request *r)
     json_t *list = json_array();
     for (size_t i = 0; i < n; i++) {
         snprintf(url, sizeof url, "/v1/jobs/%s/results/%s", row.id, file[i].path);
-        json_array_append_new(list, json_pack("{s:s,s:I,s:f,s:s,s:s}", "path", file[i].path, "size", (json_int_t)file[i].size_bytes, "modified_unix_s",
-                                              file[i].modified_unix_s, "content_type", content_type_of(file[i].path), "url", url));
+        json_array_append_new(list,
+                              json_pack("{s:s,s:I,s:f,s:s,s:s}", "path", file[i].path, "size",
+                                        (json_int_t)file[i].size_bytes, "modified_unix_s", file[i].modified_unix_s,
+                                        "content_type", content_type_of(file[i].path), "url", url));
     }
     snprintf(url, sizeof url, "/v1/jobs/%s/results.tar", row.id);
     reply_json_tagged(r, json_pack("{s:o,s:s}", "files", list, "archive", url));
@@ -119,8 +128,10 @@ void handle_get_result(struct http_request *r)
     struct error err = {0};
     int fd;
     if (!find_job(r, &row)) return;
-    if (result_open(r->service, row.id, r->param[1], &fd, &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_file(r, fd, content_type_of(r->param[1]));
+    if (result_open(r->service, row.id, r->param[1], &fd, &err) != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_file(r, fd, content_type_of(r->param[1]));
     job_row_release(&row);
 }
 
@@ -131,7 +142,8 @@ void handle_archive(struct http_request *r)
     struct MHD_Response *response = NULL;
     char text[128];
     if (!find_job(r, &row)) return;
-    if (tar_stream_response(r->service, row.id, &response, &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
+    if (tar_stream_response(r->service, row.id, &response, &err) != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
     else {
         reply_response(r, MHD_HTTP_OK, response);
         reply_header(r, "Content-Type", "application/x-tar");

@@ -20,22 +20,27 @@ void handle_about(struct http_request *r)
     const struct pipeline_stage_info *stage = pipeline_stage_table(&n_stage);
     json_t *stages = json_array(), *states = json_array();
     for (size_t i = 0; i < n_stage; i++)
-        json_array_append_new(stages, json_pack("{s:s,s:s,s:f}", "name", stage[i].name, "title", stage[i].title, "weight", stage[i].weight));
+        json_array_append_new(stages, json_pack("{s:s,s:s,s:f}", "name", stage[i].name, "title", stage[i].title,
+                                                "weight", stage[i].weight));
     for (int i = 0; i < JOB_N_STATE; i++) json_array_append_new(states, json_string(job_state_name((enum job_state)i)));
-    json_t *limits = json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I}", "max_document_bytes", (json_int_t)s->max_document_bytes, "max_file_bytes",
-                               (json_int_t)s->max_file_bytes, "max_patch_bytes", (json_int_t)s->max_patch_bytes, "max_files_per_job",
-                               (json_int_t)s->max_files_per_job, "max_jobs", (json_int_t)s->max_jobs, "max_photographs", (json_int_t)JOB_MAX_PHOTOGRAPH,
-                               "workers", (json_int_t)s->workers);
+    json_t *limits =
+        json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I}", "max_document_bytes", (json_int_t)s->max_document_bytes,
+                  "max_file_bytes", (json_int_t)s->max_file_bytes, "max_patch_bytes", (json_int_t)s->max_patch_bytes,
+                  "max_files_per_job", (json_int_t)s->max_files_per_job, "max_jobs", (json_int_t)s->max_jobs,
+                  "max_photographs", (json_int_t)JOB_MAX_PHOTOGRAPH, "workers", (json_int_t)s->workers);
     reply_json(r, MHD_HTTP_OK,
-               json_pack("{s:s,s:s,s:o,s:o,s:o}", "name", "selvedge", "version", SELVEDGE_VERSION, "stages", stages, "states", states, "limits", limits));
+               json_pack("{s:s,s:s,s:o,s:o,s:o}", "name", "selvedge", "version", SELVEDGE_VERSION, "stages", stages,
+                         "states", states, "limits", limits));
 }
 
 static void reply_static(struct http_request *r, const char *url)
 {
     const struct static_file *f = static_files_find(http_server_files(r->server), url);
     int fd = f == NULL ? -1 : open(f->path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) reply_code(r, "not_found", "", "there is nothing at this address");
-    else reply_file(r, fd, content_type_of(f->path));
+    if (fd < 0)
+        reply_code(r, "not_found", "", "there is nothing at this address");
+    else
+        reply_file(r, fd, content_type_of(f->path));
 }
 
 void handle_static(struct http_request *r) { reply_static(r, r->url); }
@@ -48,8 +53,10 @@ void handle_readyz(struct http_request *r)
     struct error err = {0};
     status s = job_disk_check(r->service, 0, &err);
     if (s == STATUS_OK) s = store_probe(r->service->store, &err);
-    if (s == STATUS_OK) reply_json(r, MHD_HTTP_OK, json_pack("{s:s}", "status", "ready"));
-    else reply_problem(r, "not_ready", &err, NULL);
+    if (s == STATUS_OK)
+        reply_json(r, MHD_HTTP_OK, json_pack("{s:s}", "status", "ready"));
+    else
+        reply_problem(r, "not_ready", &err, NULL);
 }
 
 static void print_counts(FILE *out, const struct http_request *r)
@@ -57,12 +64,16 @@ static void print_counts(FILE *out, const struct http_request *r)
     int64_t n[JOB_N_STATE] = {0};
     store_job_count(r->service->store, n, NULL);
     fprintf(out, "# HELP selvedge_jobs Jobs by state.\n# TYPE selvedge_jobs gauge\n");
-    for (int i = 0; i < JOB_N_STATE; i++) fprintf(out, "selvedge_jobs{state=\"%s\"} %lld\n", job_state_name((enum job_state)i), (long long)n[i]);
-    fprintf(out, "# HELP selvedge_jobs_finished_total Jobs that came to an end since the start.\n# TYPE selvedge_jobs_finished_total counter\n");
+    for (int i = 0; i < JOB_N_STATE; i++)
+        fprintf(out, "selvedge_jobs{state=\"%s\"} %lld\n", job_state_name((enum job_state)i), (long long)n[i]);
+    fprintf(out, "# HELP selvedge_jobs_finished_total Jobs that came to an end since the start.\n# TYPE "
+                 "selvedge_jobs_finished_total counter\n");
     for (int i = JOB_SUCCEEDED; i < JOB_N_STATE; i++)
         fprintf(out, "selvedge_jobs_finished_total{state=\"%s\"} %llu\n", job_state_name((enum job_state)i),
                 (unsigned long long)atomic_load(&r->service->n_finished_total[i]));
-    fprintf(out, "# HELP selvedge_http_requests_total Replies by status code.\n# TYPE selvedge_http_requests_total counter\n");
+    fprintf(
+        out,
+        "# HELP selvedge_http_requests_total Replies by status code.\n# TYPE selvedge_http_requests_total counter\n");
     for (unsigned i = 100; i < HTTP_MAX_STATUS; i++) {
         unsigned long long k = http_server_n_reply(r->server, i);
         if (k > 0) fprintf(out, "selvedge_http_requests_total{code=\"%u\"} %llu\n", i, k);
@@ -98,12 +109,17 @@ void handle_metrics(struct http_request *r)
     path_free_bytes(v->settings->data, &free_bytes, NULL);
     print_counts(out, r);
     print_one(out, "selvedge_attempts_total", "counter", "Workers started.", (double)atomic_load(&v->n_attempt_total));
-    print_one(out, "selvedge_attempts_lost_total", "counter", "Workers that died.", (double)atomic_load(&v->n_lost_total));
-    print_one(out, "selvedge_upload_bytes_total", "counter", "Bytes of input files received.", (double)upload_bytes_total(v->upload));
+    print_one(out, "selvedge_attempts_lost_total", "counter", "Workers that died.",
+              (double)atomic_load(&v->n_lost_total));
+    print_one(out, "selvedge_upload_bytes_total", "counter", "Bytes of input files received.",
+              (double)upload_bytes_total(v->upload));
     print_one(out, "selvedge_disk_free_bytes", "gauge", "Free space under the data folder.", (double)free_bytes);
-    print_one(out, "selvedge_disk_floor_bytes", "gauge", "Free space under which work stops.", (double)v->settings->floor_bytes);
-    print_one(out, "selvedge_http_connections", "gauge", "Open connections.", (double)http_server_n_connection(r->server));
+    print_one(out, "selvedge_disk_floor_bytes", "gauge", "Free space under which work stops.",
+              (double)v->settings->floor_bytes);
+    print_one(out, "selvedge_http_connections", "gauge", "Open connections.",
+              (double)http_server_n_connection(r->server));
     print_one(out, "process_resident_memory_bytes", "gauge", "Memory of the daemon itself.", resident_bytes());
-    if (fclose(out) == 0 && text != NULL) reply_text(r, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8", text, n);
+    if (fclose(out) == 0 && text != NULL)
+        reply_text(r, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8", text, n);
     free(text);
 }

@@ -68,10 +68,13 @@ void handle_upload_begin(struct http_request *r)
     if (!take(r, &upload, &row)) return;
     long long offset = strtoll(text, NULL, 10);
     if (offset != row.offset_bytes)
-        error_set_field(&err, STATUS_CONFLICT, "Upload-Offset", "the upload of '%s' is at offset %lld, not %lld", row.name, (long long)row.offset_bytes, offset);
+        error_set_field(&err, STATUS_CONFLICT, "Upload-Offset", "the upload of '%s' is at offset %lld, not %lld",
+                        row.name, (long long)row.offset_bytes, offset);
     else if (r->content_length > row.size_bytes - row.offset_bytes)
-        error_set_field(&err, STATUS_TOO_LARGE, "Content-Length", "'%s' was declared with %lld bytes: %lld are wanted, %lld were announced", row.name,
-                        (long long)row.size_bytes, (long long)(row.size_bytes - row.offset_bytes), (long long)r->content_length);
+        error_set_field(&err, STATUS_TOO_LARGE, "Content-Length",
+                        "'%s' was declared with %lld bytes: %lld are wanted, %lld were announced", row.name,
+                        (long long)row.size_bytes, (long long)(row.size_bytes - row.offset_bytes),
+                        (long long)r->content_length);
     if (err.code == STATUS_OK) {
         r->upload = upload;
         return;
@@ -116,8 +119,10 @@ void handle_upload_delete(struct http_request *r)
 {
     struct error err = {0};
     if (!check_version(r)) return;
-    if (job_delete_upload(r->service, r->param[0], &err) != STATUS_OK) reply_problem(r, NULL, &err, NULL);
-    else reply_empty(r, MHD_HTTP_NO_CONTENT);
+    if (job_delete_upload(r->service, r->param[0], &err) != STATUS_OK)
+        reply_problem(r, NULL, &err, NULL);
+    else
+        reply_empty(r, MHD_HTTP_NO_CONTENT);
 }
 
 void handle_upload_options(struct http_request *r)

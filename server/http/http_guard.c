@@ -6,8 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const single[] = {"Content-Length", "Host", "Transfer-Encoding", "Content-Type", "Upload-Offset", "Tus-Resumable",
-                                     "Idempotency-Key", "Origin", "If-Match", "Range"};
+static const char *const single[] = {"Content-Length", "Host",          "Transfer-Encoding", "Content-Type",
+                                     "Upload-Offset",  "Tus-Resumable", "Idempotency-Key",   "Origin",
+                                     "If-Match",       "Range"};
 enum { N_SINGLE = sizeof single / sizeof single[0] };
 
 static enum MHD_Result count_header(void *context, enum MHD_ValueKind kind, const char *name, const char *value)
@@ -25,7 +26,8 @@ bool guard_framing(struct http_request *r)
     unsigned n[N_SINGLE] = {0};
     MHD_get_connection_values(r->connection, MHD_HEADER_KIND, count_header, n);
     if (n[0] > 0 && n[2] > 0) {
-        reply_code(r, "length_and_chunked", "Content-Length", "Content-Length and Transfer-Encoding together leave the end of the body open");
+        reply_code(r, "length_and_chunked", "Content-Length",
+                   "Content-Length and Transfer-Encoding together leave the end of the body open");
         return false;
     }
     for (size_t i = 0; i < N_SINGLE; i++)
@@ -81,13 +83,15 @@ bool guard_site(struct http_request *r, const char *method)
 static bool type_is(const char *header, const char *want)
 {
     size_t n = strlen(want);
-    return header != NULL && strncasecmp(header, want, n) == 0 && (header[n] == '\0' || header[n] == ';' || header[n] == ' ');
+    return header != NULL && strncasecmp(header, want, n) == 0 &&
+           (header[n] == '\0' || header[n] == ';' || header[n] == ' ');
 }
 
 static void too_large(struct http_request *r, long long most)
 {
     struct error err = {0};
-    error_set_field(&err, STATUS_TOO_LARGE, "Content-Length", "the body has %lld bytes, at most %lld are taken at once", (long long)r->content_length, most);
+    error_set_field(&err, STATUS_TOO_LARGE, "Content-Length", "the body has %lld bytes, at most %lld are taken at once",
+                    (long long)r->content_length, most);
     reply_problem(r, NULL, &err, json_pack("{s:I}", "max_bytes", (json_int_t)most));
 }
 
@@ -97,9 +101,13 @@ bool guard_body(struct http_request *r)
     const struct settings *s = r->service->settings;
     bool json = r->route->body == HTTP_BODY_JSON;
     long long most = json ? s->max_document_bytes : s->max_patch_bytes;
-    if (request_header(r, "Content-Length") == NULL) reply_code(r, "length_required", "Content-Length", "a body with a Content-Length is required");
+    if (request_header(r, "Content-Length") == NULL)
+        reply_code(r, "length_required", "Content-Length", "a body with a Content-Length is required");
     else if (!type_is(request_header(r, "Content-Type"), json ? "application/json" : "application/offset+octet-stream"))
-        reply_code(r, "content_type", "Content-Type", json ? "Content-Type has to be application/json" : "Content-Type has to be application/offset+octet-stream");
-    else if (r->content_length > most) too_large(r, most);
+        reply_code(r, "content_type", "Content-Type",
+                   json ? "Content-Type has to be application/json"
+                        : "Content-Type has to be application/offset+octet-stream");
+    else if (r->content_length > most)
+        too_large(r, most);
     return r->reply == NULL;
 }

@@ -11,7 +11,8 @@
 #include <unistd.h>
 
 /* Everything comes from this server: no other host may supply scripts, pictures or connections. */
-static const char csp[] = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
+static const char csp[] = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; "
+                          "form-action 'self'; frame-ancestors 'none'";
 
 const char *request_header(const struct http_request *r, const char *name)
 {
@@ -113,7 +114,8 @@ void reply_problem(struct http_request *r, const char *code, const struct error 
     const struct http_problem *p = code != NULL ? http_problem_of_code(code) : http_problem_of_status(err->code);
     char type[96];
     snprintf(type, sizeof type, "urn:selvedge:problem:%s", p->code);
-    json_t *body = json_pack("{s:s,s:s,s:i,s:s}", "type", type, "title", p->title, "status", (int)p->status, "code", p->code);
+    json_t *body =
+        json_pack("{s:s,s:s,s:i,s:s}", "type", type, "title", p->title, "status", (int)p->status, "code", p->code);
     json_t *detail = json_string(err->text); /* NULL when a hostile name is not UTF-8 */
     json_object_set_new(body, "detail", detail != NULL ? detail : json_string(p->title));
     if (err->field[0] != '\0') json_object_set_new(body, "field", json_string(err->field));
@@ -132,7 +134,8 @@ void reply_code(struct http_request *r, const char *code, const char *field, con
     reply_problem(r, code, &err, NULL);
 }
 
-bool query_integer(struct http_request *r, const char *name, long long least, long long most, long long fallback, long long *out)
+bool query_integer(struct http_request *r, const char *name, long long least, long long most, long long fallback,
+                   long long *out)
 {
     const char *text = MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, name);
     *out = fallback;
@@ -142,7 +145,9 @@ bool query_integer(struct http_request *r, const char *name, long long least, lo
     *out = strtoll(text, &end, 10);
     if (*text != '\0' && *end == '\0' && errno == 0 && *out >= least && *out <= most) return true;
     struct error err = {0};
-    error_set_field(&err, STATUS_INVALID, name, "query parameter '%s' is '%.40s': a whole number from %lld to %lld is wanted", name, text, least, most);
+    error_set_field(&err, STATUS_INVALID, name,
+                    "query parameter '%s' is '%.40s': a whole number from %lld to %lld is wanted", name, text, least,
+                    most);
     reply_problem(r, NULL, &err, NULL);
     return false;
 }
@@ -206,7 +211,8 @@ void reply_file(struct http_request *r, int fd, const char *content_type)
         close(fd);
         return;
     }
-    int range = if_range != NULL && strcmp(if_range, tag) != 0 ? 0 : parse_range(request_header(r, "Range"), size, &from, &to);
+    int range =
+        if_range != NULL && strcmp(if_range, tag) != 0 ? 0 : parse_range(request_header(r, "Range"), size, &from, &to);
     if (range < 0) {
         close(fd);
         reply_code(r, "range", "Range", "the range begins behind the end of the file");

@@ -7,7 +7,8 @@
 const char *request_header(const struct http_request *request, const char *name);
 
 void reply_empty(struct http_request *request, unsigned status_code);
-void reply_text(struct http_request *request, unsigned status_code, const char *content_type, const char *text, size_t n);
+void reply_text(struct http_request *request, unsigned status_code, const char *content_type, const char *text,
+                size_t n);
 /* Takes over body. */
 void reply_json(struct http_request *request, unsigned status_code, json_t *body);
 /* The same with a strong ETag over the body, and 304 when If-None-Match has it. */
@@ -28,6 +29,7 @@ void reply_response(struct http_request *request, unsigned status_code, struct M
 void reply_file(struct http_request *request, int fd, const char *content_type);
 
 /* A whole number from the query; absent: fallback; false after deciding a 422. */
-bool query_integer(struct http_request *request, const char *name, long long least, long long most, long long fallback, long long *out);
+bool query_integer(struct http_request *request, const char *name, long long least, long long most, long long fallback,
+                   long long *out);
 
 #endif

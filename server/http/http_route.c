@@ -55,7 +55,8 @@ static bool match(const char *pattern, const char *url, char param[2][HTTP_PARAM
     return *url == '\0';
 }
 
-const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES], char *allow, size_t n_allow)
+const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES],
+                                         char *allow, size_t n_allow)
 {
     size_t n = 0;
     allow[0] = '\0';

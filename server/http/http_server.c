@@ -54,15 +54,18 @@ static bool examine(struct http_request *r, const char *method)
     }
     if (!guard_site(r, method)) return skip_body;
     r->route = http_route_find(method, r->url, r->param, allow, sizeof allow);
-    if (r->route == NULL && allow[0] == '\0') reply_code(r, "not_found", "", "there is nothing at this address");
+    if (r->route == NULL && allow[0] == '\0')
+        reply_code(r, "not_found", "", "there is nothing at this address");
     else if (r->route == NULL) {
         reply_code(r, "method", "", "this address takes other methods: see Allow");
         reply_header(r, "Allow", allow);
-    } else if (guard_body(r) && r->route->begin != NULL) r->route->begin(r);
+    } else if (guard_body(r) && r->route->begin != NULL)
+        r->route->begin(r);
     return r->reply != NULL && skip_body;
 }
 
-static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *c, const char *url, const char *method, void **context)
+static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *c, const char *url, const char *method,
+                                  void **context)
 {
     struct http_request *r = calloc(1, sizeof *r);
     if (r == NULL) return MHD_NO;
@@ -91,7 +94,8 @@ static bool consume(struct http_request *r, const char *data, size_t n)
     connection_received(r->entry, n);
     if (r->reply != NULL) return true; /* decided already: swallowed */
     if (r->upload != NULL) {
-        if (r->upload_status == STATUS_OK) r->upload_status = upload_write(r->upload, r->ticket, data, n, &r->upload_error);
+        if (r->upload_status == STATUS_OK)
+            r->upload_status = upload_write(r->upload, r->ticket, data, n, &r->upload_error);
         return r->upload_status != STATUS_STALE;
     }
     if (r->body == NULL) return true;
@@ -102,8 +106,8 @@ static bool consume(struct http_request *r, const char *data, size_t n)
     return true;
 }
 
-static enum MHD_Result on_request(void *context, struct MHD_Connection *c, const char *url, const char *method, const char *version, const char *data,
-                                  size_t *n_data, void **request)
+static enum MHD_Result on_request(void *context, struct MHD_Connection *c, const char *url, const char *method,
+                                  const char *version, const char *data, size_t *n_data, void **request)
 {
     struct http_request *r = *request;
     (void)version;
@@ -134,7 +138,8 @@ static void on_completed(void *context, struct MHD_Connection *c, void **request
     *request = NULL;
 }
 
-static void on_connection(void *context, struct MHD_Connection *c, void **socket_context, enum MHD_ConnectionNotificationCode code)
+static void on_connection(void *context, struct MHD_Connection *c, void **socket_context,
+                          enum MHD_ConnectionNotificationCode code)
 {
     struct http_server *s = context;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
@@ -164,7 +169,8 @@ static size_t unescape(void *context, struct MHD_Connection *c, char *text)
         if (low >= 0 && high + low > 0) {
             *out = (char)(high * 16 + low);
             in += 3;
-        } else *out = *in++;
+        } else
+            *out = *in++;
     }
     *out = '\0';
     return (size_t)(out - text);
@@ -202,17 +208,22 @@ static status open_socket(const struct settings *settings, int *out, unsigned *p
         v6->sin6_port = htons((uint16_t)settings->port);
         n = sizeof *v6;
         loopback = IN6_IS_ADDR_LOOPBACK(&v6->sin6_addr);
-    } else return error_set_field(err, STATUS_INVALID, "server.listen", "cannot listen on '%s': not an IP address", settings->listen);
-    if (!loopback)
-        return error_set_field(err, STATUS_INVALID, "server.listen",
-                               "cannot listen on '%s': without access tokens only loopback addresses (127.0.0.1, ::1) are allowed; "
-                               "use an SSH tunnel or an authenticating proxy on this machine",
+    } else
+        return error_set_field(err, STATUS_INVALID, "server.listen", "cannot listen on '%s': not an IP address",
                                settings->listen);
+    if (!loopback)
+        return error_set_field(
+            err, STATUS_INVALID, "server.listen",
+            "cannot listen on '%s': without access tokens only loopback addresses (127.0.0.1, ::1) are allowed; "
+            "use an SSH tunnel or an authenticating proxy on this machine",
+            settings->listen);
     int on = 1, fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return error_set_errno(err, "cannot open a socket");
     setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(fd, (struct sockaddr *)&address, n) != 0 || listen(fd, LISTEN_BACKLOG) != 0 || getsockname(fd, (struct sockaddr *)&address, &n) != 0) {
-        status s = error_set_errno(err, "cannot listen on '%s', port %lld", settings->listen, (long long)settings->port);
+    if (bind(fd, (struct sockaddr *)&address, n) != 0 || listen(fd, LISTEN_BACKLOG) != 0 ||
+        getsockname(fd, (struct sockaddr *)&address, &n) != 0) {
+        status s =
+            error_set_errno(err, "cannot listen on '%s', port %lld", settings->listen, (long long)settings->port);
         close(fd);
         return s;
     }
@@ -221,7 +232,8 @@ static status open_socket(const struct settings *settings, int *out, unsigned *p
     return STATUS_OK;
 }
 
-status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **out, unsigned *port, struct error *err)
+status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **out,
+                         unsigned *port, struct error *err)
 {
     const struct settings *settings = service->settings;
     int fd = -1;
@@ -229,23 +241,28 @@ status http_server_start(struct job_service *service, const struct static_files 
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the server: out of memory");
     s->service = service;
     s->files = files;
-    status result = connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s, &s->connection, err);
+    status result =
+        connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s, &s->connection, err);
     if (result == STATUS_OK) result = open_socket(settings, &fd, port, err);
     if (result != STATUS_OK) goto out;
     MHD_set_panic_func(on_panic, service->log);
     s->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC, 0, NULL, NULL, on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s,
-        MHD_OPTION_LISTEN_SOCKET, fd, MHD_OPTION_THREAD_POOL_SIZE, (unsigned)settings->threads, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)settings->max_connections, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-        (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s, MHD_OPTION_NOTIFY_CONNECTION, on_connection, s,
-        MHD_OPTION_UNESCAPE_CALLBACK, unescape, s, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC, 0, NULL, NULL, on_request, s,
+        MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s, MHD_OPTION_LISTEN_SOCKET, fd, MHD_OPTION_THREAD_POOL_SIZE,
+        (unsigned)settings->threads, MHD_OPTION_CONNECTION_LIMIT, (unsigned)settings->max_connections,
+        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s, MHD_OPTION_NOTIFY_CONNECTION,
+        on_connection, s, MHD_OPTION_UNESCAPE_CALLBACK, unescape, s, MHD_OPTION_STRICT_FOR_CLIENT, 1,
+        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (s->daemon == NULL) {
         close(fd);
         result = error_set_errno(err, "cannot start the HTTP server");
     }
 out:
-    if (result != STATUS_OK) http_server_stop(s);
-    else *out = s;
+    if (result != STATUS_OK)
+        http_server_stop(s);
+    else
+        *out = s;
     return result;
 }
 

@@ -50,11 +50,12 @@ struct http_route {
 extern const struct http_route http_route_table[];
 extern const size_t http_n_route;
 /* NULL and *allow "" : no such path; NULL and *allow "GET, POST": other methods exist. */
-const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES], char *allow, size_t n_allow);
+const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES],
+                                         char *allow, size_t n_allow);
 
 /* listen address and port from the settings; *port is the real one. files: see static_files.h. */
-status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **server, unsigned *port,
-                         struct error *err);
+status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **server,
+                         unsigned *port, struct error *err);
 /* Ends every connection: what uploads had received is kept. */
 void http_server_stop(struct http_server *server);
 /* Call about once a second: ends connections that are too slow. */

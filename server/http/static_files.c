@@ -18,13 +18,19 @@ struct static_files {
 static const struct {
     const char *url, *path[2];
 } vendor[] = {
-    {"/vendor/dygraph.min.js", {"/usr/share/javascript/dygraphs/dygraph.min.js", "/usr/share/javascript/dygraphs/dist/dygraph.min.js"}},
-    {"/vendor/dygraph.js", {"/usr/share/javascript/dygraphs/dygraph.js", "/usr/share/javascript/dygraphs/dist/dygraph.js"}},
-    {"/vendor/dygraph.min.css", {"/usr/share/javascript/dygraphs/dygraph.min.css", "/usr/share/javascript/dygraphs/dist/dygraph.min.css"}},
-    {"/vendor/dygraph.css", {"/usr/share/javascript/dygraphs/dygraph.css", "/usr/share/javascript/dygraphs/dist/dygraph.css"}},
-    {"/vendor/three.min.js", {"/usr/share/javascript/three/three.min.js", "/usr/share/nodejs/three/build/three.min.js"}},
+    {"/vendor/dygraph.min.js",
+     {"/usr/share/javascript/dygraphs/dygraph.min.js", "/usr/share/javascript/dygraphs/dist/dygraph.min.js"}},
+    {"/vendor/dygraph.js",
+     {"/usr/share/javascript/dygraphs/dygraph.js", "/usr/share/javascript/dygraphs/dist/dygraph.js"}},
+    {"/vendor/dygraph.min.css",
+     {"/usr/share/javascript/dygraphs/dygraph.min.css", "/usr/share/javascript/dygraphs/dist/dygraph.min.css"}},
+    {"/vendor/dygraph.css",
+     {"/usr/share/javascript/dygraphs/dygraph.css", "/usr/share/javascript/dygraphs/dist/dygraph.css"}},
+    {"/vendor/three.min.js",
+     {"/usr/share/javascript/three/three.min.js", "/usr/share/nodejs/three/build/three.min.js"}},
     {"/vendor/three.js", {"/usr/share/javascript/three/three.js", "/usr/share/nodejs/three/build/three.js"}},
-    {"/vendor/three.module.js", {"/usr/share/javascript/three/three.module.js", "/usr/share/nodejs/three/build/three.module.js"}},
+    {"/vendor/three.module.js",
+     {"/usr/share/javascript/three/three.module.js", "/usr/share/nodejs/three/build/three.module.js"}},
 };
 
 static void add(struct static_files *f, const char *url, const char *path)
@@ -37,7 +43,8 @@ static void add(struct static_files *f, const char *url, const char *path)
 
 static bool served_kind(const char *name)
 {
-    static const char *const ending[] = {".html", ".css", ".js", ".mjs", ".json", ".svg", ".png", ".jpg", ".ico", ".woff2"};
+    static const char *const ending[] = {".html", ".css", ".js",  ".mjs", ".json",
+                                         ".svg",  ".png", ".jpg", ".ico", ".woff2"};
     const char *dot = strrchr(name, '.');
     for (size_t i = 0; dot != NULL && i < sizeof ending / sizeof ending[0]; i++)
         if (strcmp(dot, ending[i]) == 0) return true;
@@ -52,7 +59,8 @@ static void add_folder(struct static_files *f, const char *folder, const char *u
         char path[1024], address[256];
         struct stat st;
         if (e->d_name[0] == '.') continue;
-        int n = snprintf(path, sizeof path, "%s/%s", folder, e->d_name), m = snprintf(address, sizeof address, "%s/%s", url, e->d_name);
+        int n = snprintf(path, sizeof path, "%s/%s", folder, e->d_name),
+            m = snprintf(address, sizeof address, "%s/%s", url, e->d_name);
         if (n >= (int)sizeof path || m >= (int)sizeof address || lstat(path, &st) != 0) continue;
         if (S_ISDIR(st.st_mode) && depth + 1 < MAX_DEPTH) add_folder(f, path, address, depth + 1);
         if (S_ISREG(st.st_mode) && served_kind(e->d_name)) add(f, address, path);
@@ -81,20 +89,25 @@ static bool find_beside(const char *in_tree, const char *installed, char out[102
 static status add_dashboard(struct static_files *f, const char *web, struct log *log, struct error *err)
 {
     char folder[1024], index[1100];
-    if (*web != '\0') snprintf(folder, sizeof folder, "%s", web);
+    if (*web != '\0')
+        snprintf(folder, sizeof folder, "%s", web);
     else if (!find_beside("clients/dashboard", "dashboard", folder)) {
         log_warning(log, "there is no dashboard beside the program: only the API is served");
         return STATUS_OK;
     }
-    if (*web != '\0' && access(folder, R_OK | X_OK) != 0) return error_set_errno(err, "cannot read the dashboard's folder '%s'", folder);
+    if (*web != '\0' && access(folder, R_OK | X_OK) != 0)
+        return error_set_errno(err, "cannot read the dashboard's folder '%s'", folder);
     add_folder(f, folder, "", 0);
     snprintf(index, sizeof index, "%s/index.html", folder);
-    if (access(index, R_OK) == 0) add(f, "/", index);
-    else log_warning(log, "the dashboard's folder has no index.html: only the API is served");
+    if (access(index, R_OK) == 0)
+        add(f, "/", index);
+    else
+        log_warning(log, "the dashboard's folder has no index.html: only the API is served");
     return STATUS_OK;
 }
 
-status static_files_new(const char *web, const char *openapi, struct log *log, struct static_files **out, struct error *err)
+status static_files_new(const char *web, const char *openapi, struct log *log, struct static_files **out,
+                        struct error *err)
 {
     char path[1024];
     struct static_files *f = calloc(1, sizeof *f);
@@ -110,9 +123,12 @@ status static_files_new(const char *web, const char *openapi, struct log *log, s
                 add(f, vendor[i].url, vendor[i].path[k]);
                 break;
             }
-    if (*openapi != '\0') add(f, "/v1/openapi.json", openapi);
-    else if (find_beside("config/openapi.json", "openapi.json", path)) add(f, "/v1/openapi.json", path);
-    else log_warning(log, "openapi.json was not found beside the program");
+    if (*openapi != '\0')
+        add(f, "/v1/openapi.json", openapi);
+    else if (find_beside("config/openapi.json", "openapi.json", path))
+        add(f, "/v1/openapi.json", path);
+    else
+        log_warning(log, "openapi.json was not found beside the program");
     *out = f;
     return STATUS_OK;
 }

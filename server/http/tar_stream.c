@@ -16,7 +16,7 @@ struct tar_stream {
     char job_id[STORE_ID_BYTES];
     struct result_file *file;
     size_t n_file, i_file;
-    int fd;              /* of the file that is being sent, or -1 */
+    int fd;               /* of the file that is being sent, or -1 */
     long long left_bytes; /* of that file, as announced in its header */
     struct archive *archive;
     bool closed, failed;
@@ -53,7 +53,8 @@ static void next_file(struct tar_stream *t)
         return;
     }
     struct archive_entry *e = archive_entry_new();
-    if (fstat(t->fd, &st) != 0 || e == NULL) t->failed = true;
+    if (fstat(t->fd, &st) != 0 || e == NULL)
+        t->failed = true;
     else {
         archive_entry_set_pathname(e, f->path);
         archive_entry_set_filetype(e, AE_IFREG);
@@ -82,8 +83,10 @@ static void more_of_file(struct tar_stream *t)
 
 static void advance(struct tar_stream *t)
 {
-    if (t->fd >= 0) more_of_file(t);
-    else if (t->i_file < t->n_file) next_file(t);
+    if (t->fd >= 0)
+        more_of_file(t);
+    else if (t->i_file < t->n_file)
+        next_file(t);
     else if (!t->closed) {
         t->closed = true;
         if (archive_write_close(t->archive) != ARCHIVE_OK) t->failed = true;
@@ -132,7 +135,8 @@ status tar_stream_response(struct job_service *v, const char *job_id, struct MHD
     if (s != STATUS_OK) goto out;
     t->archive = archive_write_new();
     if (t->archive == NULL || archive_write_set_format_pax_restricted(t->archive) != ARCHIVE_OK ||
-        archive_write_set_bytes_per_block(t->archive, 0) != ARCHIVE_OK || archive_write_open(t->archive, t, NULL, on_write, NULL) != ARCHIVE_OK) {
+        archive_write_set_bytes_per_block(t->archive, 0) != ARCHIVE_OK ||
+        archive_write_open(t->archive, t, NULL, on_write, NULL) != ARCHIVE_OK) {
         s = error_set(err, STATUS_INTERNAL, "cannot make the archive");
         goto out;
     }

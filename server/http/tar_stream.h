@@ -6,6 +6,7 @@
 
 #include <microhttpd.h>
 
-status tar_stream_response(struct job_service *service, const char *job_id, struct MHD_Response **response, struct error *err);
+status tar_stream_response(struct job_service *service, const char *job_id, struct MHD_Response **response,
+                           struct error *err);
 
 #endif

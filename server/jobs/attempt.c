@@ -29,7 +29,8 @@ json_t *attempt_read_status(const struct job_service *v, const char *job_id)
 /* Results and checkpoints of the input as it was before an edit. */
 static status clear_folder(struct job_service *v, const char *job_id, struct error *err)
 {
-    static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES, JOB_FILE_LOG, JOB_FOLDER_WORK, JOB_FOLDER_RESULTS};
+    static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES, JOB_FILE_LOG, JOB_FOLDER_WORK,
+                                        JOB_FOLDER_RESULTS};
     char path[PATH_BYTES];
     status s = STATUS_OK;
     for (size_t i = 0; s == STATUS_OK && i < sizeof stale / sizeof stale[0]; i++) {
@@ -124,7 +125,8 @@ static void failed(struct job_service *v, struct job_row *row)
 {
     json_t *j = attempt_read_status(v, row->id);
     json_t *e = json_object_get(j, "error");
-    const char *code = json_string_value(json_object_get(e, "code")), *field = json_string_value(json_object_get(e, "field"));
+    const char *code = json_string_value(json_object_get(e, "code")),
+               *field = json_string_value(json_object_get(e, "field"));
     const char *text = json_string_value(json_object_get(e, "text"));
     char tail[400], made[640];
     row->state = JOB_FAILED;
@@ -132,25 +134,34 @@ static void failed(struct job_service *v, struct job_row *row)
         set_error(row, code == NULL ? "internal" : code, field == NULL ? "" : field, text);
     else {
         console_tail(v, row->id, tail, sizeof tail);
-        snprintf(made, sizeof made, "the worker failed without saying why%s%s", tail[0] ? "; its last words: " : "", tail);
+        snprintf(made, sizeof made, "the worker failed without saying why%s%s", tail[0] ? "; its last words: " : "",
+                 tail);
         set_error(row, "internal", "", made);
     }
     json_decref(j);
 }
 
-static void describe_end(struct job_service *v, const struct job_row *row, const struct worker_end *end, enum attempt_stop stop, char *out, size_t n_out)
+static void describe_end(struct job_service *v, const struct job_row *row, const struct worker_end *end,
+                         enum attempt_stop stop, char *out, size_t n_out)
 {
     char tail[300], how[120];
     console_tail(v, row->id, tail, sizeof tail);
-    if (stop == STOP_SILENT) snprintf(how, sizeof how, "the worker gave no sign of life and was killed");
-    else if (end->by_signal && end->code == SIGKILL) snprintf(how, sizeof how, "the worker was killed (signal 9): out of memory or killed");
-    else if (end->by_signal) snprintf(how, sizeof how, "the worker crashed with signal %d (%s)", end->code, strsignal(end->code));
-    else if (end->code == 127) snprintf(how, sizeof how, "the worker could not be started");
-    else snprintf(how, sizeof how, "the worker ended with the unknown code %d", end->code);
-    snprintf(out, n_out, "%s; peak memory %.1f MB%s%s", how, (double)end->peak_rss_bytes / 1e6, tail[0] ? "; its last words: " : "", tail);
+    if (stop == STOP_SILENT)
+        snprintf(how, sizeof how, "the worker gave no sign of life and was killed");
+    else if (end->by_signal && end->code == SIGKILL)
+        snprintf(how, sizeof how, "the worker was killed (signal 9): out of memory or killed");
+    else if (end->by_signal)
+        snprintf(how, sizeof how, "the worker crashed with signal %d (%s)", end->code, strsignal(end->code));
+    else if (end->code == 127)
+        snprintf(how, sizeof how, "the worker could not be started");
+    else
+        snprintf(how, sizeof how, "the worker ended with the unknown code %d", end->code);
+    snprintf(out, n_out, "%s; peak memory %.1f MB%s%s", how, (double)end->peak_rss_bytes / 1e6,
+             tail[0] ? "; its last words: " : "", tail);
 }
 
-static void lost(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop, struct attempt_verdict *verdict)
+static void lost(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
+                 struct attempt_verdict *verdict)
 {
     char how[512], text[640];
     describe_end(v, row, end, stop, how, sizeof how);
@@ -167,21 +178,26 @@ static void lost(struct job_service *v, struct job_row *row, const struct worker
     verdict->delay_s = 0.5 * (double)row->lost_attempts;
 }
 
-static void judge(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop, struct attempt_verdict *verdict)
+static void judge(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
+                  struct attempt_verdict *verdict)
 {
     bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
-    if (!end->by_signal && end->code == WORKER_SUCCEEDED) row->state = JOB_SUCCEEDED;
-    else if (!end->by_signal && end->code == WORKER_FAILED) failed(v, row);
+    if (!end->by_signal && end->code == WORKER_SUCCEEDED)
+        row->state = JOB_SUCCEEDED;
+    else if (!end->by_signal && end->code == WORKER_FAILED)
+        failed(v, row);
     else if (asked || row->cancel_requested)
         row->state = stop == STOP_PAUSE && !row->cancel_requested      ? JOB_PAUSED
                      : stop == STOP_SHUTDOWN && !row->cancel_requested ? JOB_QUEUED
                                                                        : JOB_CANCELLED;
-    else if (!end->by_signal && end->code == WORKER_USAGE) failed(v, row);
+    else if (!end->by_signal && end->code == WORKER_USAGE)
+        failed(v, row);
     else if (!end->by_signal && end->code == WORKER_STALE) {
         row->state = JOB_QUEUED;
         verdict->busy = true;
         verdict->delay_s = 1;
-    } else lost(v, row, end, stop, verdict);
+    } else
+        lost(v, row, end, stop, verdict);
 }
 
 status attempt_settle(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
@@ -198,7 +214,9 @@ status attempt_settle(struct job_service *v, const char *job_id, const struct wo
     if (over) row.cancel_requested = false;
     s = job_update_surely(v, &row, err);
     if (s == STATUS_OK && over) atomic_fetch_add(&v->n_finished_total[row.state], 1);
-    if (s == STATUS_OK) log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "", row.error_text);
+    if (s == STATUS_OK)
+        log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "",
+                 row.error_text);
 out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);

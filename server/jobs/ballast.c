@@ -11,7 +11,9 @@ void ballast_keep(const char *data_folder, int64_t n_bytes)
     struct stat st;
     long long free_bytes = 0;
     path_join(path, data_folder, "ballast", NULL);
-    if (n_bytes == 0 || stat(path, &st) == 0 || path_free_bytes(data_folder, &free_bytes, NULL) != STATUS_OK || free_bytes < 2 * n_bytes) return;
+    if (n_bytes == 0 || stat(path, &st) == 0 || path_free_bytes(data_folder, &free_bytes, NULL) != STATUS_OK ||
+        free_bytes < 2 * n_bytes)
+        return;
     int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0) return;
     bool made = fallocate(fd, 0, 0, (off_t)n_bytes) == 0;

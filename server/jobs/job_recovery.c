@@ -77,7 +77,8 @@ static status requeue(struct job_service *v, struct error *err)
         if (row[i].cancel_requested) row[i].finished_unix_s = clock_wall_s();
         row[i].cancel_requested = false;
         s = store_job_update(v->store, &row[i], err);
-        if (s == STATUS_OK) log_info(v->log, "job %s was running when the daemon stopped: %s", row[i].id, job_state_name(row[i].state));
+        if (s == STATUS_OK)
+            log_info(v->log, "job %s was running when the daemon stopped: %s", row[i].id, job_state_name(row[i].state));
     }
     job_rows_free(row, n);
     return s;

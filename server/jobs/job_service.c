@@ -32,8 +32,10 @@ status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err)
     status s = path_free_bytes(v->settings->data, &free_bytes, err);
     if (s != STATUS_OK) return s;
     if (free_bytes < n_bytes || free_bytes - n_bytes < v->settings->floor_bytes)
-        return error_set(err, STATUS_DISK_FULL, "cannot take new work: %lld bytes are free, %lld are kept in reserve; delete jobs or free space", free_bytes,
-                         (long long)v->settings->floor_bytes);
+        return error_set(
+            err, STATUS_DISK_FULL,
+            "cannot take new work: %lld bytes are free, %lld are kept in reserve; delete jobs or free space",
+            free_bytes, (long long)v->settings->floor_bytes);
     return STATUS_OK;
 }
 
@@ -74,8 +76,8 @@ static void text_hash(const char *text, size_t n_bytes, char out[STORE_HASH_TEXT
     sodium_bin2hex(out, STORE_HASH_TEXT_BYTES, sum, sizeof sum);
 }
 
-static status find_replay(struct job_service *v, const char *key, const char *body_hash, char id[STORE_ID_BYTES], bool *replayed,
-                          struct job_refusal *refusal, struct error *err)
+static status find_replay(struct job_service *v, const char *key, const char *body_hash, char id[STORE_ID_BYTES],
+                          bool *replayed, struct job_refusal *refusal, struct error *err)
 {
     char before[STORE_HASH_TEXT_BYTES];
     status s = store_idempotency_find(v->store, key, id, before, err);
@@ -83,14 +85,15 @@ static status find_replay(struct job_service *v, const char *key, const char *bo
     if (s != STATUS_OK) return s;
     if (strcmp(before, body_hash) != 0) {
         refusal->code = "idempotency_key_reused";
-        return error_set_field(err, STATUS_INVALID, "Idempotency-Key", "key '%.128s' was used before with another body", key);
+        return error_set_field(err, STATUS_INVALID, "Idempotency-Key", "key '%.128s' was used before with another body",
+                               key);
     }
     *replayed = true;
     return STATUS_OK;
 }
 
-static status create_locked(struct job_service *v, struct job_row *row, const char *key, const char *body_hash, bool *replayed,
-                            struct job_refusal *refusal, struct error *err)
+static status create_locked(struct job_service *v, struct job_row *row, const char *key, const char *body_hash,
+                            bool *replayed, struct job_refusal *refusal, struct error *err)
 {
     status s = key == NULL ? STATUS_OK : find_replay(v, key, body_hash, row->id, replayed, refusal, err);
     if (s != STATUS_OK || *replayed) return s;
@@ -100,7 +103,8 @@ static status create_locked(struct job_service *v, struct job_row *row, const ch
     for (int i = 0; i < JOB_N_STATE; i++) n += count[i];
     if (n >= v->settings->max_jobs) {
         refusal->code = "too_many";
-        return error_set(err, STATUS_TOO_LARGE, "cannot keep more than %lld jobs: delete some", (long long)v->settings->max_jobs);
+        return error_set(err, STATUS_TOO_LARGE, "cannot keep more than %lld jobs: delete some",
+                         (long long)v->settings->max_jobs);
     }
     new_id(row->id);
     row->created_unix_s = clock_wall_s();
@@ -111,8 +115,8 @@ static status create_locked(struct job_service *v, struct job_row *row, const ch
     return s;
 }
 
-status job_create(struct job_service *v, const char *document, size_t n_bytes, const char *idempotency_key, char id[STORE_ID_BYTES],
-                  bool *replayed, struct job_refusal *refusal, struct error *err)
+status job_create(struct job_service *v, const char *document, size_t n_bytes, const char *idempotency_key,
+                  char id[STORE_ID_BYTES], bool *replayed, struct job_refusal *refusal, struct error *err)
 {
     struct job_row row = {.state = JOB_DRAFT};
     char body_hash[STORE_HASH_TEXT_BYTES];
@@ -164,7 +168,8 @@ static void edited(struct job_row *row)
 }
 
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
-                            status (*may_edit)(void *context, const struct job_row *row, struct error *err), void *context, struct error *err)
+                            status (*may_edit)(void *context, const struct job_row *row, struct error *err),
+                            void *context, struct error *err)
 {
     struct job_row row;
     pthread_mutex_lock(&v->change);
@@ -233,8 +238,8 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     if (n > 0) {
         refusal->code = "files_missing";
         refusal->missing_files = missing;
-        return error_set(err, STATUS_CONFLICT, "cannot start: %zu input file%s not complete, the first is '%s'", n, n == 1 ? " is" : "s are",
-                         json_string_value(json_array_get(missing, 0)));
+        return error_set(err, STATUS_CONFLICT, "cannot start: %zu input file%s not complete, the first is '%s'", n,
+                         n == 1 ? " is" : "s are", json_string_value(json_array_get(missing, 0)));
     }
     json_decref(missing);
     row->state = JOB_QUEUED;
@@ -246,7 +251,8 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     return store_job_update(v->store, row, err);
 }
 
-static status begin(struct job_service *v, const char *id, bool retry, bool *changed, struct job_refusal *refusal, struct error *err)
+static status begin(struct job_service *v, const char *id, bool retry, bool *changed, struct job_refusal *refusal,
+                    struct error *err)
 {
     struct job_row row;
     *changed = false;
@@ -254,11 +260,14 @@ static status begin(struct job_service *v, const char *id, bool retry, bool *cha
     status s = job_get(v, id, &row, err);
     if (s != STATUS_OK) goto out;
     if (active(&row)) {
-        if (row.cancel_requested) s = error_set(err, STATUS_CONFLICT, "cannot start the job while it is being cancelled: wait until it has stopped");
+        if (row.cancel_requested)
+            s = error_set(err, STATUS_CONFLICT,
+                          "cannot start the job while it is being cancelled: wait until it has stopped");
         goto out;
     }
     if (retry && row.state != JOB_FAILED && row.state != JOB_CANCELLED) {
-        s = error_set(err, STATUS_CONFLICT, "cannot retry a job that is %s: only failed and cancelled jobs", job_state_name(row.state));
+        s = error_set(err, STATUS_CONFLICT, "cannot retry a job that is %s: only failed and cancelled jobs",
+                      job_state_name(row.state));
         goto out;
     }
     if (row.state == JOB_SUCCEEDED) goto out;
@@ -337,12 +346,20 @@ static bool role_valid(const char *role)
 static status check_declaration(struct job_service *v, struct file_row *row, struct error *err)
 {
     if (!job_file_name_valid(row->name))
-        return error_set_field(err, STATUS_INVALID, "name", "file name '%.127s' is not allowed: 1..127 of A-Z a-z 0-9 . _ -, not starting with a dot", row->name);
+        return error_set_field(
+            err, STATUS_INVALID, "name",
+            "file name '%.127s' is not allowed: 1..127 of A-Z a-z 0-9 . _ -, not starting with a dot", row->name);
     if (!role_valid(row->role))
-        return error_set_field(err, STATUS_INVALID, "role", "role '%.31s' is not one of volume, fibers, measurements, photograph, chart, dark_frame", row->role);
-    if (row->size_bytes < 1) return error_set_field(err, STATUS_INVALID, "size", "file '%s' is declared with %lld bytes: empty files are of no use", row->name, (long long)row->size_bytes);
+        return error_set_field(err, STATUS_INVALID, "role",
+                               "role '%.31s' is not one of volume, fibers, measurements, photograph, chart, dark_frame",
+                               row->role);
+    if (row->size_bytes < 1)
+        return error_set_field(err, STATUS_INVALID, "size",
+                               "file '%s' is declared with %lld bytes: empty files are of no use", row->name,
+                               (long long)row->size_bytes);
     if (row->size_bytes > v->settings->max_file_bytes)
-        return error_set_field(err, STATUS_TOO_LARGE, "size", "file '%s' is declared with %lld bytes, the limit is %lld", row->name,
+        return error_set_field(err, STATUS_TOO_LARGE, "size",
+                               "file '%s' is declared with %lld bytes, the limit is %lld", row->name,
                                (long long)row->size_bytes, (long long)v->settings->max_file_bytes);
     size_t n = strlen(row->sha256);
     for (size_t i = 0; i < n; i++) {
@@ -350,12 +367,13 @@ static status check_declaration(struct job_service *v, struct file_row *row, str
         char c = row->sha256[i];
         if (!((c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'))) n = 1;
     }
-    if (n != 0 && n != 64) return error_set_field(err, STATUS_INVALID, "sha256", "sha256 of '%s' is not 64 hexadecimal digits", row->name);
+    if (n != 0 && n != 64)
+        return error_set_field(err, STATUS_INVALID, "sha256", "sha256 of '%s' is not 64 hexadecimal digits", row->name);
     return STATUS_OK;
 }
 
-static status declare_locked(struct job_service *v, const char *id, struct file_row *row, bool *existed, struct job_refusal *refusal,
-                             struct error *err)
+static status declare_locked(struct job_service *v, const char *id, struct file_row *row, bool *existed,
+                             struct job_refusal *refusal, struct error *err)
 {
     struct job_row job;
     struct file_row before, *all = NULL;
@@ -367,10 +385,13 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
     if (s == STATUS_OK) {
         bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
                     (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
-        if (!same) s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first", row->name);
+        if (!same)
+            s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first",
+                                row->name);
         else if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
             s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
-        else *row = before;
+        else
+            *row = before;
         *existed = true;
         goto out;
     }
@@ -378,7 +399,8 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
     if (s != STATUS_OK) goto out;
     if ((int64_t)n >= v->settings->max_files_per_job) {
         refusal->code = "too_many";
-        s = error_set(err, STATUS_TOO_LARGE, "a job takes at most %lld files", (long long)v->settings->max_files_per_job);
+        s = error_set(err, STATUS_TOO_LARGE, "a job takes at most %lld files",
+                      (long long)v->settings->max_files_per_job);
         goto out;
     }
     s = check_editable(&job, err);
@@ -396,8 +418,8 @@ out:
     return s;
 }
 
-status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed, struct job_refusal *refusal,
-                        struct error *err)
+status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed,
+                        struct job_refusal *refusal, struct error *err)
 {
     *existed = false;
     status s = check_declaration(v, row, err);

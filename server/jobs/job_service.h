@@ -33,16 +33,18 @@ struct job_refusal {
 
 /* Opens the database in the data folder, quarantines unknown job folders, removes tombstones, brings running jobs back to
  * the queue and uploads into a known state. */
-status job_service_open(const struct settings *settings, struct log *log, struct job_service **service, struct error *err);
+status job_service_open(const struct settings *settings, struct log *log, struct job_service **service,
+                        struct error *err);
 void job_service_close(struct job_service *service);
 
 /* idempotency_key may be NULL. *replayed: the job existed already. */
-status job_create(struct job_service *v, const char *document, size_t n_bytes, const char *idempotency_key, char id[STORE_ID_BYTES],
-                  bool *replayed, struct job_refusal *refusal, struct error *err);
+status job_create(struct job_service *v, const char *document, size_t n_bytes, const char *idempotency_key,
+                  char id[STORE_ID_BYTES], bool *replayed, struct job_refusal *refusal, struct error *err);
 /* may_edit (NULL: always) sees the job as it is and is not changed by anyone until the document is replaced; what it returns
  * ends the call. */
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
-                            status (*may_edit)(void *context, const struct job_row *row, struct error *err), void *context, struct error *err);
+                            status (*may_edit)(void *context, const struct job_row *row, struct error *err),
+                            void *context, struct error *err);
 /* *changed: false when the job was in the wanted state already. */
 status job_start(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);
 status job_retry(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);
@@ -56,8 +58,8 @@ status job_update_surely(struct job_service *v, struct job_row *row, struct erro
 status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err);
 
 /* row: name, role, size, sha256 filled in and checked here. *existed: the same declaration was made before. */
-status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed, struct job_refusal *refusal,
-                        struct error *err);
+status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed,
+                        struct job_refusal *refusal, struct error *err);
 status job_delete_file(struct job_service *v, const char *id, const char *name, struct error *err);
 status job_delete_upload(struct job_service *v, const char *upload_id, struct error *err);
 

@@ -24,14 +24,16 @@ static void put(json_t *out, const char *key, const json_t *from, const char *na
     if (fits) {
         json_decref(fallback);
         json_object_set(out, key, x);
-    } else json_object_set_new(out, key, fallback);
+    } else
+        json_object_set_new(out, key, fallback);
 }
 
 static void put_error(json_t *out, const struct job_row *row)
 {
     json_object_set_new(out, "error",
                         row->error_code[0] == '\0' ? json_null()
-                                                   : json_pack("{s:s,s:s,s:s}", "code", row->error_code, "field", row->error_field, "text", row->error_text));
+                                                   : json_pack("{s:s,s:s,s:s}", "code", row->error_code, "field",
+                                                               row->error_field, "text", row->error_text));
 }
 
 static void put_progress(json_t *out, const struct job_row *row, const json_t *st)
@@ -86,9 +88,10 @@ json_t *file_view(const struct file_row *f)
     snprintf(upload, sizeof upload, "/v1/uploads/%s", f->id);
     snprintf(url, sizeof url, "/v1/jobs/%s/files/%s", f->job_id, f->name);
     bool complete = f->state == FILE_COMPLETE;
-    return json_pack("{s:s,s:s,s:I,s:o,s:s,s:I,s:o,s:s}", "name", f->name, "role", f->role, "size", (json_int_t)f->size_bytes, "sha256",
-                     f->sha256[0] ? json_string(f->sha256) : json_null(), "state", complete ? "complete" : "uploading", "offset",
-                     (json_int_t)f->offset_bytes, "upload_url", complete ? json_null() : json_string(upload), "url", url);
+    return json_pack("{s:s,s:s,s:I,s:o,s:s,s:I,s:o,s:s}", "name", f->name, "role", f->role, "size",
+                     (json_int_t)f->size_bytes, "sha256", f->sha256[0] ? json_string(f->sha256) : json_null(), "state",
+                     complete ? "complete" : "uploading", "offset", (json_int_t)f->offset_bytes, "upload_url",
+                     complete ? json_null() : json_string(upload), "url", url);
 }
 
 status job_view_files(struct job_service *v, const struct job_row *row, json_t **out, struct error *err)
@@ -135,15 +138,19 @@ static status put_details(struct job_service *v, const struct job_row *row, json
 status job_view(struct job_service *v, const struct job_row *row, bool full, json_t **view, struct error *err)
 {
     json_t *st = has_run(row) ? attempt_read_status(v, row->id) : NULL;
-    json_t *out = json_pack("{s:s,s:s,s:s,s:b,s:f,s:f,s:o,s:o,s:I,s:I,s:I}", "id", row->id, "sample", row->sample, "state", job_state_name(row->state),
-                            "cancel_requested", row->cancel_requested, "created_unix_s", row->created_unix_s, "updated_unix_s", row->updated_unix_s,
-                            "started_unix_s", time_or_null(row->started_unix_s), "finished_unix_s", time_or_null(row->finished_unix_s), "attempt",
-                            (json_int_t)row->attempt, "lost_attempts", (json_int_t)row->lost_attempts, "generation", (json_int_t)row->generation);
+    json_t *out = json_pack("{s:s,s:s,s:s,s:b,s:f,s:f,s:o,s:o,s:I,s:I,s:I}", "id", row->id, "sample", row->sample,
+                            "state", job_state_name(row->state), "cancel_requested", row->cancel_requested,
+                            "created_unix_s", row->created_unix_s, "updated_unix_s", row->updated_unix_s,
+                            "started_unix_s", time_or_null(row->started_unix_s), "finished_unix_s",
+                            time_or_null(row->finished_unix_s), "attempt", (json_int_t)row->attempt, "lost_attempts",
+                            (json_int_t)row->lost_attempts, "generation", (json_int_t)row->generation);
     put_progress(out, row, st);
     put_error(out, row);
     json_decref(st);
     status s = full ? put_details(v, row, out, err) : STATUS_OK;
-    if (s != STATUS_OK) json_decref(out);
-    else *view = out;
+    if (s != STATUS_OK)
+        json_decref(out);
+    else
+        *view = out;
     return s;
 }

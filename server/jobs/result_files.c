@@ -23,7 +23,8 @@ static bool component_valid(const char *name, size_t n)
     if (n == 0 || name[0] == '.') return false;
     for (size_t i = 0; i < n; i++) {
         char c = name[i];
-        bool fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
+        bool fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+                    c == '_' || c == '-';
         if (!fine) return false;
         if (n - i >= 5 && strncmp(name + i, ".tmp-", 5) == 0) return false;
     }
@@ -32,7 +33,8 @@ static bool component_valid(const char *name, size_t n)
 
 static status add(struct listing *l, const char *path, const struct stat *st, struct error *err)
 {
-    if (l->n == RESULT_MAX_FILE) return error_set(err, STATUS_TOO_LARGE, "there are more than %d result files", RESULT_MAX_FILE);
+    if (l->n == RESULT_MAX_FILE)
+        return error_set(err, STATUS_TOO_LARGE, "there are more than %d result files", RESULT_MAX_FILE);
     if (l->n == l->capacity) {
         size_t more = l->capacity == 0 ? 64 : l->capacity * 2;
         struct result_file *p = realloc(l->file, more * sizeof *p);
@@ -71,7 +73,10 @@ static status walk(int folder_fd, const char *prefix, int depth, struct listing 
     return s;
 }
 
-static int by_path(const void *a, const void *b) { return strcmp(((const struct result_file *)a)->path, ((const struct result_file *)b)->path); }
+static int by_path(const void *a, const void *b)
+{
+    return strcmp(((const struct result_file *)a)->path, ((const struct result_file *)b)->path);
+}
 
 static int open_results(struct job_service *v, const char *job_id)
 {
@@ -128,11 +133,23 @@ status result_open(struct job_service *v, const char *job_id, const char *path, 
 const char *content_type_of(const char *name)
 {
     static const char *const table[][2] = {
-        {".html", "text/html; charset=utf-8"}, {".css", "text/css; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
-        {".mjs", "text/javascript; charset=utf-8"}, {".json", "application/json"}, {".svg", "image/svg+xml"}, {".png", "image/png"},
-        {".jpg", "image/jpeg"}, {".ico", "image/x-icon"}, {".woff2", "font/woff2"}, {".txt", "text/plain; charset=utf-8"},
-        {".csv", "text/csv; charset=utf-8"}, {".md", "text/plain; charset=utf-8"}, {".tif", "image/tiff"}, {".tiff", "image/tiff"},
-        {".exr", "image/x-exr"}, {".tar", "application/x-tar"},
+        {".html", "text/html; charset=utf-8"},
+        {".css", "text/css; charset=utf-8"},
+        {".js", "text/javascript; charset=utf-8"},
+        {".mjs", "text/javascript; charset=utf-8"},
+        {".json", "application/json"},
+        {".svg", "image/svg+xml"},
+        {".png", "image/png"},
+        {".jpg", "image/jpeg"},
+        {".ico", "image/x-icon"},
+        {".woff2", "font/woff2"},
+        {".txt", "text/plain; charset=utf-8"},
+        {".csv", "text/csv; charset=utf-8"},
+        {".md", "text/plain; charset=utf-8"},
+        {".tif", "image/tiff"},
+        {".tiff", "image/tiff"},
+        {".exr", "image/x-exr"},
+        {".tar", "application/x-tar"},
     };
     size_t n = strlen(name);
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {

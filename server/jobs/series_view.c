@@ -90,7 +90,9 @@ static bool take_description(void *context, const char *json, size_t n)
     json_t *j = json_loadb(json, n, 0, NULL), *parameters = json_object_get(j, "parameters");
     bool found = parameters != NULL && model_of(j) == d->i_model;
     bool go_on = !found && (j == NULL || key_of(j) < d->i_model);
-    if (found) json_array_append_new(d->model, json_pack("{s:O?,s:O}", "id", json_object_get(j, "model"), "parameters", parameters));
+    if (found)
+        json_array_append_new(d->model,
+                              json_pack("{s:O?,s:O}", "id", json_object_get(j, "model"), "parameters", parameters));
     json_decref(j);
     return go_on;
 }
@@ -212,7 +214,8 @@ static bool merge(void *context, const char *json, size_t n)
     return true;
 }
 
-static status read_series(const char *path, struct counting *c, struct merging *m, json_t *model, size_t max_points, struct error *err)
+static status read_series(const char *path, struct counting *c, struct merging *m, json_t *model, size_t max_points,
+                          struct error *err)
 {
     uint64_t from = 0;
     status s = record_seek(path, is_seen, c, &from, err);
@@ -230,8 +233,8 @@ static status read_series(const char *path, struct counting *c, struct merging *
     return s;
 }
 
-status series_view(struct job_service *v, const struct job_row *row, long long after_step, size_t max_points, bool all_rendered, json_t **view,
-                   struct error *err)
+status series_view(struct job_service *v, const struct job_row *row, long long after_step, size_t max_points,
+                   bool all_rendered, json_t **view, struct error *err)
 {
     char path[PATH_BYTES];
     struct counting c = {.after_step = after_step, .last_step = -1};
@@ -239,7 +242,8 @@ status series_view(struct job_service *v, const struct job_row *row, long long a
     json_t *model = json_array();
     path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_SERIES, NULL);
     status s = STATUS_OK;
-    if (row->attempt > 0 && !row->dirty && access(path, F_OK) == 0) s = read_series(path, &c, &m, model, max_points, err);
+    if (row->attempt > 0 && !row->dirty && access(path, F_OK) == 0)
+        s = read_series(path, &c, &m, model, max_points, err);
     if (s == STATUS_NOT_FOUND) s = STATUS_OK; /* removed meanwhile */
     json_decref(m.group.last);
     if (s != STATUS_OK) {
@@ -248,7 +252,7 @@ status series_view(struct job_service *v, const struct job_row *row, long long a
         return s;
     }
     json_int_t next = c.n > 0 ? c.last_step : (json_int_t)after_step;
-    *view = json_pack("{s:o,s:o,s:I,s:I,s:I}", "points", m.point, "models", model, "next_after_step", next, "n_step", c.last_step + 1, "generation",
-                      (json_int_t)row->generation);
+    *view = json_pack("{s:o,s:o,s:I,s:I,s:I}", "points", m.point, "models", model, "next_after_step", next, "n_step",
+                      c.last_step + 1, "generation", (json_int_t)row->generation);
     return STATUS_OK;
 }

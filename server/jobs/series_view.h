@@ -7,7 +7,7 @@
 /* *view: {"points","models","next_after_step","n_step","generation"}. A job without a series has no points.
  * all_rendered: renderings and paths of rows with every point, not with the last only; then fewer points where they would
  * exceed 8 MiB. */
-status series_view(struct job_service *v, const struct job_row *row, long long after_step, size_t max_points, bool all_rendered, json_t **view,
-                   struct error *err);
+status series_view(struct job_service *v, const struct job_row *row, long long after_step, size_t max_points,
+                   bool all_rendered, json_t **view, struct error *err);
 
 #endif

@@ -19,7 +19,7 @@ struct slot {
     bool used;
     char job_id[STORE_ID_BYTES];
     pid_t pid;
-    enum attempt_stop stop;   /* why it was asked to stop */
+    enum attempt_stop stop;     /* why it was asked to stop */
     double beat_unix_s, beat_s; /* the last heartbeat seen, and when it was new (monotonic; at first the start) */
     double asked_s;             /* monotonic; 0: not asked */
     bool killed, ended;
@@ -92,7 +92,8 @@ static void end_of(struct supervisor *u, struct slot *slot)
     struct waiting *w = waiting_of(u, slot->job_id, verdict.delay_s > 0);
     if (w == NULL) return;
     w->until_s = clock_monotonic_s() + verdict.delay_s;
-    if (!verdict.busy) w->n_busy = 0;
+    if (!verdict.busy)
+        w->n_busy = 0;
     else if (++w->n_busy >= 60) {
         w->n_busy = 0;
         attempt_give_up(u->v, slot->job_id, "another process holds the job's folder", NULL);
@@ -109,9 +110,12 @@ static void watch(struct supervisor *u, struct slot *slot)
     }
     struct attempt_wish wish;
     bool known = attempt_look(u->v, slot->job_id, &wish);
-    if (wish.deleted) kill_now(slot, STOP_CANCEL);
-    else if (wish.cancel) ask_to_stop(slot, STOP_CANCEL);
-    else if (u->below_floor) ask_to_stop(slot, STOP_PAUSE);
+    if (wish.deleted)
+        kill_now(slot, STOP_CANCEL);
+    else if (wish.cancel)
+        ask_to_stop(slot, STOP_CANCEL);
+    else if (u->below_floor)
+        ask_to_stop(slot, STOP_PAUSE);
     /* by our own clock, from beat to beat: the wall clock may be set meanwhile, and one failed read is no silence */
     if (wish.heartbeat_unix_s > 0 && wish.heartbeat_unix_s != slot->beat_unix_s) {
         slot->beat_unix_s = wish.heartbeat_unix_s;
@@ -159,7 +163,8 @@ static void launch(struct supervisor *u, const char *job_id)
     while (slot->used) slot++;
     *slot = (struct slot){.used = true, .beat_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
-    struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes, u->v->settings->volume_memory_bytes};
+    struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes,
+                                   u->v->settings->volume_memory_bytes};
     s = worker_launch(u->worker, folder, console, &limits, &slot->pid, &err);
     if (s == STATUS_OK) {
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
@@ -220,7 +225,9 @@ static void look_at_disk(struct supervisor *u)
     bool was = u->below_floor;
     /* a little hysteresis, so that a job does not stop and go */
     u->below_floor = free_bytes < (was ? floor_bytes + floor_bytes / 10 : floor_bytes);
-    if (u->below_floor && !was) log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve: running jobs pause", free_bytes, (long long)floor_bytes);
+    if (u->below_floor && !was)
+        log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve: running jobs pause", free_bytes,
+                    (long long)floor_bytes);
     if (!u->below_floor) attempt_resume_paused(u->v);
     if (!u->below_floor) ballast_keep(u->v->settings->data, u->v->settings->ballast_bytes);
 }
@@ -265,7 +272,8 @@ static void *run(void *context)
         until.tv_sec += busy ? until.tv_nsec / 1000000000 : 1;
         until.tv_nsec %= 1000000000;
         pthread_mutex_lock(&u->lock);
-        while (!u->woken && !u->stop && pthread_cond_timedwait(&u->changed, &u->lock, &until) == 0) {}
+        while (!u->woken && !u->stop && pthread_cond_timedwait(&u->changed, &u->lock, &until) == 0) {
+        }
     }
     pthread_mutex_unlock(&u->lock);
     stop_all(u);
@@ -274,7 +282,8 @@ static void *run(void *context)
 
 status supervisor_start(struct job_service *v, const char *worker_program, struct supervisor **out, struct error *err)
 {
-    if (access(worker_program, X_OK) != 0) return error_set_errno(err, "cannot execute worker program '%s'", worker_program);
+    if (access(worker_program, X_OK) != 0)
+        return error_set_errno(err, "cannot execute worker program '%s'", worker_program);
     struct supervisor *u = calloc(1, sizeof *u);
     if (u == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the supervisor: out of memory");
     u->v = v;

@@ -6,7 +6,8 @@
 #include "server/jobs/job_service.h"
 
 /* Sets service->supervisor. worker_program must be executable (checked here: STATUS_NOT_FOUND). */
-status supervisor_start(struct job_service *service, const char *worker_program, struct supervisor **supervisor, struct error *err);
+status supervisor_start(struct job_service *service, const char *worker_program, struct supervisor **supervisor,
+                        struct error *err);
 /* Look now instead of at the next tick. */
 void supervisor_wake(struct supervisor *supervisor);
 /* Workers get SIGTERM, the grace time, SIGKILL; their jobs go back to the queue. Joins the thread. */

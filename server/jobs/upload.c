@@ -39,8 +39,8 @@ struct upload_set {
     atomic_uint_least64_t n_bytes_total;
 };
 
-status upload_set_new(struct store *store, const char *data_folder, int64_t commit_bytes, struct log *log, struct upload_set **out,
-                      struct error *err)
+status upload_set_new(struct store *store, const char *data_folder, int64_t commit_bytes, struct log *log,
+                      struct upload_set **out, struct error *err)
 {
     struct upload_set *set = calloc(1, sizeof *set);
     if (set == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare uploads: out of memory");
@@ -88,9 +88,11 @@ status upload_reserve(struct upload_set *set, struct file_row *row, struct error
     if (fd < 0) return error_set_errno(err, "cannot make room for '%s'", row->name);
     /* not posix_fallocate(): where the file system cannot reserve, it would write every block of a 100 GB file */
     if (fallocate(fd, 0, 0, (off_t)row->size_bytes) != 0 && errno != EOPNOTSUPP) {
-        s = errno == EFBIG ? error_set(err, STATUS_DISK_FULL, "cannot make room for '%s': the file system does not take files of %lld bytes", row->name,
-                                       (long long)row->size_bytes)
-                           : error_set_errno(err, "cannot make room for the %lld bytes of '%s'", (long long)row->size_bytes, row->name);
+        s = errno == EFBIG ? error_set(err, STATUS_DISK_FULL,
+                                       "cannot make room for '%s': the file system does not take files of %lld bytes",
+                                       row->name, (long long)row->size_bytes)
+                           : error_set_errno(err, "cannot make room for the %lld bytes of '%s'",
+                                             (long long)row->size_bytes, row->name);
         goto out;
     }
     if (fsync(fd) != 0) s = error_set_errno(err, "cannot make room for '%s'", row->name);
@@ -213,9 +215,10 @@ static status start_again(struct upload *u, const char *computed, struct error *
     atomic_store(&u->offset_seen, 0);
     status s = store_file_update(u->set->store, &u->row, err);
     if (s != STATUS_OK) return s;
-    return error_set_field(err, STATUS_CHECKSUM, u->row.name,
-                           "file '%s' has SHA-256 %s, declared was %s: send it again from offset 0, or delete it and declare it anew", u->row.name,
-                           computed, declared);
+    return error_set_field(
+        err, STATUS_CHECKSUM, u->row.name,
+        "file '%s' has SHA-256 %s, declared was %s: send it again from offset 0, or delete it and declare it anew",
+        u->row.name, computed, declared);
 }
 
 /* u->lock is held and the bytes are durable. */
@@ -231,7 +234,9 @@ static status finish(struct upload *u, struct error *err)
     u->row.state = FILE_VERIFIED;
     status s = store_file_update(u->set->store, &u->row, err);
     if (s == STATUS_OK) s = settle(u->set, &u->row, err);
-    if (s == STATUS_OK) log_info(u->set->log, "file '%s' of job %s is complete, %lld bytes", u->row.name, u->row.job_id, (long long)u->row.size_bytes);
+    if (s == STATUS_OK)
+        log_info(u->set->log, "file '%s' of job %s is complete, %lld bytes", u->row.name, u->row.job_id,
+                 (long long)u->row.size_bytes);
     return s;
 }
 
@@ -290,7 +295,8 @@ status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t 
     const unsigned char *next = data;
     status s = STATUS_OK;
     pthread_mutex_lock(&u->lock);
-    if (u->ticket != ticket || u->discarded) s = error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name);
+    if (u->ticket != ticket || u->discarded)
+        s = error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name);
     else if (u->row.state != FILE_UPLOADING || (int64_t)n_bytes > u->row.size_bytes - u->offset_bytes)
         s = error_set(err, STATUS_INVALID, "file '%s' has more bytes than declared", u->row.name);
     if (s == STATUS_OK) s = open_part(u, err);
@@ -308,7 +314,9 @@ status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t 
         n_bytes -= (size_t)n;
         atomic_fetch_add(&u->set->n_bytes_total, (uint64_t)n);
     }
-    if (s == STATUS_OK && u->offset_bytes - u->row.offset_bytes >= u->set->commit_bytes && u->offset_bytes < u->row.size_bytes) s = commit(u, err);
+    if (s == STATUS_OK && u->offset_bytes - u->row.offset_bytes >= u->set->commit_bytes &&
+        u->offset_bytes < u->row.size_bytes)
+        s = commit(u, err);
     pthread_mutex_unlock(&u->lock);
     return s;
 }
@@ -316,7 +324,9 @@ status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t 
 status upload_commit(struct upload *u, uint64_t ticket, struct file_row *row, struct error *err)
 {
     pthread_mutex_lock(&u->lock);
-    status s = u->ticket != ticket ? error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name) : commit(u, err);
+    status s = u->ticket != ticket
+                   ? error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name)
+                   : commit(u, err);
     if (row != NULL) *row = u->row;
     pthread_mutex_unlock(&u->lock);
     return s;
@@ -378,7 +388,8 @@ status upload_recover(struct upload_set *set, struct error *err)
     status s = store_file_list(set->store, NULL, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         struct error why = {0};
-        if (recover_one(set, &row[i], &why) != STATUS_OK) log_warning(set->log, "file '%s' of job %s: %s", row[i].name, row[i].job_id, why.text);
+        if (recover_one(set, &row[i], &why) != STATUS_OK)
+            log_warning(set->log, "file '%s' of job %s: %s", row[i].name, row[i].job_id, why.text);
     }
     free(row);
     return s;

@@ -13,8 +13,8 @@
 struct upload_set;
 struct upload;
 
-status upload_set_new(struct store *store, const char *data_folder, int64_t commit_bytes, struct log *log, struct upload_set **set,
-                      struct error *err);
+status upload_set_new(struct store *store, const char *data_folder, int64_t commit_bytes, struct log *log,
+                      struct upload_set **set, struct error *err);
 void upload_set_free(struct upload_set *set);
 
 /* Reserve the space of a declared file (row not yet in the database) and write its first hash state into the row.

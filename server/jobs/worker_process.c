@@ -12,8 +12,8 @@
 enum { EXIT_CANNOT_EXECUTE = 127 };
 
 /* Between fork and exec of a threaded process: system calls only. */
-static _Noreturn void become_worker(const char *program, char *const argv[], int console_fd, int null_fd, const struct worker_limits *limits,
-                                    pid_t parent)
+static _Noreturn void become_worker(const char *program, char *const argv[], int console_fd, int null_fd,
+                                    const struct worker_limits *limits, pid_t parent)
 {
     setsid();
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -36,8 +36,8 @@ static _Noreturn void become_worker(const char *program, char *const argv[], int
     _exit(n < 0 ? EXIT_CANNOT_EXECUTE : EXIT_CANNOT_EXECUTE);
 }
 
-status worker_launch(const char *program, const char *job_folder, const char *console_path, const struct worker_limits *limits, pid_t *out,
-                     struct error *err)
+status worker_launch(const char *program, const char *job_folder, const char *console_path,
+                     const struct worker_limits *limits, pid_t *out, struct error *err)
 {
     status s = STATUS_OK;
     int null_fd = -1;
@@ -50,7 +50,8 @@ status worker_launch(const char *program, const char *job_folder, const char *co
     }
     char volume_mib[24];
     snprintf(volume_mib, sizeof volume_mib, "%lld", (long long)(limits->volume_memory_bytes >> 20));
-    char *folder = (char *)(uintptr_t)job_folder, *argv[] = {(char *)(uintptr_t)program, "--memory-mib", volume_mib, folder, NULL};
+    char *folder = (char *)(uintptr_t)job_folder,
+         *argv[] = {(char *)(uintptr_t)program, "--memory-mib", volume_mib, folder, NULL};
     pid_t parent = getpid(), pid = fork();
     if (pid < 0) s = error_set_errno(err, "cannot start worker '%s'", program);
     if (pid == 0) become_worker(program, argv, console_fd, null_fd, limits, parent);

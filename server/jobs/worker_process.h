@@ -22,8 +22,8 @@ struct worker_end {
 };
 
 /* stdout and stderr go to console_path (made anew). Call from a thread that lives as long as the daemon. */
-status worker_launch(const char *program, const char *job_folder, const char *console_path, const struct worker_limits *limits, pid_t *pid,
-                     struct error *err);
+status worker_launch(const char *program, const char *job_folder, const char *console_path,
+                     const struct worker_limits *limits, pid_t *pid, struct error *err);
 /* false while it still runs */
 bool worker_ended(pid_t pid, struct worker_end *end);
 /* To the worker and everything that it started. */

@@ -8,20 +8,26 @@
 #include <string.h>
 #include <sys/vfs.h>
 
-static const char *const state_name[JOB_N_STATE] = {"draft", "queued", "running", "paused", "succeeded", "failed", "cancelled"};
+static const char *const state_name[JOB_N_STATE] = {"draft",     "queued", "running",  "paused",
+                                                    "succeeded", "failed", "cancelled"};
 
 /* entry i brings version i to i + 1 */
 static const char *const migration[] = {
-    "CREATE TABLE job (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, sample TEXT NOT NULL, document TEXT NOT NULL,"
+    "CREATE TABLE job (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, sample TEXT NOT NULL, "
+    "document TEXT NOT NULL,"
     " state INTEGER NOT NULL, cancel_requested INTEGER NOT NULL, dirty INTEGER NOT NULL, deleted INTEGER NOT NULL,"
     " attempt INTEGER NOT NULL, lost_attempts INTEGER NOT NULL, generation INTEGER NOT NULL, token TEXT NOT NULL,"
-    " created REAL NOT NULL, updated REAL NOT NULL, queued REAL NOT NULL, started REAL NOT NULL, finished REAL NOT NULL,"
+    " created REAL NOT NULL, updated REAL NOT NULL, queued REAL NOT NULL, started REAL NOT NULL, finished REAL NOT "
+    "NULL,"
     " error_code TEXT NOT NULL, error_field TEXT NOT NULL, error_text TEXT NOT NULL, peak_rss INTEGER NOT NULL);"
     "CREATE INDEX job_state ON job (deleted, state, serial);"
-    "CREATE TABLE file (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, job_id TEXT NOT NULL, name TEXT NOT NULL,"
-    " role TEXT NOT NULL, size INTEGER NOT NULL, offset INTEGER NOT NULL, sha256 TEXT NOT NULL, state INTEGER NOT NULL, hash_state BLOB NOT NULL,"
+    "CREATE TABLE file (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, job_id TEXT NOT NULL, name "
+    "TEXT NOT NULL,"
+    " role TEXT NOT NULL, size INTEGER NOT NULL, offset INTEGER NOT NULL, sha256 TEXT NOT NULL, state INTEGER NOT "
+    "NULL, hash_state BLOB NOT NULL,"
     " UNIQUE (job_id, name));"
-    "CREATE TABLE idempotency (key TEXT PRIMARY KEY, job_id TEXT NOT NULL, body_hash TEXT NOT NULL, created REAL NOT NULL);"
+    "CREATE TABLE idempotency (key TEXT PRIMARY KEY, job_id TEXT NOT NULL, body_hash TEXT NOT NULL, created REAL NOT "
+    "NULL);"
     "CREATE INDEX idempotency_job ON idempotency (job_id);"
     "CREATE TABLE probe (one INTEGER PRIMARY KEY, at REAL NOT NULL);",
 };
@@ -42,19 +48,23 @@ bool job_state_parse(const char *name, enum job_state *state)
 status store_error(struct store *store, const char *what, struct error *err)
 {
     int code = sqlite3_errcode(store->db);
-    status s = code == SQLITE_FULL                                            ? STATUS_DISK_FULL
+    status s = code == SQLITE_FULL                                                 ? STATUS_DISK_FULL
                : (sqlite3_extended_errcode(store->db) & 0xff) == SQLITE_CONSTRAINT ? STATUS_EXISTS
-                                                                              : STATUS_IO;
+                                                                                   : STATUS_IO;
     return error_set(err, s, "%s: database says '%s'", what, sqlite3_errmsg(store->db));
 }
 
-static status bind_all(struct store *store, sqlite3_stmt *statement, struct error *err, const char *format, va_list args)
+static status bind_all(struct store *store, sqlite3_stmt *statement, struct error *err, const char *format,
+                       va_list args)
 {
     int rc = SQLITE_OK;
     for (int i = 1; *format != '\0' && rc == SQLITE_OK; format++, i++) {
-        if (*format == 's') rc = sqlite3_bind_text(statement, i, va_arg(args, const char *), -1, SQLITE_TRANSIENT);
-        else if (*format == 'i') rc = sqlite3_bind_int64(statement, i, va_arg(args, int64_t));
-        else if (*format == 'd') rc = sqlite3_bind_double(statement, i, va_arg(args, double));
+        if (*format == 's')
+            rc = sqlite3_bind_text(statement, i, va_arg(args, const char *), -1, SQLITE_TRANSIENT);
+        else if (*format == 'i')
+            rc = sqlite3_bind_int64(statement, i, va_arg(args, int64_t));
+        else if (*format == 'd')
+            rc = sqlite3_bind_double(statement, i, va_arg(args, double));
         else {
             const void *blob = va_arg(args, const void *);
             int n = va_arg(args, int);
@@ -64,9 +74,11 @@ static status bind_all(struct store *store, sqlite3_stmt *statement, struct erro
     return rc == SQLITE_OK ? STATUS_OK : store_error(store, "cannot bind a value", err);
 }
 
-static status prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql, const char *format, va_list args)
+static status prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql,
+                      const char *format, va_list args)
 {
-    if (sqlite3_prepare_v2(store->db, sql, -1, statement, NULL) != SQLITE_OK) return store_error(store, "cannot prepare a query", err);
+    if (sqlite3_prepare_v2(store->db, sql, -1, statement, NULL) != SQLITE_OK)
+        return store_error(store, "cannot prepare a query", err);
     status s = bind_all(store, *statement, err, format, args);
     if (s != STATUS_OK) {
         sqlite3_finalize(*statement);
@@ -75,7 +87,8 @@ static status prepare(struct store *store, sqlite3_stmt **statement, struct erro
     return s;
 }
 
-status store_prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql, const char *format, ...)
+status store_prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql,
+                     const char *format, ...)
 {
     va_list args;
     va_start(args, format);
@@ -93,7 +106,8 @@ status store_run(struct store *store, int *n_changed, struct error *err, const c
     va_end(args);
     if (s != STATUS_OK) return s;
     int rc;
-    while ((rc = sqlite3_step(statement)) == SQLITE_ROW) {}
+    while ((rc = sqlite3_step(statement)) == SQLITE_ROW) {
+    }
     if (rc != SQLITE_DONE) s = store_error(store, "cannot write to the database", err);
     if (n_changed != NULL) *n_changed = sqlite3_changes(store->db);
     sqlite3_finalize(statement);
@@ -129,7 +143,8 @@ static status refuse_network(const char *path, struct error *err)
     static const unsigned long network[] = {0x6969, 0x517B, 0xFF534D42, 0xFE534D42, 0x5346414F, 0x00C36400, 0x01021997};
     for (size_t i = 0; i < sizeof network / sizeof network[0]; i++)
         if (((unsigned long)fs.f_type & 0xffffffffUL) == network[i])
-            return error_set(err, STATUS_UNSUPPORTED, "cannot keep the database in '%s': a network file system does not lock safely", folder);
+            return error_set(err, STATUS_UNSUPPORTED,
+                             "cannot keep the database in '%s': a network file system does not lock safely", folder);
     return STATUS_OK;
 }
 
@@ -138,8 +153,10 @@ static status read_version(struct store *store, int *version, struct error *err)
     sqlite3_stmt *statement;
     status s = store_prepare(store, &statement, err, "PRAGMA user_version", "");
     if (s != STATUS_OK) return s;
-    if (sqlite3_step(statement) == SQLITE_ROW) *version = sqlite3_column_int(statement, 0);
-    else s = store_error(store, "cannot read the database's version", err);
+    if (sqlite3_step(statement) == SQLITE_ROW)
+        *version = sqlite3_column_int(statement, 0);
+    else
+        s = store_error(store, "cannot read the database's version", err);
     sqlite3_finalize(statement);
     return s;
 }
@@ -150,7 +167,8 @@ static status migrate(struct store *store, const char *path, struct error *err)
     status s = read_version(store, &version, err);
     if (s != STATUS_OK || version == N_MIGRATION) return s;
     if (version > N_MIGRATION)
-        return error_set(err, STATUS_UNSUPPORTED, "cannot open database '%s': its version is %d, this program knows %d", path, version, N_MIGRATION);
+        return error_set(err, STATUS_UNSUPPORTED, "cannot open database '%s': its version is %d, this program knows %d",
+                         path, version, N_MIGRATION);
     if (version > 0) {
         char backup[4096 + 32];
         snprintf(backup, sizeof backup, "%s.v%d", path, version);
@@ -178,13 +196,16 @@ status store_open(const char *path, struct store **out, struct error *err)
     struct store *store = calloc(1, sizeof *store);
     if (store == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot open the database: out of memory");
     pthread_mutex_init(&store->lock, NULL);
-    if (sqlite3_open_v2(path, &store->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, NULL) != SQLITE_OK) {
+    if (sqlite3_open_v2(path, &store->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, NULL) !=
+        SQLITE_OK) {
         s = store_error(store, "cannot open the database", err);
         goto out;
     }
     sqlite3_busy_timeout(store->db, 5000);
-    if (sqlite3_exec(store->db, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA trusted_schema=OFF", NULL, NULL,
-                     NULL) != SQLITE_OK) {
+    if (sqlite3_exec(
+            store->db,
+            "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA trusted_schema=OFF", NULL,
+            NULL, NULL) != SQLITE_OK) {
         s = store_error(store, "cannot set up the database", err);
         goto out;
     }

@@ -83,7 +83,8 @@ struct job_query {
     size_t limit;
 };
 /* *row is an array of *n rows, without their documents: job_rows_free. */
-status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n, struct error *err);
+status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n,
+                      struct error *err);
 void job_rows_free(struct job_row *row, size_t n);
 /* Jobs in each state, without tombstones. */
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err);
@@ -91,7 +92,8 @@ status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error
 /* With its job's row (store_job_update; NULL: without) in one transaction: both are written, or neither. */
 status store_file_insert(struct store *store, const struct file_row *row, struct job_row *job, struct error *err);
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err);
-status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row, struct error *err);
+status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row,
+                       struct error *err);
 /* Offset, hash state, sha256, state. STATUS_NOT_FOUND when the row is gone. */
 status store_file_update(struct store *store, const struct file_row *row, struct error *err);
 /* With its job's row as above. */

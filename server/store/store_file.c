@@ -47,7 +47,8 @@ static status get_one(struct store *store, sqlite3_stmt *q, const char *what, st
         read_row(q, row);
         return STATUS_OK;
     }
-    return rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "file '%.127s' does not exist", what) : store_error(store, "cannot read file", err);
+    return rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "file '%.127s' does not exist", what)
+                             : store_error(store, "cannot read file", err);
 }
 
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err)
@@ -61,11 +62,13 @@ status store_file_get(struct store *store, const char *id, struct file_row *row,
     return s;
 }
 
-status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row, struct error *err)
+status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row,
+                       struct error *err)
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? AND name = ?", "ss", job_id, name);
+    status s =
+        store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? AND name = ?", "ss", job_id, name);
     if (s == STATUS_OK) s = get_one(store, q, name, row, err);
     sqlite3_finalize(q);
     pthread_mutex_unlock(&store->lock);
@@ -76,8 +79,9 @@ status store_file_update(struct store *store, const struct file_row *r, struct e
 {
     int n = 0;
     pthread_mutex_lock(&store->lock);
-    status s = store_run(store, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs", r->offset_bytes, r->sha256,
-                         (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
+    status s =
+        store_run(store, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs",
+                  r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
     pthread_mutex_unlock(&store->lock);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' does not exist any more", r->name);
     return s;
@@ -107,8 +111,10 @@ status store_file_list(struct store *store, const char *job_id, struct file_row 
     size_t n = 0, capacity = 0;
     int rc = SQLITE_DONE;
     pthread_mutex_lock(&store->lock);
-    status s = job_id != NULL ? store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? ORDER BY serial", "s", job_id)
-                              : store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE state <> 2 ORDER BY serial", "");
+    status s = job_id != NULL
+                   ? store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? ORDER BY serial", "s",
+                                   job_id)
+                   : store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE state <> 2 ORDER BY serial", "");
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         if (n == capacity) {
             capacity = capacity == 0 ? 64 : capacity * 2;

@@ -56,17 +56,21 @@ static status insert(struct store *store, struct job_row *r, const char *key, co
     status s = store_begin(store, err);
     if (s != STATUS_OK) return s;
     s = store_run(store, NULL, err,
-                  "INSERT INTO job (id, sample, document, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, token, created, "
-                  "updated, queued, started, finished, error_code, error_field, error_text, peak_rss) VALUES (?,?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0)",
+                  "INSERT INTO job (id, sample, document, state, cancel_requested, dirty, deleted, attempt, "
+                  "lost_attempts, generation, token, created, "
+                  "updated, queued, started, finished, error_code, error_field, error_text, peak_rss) VALUES "
+                  "(?,?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0)",
                   "sssidd", r->id, r->sample, r->document, (int64_t)r->state, r->created_unix_s, r->created_unix_s);
     if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->db);
     if (s == STATUS_OK && key != NULL)
-        s = store_run(store, NULL, err, "INSERT OR REPLACE INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd", key, r->id, body_hash,
-                      r->created_unix_s);
+        s = store_run(store, NULL, err,
+                      "INSERT OR REPLACE INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd",
+                      key, r->id, body_hash, r->created_unix_s);
     return store_end(store, s, err);
 }
 
-status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash, struct error *err)
+status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash,
+                        struct error *err)
 {
     pthread_mutex_lock(&store->lock);
     status s = insert(store, row, idempotency_key, body_hash, err);
@@ -74,18 +78,23 @@ status store_job_insert(struct store *store, struct job_row *row, const char *id
     return s;
 }
 
-status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES], char body_hash[STORE_HASH_TEXT_BYTES],
-                              struct error *err)
+status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES],
+                              char body_hash[STORE_HASH_TEXT_BYTES], struct error *err)
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, "SELECT i.job_id, i.body_hash FROM idempotency i JOIN job j ON j.id = i.job_id WHERE i.key = ? AND j.deleted = 0", "s", key);
+    status s = store_prepare(store, &q, err,
+                             "SELECT i.job_id, i.body_hash FROM idempotency i JOIN job j ON j.id = i.job_id WHERE "
+                             "i.key = ? AND j.deleted = 0",
+                             "s", key);
     if (s != STATUS_OK) goto out;
     int rc = sqlite3_step(q);
     if (rc == SQLITE_ROW) {
         store_text(q, 0, job_id, STORE_ID_BYTES);
         store_text(q, 1, body_hash, STORE_HASH_TEXT_BYTES);
-    } else s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "key is new") : store_error(store, "cannot look up a key", err);
+    } else
+        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "key is new")
+                              : store_error(store, "cannot look up a key", err);
 out:
     sqlite3_finalize(q);
     pthread_mutex_unlock(&store->lock);
@@ -100,8 +109,11 @@ static status get(struct store *store, const char *sql, const char *id, struct j
     status s = store_prepare(store, &q, err, sql, "s", id);
     if (s != STATUS_OK) goto out;
     int rc = sqlite3_step(q);
-    if (rc == SQLITE_ROW) s = read_row(q, row, err);
-    else s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id) : store_error(store, "cannot read job", err);
+    if (rc == SQLITE_ROW)
+        s = read_row(q, row, err);
+    else
+        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id)
+                              : store_error(store, "cannot read job", err);
 out:
     sqlite3_finalize(q);
     pthread_mutex_unlock(&store->lock);
@@ -122,13 +134,15 @@ status store_job_write(struct store *store, struct job_row *r, struct error *err
 {
     int n = 0;
     r->updated_unix_s = clock_wall_s();
-    status s = store_run(store, &n, err,
-                         "UPDATE job SET sample=?, document=coalesce(?, document), state=?, cancel_requested=?, dirty=?, "
-                         "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
-                         "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
-                         "ssiiiiiiisddddsssis", r->sample, r->document, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
-                         (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
-                         r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes, r->id);
+    status s =
+        store_run(store, &n, err,
+                  "UPDATE job SET sample=?, document=coalesce(?, document), state=?, cancel_requested=?, dirty=?, "
+                  "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
+                  "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
+                  "ssiiiiiiisddddsssis", r->sample, r->document, (int64_t)r->state, (int64_t)r->cancel_requested,
+                  (int64_t)r->dirty, (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token,
+                  r->updated_unix_s, r->queued_unix_s, r->started_unix_s, r->finished_unix_s, r->error_code,
+                  r->error_field, r->error_text, r->peak_rss_bytes, r->id);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
     return s;
 }
@@ -170,18 +184,20 @@ static status grow(struct job_row **row, size_t n, size_t *capacity, struct erro
     return STATUS_OK;
 }
 
-status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out, struct error *err)
+status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out,
+                      struct error *err)
 {
 #define WANTED                                                                                                         \
     "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
-    const char *sql = query->queue_order ? WANTED "ORDER BY queued, serial LIMIT ?4"
-                                         : WANTED "ORDER BY serial DESC LIMIT ?4";
+    const char *sql =
+        query->queue_order ? WANTED "ORDER BY queued, serial LIMIT ?4" : WANTED "ORDER BY serial DESC LIMIT ?4";
 #undef WANTED
     sqlite3_stmt *q = NULL;
     struct job_row *row = NULL;
     size_t n = 0, capacity = 0;
     pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, sql, "iiii", (int64_t)query->deleted, (int64_t)query->state, query->before_serial, (int64_t)query->limit);
+    status s = store_prepare(store, &q, err, sql, "iiii", (int64_t)query->deleted, (int64_t)query->state,
+                             query->before_serial, (int64_t)query->limit);
     int rc = SQLITE_DONE;
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         s = grow(&row, n, &capacity, err);

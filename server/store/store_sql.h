@@ -15,7 +15,8 @@ struct store {
 /* Translate SQLite's last result; what: "cannot write job". */
 status store_error(struct store *store, const char *what, struct error *err);
 /* Values are bound by format: s text, i int64_t, d double, b (pointer, int size) blob. */
-status store_prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql, const char *format, ...);
+status store_prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql,
+                     const char *format, ...);
 /* Prepare, bind, run to the end. *n_changed may be NULL. */
 status store_run(struct store *store, int *n_changed, struct error *err, const char *sql, const char *format, ...);
 /* A transaction; end commits it, or undoes it when so_far or the commit itself failed. store->lock is held. */

@@ -28,11 +28,11 @@
  *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
  *                                        from the normal, as fitted by each model to the 16 photographs; _brightest: at 80 degrees, of any microflakes
  */
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/objective/objective.h"
+#include "optimizer/job/method_names.h"
 #include "tests/bench/fit_bench.h"
-#include "tests/support/tracer/fake_estimator.h"
 #include "tests/support/cloth/fit_fabrics.h"
+#include "tests/support/tracer/fake_estimator.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -60,7 +60,8 @@ static void open_fabric(const struct bench *b, const char *name, struct fit_phan
 
 static struct fit_score score(const struct bench *b, const struct fit_phantom *f, const double *param)
 {
-    return fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, param, param == f->truth ? 0 : b->score_paths);
+    return fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, param,
+                             param == f->truth ? 0 : b->score_paths);
 }
 
 /* 16 configurations x 2 replicas x 64 x 64 x 64 paths x (6 x 60 iterations, one for the first rate, up to 10 to settle);
@@ -101,8 +102,8 @@ static void bench_fabric(const struct bench *b, const char *name)
     struct fit_result r;
     open_fabric(b, name, &f);
     struct fit_score truth = score(b, &f, f.truth);
-    fprintf(stderr, "  the truth scores %.4f +- %.4f, %.4f expected of the photographs' stated errors\n", truth.rel_rms, truth.se,
-            expected_score(&f));
+    fprintf(stderr, "  the truth scores %.4f +- %.4f, %.4f expected of the photographs' stated errors\n", truth.rel_rms,
+            truth.se, expected_score(&f));
     if (!b->prepare) {
         bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
         bench_tell_fit(&f, &r);
@@ -183,20 +184,23 @@ static void bench_seeds(const struct bench *b)
 }
 
 /* Points evenly spaced in the logarithm of paths, and the result. */
-static void print_curve(const struct bench *b, const struct fit_phantom *f, const char *method, const struct fit_curve *c,
-                        const struct fit_result *r)
+static void print_curve(const struct bench *b, const struct fit_phantom *f, const char *method,
+                        const struct fit_curve *c, const struct fit_result *r)
 {
     double next = 0.0, ratio = pow(c->paths[c->n - 1] / c->paths[0], 1.0 / (N_CURVE - 1));
     for (size_t i = 0; i < c->n; i++) {
         if (c->paths[i] < next) continue;
         next = c->paths[i] * ratio;
-        struct fit_score s = fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, c->param[i], b->curve_paths);
-        printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_s\":%.4g}\n",
+        struct fit_score s =
+            fit_phantom_score(f, JOB_SET_HELD_OUT, f->truth, b->kept_paths, c->param[i], b->curve_paths);
+        printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_"
+               "s\":%.4g}\n",
                method, s.rel_rms, c->paths[i], c->wall_s[i]);
         fflush(stdout);
     }
     struct fit_score s = score(b, f, r->param);
-    printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_s\":%.4g}\n",
+    printf("{\"name\":\"fit.curve.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"wall_s\":%."
+           "4g}\n",
            method, s.rel_rms, (double)r->n_path, r->wall_s);
     fflush(stdout);
 }
@@ -234,7 +238,8 @@ static void bench_published(const struct bench *b)
     bench_print(of, "wall_s", r.wall_s, "s", "lower");
     bench_print(of, "paths", (double)r.n_path, "path", "lower");
     struct fit_score fitted = score(b, &f, r.param), truth = score(b, &f, f.truth);
-    fprintf(stderr, "  held out %.4f +- %.4f, the truth %.4f +- %.4f\n", fitted.rel_rms, fitted.se, truth.rel_rms, truth.se);
+    fprintf(stderr, "  held out %.4f +- %.4f, the truth %.4f +- %.4f\n", fitted.rel_rms, fitted.se, truth.rel_rms,
+            truth.se);
     bench_print(of, "heldout_rel_rms", fitted.rel_rms, "1", "lower");
     bench_print(of, "truth_rel_rms", truth.rel_rms, "1", "lower");
     bench_print(of, "first_order_ratio", first_order_ratio(b, &f, &r), "1", "lower");
@@ -268,7 +273,8 @@ static void fit_analytic(const char *method, uint64_t seed, struct fit_curve *c)
     c->n = 0;
     fit_check(descent_find(method)->run(&problem, &r, &err), &err);
     for (size_t i = 0; i <= c->n; i++) /* the result last: the published method returns the best of its runs */
-        printf("{\"name\":\"fit.analytic.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,\"seed\":%d}\n",
+        printf("{\"name\":\"fit.analytic.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,"
+               "\"seed\":%d}\n",
                method, fake_rel_rms(&f, 0, FAKE_N_FIT, i < c->n ? c->param[i] : r.param, truth),
                i < c->n ? c->paths[i] : (double)r.n_path, (int)seed);
     observation_set_release(&o);

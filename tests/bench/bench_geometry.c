@@ -14,7 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 
-static const enum phantom_weave weave[] = {PHANTOM_PLAIN, PHANTOM_TWILL_2_2, PHANTOM_SATIN_5, PHANTOM_KNIT, PHANTOM_VELVET, PHANTOM_FELT};
+static const enum phantom_weave weave[] = {PHANTOM_PLAIN, PHANTOM_TWILL_2_2, PHANTOM_SATIN_5,
+                                           PHANTOM_KNIT,  PHANTOM_VELVET,    PHANTOM_FELT};
 static const int diameter[] = {4, 7, 12}, snr[] = {2, 5};
 
 struct selection {
@@ -33,13 +34,16 @@ static bool selected(const struct selection *s, const char *name)
 static void print(const char *name, const char *what, double value, const char *unit, const char *better)
 {
     if (isfinite(value))
-        printf("{\"name\":\"geometry.%s.%s\",\"value\":%.5g,\"unit\":\"%s\",\"better\":\"%s\"}\n", name, what, value, unit, better);
+        printf("{\"name\":\"geometry.%s.%s\",\"value\":%.5g,\"unit\":\"%s\",\"better\":\"%s\"}\n", name, what, value,
+               unit, better);
     else
-        printf("{\"name\":\"geometry.%s.%s\",\"value\":null,\"unit\":\"%s\",\"better\":\"%s\"}\n", name, what, unit, better);
+        printf("{\"name\":\"geometry.%s.%s\",\"value\":null,\"unit\":\"%s\",\"better\":\"%s\"}\n", name, what, unit,
+               better);
     fflush(stdout);
 }
 
-static status write_pictures(const char *folder, const char *name, const struct volume *v, const struct fiber_set *f, struct error *err)
+static status write_pictures(const char *folder, const char *name, const struct volume *v, const struct fiber_set *f,
+                             struct error *err)
 {
     status s = STATUS_OK;
     for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) {
@@ -49,14 +53,19 @@ static status write_pictures(const char *folder, const char *name, const struct 
         snprintf(path, sizeof path, "%s/%s_%c.png", folder, name, "xyz"[axis]);
         s = reconstruct_slice_picture(v, f, axis, v->n[axis] / 2, &rgb, &width, &height, err);
         if (s != STATUS_OK) return s;
-        png_image image = {.version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height, .format = PNG_FORMAT_RGB};
-        if (!png_image_write_to_file(&image, path, 0, rgb, 0, NULL)) s = error_set(err, STATUS_IO, "cannot write '%s': %s", path, image.message);
+        png_image image = {.version = PNG_IMAGE_VERSION,
+                           .width = (png_uint_32)width,
+                           .height = (png_uint_32)height,
+                           .format = PNG_FORMAT_RGB};
+        if (!png_image_write_to_file(&image, path, 0, rgb, 0, NULL))
+            s = error_set(err, STATUS_IO, "cannot write '%s': %s", path, image.message);
         free(rgb);
     }
     return s;
 }
 
-static status bench_phantom(const struct selection *s, const char *name, enum phantom_weave w, int d, int noise, struct error *err)
+static status bench_phantom(const struct selection *s, const char *name, enum phantom_weave w, int d, int noise,
+                            struct error *err)
 {
     struct phantom_option o;
     struct phantom_reconstruction r = {0};
@@ -66,8 +75,11 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
     if (st == STATUS_OK && s->pictures != NULL) st = write_pictures(s->pictures, name, &r.v, &r.found, err);
     const struct compare_report *c = &r.compare;
     if (st == STATUS_OK) {
-        fprintf(stderr, "%s: %zu x %zu x %zu voxels, %zu true fibers (%zu pieces), %zu found, %.1f s, diameter measured %.2f, radius %+.1f %%\n", name, r.v.n[0],
-                r.v.n[1], r.v.n[2], c->n_true, c->n_true_piece, c->n_found, r.wall_s, r.report.fiber_diameter_voxel, c->radius_bias_percent);
+        fprintf(stderr,
+                "%s: %zu x %zu x %zu voxels, %zu true fibers (%zu pieces), %zu found, %.1f s, diameter measured %.2f, "
+                "radius %+.1f %%\n",
+                name, r.v.n[0], r.v.n[1], r.v.n[2], c->n_true, c->n_true_piece, c->n_found, r.wall_s,
+                r.report.fiber_diameter_voxel, c->radius_bias_percent);
         print(name, "precision", c->center_precision, "1", "higher");
         print(name, "recall", c->center_recall, "1", "higher");
         print(name, "centerline_rms_voxel", c->centerline_rms_voxel, "voxel", "lower");
@@ -89,7 +101,8 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     snprintf(scan, sizeof scan, "%s/weave-ct/small_weave.tif", folder != NULL ? folder : "../shared/data");
     snprintf(label, sizeof label, "%s/weave-ct/labels.tif", folder != NULL ? folder : "../shared/data");
     if (access(scan, R_OK) != 0 || access(label, R_OK) != 0) {
-        fprintf(stderr, "skipped geometry.weave_ct: no '%s' (set SELVEDGE_DATA)\n", access(scan, R_OK) != 0 ? scan : label);
+        fprintf(stderr, "skipped geometry.weave_ct: no '%s' (set SELVEDGE_DATA)\n",
+                access(scan, R_OK) != 0 ? scan : label);
         return STATUS_OK;
     }
     struct thread_pool *pool = NULL;

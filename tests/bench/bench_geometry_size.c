@@ -25,7 +25,8 @@ static const double VOXEL_M = 2e-6;
 struct sample {
     const char *name;
     enum phantom_weave weave;
-    size_t n_yarn, n_fiber, n_relax, n[3]; /* n_fiber: of a yarn; felt: in all. n: of the cropped scan; n[2]: with void */
+    size_t n_yarn, n_fiber, n_relax,
+        n[3]; /* n_fiber: of a yarn; felt: in all. n: of the cropped scan; n[2]: with void */
     double diameter_voxel, cover, tile_voxel, thickness_voxel;
 };
 
@@ -88,7 +89,8 @@ static status make_scan(const struct sample *p, const char *folder, const char *
     return s;
 }
 
-static status reconstruct(const char *path, const size_t n[3], const char *folder, struct reconstruct_report *report, struct error *err)
+static status reconstruct(const char *path, const size_t n[3], const char *folder, struct reconstruct_report *report,
+                          struct error *err)
 {
     struct reconstruct_option o;
     struct volume v = {0};
@@ -113,8 +115,11 @@ static status reconstruct(const char *path, const size_t n[3], const char *folde
     t[3] = clock_monotonic_s();
     if (s == STATUS_OK) s = reconstruct_transfer(&f, &d, pool, NULL, report, err);
     t[4] = clock_monotonic_s();
-    fprintf(stderr, "%zu x %zu x %zu: read %.1f s, orientation %.1f s, fibers %.1f s, transfer %.1f s; %zu fibers, %zu vertices, %.2f GB in files\n",
-            n[0], n[1], n[2], t[1] - t[0], t[2] - t[1], t[3] - t[2], t[4] - t[3], f.n_fiber, f.n_vertex, 1e-9 * (double)scratch_file_bytes(space));
+    fprintf(stderr,
+            "%zu x %zu x %zu: read %.1f s, orientation %.1f s, fibers %.1f s, transfer %.1f s; %zu fibers, %zu "
+            "vertices, %.2f GB in files\n",
+            n[0], n[1], n[2], t[1] - t[0], t[2] - t[1], t[3] - t[2], t[4] - t[3], f.n_fiber, f.n_vertex,
+            1e-9 * (double)scratch_file_bytes(space));
     volume_release(&v);
     direction_volume_release(&d);
     fiber_set_release(&f);
@@ -153,7 +158,8 @@ static struct outcome in_child(const struct sample *p, const size_t *n, const ch
 
 static void print(const char *name, const char *what, double value, const char *unit, const char *better)
 {
-    printf("{\"name\":\"geometry.%s.%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", name, what, value, unit, better);
+    printf("{\"name\":\"geometry.%s.%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", name, what, value, unit,
+           better);
     fflush(stdout);
 }
 
@@ -172,7 +178,8 @@ static bool bench(const struct sample *p, const char *folder)
     if (stat(path, &st) != 0) {
         struct outcome made = in_child(p, NULL, folder, path);
         if (failed(p, &made)) return false;
-        fprintf(stderr, "%s: made in %.0f s, %.0f s of processor time, peak %.0f MB\n", p->name, made.wall_s, made.cpu_s, 1e-6 * (double)made.peak_bytes);
+        fprintf(stderr, "%s: made in %.0f s, %.0f s of processor time, peak %.0f MB\n", p->name, made.wall_s,
+                made.cpu_s, 1e-6 * (double)made.peak_bytes);
     }
     for (int part = 0; part < (strcmp(p->name, "fleece") == 0 ? 3 : 1); part++) {
         const size_t n[3] = {part == 2 ? p->n[0] / 2 : p->n[0], part >= 1 ? p->n[1] / 2 : p->n[1], p->n[2]};

@@ -106,7 +106,8 @@ static void fleece_fibers(struct fiber_set *f)
     for (size_t i = 0; i < N_FIBER; i++) {
         rng_start(&r, &(struct rng_key){.seed = 9}, (uint32_t)i, 0);
         double p[3] = {tile_m * rng_double(&r), tile_m * rng_double(&r), 1.2e-3 * rng_double(&r)};
-        double phi = 2 * M_PI * rng_double(&r), climb = 0.3 * (rng_double(&r) - 0.5), bend = 0.2 * (rng_double(&r) - 0.5);
+        double phi = 2 * M_PI * rng_double(&r), climb = 0.3 * (rng_double(&r) - 0.5),
+               bend = 0.2 * (rng_double(&r) - 0.5);
         size_t n_segment = 18 + (i < N_SEGMENT - 18 * (size_t)N_FIBER);
         f->radius_m[i] = 7e-6f;
         f->axis_class[i] = 0;
@@ -137,8 +138,14 @@ static int trace_fleece(void)
     for (int i = 0; i < 16; i++) n[i] = 256;
     for (int p = 0; p < 9; p++) param[p] = m->param[p].start;
     status st = scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, &err);
-    struct estimate_request q = {.scene = scene, .model = m, .param = param, .configuration = c, .n_configuration = 16,
-                                 .n_path = n, .seed = 1, .want_jacobian = true};
+    struct estimate_request q = {.scene = scene,
+                                 .model = m,
+                                 .param = param,
+                                 .configuration = c,
+                                 .n_configuration = 16,
+                                 .n_path = n,
+                                 .seed = 1,
+                                 .want_jacobian = true};
     if (st == STATUS_OK) st = estimate_run(&q, NULL, NULL, e, &err);
     if (st == STATUS_OK)
         fprintf(stderr, "fleece: %zu segments, %zu fibers\n", scene_n_segment(scene), f.n_fiber);
@@ -170,14 +177,23 @@ struct bench {
 };
 
 /* Estimates with all derivatives; gives the processor seconds. Ends the program when it fails. */
-static double trace(const struct bench *b, const double param[9], size_t n_path, uint32_t replica, bool share, bool plain, struct estimate e[N_CONFIGURATION])
+static double trace(const struct bench *b, const double param[9], size_t n_path, uint32_t replica, bool share,
+                    bool plain, struct estimate e[N_CONFIGURATION])
 {
     struct error err = {0};
     size_t n[N_CONFIGURATION];
     for (int i = 0; i < N_CONFIGURATION; i++) n[i] = n_path;
-    const struct estimate_request q = {.scene = b->scene, .model = scattering_find("two_lobe.v1"), .param = param, .configuration = b->configuration,
-                                       .n_configuration = N_CONFIGURATION, .n_path = n, .seed = 1, .replica = replica, .want_jacobian = true,
-                                       .share_camera_paths = share, .no_probes = plain};
+    const struct estimate_request q = {.scene = b->scene,
+                                       .model = scattering_find("two_lobe.v1"),
+                                       .param = param,
+                                       .configuration = b->configuration,
+                                       .n_configuration = N_CONFIGURATION,
+                                       .n_path = n,
+                                       .seed = 1,
+                                       .replica = replica,
+                                       .want_jacobian = true,
+                                       .share_camera_paths = share,
+                                       .no_probes = plain};
     double t0 = processor_s();
     if (estimate_run(&q, b->pool, NULL, e, &err) != STATUS_OK) {
         fprintf(stderr, "%s\n", err.text);
@@ -222,14 +238,17 @@ static void bench_set(const struct bench *b, const char *set, const double param
                  {"beta_R.s_to_5pct_derivative", 6, false},
                  {"beta_TT.s_to_5pct_derivative", 7, false},
                  {"gamma_TT.s_to_5pct_derivative", 8, false}};
-    static const char *const width[3] = {"beta_R.s_to_1pct_of_mean", "beta_TT.s_to_1pct_of_mean", "gamma_TT.s_to_1pct_of_mean"};
+    static const char *const width[3] = {"beta_R.s_to_1pct_of_mean", "beta_TT.s_to_1pct_of_mean",
+                                         "gamma_TT.s_to_1pct_of_mean"};
     static struct estimate e[N_CONFIGURATION];
     trace(b, param, 256, 1, false, false, e); /* warm up */
-    double alone_s = trace(b, param, b->n_path, 0, false, false, e), per_path = alone_s / (N_CONFIGURATION * (double)e[0].n_path);
+    double alone_s = trace(b, param, b->n_path, 0, false, false, e),
+           per_path = alone_s / (N_CONFIGURATION * (double)e[0].n_path);
     print_times(set, e, per_path);
     for (size_t p = 0; p < sizeof other / sizeof other[0]; p++)
         print(set, other[p].name, s_to_derivative(e, other[p].first, other[p].colour, per_path), "s", "lower");
-    for (size_t p = 0; p < 3; p++) print(set, width[p], s_to_log_derivative(e, 6 + p, param[6 + p], per_path), "s", "lower");
+    for (size_t p = 0; p < 3; p++)
+        print(set, width[p], s_to_log_derivative(e, 6 + p, param[6 + p], per_path), "s", "lower");
     print(set, "shared_camera_speedup", alone_s / trace(b, param, b->n_path, 0, true, false, e), "", "higher");
 }
 
@@ -268,7 +287,8 @@ int main(int argc, char **argv)
         double param[9];
         for (int p = 0; p < 9; p++) param[p] = param_from_file_unit(&m->param[p], fabric[k].param[p]);
         if (only == NULL || strcmp(only, set) == 0) bench_set(&b, set, param);
-        if (strcmp(set, "gabardine") == 0 && (only == NULL || strcmp(only, "published") == 0)) bench_published(&b, set, param);
+        if (strcmp(set, "gabardine") == 0 && (only == NULL || strcmp(only, "published") == 0))
+            bench_published(&b, set, param);
     }
     thread_pool_free(b.pool);
     scene_free(b.scene);

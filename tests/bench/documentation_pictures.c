@@ -50,12 +50,25 @@ static status make_twill(struct thread_pool *pool, const struct scene *scene, si
         {0.06, 0.08, 0.11, 0.18, 0.40, 0.76, 6 * DEG, 16 * DEG, 30 * DEG}, /* warp: blue */
         {0.10, 0.09, 0.07, 0.95, 0.87, 0.70, 6 * DEG, 16 * DEG, 30 * DEG}, /* upright fibers */
     };
-    const struct configuration c = {.light_theta_rad = 52 * DEG, .light_phi_rad = 205 * DEG, .camera_theta_rad = 52 * DEG,
-                                    .camera_phi_rad = 0, .cloth_rotation_rad = 28 * DEG, .light_distance_m = 0.61,
-                                    .lamp_side_m = 0.6, .camera_distance_m = 0.008, .crop_m = 0.0034,
-                                    .crop_aspect = 1.5, .environment_rgb = {0.12, 0.14, 0.17}};
-    const struct render_request q = {.scene = scene, .model = scattering_find("two_lobe.v1"), .param = param[0],
-                                     .configuration = &c, .width = width, .height = width * 2 / 3, .n_sample = n_sample, .seed = 7,
+    const struct configuration c = {.light_theta_rad = 52 * DEG,
+                                    .light_phi_rad = 205 * DEG,
+                                    .camera_theta_rad = 52 * DEG,
+                                    .camera_phi_rad = 0,
+                                    .cloth_rotation_rad = 28 * DEG,
+                                    .light_distance_m = 0.61,
+                                    .lamp_side_m = 0.6,
+                                    .camera_distance_m = 0.008,
+                                    .crop_m = 0.0034,
+                                    .crop_aspect = 1.5,
+                                    .environment_rgb = {0.12, 0.14, 0.17}};
+    const struct render_request q = {.scene = scene,
+                                     .model = scattering_find("two_lobe.v1"),
+                                     .param = param[0],
+                                     .configuration = &c,
+                                     .width = width,
+                                     .height = width * 2 / 3,
+                                     .n_sample = n_sample,
+                                     .seed = 7,
                                      .n_set = 3};
     struct image im;
     status st = render_run(&q, pool, NULL, &im, err);
@@ -80,7 +93,7 @@ static const struct {
     const char *name, *unit;
     size_t first_param;
     bool colour;
-} column_of[N_COLUMN] = {{"rendering", "", 0, true}, {"C_R", "", 0, true},          {"C_TT", "", 3, true},
+} column_of[N_COLUMN] = {{"rendering", "", 0, true},   {"C_R", "", 0, true},          {"C_TT", "", 3, true},
                          {"beta_R", "/deg", 6, false}, {"beta_TT", "/deg", 7, false}, {"gamma_TT", "/deg", 8, false}};
 
 static int by_size(const void *a, const void *b)
@@ -115,7 +128,8 @@ static double scale_of(const struct image im[N_ROW], size_t column)
 /* Blue for -1, white for 0, red for 1. */
 static void paint(double value, uint8_t *rgb)
 {
-    static const double end[2][3] = {{0.02, 0.19, 0.38}, {0.40, 0.0, 0.12}}, middle[2][3] = {{0.26, 0.58, 0.76}, {0.84, 0.38, 0.30}};
+    static const double end[2][3] = {{0.02, 0.19, 0.38}, {0.40, 0.0, 0.12}},
+                        middle[2][3] = {{0.26, 0.58, 0.76}, {0.84, 0.38, 0.30}};
     double v = fmin(1, fabs(value)), t = v < 0.5 ? 2 * v : 2 * v - 1;
     for (int k = 0; k < 3; k++) {
         double far = end[value > 0][k], half = middle[value > 0][k];
@@ -159,10 +173,21 @@ static status make_derivatives(struct thread_pool *pool, const struct scene *sce
 {
     static const double param[9] = {0.25, 0.15, 0.10, 0.75, 0.55, 0.35, 8 * DEG, 22 * DEG, 30 * DEG};
     const struct configuration c[N_ROW] = {
-        {.light_theta_rad = 35 * DEG, .light_phi_rad = 180 * DEG, .camera_theta_rad = 20 * DEG, .light_distance_m = 0.61,
-         .lamp_side_m = 0.1, .camera_distance_m = 1, .crop_m = 0.0014},
-        {.light_theta_rad = 60 * DEG, .light_phi_rad = 90 * DEG, .camera_theta_rad = 55 * DEG, .cloth_rotation_rad = 30 * DEG,
-         .light_distance_m = 0.61, .lamp_side_m = 0.1, .camera_distance_m = 1, .crop_m = 0.0014},
+        {.light_theta_rad = 35 * DEG,
+         .light_phi_rad = 180 * DEG,
+         .camera_theta_rad = 20 * DEG,
+         .light_distance_m = 0.61,
+         .lamp_side_m = 0.1,
+         .camera_distance_m = 1,
+         .crop_m = 0.0014},
+        {.light_theta_rad = 60 * DEG,
+         .light_phi_rad = 90 * DEG,
+         .camera_theta_rad = 55 * DEG,
+         .cloth_rotation_rad = 30 * DEG,
+         .light_distance_m = 0.61,
+         .lamp_side_m = 0.1,
+         .camera_distance_m = 1,
+         .crop_m = 0.0014},
     };
     (void)width;
     static uint8_t rgb[HEIGHT * WIDTH * 3];
@@ -170,9 +195,16 @@ static status make_derivatives(struct thread_pool *pool, const struct scene *sce
     status st = STATUS_OK;
     memset(rgb, 255, sizeof rgb);
     for (size_t r = 0; r < N_ROW && st == STATUS_OK; r++) {
-        const struct render_request q = {.scene = scene, .model = scattering_find("two_lobe.v1"), .param = param,
-                                         .configuration = &c[r], .width = PANEL, .height = PANEL, .n_sample = n_sample,
-                                         .seed = 8, .stream = (uint32_t)r, .want_derivative = true};
+        const struct render_request q = {.scene = scene,
+                                         .model = scattering_find("two_lobe.v1"),
+                                         .param = param,
+                                         .configuration = &c[r],
+                                         .width = PANEL,
+                                         .height = PANEL,
+                                         .n_sample = n_sample,
+                                         .seed = 8,
+                                         .stream = (uint32_t)r,
+                                         .want_derivative = true};
         st = render_run(&q, pool, NULL, &im[r], err);
     }
     for (size_t column = 0; column < N_COLUMN && st == STATUS_OK; column++) draw_column(rgb, im, column);
@@ -183,7 +215,8 @@ static status make_derivatives(struct thread_pool *pool, const struct scene *sce
 
 int main(int argc, char **argv)
 {
-    bool twill = argc >= 3 && strcmp(argv[1], "twill") == 0, derivatives = argc >= 3 && strcmp(argv[1], "derivatives") == 0;
+    bool twill = argc >= 3 && strcmp(argv[1], "twill") == 0,
+         derivatives = argc >= 3 && strcmp(argv[1], "derivatives") == 0;
     if (!twill && !derivatives) {
         fprintf(stderr, "documentation_pictures twill|derivatives FILE.png [samples]\n");
         return 2;

@@ -12,7 +12,10 @@ const struct bench_model_name bench_model[BENCH_N_MODEL] = {{"two_lobe", "two_lo
                                                             {"two_lobe_volume", "phase_two_lobe.v1"},
                                                             {"two_lobe_balanced", "two_lobe_balanced.v1"}};
 
-bool bench_takes_model(const struct bench *b, size_t k) { return b->model == NULL || strcmp(b->model, bench_model[k].name) == 0; }
+bool bench_takes_model(const struct bench *b, size_t k)
+{
+    return b->model == NULL || strcmp(b->model, bench_model[k].name) == 0;
+}
 
 bool bench_has_model(const char *name)
 {
@@ -41,7 +44,7 @@ status bench_on_step(void *context, const struct fit_step *step, struct error *e
 }
 
 void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t seed, uint64_t budget,
-                    const char *journal_file, struct fit_result *r, struct fit_curve *curve)
+                   const char *journal_file, struct fit_result *r, struct fit_curve *curve)
 {
     struct error err = {0};
     struct estimate_journal *journal = NULL;
@@ -56,7 +59,8 @@ void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t see
     const struct estimator live = trace_estimator(&trace);
     struct estimator estimator = live;
     if (journal_file != NULL) {
-        fit_check(estimate_journal_open(journal_file, fit_phantom_fingerprint(f), &live, NULL, NULL, &journal, &err), &err);
+        fit_check(estimate_journal_open(journal_file, fit_phantom_fingerprint(f), &live, NULL, NULL, &journal, &err),
+                  &err);
         estimator = estimate_journal_estimator(journal);
     }
     for (size_t p = 0; p < f->model.n_param; p++) {
@@ -102,5 +106,6 @@ void bench_keep_truth_inside(struct fit_phantom *f)
 
 void bench_photograph(const struct bench *b, struct fit_phantom *f)
 {
-    fit_phantom_photograph(f, &(struct fit_photography){.n_path = b->photograph_paths, .noise = BENCH_NOISE, .noise_seed = 1});
+    fit_phantom_photograph(
+        f, &(struct fit_photography){.n_path = b->photograph_paths, .noise = BENCH_NOISE, .noise_seed = 1});
 }

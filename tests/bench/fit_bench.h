@@ -17,9 +17,10 @@ struct bench {
     uint64_t path_budget, sgd_budget;
     const char *fabric;  /* of "curve" and "published" */
     const char *journal; /* of the published method; NULL: not kept */
-    const char *sample; /* NULL: all measured tables */
-    const char *model;  /* NULL: all four on measured tables */
-    const char *yarn;   /* file of the measured tables' yarn; NULL: yarns/cotton1.txt of SELVEDGE_DATA; "none": smooth yarns */
+    const char *sample;  /* NULL: all measured tables */
+    const char *model;   /* NULL: all four on measured tables */
+    const char
+        *yarn; /* file of the measured tables' yarn; NULL: yarns/cotton1.txt of SELVEDGE_DATA; "none": smooth yarns */
     double flatness; /* of the measured tables' yarns: width over height */
     bool prepare;
 };
@@ -31,7 +32,8 @@ extern const struct bench_model_name {
 
 struct fit_curve {
     size_t n, n_param;
-    double wall_s[BENCH_MAX_STEP], paths[BENCH_MAX_STEP], objective[BENCH_MAX_STEP], param[BENCH_MAX_STEP][SCATTERING_MAX_PARAM];
+    double wall_s[BENCH_MAX_STEP], paths[BENCH_MAX_STEP], objective[BENCH_MAX_STEP],
+        param[BENCH_MAX_STEP][SCATTERING_MAX_PARAM];
 };
 
 /* One JSON object fit.<of>.<what>, without the dot when `what` is empty. */
@@ -43,8 +45,8 @@ bool bench_takes_model(const struct bench *b, size_t k);
 /* Step by step into a struct fit_curve; steps beyond BENCH_MAX_STEP are not kept. */
 status bench_on_step(void *curve, const struct fit_step *step, struct error *err);
 /* From the default start, density multiplier fixed; budget 0: the method's own. journal_file, curve: NULL when not wanted. */
-void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t seed, uint64_t budget, const char *journal_file,
-                   struct fit_result *r, struct fit_curve *curve);
+void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t seed, uint64_t budget,
+                   const char *journal_file, struct fit_result *r, struct fit_curve *curve);
 /* To standard error: how it ended, fitted and true parameters. */
 void bench_tell_fit(const struct fit_phantom *f, const struct fit_result *r);
 /* The true parameters are those of a rounded table: not beyond a bound. */
@@ -53,6 +55,6 @@ void bench_photograph(const struct bench *b, struct fit_phantom *f);
 
 /* The parts in files of their own. */
 void bench_real(const struct bench *b, bool all_rotations); /* fit_tables.c */
-void bench_grazing(const struct bench *b); /* fit_grazing.c */
+void bench_grazing(const struct bench *b);                  /* fit_grazing.c */
 
 #endif

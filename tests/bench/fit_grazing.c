@@ -10,8 +10,9 @@ enum { N_MIRROR = 18, MIRROR_STEP_DEG = 5 };
 
 static void print_mirror(const char *of, double angle_deg, const double rgb[3], double se)
 {
-    printf("{\"name\":\"fit.grazing.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"higher\",\"angle_deg\":%g,\"se\":%.2g}\n", of,
-           (rgb[0] + rgb[1] + rgb[2]) / 3.0, angle_deg, se);
+    printf("{\"name\":\"fit.grazing.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"higher\",\"angle_deg\":%g,\"se\":%."
+           "2g}\n",
+           of, (rgb[0] + rgb[1] + rgb[2]) / 3.0, angle_deg, se);
 }
 
 /* The photographs of the fit that were taken in such directions. */
@@ -30,14 +31,17 @@ static void print_mirror_photographs(const struct observation_set *o)
 /* Replaces f's observations by mirrored directions: n of them from first_deg on. */
 static void observe_mirror(struct fit_phantom *f, double first_deg, size_t n)
 {
-    const struct job_document set_up = {.lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
+    const struct job_document set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
     struct observation_set o;
     struct error err = {0};
     observation_set_init(&o);
     for (size_t i = 0; i < n; i++) {
         double theta_deg = first_deg + MIRROR_STEP_DEG * (double)i;
-        const struct observation item = {.set = JOB_SET_HELD_OUT, .weight = 1.0,
-                                         .configuration = observation_configuration(&set_up, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
+        const struct observation item = {.set = JOB_SET_HELD_OUT,
+                                         .weight = 1.0,
+                                         .configuration =
+                                             observation_configuration(&set_up, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
         fit_check(observation_set_append(&o, &item, &err), &err);
     }
     fit_phantom_observe(f, &o);
@@ -73,7 +77,8 @@ static void print_brightest_microflake(const struct bench *b, const struct fit_c
             param[i_gamma] = gamma->lower * pow(gamma->upper / gamma->lower, (double)g / (N_GAMMA - 1));
             param[i_d] = f.model.param[i_d].start * pow(4.0, (double)d - 1.0);
             fit_phantom_render(&f, param, b->score_paths, &e);
-            fprintf(stderr, "  microflake, albedo %.3f, gamma %.3f, d %.0f /cm: %.3f\n", param[0], param[i_gamma], 1e-2 * param[i_d], e.mean[0]);
+            fprintf(stderr, "  microflake, albedo %.3f, gamma %.3f, d %.0f /cm: %.3f\n", param[0], param[i_gamma],
+                    1e-2 * param[i_d], e.mean[0]);
             if (e.mean[0] > brightest.mean[0]) brightest = e;
         }
     print_mirror("microflake_brightest", at_deg, brightest.mean, mean_se(&brightest));

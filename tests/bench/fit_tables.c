@@ -1,7 +1,7 @@
 /* Measured tables: figures fit.real.* and fit.real_all_rotations.* of bench_fit. */
 #include "base/durable.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/photographs/measurement_table.h"
+#include "optimizer/job/method_names.h"
 #include "tests/bench/fit_bench.h"
 
 #include <glob.h>
@@ -32,14 +32,17 @@ static void tell_rows(const struct fit_phantom *f, const double *param, size_t n
     struct estimate e[FIT_MAX_OBSERVATION];
     const double deg = 180.0 / M_PI;
     fit_phantom_render(f, param, n_path, e);
-    fprintf(stderr, "  %-12s %5s %5s %5s %5s %5s  %-24s  %s\n", "row", "lamp", "phi", "cam", "phi", "turn", "measured", "rendered / measured");
+    fprintf(stderr, "  %-12s %5s %5s %5s %5s %5s  %-24s  %s\n", "row", "lamp", "phi", "cam", "phi", "turn", "measured",
+            "rendered / measured");
     for (size_t i = 0; i < f->observation.n; i++) {
         const struct observation *o = &f->observation.item[i];
         const struct configuration *k = &o->configuration;
-        fprintf(stderr, "  %-12s %5.0f %5.0f %5.0f %5.0f %5.0f ", o->name, k->light_theta_rad * deg, k->light_phi_rad * deg,
-                k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->cloth_rotation_rad * deg);
+        fprintf(stderr, "  %-12s %5.0f %5.0f %5.0f %5.0f %5.0f ", o->name, k->light_theta_rad * deg,
+                k->light_phi_rad * deg, k->camera_theta_rad * deg, k->camera_phi_rad * deg,
+                k->cloth_rotation_rad * deg);
         for (int c = 0; c < 3; c++) fprintf(stderr, " %7.4f", o->mean_rgb[c]);
-        for (int c = 0; c < 3; c++) fprintf(stderr, "  %5.2f +- %.2f", e[i].mean[c] / o->mean_rgb[c], sqrt(e[i].var[c]) / o->mean_rgb[c]);
+        for (int c = 0; c < 3; c++)
+            fprintf(stderr, "  %5.2f +- %.2f", e[i].mean[c] / o->mean_rgb[c], sqrt(e[i].var[c]) / o->mean_rgb[c]);
         fputc('\n', stderr);
     }
 }
@@ -61,8 +64,11 @@ static void read_table(const struct real *real, const char *path, struct real_ro
     struct error err = {0};
     char *text = NULL;
     size_t n = 0;
-    const struct job_document set_up = {
-        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0, .black_sheet = true};
+    const struct job_document set_up = {.lamp_side_cm = 10.0,
+                                        .lamp_distance_cm = 61.0,
+                                        .camera_distance_cm = 100.0,
+                                        .crop_cm = 1.0,
+                                        .black_sheet = true};
     observation_set_init(&row->observation);
     fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
     fit_check(measurement_table_parse(text, n, row->sample, &set_up, &row->observation, &err), &err);
@@ -71,7 +77,8 @@ static void read_table(const struct real *real, const char *path, struct real_ro
 }
 
 /* Both errors by fresh paths: the fit's own objective is at its lowest partly by the luck of the paths that it was fitted to. */
-static void score_table(const struct real *real, const struct fit_phantom *f, const double *param, size_t k, struct real_row *row)
+static void score_table(const struct real *real, const struct fit_phantom *f, const double *param, size_t k,
+                        struct real_row *row)
 {
     const struct fit_score_goal goal = {SCORE_SE, real->bench->score_paths / 2, MOST_SCORE_PATHS};
     for (int held_out = 0; held_out < 2; held_out++) {
@@ -79,7 +86,8 @@ static void score_table(const struct real *real, const struct fit_phantom *f, co
         const struct fit_score s = fit_phantom_score_to(f, held_out ? JOB_SET_HELD_OUT : JOB_SET_FIT, param, &goal);
         row->error[k][held_out] = s.rel_rms;
         fprintf(stderr, "  %s %.3f +- %.3f\n", held_out ? "held out" : "fitted", s.rel_rms, s.se);
-        snprintf(what, sizeof what, "%s.%s.%s", row->sample, bench_model[k].name, held_out ? "heldout_rel_rms" : "fit_rel_rms");
+        snprintf(what, sizeof what, "%s.%s.%s", row->sample, bench_model[k].name,
+                 held_out ? "heldout_rel_rms" : "fit_rel_rms");
         bench_print(real->all_rotations ? "real_all_rotations" : "real", what, s.rel_rms, "1", "lower");
     }
 }
@@ -121,8 +129,10 @@ static const struct fit_cloth *real_cloth(struct real *real, const char *data, c
     if (cloth->scene != NULL) return cloth;
     snprintf(yarn, sizeof yarn, "%s/yarns/cotton1.txt", data);
     const char *file = b->yarn == NULL ? yarn : b->yarn;
-    const struct fit_cloth_option weave = {.weave = PHANTOM_PLAIN, .yarn_file = strcmp(file, "none") == 0 ? NULL : file,
-                                           .flatness = b->flatness, .with_volume = true},
+    const struct fit_cloth_option weave = {.weave = PHANTOM_PLAIN,
+                                           .yarn_file = strcmp(file, "none") == 0 ? NULL : file,
+                                           .flatness = b->flatness,
+                                           .with_volume = true},
                                   lofty = {.weave = PHANTOM_FELT, .lofty = true, .with_volume = true};
     fit_cloth_init(cloth, felt ? &lofty : &weave, b->pool);
     return cloth;

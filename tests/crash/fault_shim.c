@@ -18,7 +18,8 @@ __attribute__((constructor)) static void only_here(void) { unsetenv("LD_PRELOAD"
 /* true: this is the call that has to fail */
 static int fires(const char *call, int fd)
 {
-    const char *wanted = getenv("FAULT_CALL"), *at = getenv("FAULT_AT"), *path = getenv("FAULT_PATH"), *mark = getenv("FAULT_MARK");
+    const char *wanted = getenv("FAULT_CALL"), *at = getenv("FAULT_AT"), *path = getenv("FAULT_PATH"),
+               *mark = getenv("FAULT_MARK");
     char link[64], file[4096];
     if (wanted == NULL || at == NULL || path == NULL || mark == NULL || strcmp(wanted, call) != 0) return 0;
     snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
@@ -50,8 +51,14 @@ static ssize_t faulty_pwrite(const char *name, int fd, const void *data, size_t 
     return REAL(ssize_t, name, int, const void *, size_t, off_t)(fd, data, n, offset);
 }
 
-ssize_t pwrite(int fd, const void *data, size_t n, off_t offset) { return faulty_pwrite("pwrite", fd, data, n, offset); }
-ssize_t pwrite64(int fd, const void *data, size_t n, off_t offset) { return faulty_pwrite("pwrite64", fd, data, n, offset); }
+ssize_t pwrite(int fd, const void *data, size_t n, off_t offset)
+{
+    return faulty_pwrite("pwrite", fd, data, n, offset);
+}
+ssize_t pwrite64(int fd, const void *data, size_t n, off_t offset)
+{
+    return faulty_pwrite("pwrite64", fd, data, n, offset);
+}
 
 ssize_t write(int fd, const void *data, size_t n)
 {

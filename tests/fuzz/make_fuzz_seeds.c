@@ -33,7 +33,8 @@ static void must(bool ok, const char *what)
 static void put(const char *parser, const char *name, const char *text, const void *data, size_t n_data)
 {
     FILE *file = fopen(seed_path(parser, name), "wb");
-    must(file != NULL && fwrite(text, 1, strlen(text), file) == strlen(text) && fwrite(data, 1, n_data, file) == n_data, name);
+    must(file != NULL && fwrite(text, 1, strlen(text), file) == strlen(text) && fwrite(data, 1, n_data, file) == n_data,
+         name);
     must(fclose(file) == 0, name);
 }
 
@@ -43,7 +44,8 @@ static void volume_seeds(void)
     static const double voxel[3] = {2e-6, 2e-6, 2e-6};
     struct volume v;
     struct direction_volume d;
-    must(volume_init(&v, n, voxel, NULL) == STATUS_OK && direction_volume_init(&d, n, voxel, NULL) == STATUS_OK, "memory");
+    must(volume_init(&v, n, voxel, NULL) == STATUS_OK && direction_volume_init(&d, n, voxel, NULL) == STATUS_OK,
+         "memory");
     for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = (float)(i % 7) / 7.0f;
     struct phantom_file_option o;
     phantom_file_option_default(&o);
@@ -66,21 +68,43 @@ static void header_seeds(void)
     uLongf n_packed = sizeof packed;
     for (size_t i = 0; i < sizeof data; i++) data[i] = (uint8_t)(i * 3);
     must(compress(packed, &n_packed, data, sizeof data) == Z_OK, "zlib");
-    put("metaimage", "u8.mha", "ObjectType = Image\nNDims = 3\nDimSize = 6 5 4\nElementSpacing = 0.002 0.002 0.002\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n", data, 120);
-    put("metaimage", "u16z.mha", "NDims = 3\nDimSize = 5 4 3\nElementType = MET_USHORT\nElementByteOrderMSB = True\nCompressedData = True\nElementDataFile = LOCAL\n", packed, n_packed);
-    put("nrrd", "u8.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 6 5 4\nencoding: raw\nspacings: 0.002 0.002 0.002\n\n", data, 120);
-    put("nrrd", "f32.nrrd", "NRRD0005\n# c\ntype: float\ndimension: 3\nsizes: 5 3 2\nendian: big\nencoding: raw\nspace: left-posterior-superior\nspace directions: (2,0,0) (0,2,0) (0,0,2)\nspace units: \"um\" \"um\" \"um\"\n\n", data, 120);
-    put("nrrd", "u16z.nrrd", "NRRD0004\ntype: ushort\ndimension: 3\nsizes: 5 4 2\nendian: little\nencoding: gzip\nbyte skip: 40\nline skip: 1\n\nline\n", packed, n_packed);
+    put("metaimage", "u8.mha",
+        "ObjectType = Image\nNDims = 3\nDimSize = 6 5 4\nElementSpacing = 0.002 0.002 0.002\nElementType = "
+        "MET_UCHAR\nElementDataFile = LOCAL\n",
+        data, 120);
+    put("metaimage", "u16z.mha",
+        "NDims = 3\nDimSize = 5 4 3\nElementType = MET_USHORT\nElementByteOrderMSB = True\nCompressedData = "
+        "True\nElementDataFile = LOCAL\n",
+        packed, n_packed);
+    put("nrrd", "u8.nrrd",
+        "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 6 5 4\nencoding: raw\nspacings: 0.002 0.002 0.002\n\n", data, 120);
+    put("nrrd", "f32.nrrd",
+        "NRRD0005\n# c\ntype: float\ndimension: 3\nsizes: 5 3 2\nendian: big\nencoding: raw\nspace: "
+        "left-posterior-superior\nspace directions: (2,0,0) (0,2,0) (0,0,2)\nspace units: \"um\" \"um\" \"um\"\n\n",
+        data, 120);
+    put("nrrd", "u16z.nrrd",
+        "NRRD0004\ntype: ushort\ndimension: 3\nsizes: 5 4 2\nendian: little\nencoding: gzip\nbyte skip: 40\nline skip: "
+        "1\n\nline\n",
+        packed, n_packed);
     put("raw", "u8", "\x06\x05\x04", "\0\0\0", 3);
     uint8_t raw[126] = {5, 4, 3, 1, 2, 0};
     memcpy(raw + 6, data, 120);
     put("raw", "u16", "", raw, sizeof raw);
-    put("measurements", "table.csv", "# c\nset,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b,r_se,g_se,b_se,weight,name\nfit,0,20,0,20,180,0,0.0222,0.0247,0.0564,0,0,0,1,a\nheld-out,1,60,0,60,90,90,0.0187,0.0201,0.0467,1e-3,1e-3,1e-3,2,b\n", "", 0);
+    put("measurements", "table.csv",
+        "# "
+        "c\nset,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b,r_se,g_se,"
+        "b_se,weight,name\nfit,0,20,0,20,180,0,0.0222,0.0247,0.0564,0,0,0,1,a\nheld-out,1,60,0,60,90,90,0.0187,0.0201,"
+        "0.0467,1e-3,1e-3,1e-3,2,b\n",
+        "", 0);
 }
 
 static void fiber_seeds(void)
 {
-    put("yarn_file", "yarn.txt", "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: 0\nfiber_clock_wise: 1\nyarn_alpha: 0.45\nalpha: 0.36\nyarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: 0.2\nR_max: 1\nflyaway_hair_ze: 0.002 0.06\n", "", 0);
+    put("yarn_file", "yarn.txt",
+        "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: 0\nfiber_clock_wise: 1\nyarn_alpha: "
+        "0.45\nalpha: 0.36\nyarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: "
+        "0.2\nR_max: 1\nflyaway_hair_ze: 0.002 0.06\n",
+        "", 0);
     struct fiber_set f;
     fiber_set_init(&f);
     must(fiber_set_reserve(&f, 2, 5, NULL) == STATUS_OK, "memory");

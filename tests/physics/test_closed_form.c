@@ -84,7 +84,8 @@ static void check(const struct configuration *c, const double param[9], struct t
             fail_msg("camera %.0f/%.0f lamp %.0f/%.0f rotation %.0f, channel %d: %.6g +- %.2g, quadrature %.6g",
                      c->camera_theta_rad / DEG, c->camera_phi_rad / DEG, c->light_theta_rad / DEG,
                      c->light_phi_rad / DEG, c->cloth_rotation_rad / DEG, k, e.mean[k], se, want);
-        joint->sum += want * want / (se * se) * (e.mean[k] / want - 1); /* channels share paths: their errors go together */
+        joint->sum +=
+            want * want / (se * se) * (e.mean[k] / want - 1); /* channels share paths: their errors go together */
         joint->weight += want * want / (se * se);
     }
 }

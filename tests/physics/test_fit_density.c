@@ -2,8 +2,8 @@
  * its standard error; and one that nothing depends on is said not to be determined. */
 #include "base/rng.h"
 #include "optimizer/fit/descent/descent.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/descent/trace_estimator.h"
+#include "optimizer/job/method_names.h"
 #include "tests/support/cloth/hand_volume.h"
 
 #include <math.h>
@@ -81,15 +81,23 @@ static void fit(const struct volume_scene *scene, size_t n, uint64_t budget, str
     const struct param_info *d = &model.param[model.n_param - 1];
     truth[model.n_param - 1] = param_from_file_unit(d, TRUE_PER_CM);
     assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
-    struct trace_estimator t = {.model = &model, .scene = {.volume = scene}, .pool = pool, .seed = 77,
-                                .configuration = c, .n_configuration = n};
+    struct trace_estimator t = {.model = &model,
+                                .scene = {.volume = scene},
+                                .pool = pool,
+                                .seed = 77,
+                                .configuration = c,
+                                .n_configuration = n};
     observe(&t, truth, &o);
     for (size_t p = 0; p < model.n_param; p++)
         parameter[p] = (struct fit_parameter){model.param[p].lower, model.param[p].upper, model.param[p].start, false};
     t.seed = 1;
     struct estimator e = trace_estimator(&t);
-    const struct fit_problem problem = {.n_param = model.n_param, .info = model.param, .param = parameter,
-                                        .observation = &o, .estimator = &e, .path_budget = budget};
+    const struct fit_problem problem = {.n_param = model.n_param,
+                                        .info = model.param,
+                                        .param = parameter,
+                                        .observation = &o,
+                                        .estimator = &e,
+                                        .path_budget = budget};
     struct error err = {0};
     if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
     for (size_t p = 0; p < model.n_param; p++)

@@ -4,9 +4,9 @@
 #include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/statistics_test.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/reference_two_lobe.h"
-#include "tests/support/statistics_test.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -127,15 +127,16 @@ static void sampling_gives_the_camera_side_integral(void **state)
 /* Integral of S cos th over the far side's directions for the near side's angle, per channel; light comes from theta
  * (incident) or leaves to it. The grids resolve a lobe of 1 degree: periodic or nearly so, they converge
  * exponentially. */
-static void both_furnaces(const struct scattering_model *m, const struct scattering_state *s, double theta, bool incident,
-                          size_t n_phi, double sum[3])
+static void both_furnaces(const struct scattering_model *m, const struct scattering_state *s, double theta,
+                          bool incident, size_t n_phi, double sum[3])
 {
     enum { N_THETA = 720 };
     float at[3], other[3], rgb[3];
     direction(theta, 0, at);
     sum[0] = sum[1] = sum[2] = 0;
     for (int i = 0; i < N_THETA; i++) {
-        double t = -M_PI_2 + (i + 0.5) * M_PI / N_THETA, weight = cos(t) * cos(t) * (M_PI / N_THETA) * 2 * M_PI / (double)n_phi;
+        double t = -M_PI_2 + (i + 0.5) * M_PI / N_THETA,
+               weight = cos(t) * cos(t) * (M_PI / N_THETA) * 2 * M_PI / (double)n_phi;
         for (size_t j = 0; j < n_phi; j++) {
             direction(t, ((double)j + 0.5) * 2 * M_PI / (double)n_phi, other);
             m->eval(s, incident ? at : other, incident ? other : at, rgb, NULL);
@@ -156,7 +157,8 @@ static void balanced_is_lossless_from_both_sides(void **state)
     rng_start(&r, &(struct rng_key){51, 0, 0, 0}, 0, 0);
     for (int k = 0; k < 16 + N_RANDOM; k++) { /* corners, then anywhere */
         double box[4], param[9];
-        static const double range[4][2] = {{0.001, 0.999}, {1 * DEG, 10 * DEG}, {10 * DEG, 45 * DEG}, {1 * DEG, 45 * DEG}};
+        static const double range[4][2] = {
+            {0.001, 0.999}, {1 * DEG, 10 * DEG}, {10 * DEG, 45 * DEG}, {1 * DEG, 45 * DEG}};
         for (int p = 0; p < 4; p++) {
             double t = k < 16 ? (k >> p & 1) : rng_double(&r);
             box[p] = range[p][0] + t * (range[p][1] - range[p][0]);

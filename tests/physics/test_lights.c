@@ -1,13 +1,13 @@
 /* Lights and cameras beside the square lamp and the perspective camera: against closed forms, quadrature, or each
  * other. Tolerances are standard errors (4, over several dozen comparisons) plus the stated remainders.
  */
-#include "renderer/transport/light/environment.h"
 #include "renderer/transport/estimate.h"
+#include "renderer/transport/light/environment.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/statistics_test.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/painted_environment.h"
 #include "tests/support/tracer/reference_two_lobe.h"
-#include "tests/support/statistics_test.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -50,8 +50,13 @@ static struct estimate run(const struct scene *scene, const char *model, const d
 {
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = {.scene = scene, .model = scattering_find(model), .param = param, .configuration = c,
-                                 .n_configuration = 1, .n_path = &n_path, .seed = seed};
+    struct estimate_request q = {.scene = scene,
+                                 .model = scattering_find(model),
+                                 .param = param,
+                                 .configuration = c,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .seed = seed};
     if (estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     return e;
 }
@@ -77,8 +82,9 @@ static void directional_lamp_closed_form(void **state)
 {
     (void)state;
     static const double angle_deg[][5] = {/* camera theta, phi, lamp theta, phi, rotation */
-                                          {0, 0, 30, 90, 0}, {30, 0, 30, 180, 0}, {40, 90, 35, 270, 90}, {20, 45, 30, 235, 45},
-                                          {60, 180, 62, 5, 0}, {10, 90, 150, 270, 0}, {35, 45, 130, 215, 20}};
+                                          {0, 0, 30, 90, 0},     {30, 0, 30, 180, 0}, {40, 90, 35, 270, 90},
+                                          {20, 45, 30, 235, 45}, {60, 180, 62, 5, 0}, {10, 90, 150, 270, 0},
+                                          {35, 45, 130, 215, 20}};
     static const double param[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
     const double tile_m = 0.4e-3, radius_m = 5e-6, y_z[1][2] = {{0.13e-3, 0}};
     struct fiber_set f;
@@ -89,9 +95,14 @@ static void directional_lamp_closed_form(void **state)
     for (size_t i = 0; i < sizeof angle_deg / sizeof angle_deg[0]; i++) {
         const double *a = angle_deg[i];
         const struct scene *scene = with_sheet[a[2] < 90];
-        struct configuration c = {.light_theta_rad = a[2] * DEG, .light_phi_rad = a[3] * DEG, .camera_theta_rad = a[0] * DEG,
-                                  .camera_phi_rad = a[1] * DEG, .cloth_rotation_rad = a[4] * DEG, .crop_m = 8 * tile_m,
-                                  .light = LIGHT_DIRECTIONAL, .camera = CAMERA_FAR_FIELD};
+        struct configuration c = {.light_theta_rad = a[2] * DEG,
+                                  .light_phi_rad = a[3] * DEG,
+                                  .camera_theta_rad = a[0] * DEG,
+                                  .camera_phi_rad = a[1] * DEG,
+                                  .cloth_rotation_rad = a[4] * DEG,
+                                  .crop_m = 8 * tile_m,
+                                  .light = LIGHT_DIRECTIONAL,
+                                  .camera = CAMERA_FAR_FIELD};
         double w[2][3];
         for (int k = 0; k < 2; k++) {
             double theta = k == 0 ? c.light_theta_rad : c.camera_theta_rad;
@@ -229,15 +240,19 @@ static void picture_on_a_straight_fiber(void **state)
     hand_straight(&f, 1, y_z, tile_m, radius_m);
     assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, NULL), STATUS_OK);
     for (int r = 0; r < 3; r++) {
-        struct configuration c = {.cloth_rotation_rad = rotation[r], .crop_m = 8 * tile_m, .light = LIGHT_NO_LAMP,
-                                  .camera = CAMERA_FAR_FIELD, .environment = e};
+        struct configuration c = {.cloth_rotation_rad = rotation[r],
+                                  .crop_m = 8 * tile_m,
+                                  .light = LIGHT_NO_LAMP,
+                                  .camera = CAMERA_FAR_FIELD,
+                                  .environment = e};
         double want[3] = {0}, wo[3] = {0, 0, 1};
         for (int i = 0; i < FINE / 2; i++)
             for (int j = 0; j < 2 * FINE; j++) { /* upper half only: the sheet is black */
                 double theta = M_PI * (i + 0.5) / FINE, phi = M_PI * (j + 0.5) / FINE, turned = phi - rotation[r];
                 double wi[3] = {sin(theta) * cos(turned), sin(theta) * sin(turned), cos(theta)};
                 double area = sin(theta) * (M_PI / FINE) * (M_PI / FINE);
-                float d[3] = {(float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)cos(theta)}, rgb[3];
+                float d[3] = {(float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)cos(theta)},
+                      rgb[3];
                 environment_at(e, d, rgb);
                 for (int k = 0; k < 3; k++)
                     want[k] += reference_s(param, wi, wo, k) * hypot(wi[1], wi[2]) * (double)rgb[k] * area;
@@ -266,7 +281,8 @@ static void picture_samples_follow_their_density(void **state)
         for (int j = 0; j < COLUMNS * FINE; j++) {
             double theta = M_PI * (i + 0.5) / (ROWS * FINE), phi = 2 * M_PI * (j + 0.5) / (COLUMNS * FINE);
             float d[3] = {(float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)cos(theta)}, rgb[3];
-            double area = (cos(M_PI * i / (ROWS * FINE)) - cos(M_PI * (i + 1) / (ROWS * FINE))) * 2 * M_PI / (COLUMNS * FINE);
+            double area =
+                (cos(M_PI * i / (ROWS * FINE)) - cos(M_PI * (i + 1) / (ROWS * FINE))) * 2 * M_PI / (COLUMNS * FINE);
             expected[i / FINE * COLUMNS + j / FINE] += (double)environment_at(e, d, rgb) * area;
         }
     double total = 0, chi2 = 0;
@@ -314,8 +330,12 @@ static void bad_lights_are_refused(void **state)
     assert_int_equal(environment_new(&im, 1, &e, &err), STATUS_OK);
     assert_int_not_equal(environment_read_exr("/nowhere/sky.exr", 1, &e, &err), STATUS_OK);
     orbit_configurations_16(c);
-    struct estimate_request q = {.scene = weave[0], .model = scattering_find("isotropic.v1"), .param = white,
-                                 .configuration = c, .n_configuration = 1, .n_path = &n_path};
+    struct estimate_request q = {.scene = weave[0],
+                                 .model = scattering_find("isotropic.v1"),
+                                 .param = white,
+                                 .configuration = c,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path};
     c[0].environment = e; /* all black: no light, no NaN */
     c[0].light = LIGHT_NO_LAMP;
     assert_int_equal(estimate_run(&q, NULL, NULL, &out, &err), STATUS_OK);

@@ -18,8 +18,9 @@ enum { N = 224, N_CYLINDER = 7 };
 static const size_t LIMIT_BYTES = (size_t)120 << 20; /* 18 bytes a voxel are 202 MB */
 
 static const struct test_cylinder cylinder[N_CYLINDER] = {
-    {{0.0, 60.0, 30.0}, {1.0, 0.0, 0.0}, 3.5},   {{0.0, 67.5, 30.0}, {1.0, 0.0, 0.0}, 3.5},    {{0.0, 120.0, 110.0}, {1.0, 0.1, 0.05}, 3.5},
-    {{60.0, 0.0, 60.0}, {0.1, 1.0, 0.0}, 3.5},   {{150.0, 0.0, 150.0}, {0.0, 1.0, 0.1}, 3.5},  {{110.0, 112.0, 112.0}, {0.6, 0.0, 0.8}, 3.5},
+    {{0.0, 60.0, 30.0}, {1.0, 0.0, 0.0}, 3.5},    {{0.0, 67.5, 30.0}, {1.0, 0.0, 0.0}, 3.5},
+    {{0.0, 120.0, 110.0}, {1.0, 0.1, 0.05}, 3.5}, {{60.0, 0.0, 60.0}, {0.1, 1.0, 0.0}, 3.5},
+    {{150.0, 0.0, 150.0}, {0.0, 1.0, 0.1}, 3.5},  {{110.0, 112.0, 112.0}, {0.6, 0.0, 0.8}, 3.5},
     {{40.0, 170.0, 200.0}, {0.5, 0.8, 0.0}, 3.5},
 };
 
@@ -35,7 +36,9 @@ static int reconstruct(const char *folder)
     struct direction_volume d;
     struct fiber_set f;
     reconstruct_option_default(&o);
-    if (thread_pool_new(2, &pool, NULL) != STATUS_OK || scratch_space_new(folder, LIMIT_BYTES, &space, NULL) != STATUS_OK) return 1;
+    if (thread_pool_new(2, &pool, NULL) != STATUS_OK ||
+        scratch_space_new(folder, LIMIT_BYTES, &space, NULL) != STATUS_OK)
+        return 1;
     if (volume_init_in(&v, n, (const double[3]){2e-6, 2e-6, 2e-6}, space, NULL) != STATUS_OK) return 2;
     test_fill_cylinders(&v, cylinder, N_CYLINDER, 0.1, 3);
     fiber_set_init(&f);

@@ -2,8 +2,8 @@
  */
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/render.h"
+#include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
 
@@ -44,13 +44,20 @@ static int tear_down(void **state)
     return 0;
 }
 
-static struct estimate run(const struct scene *scene, const double *param, size_t n_set, int i_configuration, size_t n_path)
+static struct estimate run(const struct scene *scene, const double *param, size_t n_set, int i_configuration,
+                           size_t n_path)
 {
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = {.scene = scene, .model = scattering_find("two_lobe.v1"), .param = param,
-                                 .configuration = &configuration[i_configuration], .n_configuration = 1,
-                                 .n_path = &n_path, .seed = 31, .want_jacobian = true, .n_set = n_set};
+    struct estimate_request q = {.scene = scene,
+                                 .model = scattering_find("two_lobe.v1"),
+                                 .param = param,
+                                 .configuration = &configuration[i_configuration],
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .seed = 31,
+                                 .want_jacobian = true,
+                                 .n_set = n_set};
     if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     return e;
 }
@@ -63,7 +70,8 @@ static void equal_sets_are_one_set(void **state)
     assert_int_equal(scene_n_group(one), 1);
     assert_int_equal(scene_n_group(two), 2);
     for (int i = 0; i < 16; i += 5) {
-        struct estimate a = run(one, set[0], 0, i, 8192), b = run(two, twice, 2, i, 8192), c = run(two, set[0], 1, i, 8192);
+        struct estimate a = run(one, set[0], 0, i, 8192), b = run(two, twice, 2, i, 8192),
+                        c = run(two, set[0], 1, i, 8192);
         assert_memory_equal(&a, &c, sizeof a);
         assert_memory_equal(a.mean, b.mean, sizeof a.mean);
         assert_memory_equal(a.var, b.var, sizeof a.var);
@@ -72,7 +80,8 @@ static void equal_sets_are_one_set(void **state)
                 double all = a.jac[k * N_PARAM + p], first = b.jac[k * 2 * N_PARAM + p],
                        second = b.jac[k * 2 * N_PARAM + N_PARAM + p];
                 if (!(fabs(first + second - all) <= 2e-6 * (fabs(first) + fabs(second)) + 1e-7 * a.mean[k] / set[0][p]))
-                    fail_msg("configuration %d, parameter %d, channel %d: %g + %g is not %g", i, p, k, first, second, all);
+                    fail_msg("configuration %d, parameter %d, channel %d: %g + %g is not %g", i, p, k, first, second,
+                             all);
                 if (all != 0) assert_true(first != 0 && second != 0);
             }
     }
@@ -93,7 +102,8 @@ static void groups_by_fiber(void **state)
     uint8_t *group = malloc(f.n_fiber);
     assert_non_null(group);
     memset(group, 1, f.n_fiber);
-    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true, .fiber_group = group}, &scene, &err), STATUS_OK);
+    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true, .fiber_group = group}, &scene, &err),
+                     STATUS_OK);
     assert_int_equal(scene_n_group(scene), 2);
     struct estimate a = run(one, set[0], 1, 1, 2048), b = run(scene, param, 3, 1, 2048);
     assert_memory_equal(a.mean, b.mean, sizeof a.mean);
@@ -124,8 +134,13 @@ static void bad_sets_are_refused(void **state)
     hand_weave_small(&f);
     f.axis_class[3] = 2; /* a third group */
     assert_int_equal(scene_new(&f, &(struct scene_option){.group_by_axis_class = true}, &scene, &err), STATUS_OK);
-    struct estimate_request q = {.scene = scene, .model = scattering_find("two_lobe.v1"), .param = param,
-                                 .configuration = configuration, .n_configuration = 1, .n_path = &n_path, .n_set = 2};
+    struct estimate_request q = {.scene = scene,
+                                 .model = scattering_find("two_lobe.v1"),
+                                 .param = param,
+                                 .configuration = configuration,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .n_set = 2};
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
     assert_string_equal(err.field, "n_set");
     q.n_set = 8; /* 72 parameters */
@@ -230,7 +245,8 @@ static void recorded_paths_of_two_sets(void **state)
         evaluate(set, record, n_record, again);
         for (int k = 0; k < 3; k++) assert_true(fabs(again[k] / value[k] - 1) < 1e-4);
         for (size_t p = 0; p < 2 * N_PARAM; p++) {
-            double moved[2][N_PARAM], up[3], down[3], *at = &moved[p / N_PARAM][p % N_PARAM], h = 3e-3 * set[p / N_PARAM][p % N_PARAM];
+            double moved[2][N_PARAM], up[3], down[3], *at = &moved[p / N_PARAM][p % N_PARAM],
+                                                      h = 3e-3 * set[p / N_PARAM][p % N_PARAM];
             memcpy(moved, set, sizeof moved);
             *at += h;
             evaluate((const double(*)[N_PARAM])moved, record, n_record, up);
@@ -253,9 +269,16 @@ static void pictures_name_their_layers(void **state)
     (void)state;
     struct image im;
     struct error err = {0};
-    struct render_request q = {.scene = two, .model = scattering_find("two_lobe.v1"), .param = set[0],
-                               .configuration = configuration, .width = 4, .height = 4, .n_sample = 4, .seed = 1,
-                               .want_derivative = true, .n_set = 2};
+    struct render_request q = {.scene = two,
+                               .model = scattering_find("two_lobe.v1"),
+                               .param = set[0],
+                               .configuration = configuration,
+                               .width = 4,
+                               .height = 4,
+                               .n_sample = 4,
+                               .seed = 1,
+                               .want_derivative = true,
+                               .n_set = 2};
     if (render_run(&q, NULL, NULL, &im, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_int_equal(im.n_channel, 6 + 3 * 2 * N_PARAM);
     assert_string_equal(im.channel_name[6], "d_set0.C_R.r.R");
@@ -266,8 +289,8 @@ static void pictures_name_their_layers(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(equal_sets_are_one_set),   cmocka_unit_test(groups_by_fiber),
-        cmocka_unit_test(bad_sets_are_refused),     cmocka_unit_test(recorded_paths_of_two_sets),
+        cmocka_unit_test(equal_sets_are_one_set),     cmocka_unit_test(groups_by_fiber),
+        cmocka_unit_test(bad_sets_are_refused),       cmocka_unit_test(recorded_paths_of_two_sets),
         cmocka_unit_test(pictures_name_their_layers),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -3,8 +3,8 @@
  */
 #include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
-#include "tests/support/tracer/naive_tracer.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/naive_tracer.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -35,7 +35,8 @@ static void test_guide(void **state)
         lamp_guide_sample(towards, u, d);
         assert_true(fabsf(dot(d, d) - 1) < 1e-5f);
         to_local(&f, d, local);
-        double inner = exp(LAMP_GUIDE_KAPPA * ((double)local[0] - 1)), angle = atan2((double)local[2], (double)local[1]);
+        double inner = exp(LAMP_GUIDE_KAPPA * ((double)local[0] - 1)),
+               angle = atan2((double)local[2], (double)local[1]);
         int ring = (int)(inner * RING), quarter = (int)((angle + M_PI) / (2 * M_PI) * 4);
         count[4 * (ring < RING ? ring : RING - 1) + (quarter < 4 ? quarter : 3)]++;
     }
@@ -60,9 +61,12 @@ struct view {
 };
 
 static const struct view view[] = {
-    {"two_lobe.v1", true, LIGHT_SQUARE_LAMP, 20, 0, 20, 180},       {"two_lobe.v1", true, LIGHT_SQUARE_LAMP, 75, 0, 70, 150},
-    {"two_lobe.v1", true, LIGHT_DIRECTIONAL, 45, 30, 10, 90},       {"two_lobe.v1", false, LIGHT_SQUARE_LAMP, 150, 40, 30, 0},
-    {"two_lobe_balanced.v1", true, LIGHT_SQUARE_LAMP, 60, 0, 0, 0}, {"kajiya_kay.v1", true, LIGHT_SQUARE_LAMP, 50, 0, 40, 180},
+    {"two_lobe.v1", true, LIGHT_SQUARE_LAMP, 20, 0, 20, 180},
+    {"two_lobe.v1", true, LIGHT_SQUARE_LAMP, 75, 0, 70, 150},
+    {"two_lobe.v1", true, LIGHT_DIRECTIONAL, 45, 30, 10, 90},
+    {"two_lobe.v1", false, LIGHT_SQUARE_LAMP, 150, 40, 30, 0},
+    {"two_lobe_balanced.v1", true, LIGHT_SQUARE_LAMP, 60, 0, 0, 0},
+    {"kajiya_kay.v1", true, LIGHT_SQUARE_LAMP, 50, 0, 40, 180},
     {"marschner.v1", true, LIGHT_SQUARE_LAMP, 30, 0, 50, 180},
 };
 
@@ -101,9 +105,14 @@ static void test_same_means(void **state)
     for (size_t i = 0; i < n_view; i++) {
         const struct view *v = &view[i];
         const struct scattering_model *m = scattering_find(v->model);
-        struct configuration c = {.light_theta_rad = v->lamp_theta_deg * DEG, .light_phi_rad = v->lamp_phi_deg * DEG,
-                                  .camera_theta_rad = v->camera_theta_deg * DEG, .camera_phi_rad = v->camera_phi_deg * DEG,
-                                  .light_distance_m = 0.61, .lamp_side_m = 0.1, .camera_distance_m = 1, .crop_m = 0.01,
+        struct configuration c = {.light_theta_rad = v->lamp_theta_deg * DEG,
+                                  .light_phi_rad = v->lamp_phi_deg * DEG,
+                                  .camera_theta_rad = v->camera_theta_deg * DEG,
+                                  .camera_phi_rad = v->camera_phi_deg * DEG,
+                                  .light_distance_m = 0.61,
+                                  .lamp_side_m = 0.1,
+                                  .camera_distance_m = 1,
+                                  .crop_m = 0.01,
                                   .light = v->light};
         double param[SCATTERING_MAX_PARAM];
         struct estimate e[2];
@@ -111,15 +120,24 @@ static void test_same_means(void **state)
         assert_non_null(m);
         for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
         for (int plain = 0; plain < 2; plain++) {
-            struct estimate_request q = {.scene = weave[v->black_sheet], .model = m, .param = param, .configuration = &c,
-                                         .n_configuration = 1, .n_path = &n_path, .seed = 11, .iteration = (uint32_t)plain,
-                                         .want_jacobian = true, .no_probes = plain == 1};
+            struct estimate_request q = {.scene = weave[v->black_sheet],
+                                         .model = m,
+                                         .param = param,
+                                         .configuration = &c,
+                                         .n_configuration = 1,
+                                         .n_path = &n_path,
+                                         .seed = 11,
+                                         .iteration = (uint32_t)plain,
+                                         .want_jacobian = true,
+                                         .no_probes = plain == 1};
             if (estimate_run(&q, pool, NULL, &e[plain], &err) != STATUS_OK) fail_msg("%s", err.text);
         }
         struct comparison here = {0};
         for (int k = 0; k < 3; k++) compare(&here, e[0].mean[k], e[0].var[k], e[1].mean[k], e[1].var[k]);
-        for (size_t k = 0; k < 3 * m->n_param; k++) compare(&here, e[0].jac[k], e[0].jac_var[k], e[1].jac[k], e[1].jac_var[k]);
-        print_message("%-20s view %zu: %zu numbers, mean square %.2f, largest %.1f standard errors; variance %.2f of the plain one\n",
+        for (size_t k = 0; k < 3 * m->n_param; k++)
+            compare(&here, e[0].jac[k], e[0].jac_var[k], e[1].jac[k], e[1].jac_var[k]);
+        print_message("%-20s view %zu: %zu numbers, mean square %.2f, largest %.1f standard errors; variance %.2f of "
+                      "the plain one\n",
                       m->id, i, here.n, here.sum_square / (double)here.n, here.largest, e[0].var[1] / e[1].var[1]);
         all.n += here.n;
         all.sum_square += here.sum_square;

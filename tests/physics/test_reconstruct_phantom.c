@@ -18,11 +18,14 @@ static void reconstruct_phantom(enum phantom_weave weave, struct compare_report 
     reconstruct_option_default(&r.option);
     assert_int_equal(phantom_reconstruct(&o, 5.0, &r, &err), STATUS_OK);
     *c = r.compare;
-    print_message("%s, diameter %.1f voxels, signal-to-noise 5: %zu fibers found, %zu true; precision %.3f recall %.3f rms %.2f voxel "
-                  "length recovered %.3f (found/true %.3f) fragments %.2f merges %.3f direction %.1f deg (95 %%: %.1f) radius %+.1f %%\n",
-                  phantom_weave_name(weave), c->fiber_diameter_voxel, c->n_found, c->n_true, c->center_precision, c->center_recall,
-                  c->centerline_rms_voxel, c->length_recovered, c->length_found_m / c->length_true_m, c->fragments_per_fiber,
-                  c->merges_per_fiber, c->direction_mean_deg, c->direction_p95_deg, c->radius_bias_percent);
+    print_message("%s, diameter %.1f voxels, signal-to-noise 5: %zu fibers found, %zu true; precision %.3f recall %.3f "
+                  "rms %.2f voxel "
+                  "length recovered %.3f (found/true %.3f) fragments %.2f merges %.3f direction %.1f deg (95 %%: %.1f) "
+                  "radius %+.1f %%\n",
+                  phantom_weave_name(weave), c->fiber_diameter_voxel, c->n_found, c->n_true, c->center_precision,
+                  c->center_recall, c->centerline_rms_voxel, c->length_recovered, c->length_found_m / c->length_true_m,
+                  c->fragments_per_fiber, c->merges_per_fiber, c->direction_mean_deg, c->direction_p95_deg,
+                  c->radius_bias_percent);
     phantom_reconstruction_release(&r);
 }
 
@@ -66,6 +69,7 @@ static void test_velvet(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_twill), cmocka_unit_test(test_knit), cmocka_unit_test(test_velvet)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_twill), cmocka_unit_test(test_knit),
+                                       cmocka_unit_test(test_velvet)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -43,8 +43,12 @@ static void save_pictures(const struct scan *s, const char *name)
         uint8_t *rgb;
         size_t width, height;
         snprintf(path, sizeof path, "%s/%s_%c.png", folder, name, "xyz"[axis]);
-        assert_int_equal(reconstruct_slice_picture(&s->v, &s->f, axis, s->v.n[axis] / 2, &rgb, &width, &height, NULL), STATUS_OK);
-        png_image image = {.version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height, .format = PNG_FORMAT_RGB};
+        assert_int_equal(reconstruct_slice_picture(&s->v, &s->f, axis, s->v.n[axis] / 2, &rgb, &width, &height, NULL),
+                         STATUS_OK);
+        png_image image = {.version = PNG_IMAGE_VERSION,
+                           .width = (png_uint_32)width,
+                           .height = (png_uint_32)height,
+                           .format = PNG_FORMAT_RGB};
         assert_true(png_image_write_to_file(&image, path, 0, rgb, 0, NULL));
         free(rgb);
     }
@@ -72,11 +76,12 @@ static void reconstruct_scan(const char *path, const char *axes, const char *nam
     s->seconds = clock_monotonic_s() - start;
     thread_pool_free(pool);
     save_pictures(s, name);
-    print_message("%s: %zu fibers, %zu vertices, %.1f mm, radius %.2f um at %.1f um voxels (diameter %.1f voxels), dice %.3f, %zu gaps, "
+    print_message("%s: %zu fibers, %zu vertices, %.1f mm, radius %.2f um at %.1f um voxels (diameter %.1f voxels), "
+                  "dice %.3f, %zu gaps, "
                   "%zu joins, direction change %.1f deg, %.1f s\n",
-                  name, s->f.n_fiber, s->f.n_vertex, s->r.total_length_m * 1e3, s->r.radius_m[0] * 1e6, s->v.voxel_size_m[0] * 1e6,
-                  2.0 * s->r.radius_m[0] / s->v.voxel_size_m[0], s->r.dice, s->r.n_gap_bridged, s->r.n_joined,
-                  s->r.direction_change_mean_deg, s->seconds);
+                  name, s->f.n_fiber, s->f.n_vertex, s->r.total_length_m * 1e3, s->r.radius_m[0] * 1e6,
+                  s->v.voxel_size_m[0] * 1e6, 2.0 * s->r.radius_m[0] / s->v.voxel_size_m[0], s->r.dice,
+                  s->r.n_gap_bridged, s->r.n_joined, s->r.direction_change_mean_deg, s->seconds);
 }
 
 static void release(struct scan *s)
@@ -113,7 +118,8 @@ static void test_weave_ct(void **state)
     data_path(labels, "weave-ct/labels.tif");
     reconstruct_scan(path, "zxy", "weave_ct", 0, &s);
     assert_int_equal(weave_label_accuracy(&s.d, labels, &accuracy, &kept, NULL), STATUS_OK);
-    print_message("weave_ct: %.1f %% of the labelled tow voxels kept, %.1f %% of those in the right axis class\n", 100.0 * kept, 100.0 * accuracy);
+    print_message("weave_ct: %.1f %% of the labelled tow voxels kept, %.1f %% of those in the right axis class\n",
+                  100.0 * kept, 100.0 * accuracy);
     assert_true(accuracy >= 0.9);
     assert_true(kept >= 0.9);
     release(&s);

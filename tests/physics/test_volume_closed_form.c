@@ -4,12 +4,12 @@
  */
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
-#include "renderer/transport/volume_estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
+#include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/cloth/hand_weave.h"
-#include "tests/support/tracer/reference_two_lobe.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/reference_two_lobe.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 /* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
  * bits for any number of threads. */
-#include "renderer/transport/volume_estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
+#include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 
 #include <math.h>
@@ -196,7 +196,8 @@ static void stored_voxels_are_the_volume(void **state)
                 volume_voxel_direction(voxel, b);
                 double cross[3] = {(double)(a[1] * b[2] - a[2] * b[1]), (double)(a[2] * b[0] - a[0] * b[2]),
                                    (double)(a[0] * b[1] - a[1] * b[0])};
-                worst = fmin(worst, 0.035 * DEG - sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]));
+                worst =
+                    fmin(worst, 0.035 * DEG - sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]));
             }
     assert_true(worst > 0);
     cloth_release(&k);
@@ -226,8 +227,10 @@ static void empty_distances(void **state)
                     nearest = most < nearest ? most : nearest;
                 }
                 int got = s.brick[(z * s.n_brick[1] + y) * s.n_brick[0] + x];
-                if (nearest == 0) assert_true(got >= 0);
-                else assert_int_equal(got, -nearest);
+                if (nearest == 0)
+                    assert_true(got >= 0);
+                else
+                    assert_int_equal(got, -nearest);
             }
     assert_int_equal(s.n_stored, 2);
     volume_scene_release(&s);

@@ -54,9 +54,15 @@ static struct estimate run(const struct volume_scene *scene, const char *model, 
 {
     struct estimate e;
     struct error err = {0};
-    const struct volume_estimate_request q = {.scene = scene, .model = phase_find(model), .param = param,
-                                              .multiplier_per_m = scene->n[2] == 5 ? d_per_m : 3e4, .configuration = c,
-                                              .n_configuration = 1, .n_path = &n_path, .seed = seed, .want_jacobian = true};
+    const struct volume_estimate_request q = {.scene = scene,
+                                              .model = phase_find(model),
+                                              .param = param,
+                                              .multiplier_per_m = scene->n[2] == 5 ? d_per_m : 3e4,
+                                              .configuration = c,
+                                              .n_configuration = 1,
+                                              .n_path = &n_path,
+                                              .seed = seed,
+                                              .want_jacobian = true};
     if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     return e;
 }
@@ -92,9 +98,12 @@ static void directional_lamp_closed_form(void **state)
     const double param[3] = {alpha, alpha, alpha}, tau = slab_m * d_per_m;
     const double angle_deg[5][2] = {{0, 40}, {60, 30}, {75, 80}, {20, 150}, {60, 105}}; /* camera, lamp */
     for (int i = 0; i < 5; i++) {
-        const struct configuration c = {.light_theta_rad = angle_deg[i][1] * DEG, .light_phi_rad = 0.7,
-                                        .camera_theta_rad = angle_deg[i][0] * DEG, .crop_m = 0.01,
-                                        .light = LIGHT_DIRECTIONAL, .camera = CAMERA_FAR_FIELD};
+        const struct configuration c = {.light_theta_rad = angle_deg[i][1] * DEG,
+                                        .light_phi_rad = 0.7,
+                                        .camera_theta_rad = angle_deg[i][0] * DEG,
+                                        .crop_m = 0.01,
+                                        .light = LIGHT_DIRECTIONAL,
+                                        .camera = CAMERA_FAR_FIELD};
         double by_tau, want = scattered_once(tau, cos(c.light_theta_rad), cos(c.camera_theta_rad), &by_tau);
         struct estimate e = run(&thin[0], "phase_isotropic.v1", param, &c, 1000000, 3);
         double se = sqrt(e.var[0]), by_d = by_tau * slab_m, se_d = sqrt(e.jac_var[3]);
@@ -179,8 +188,12 @@ static void picture_on_the_slab(void **state)
     struct environment *e = painted_environment(64, 32, paint_sky_and_lamp);
     for (int i = 0; i < 4; i++) {
         bool sheet = i % 2;
-        const struct configuration c = {.cloth_rotation_rad = 0.9 * i, .crop_m = 0.01, .light = LIGHT_NO_LAMP,
-                                        .camera_theta_rad = 35 * DEG, .camera_phi_rad = 0.5, .camera = CAMERA_FAR_FIELD,
+        const struct configuration c = {.cloth_rotation_rad = 0.9 * i,
+                                        .crop_m = 0.01,
+                                        .light = LIGHT_NO_LAMP,
+                                        .camera_theta_rad = 35 * DEG,
+                                        .camera_phi_rad = 0.5,
+                                        .camera = CAMERA_FAR_FIELD,
                                         .environment = e};
         double want[3] = {0}, mo = cos(c.camera_theta_rad);
         const float through[3] = {(float)(-sin(35 * DEG) * cos(0.5)), (float)(-sin(35 * DEG) * sin(0.5)), (float)-mo};
@@ -191,8 +204,9 @@ static void picture_on_the_slab(void **state)
                 double area = sin(theta) * (M_PI / FINE) * (M_PI / FINE), mi = cos(theta), sum = 1 / mi + 1 / mo;
                 const float d[3] = {(float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)mi};
                 environment_at(e, d, rgb);
-                double once = mi > 0 ? alpha / 4 * mi / (mi + mo) * -expm1(-tau * sum)
-                                     : column == 0 ? scattered_once(tau, mi, mo, &unused) : 0;
+                double once = mi > 0        ? alpha / 4 * mi / (mi + mo) * -expm1(-tau * sum)
+                              : column == 0 ? scattered_once(tau, mi, mo, &unused)
+                                            : 0;
                 static double row_value;
                 if (mi < 0 && column == 0) row_value = once;
                 for (int k = 0; k < 3; k++) want[k] += (mi > 0 ? once : row_value) / M_PI * (double)rgb[k] * area;
@@ -248,14 +262,24 @@ static void no_ray_leaves_where_it_enters(void **state)
     const double dark[3] = {0.001, 0.001, 0.001};
     struct direction_volume thick;
     struct volume_scene scene;
-    const struct configuration c = {.light = LIGHT_NO_LAMP, .camera_theta_rad = 80 * M_PI / 180, .camera_distance_m = 1, .crop_m = 1e-3,
+    const struct configuration c = {.light = LIGHT_NO_LAMP,
+                                    .camera_theta_rad = 80 * M_PI / 180,
+                                    .camera_distance_m = 1,
+                                    .crop_m = 1e-3,
                                     .environment_rgb = {1, 1, 1}};
     struct estimate e;
     struct error err = {0};
     hand_volume_uniform(&thick, n, 5e-6, 255, along);
-    if (volume_scene_init(&scene, &thick, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK) fail_msg("%s", err.text);
-    const struct volume_estimate_request q = {.scene = &scene, .model = phase_find("phase_isotropic.v1"), .param = dark, .configuration = &c,
-                                              .multiplier_per_m = 1e7, .n_configuration = 1, .n_path = &n_path, .seed = 7};
+    if (volume_scene_init(&scene, &thick, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
+    const struct volume_estimate_request q = {.scene = &scene,
+                                              .model = phase_find("phase_isotropic.v1"),
+                                              .param = dark,
+                                              .configuration = &c,
+                                              .multiplier_per_m = 1e7,
+                                              .n_configuration = 1,
+                                              .n_path = &n_path,
+                                              .seed = 7};
     if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (!(e.mean[0] <= 1.01 * dark[0] + 4 * sqrt(e.var[0])) || !(sqrt(e.var[0]) < 0.1 * dark[0]))
         fail_msg("mean radiance %g +- %g of a slab with albedo %g", e.mean[0], sqrt(e.var[0]), dark[0]);
@@ -274,15 +298,23 @@ static void a_lost_path_brings_nothing(void **state)
     const double grey[3] = {0.5, 0.5, 0.5};
     struct direction_volume one;
     struct volume_scene scene;
-    struct configuration c = {.light = LIGHT_NO_LAMP, .camera_distance_m = 1, .crop_m = EDGE * 100e-6, .environment_rgb = {1, 1, 1}};
+    struct configuration c = {
+        .light = LIGHT_NO_LAMP, .camera_distance_m = 1, .crop_m = EDGE * 100e-6, .environment_rgb = {1, 1, 1}};
     struct estimate e;
     struct error err = {0};
     hand_volume_uniform(&one, n, 100e-6, 0, along);
     for (size_t z = 0; z < n[2]; z++) one.density[z * EDGE * EDGE] = 255;
-    if (volume_scene_init(&scene, &one, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (volume_scene_init(&scene, &one, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
     for (int k = 0; k < 2; k++) { /* mean step 8e-6 m: all get across; 8e-10 m: none of the 0.8 mm */
-        const struct volume_estimate_request q = {.scene = &scene, .model = phase_find("phase_isotropic.v1"), .param = grey, .configuration = &c,
-                                                  .multiplier_per_m = k == 0 ? 1e5 : 1e9, .n_configuration = 1, .n_path = &n_path, .seed = 1};
+        const struct volume_estimate_request q = {.scene = &scene,
+                                                  .model = phase_find("phase_isotropic.v1"),
+                                                  .param = grey,
+                                                  .configuration = &c,
+                                                  .multiplier_per_m = k == 0 ? 1e5 : 1e9,
+                                                  .n_configuration = 1,
+                                                  .n_path = &n_path,
+                                                  .seed = 1};
         if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
         if (k == 0 ? !(e.mean[0] > 0.9) : !(e.mean[0] < 0.1)) fail_msg("mean radiance %g in front of 1", e.mean[0]);
     }

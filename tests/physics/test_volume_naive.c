@@ -3,8 +3,8 @@
 #include "base/thread_pool.h"
 #include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
-#include "tests/support/tracer/naive_volume.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/naive_volume.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -78,9 +78,14 @@ static void agree(struct configuration c, double sky, bool black_sheet, double d
     for (int i = 0; i < N_TASK; i++) sample_mean_add(&batch, j.mean[i].mean);
     for (int k = 0; k < 3; k++) c.environment_rgb[k] = sky;
     assert_int_equal(volume_scene_init(&scene, &volume, &(struct volume_scene_option){black_sheet}, &err), STATUS_OK);
-    const struct volume_estimate_request q = {.scene = &scene, .model = phase_find("phase_two_lobe.v1"), .param = param,
-                                              .multiplier_per_m = d_per_m, .configuration = &c, .n_configuration = 1,
-                                              .n_path = &n_path, .seed = 5};
+    const struct volume_estimate_request q = {.scene = &scene,
+                                              .model = phase_find("phase_two_lobe.v1"),
+                                              .param = param,
+                                              .multiplier_per_m = d_per_m,
+                                              .configuration = &c,
+                                              .n_configuration = 1,
+                                              .n_path = &n_path,
+                                              .seed = 5};
     if (volume_estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     double se = sqrt(sample_mean_se(&batch) * sample_mean_se(&batch) + e.var[0]), z = (batch.mean - e.mean[0]) / se;
     print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se,
@@ -98,8 +103,8 @@ static void two_tracers_agree(void **state)
     const double narrower[12] = {0.3, 0.3, 0.3, 0.35, 0.35, 0.35, 10 * DEG, 38 * DEG, 40 * DEG, 0.9, 0.9, 0.9};
     agree((struct configuration){30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, 0, true, 5e4, wide, 1500,
           pool);
-    agree((struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, 0.2, true, 2e4,
-          narrower, 4000, pool);
+    agree((struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, 0.2, true,
+          2e4, narrower, 4000, pool);
     /* back light, seen through the cloth and beside it */
     agree((struct configuration){170 * DEG, 40 * DEG, 25 * DEG, 0, 0.3, 0.61, 1.0, 1.0, 0.01}, 0, false, 3e4, wide,
           1000, pool);

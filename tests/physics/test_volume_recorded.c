@@ -74,11 +74,12 @@ static double ratio(const struct volume_setting *s, const struct phase_extinctio
                     const struct volume_event *v)
 {
     float unused;
-    return d_per_m / (double)s->multiplier_per_m * (double)v->density * (double)phase_extinction_at(e, v->sine, &unused) /
-           (double)s->majorant_density;
+    return d_per_m / (double)s->multiplier_per_m * (double)v->density *
+           (double)phase_extinction_at(e, v->sine, &unused) / (double)s->majorant_density;
 }
 
-static void replay(const struct volume_setting *s, const struct now *now, const struct volume_record *r, double value[3])
+static void replay(const struct volume_setting *s, const struct now *now, const struct volume_record *r,
+                   double value[3])
 {
     const struct phase_extinction *e = s->model->extinction(now->state);
     double t[3] = {1, 1, 1}, light[3] = {0};
@@ -89,20 +90,34 @@ static void replay(const struct volume_setting *s, const struct now *now, const 
         if (v->kind == VOLUME_SCATTER || v->kind == VOLUME_CONNECT)
             s->model->eval_pdf(now->state, v->wi, v->wo, NULL, f, NULL);
         for (int c = 0; c < 3; c++) switch (v->kind) {
-            case VOLUME_NULL: t[c] *= (1 - r_now) / (1 - then); break;
-            case VOLUME_REAL: t[c] *= r_now / then; break;
-            case VOLUME_SCATTER: t[c] *= (double)f[c] * (double)v->weight[0]; break;
-            case VOLUME_CONNECT: light[c] = t[c] * (double)f[c] * (double)v->weight[c]; break;
-            case VOLUME_PASSED: light[c] *= 1 - r_now; break;
-            case VOLUME_ARRIVE: value[c] += light[c] * (double)v->weight[0]; break;
-            case VOLUME_BEYOND: value[c] += t[c] * (double)v->weight[c]; break;
+            case VOLUME_NULL:
+                t[c] *= (1 - r_now) / (1 - then);
+                break;
+            case VOLUME_REAL:
+                t[c] *= r_now / then;
+                break;
+            case VOLUME_SCATTER:
+                t[c] *= (double)f[c] * (double)v->weight[0];
+                break;
+            case VOLUME_CONNECT:
+                light[c] = t[c] * (double)f[c] * (double)v->weight[c];
+                break;
+            case VOLUME_PASSED:
+                light[c] *= 1 - r_now;
+                break;
+            case VOLUME_ARRIVE:
+                value[c] += light[c] * (double)v->weight[0];
+                break;
+            case VOLUME_BEYOND:
+                value[c] += t[c] * (double)v->weight[c];
+                break;
             }
     }
 }
 
 /* Fills sum[j][c] with the recorded paths' values for parameters moved by (j - 2) h, jac with the traced derivative. */
-static void differences_of(const struct phase_model *m, const struct configuration *c, const double *param, double d_per_m,
-                           size_t p, double h, double sum[5][3], double jac[3], double radiance[3])
+static void differences_of(const struct phase_model *m, const struct configuration *c, const double *param,
+                           double d_per_m, size_t p, double h, double sum[5][3], double jac[3], double radiance[3])
 {
     static struct volume_event event[N_EVENT];
     struct phase_state *base = NULL, *moved[5] = {NULL};
@@ -202,7 +217,8 @@ static void white_without_roulette(void **state)
             fail_msg("channel %zu: %g and %g without roulette, standard error %g", k, value[0][k].mean,
                      value[1][k].mean, se);
         n_beyond += off > 2.5 * se;
-        if (off > 4.5 * se) fail_msg("value %zu: %g and %g, standard error %g", k, value[0][k].mean, value[1][k].mean, se);
+        if (off > 4.5 * se)
+            fail_msg("value %zu: %g and %g, standard error %g", k, value[0][k].mean, value[1][k].mean, se);
     }
     assert_true(n_beyond <= 4); /* of 42, three channels of each much the same */
     m->release(ps);

@@ -9,7 +9,8 @@ enum { REACH = 4 };
 /* Squared sine of the angle at vertex i; negative where the voxel is empty. */
 static float sine2(const struct polyline_set *p, size_t line, size_t i, const struct direction_volume *d)
 {
-    size_t a = i >= p->first[line] + 2 ? i - 2 : p->first[line], b = i + 2 < p->first[line + 1] ? i + 2 : p->first[line + 1] - 1;
+    size_t a = i >= p->first[line] + 2 ? i - 2 : p->first[line],
+           b = i + 2 < p->first[line + 1] ? i + 2 : p->first[line + 1] - 1;
     size_t at[3];
     float t[3], e[3], norm = 0.0f, cosine = 0.0f;
     for (int c = 0; c < 3; c++) {
@@ -36,10 +37,12 @@ static bool disagrees(const float *value, size_t n, size_t i, float limit)
     return weight > 0.0f && sum > limit * weight;
 }
 
-status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d, double max_angle_rad,
-                                 size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
+status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
+                                 double max_angle_rad, size_t min_vertex, struct polyline_set *result, size_t *n_cut,
+                                 struct error *err)
 {
-    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), *value = malloc((lines->n_vertex + 1) * sizeof *value);
+    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)),
+          *value = malloc((lines->n_vertex + 1) * sizeof *value);
     if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
     status s = STATUS_OK;
     *n_cut = 0;
@@ -49,7 +52,8 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
         for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
             if (i < n && !disagrees(value, n, i, limit)) continue;
-            if (i - run >= min_vertex) s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
+            if (i - run >= min_vertex)
+                s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
             *n_cut += i < n;
             run = i + 1;
         }
@@ -58,10 +62,12 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
     return s;
 }
 
-status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d, double max_angle_rad, size_t reach,
-                                  size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
+status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
+                                  double max_angle_rad, size_t reach, size_t min_vertex, struct polyline_set *result,
+                                  size_t *n_cut, struct error *err)
 {
-    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), *value = malloc((lines->n_vertex + 1) * sizeof *value);
+    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)),
+          *value = malloc((lines->n_vertex + 1) * sizeof *value);
     if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
     status s = STATUS_OK;
     *n_cut = 0;

@@ -7,7 +7,8 @@
 /* Tangent at vertex i of a line, central difference. */
 static void tangent_at(const struct polyline_set *p, size_t line, size_t i, float t[3])
 {
-    size_t a = i > p->first[line] + 1 ? i - 2 : p->first[line], b = i + 2 < p->first[line + 1] ? i + 2 : p->first[line + 1] - 1;
+    size_t a = i > p->first[line] + 1 ? i - 2 : p->first[line],
+           b = i + 2 < p->first[line + 1] ? i + 2 : p->first[line + 1] - 1;
     float norm = 0.0f;
     for (int c = 0; c < 3; c++) {
         t[c] = p->vertex[b][c] - p->vertex[a][c];

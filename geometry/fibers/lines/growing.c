@@ -12,12 +12,12 @@ static const float FLOOR = 0.15f;
 struct live_grid {
     float cell;
     size_t n[3];
-    uint32_t *head;      /* per cell: entry + 1 */
+    uint32_t *head; /* per cell: entry + 1 */
     struct live_entry {
         float x[3];
         uint32_t line, next;
         bool is_end; /* within a few vertices of an end of its line */
-    } *entry;
+    } * entry;
     size_t n_entry, capacity;
 };
 
@@ -57,8 +57,8 @@ static bool grid_add(struct live_grid *g, const float x[3], uint32_t line, bool 
 }
 
 /* Vertices of other lines within `reach` of x, at most max; squared distance of the nearest in *least2. */
-static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t line, float reach, float (*found)[3], size_t max,
-                         float *least2, uint32_t *nearest)
+static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t line, float reach, float (*found)[3],
+                         size_t max, float *least2, uint32_t *nearest)
 {
     size_t n = 0, from[3], to[3], c[3];
     *least2 = INFINITY;
@@ -89,8 +89,8 @@ static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t l
 /* Material around x in the disk of radius r and thickness 1.5 perpendicular to t that is nearer to x than to the neighbours:
  * mean offset (perpendicular), and mean density within half of r of x. Near a face only voxels whose mirror image through x is in the
  * volume too count, or the walk would turn along the face. */
-static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r, float (*other)[3], size_t n_other,
-                          float offset[3], float *core)
+static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r, float (*other)[3],
+                          size_t n_other, float offset[3], float *core)
 {
     const size_t *n = w->v->n;
     float sum = 0.0f, core_sum = 0.0f, core_n = 0.0f;

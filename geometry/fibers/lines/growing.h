@@ -12,8 +12,8 @@
 
 struct grow_option {
     float diameter_voxel;
-    float eps_d;          /* mean density around the axis that counts as fiber */
-    int max_step;         /* voxels per end */
+    float eps_d;  /* mean density around the axis that counts as fiber */
+    int max_step; /* voxels per end */
 };
 
 /* lines in, result (initialised, empty) out; *n_grown is the number of vertices added. STATUS_NO_MEMORY. */

@@ -3,7 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-enum { SIDE = 10, N_PROBE = 9 }; /* vertices of each side that the curve goes through; places where its curvature is taken */
+enum {
+    SIDE = 10,
+    N_PROBE = 9
+}; /* vertices of each side that the curve goes through; places where its curvature is taken */
 
 const float *line_end_vertex(const struct polyline_set *p, uint32_t end, size_t k)
 {
@@ -19,7 +22,8 @@ static double distance(const float a[3], const float b[3])
 }
 
 /* Vertices of one side from the gap outwards with their arc length from the gap. */
-static size_t take_side(const struct polyline_set *p, uint32_t end, size_t trim, const float *vertex[SIDE], double arc[SIDE])
+static size_t take_side(const struct polyline_set *p, uint32_t end, size_t trim, const float *vertex[SIDE],
+                        double arc[SIDE])
 {
     size_t length = polyline_length(p, end / 2), n = 0;
     for (size_t k = trim; k < length && n < SIDE; k++, n++) {
@@ -101,7 +105,8 @@ bool join_curve_fit(const struct polyline_set *p, uint32_t a, uint32_t b, const 
     if (na < 3 || nb < 3) return false;
     *j = (struct join_curve){.gap = distance(va[0], vb[0]), .trim = {trim[0], trim[1]}};
     for (int k = 0; k < 3; k++) /* from the far end of a to the far end of b the way must lead through the gap */
-        ahead += (double)(vb[0][k] - va[0][k]) * ((double)(va[0][k] - va[na - 1][k]) / sa[na - 1] + (double)(vb[nb - 1][k] - vb[0][k]) / sb[nb - 1]);
+        ahead += (double)(vb[0][k] - va[0][k]) *
+                 ((double)(va[0][k] - va[na - 1][k]) / sa[na - 1] + (double)(vb[nb - 1][k] - vb[0][k]) / sb[nb - 1]);
     if (!(ahead > 0.0)) return false;
     double length = sa[na - 1] + j->gap + sb[nb - 1];
     j->scale = 0.5 * length;

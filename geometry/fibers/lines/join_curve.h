@@ -13,13 +13,13 @@
 
 /* End of a line: index 2 l for the first vertex of line l, 2 l + 1 for the last. */
 struct join_curve {
-    double c[4][3];       /* position = sum of c[k] u^k, voxels */
-    double from, to;      /* u at the last vertex kept of a, and at the first of b */
-    double scale;         /* voxels per unit of u */
-    double rms;           /* distance of the vertices from the curve */
-    double bend;          /* largest curvature over the gap and a few vertices on both sides, per voxel */
-    double gap;           /* voxels from a to b */
-    uint8_t trim[2];      /* vertices left out at the ends of a and b */
+    double c[4][3];  /* position = sum of c[k] u^k, voxels */
+    double from, to; /* u at the last vertex kept of a, and at the first of b */
+    double scale;    /* voxels per unit of u */
+    double rms;      /* distance of the vertices from the curve */
+    double bend;     /* largest curvature over the gap and a few vertices on both sides, per voxel */
+    double gap;      /* voxels from a to b */
+    uint8_t trim[2]; /* vertices left out at the ends of a and b */
 };
 
 /* Fit to ends a and b with the given trims. False when they cannot follow each other (b not ahead of a). */

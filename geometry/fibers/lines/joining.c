@@ -9,7 +9,7 @@
 
 enum { MAX_TRIM = 6, TRIM_STEP = 3 };
 /* Limits of a join. Lines keep within a tenth of a diameter of smooth curves; fibers bend with radii of more than a diameter or so. */
-static const float FACE_STEPS = 1.5f; /* voxels along the fiber to a face */
+static const float FACE_STEPS = 1.5f;                              /* voxels along the fiber to a face */
 static const double MAX_RMS = 0.13, MAX_BEND = 1.2, MAX_GAP = 1.5; /* diameters, per diameter, diameters */
 
 struct join {
@@ -108,7 +108,8 @@ static bool may_face(const struct join_job *job, uint32_t a, uint32_t b)
         ahead += 0.5f * (y[c] - x[c]) * (ta[c] - tb[c]);
         length2 += (y[c] - x[c]) * (y[c] - x[c]);
     }
-    float side2 = fmaxf(0.0f, length2 - ahead * ahead), free_way = fmaxf(0.0f, ahead) + (float)MAX_TRIM, wide = 0.4f * (float)job->diameter;
+    float side2 = fmaxf(0.0f, length2 - ahead * ahead), free_way = fmaxf(0.0f, ahead) + (float)MAX_TRIM,
+          wide = 0.4f * (float)job->diameter;
     return cosine > -0.2f && ahead > -(float)MAX_TRIM && side2 < (wide + 0.4f * free_way) * (wide + 0.4f * free_way);
 }
 
@@ -125,7 +126,8 @@ static struct join best_join(const struct join_job *job, uint32_t a, uint32_t b)
             if (!join_curve_fit(job->lines, a, b, trim, &j)) continue;
             double rms = j.rms / job->diameter, bend = j.bend * job->diameter, gap = j.gap / job->diameter;
             if (rms > MAX_RMS || bend > MAX_BEND || gap > MAX_GAP + 0.15 * (trim[0] + trim[1])) continue;
-            double cost = (rms / MAX_RMS) * (rms / MAX_RMS) + 0.5 * (bend / MAX_BEND) * (bend / MAX_BEND) + 0.3 * gap + 0.04 * (trim[0] + trim[1]);
+            double cost = (rms / MAX_RMS) * (rms / MAX_RMS) + 0.5 * (bend / MAX_BEND) * (bend / MAX_BEND) + 0.3 * gap +
+                          0.04 * (trim[0] + trim[1]);
             if (cost >= best.cost || !is_way_free(job, &j, a, b)) continue;
             best.cost = cost;
             memcpy(best.trim, trim, sizeof trim);
@@ -158,7 +160,8 @@ static int cheaper_first(const void *p, const void *q)
 static bool is_at_face(const struct join_job *job, uint32_t end)
 {
     size_t length = polyline_length(job->lines, end / 2);
-    const float *x = line_end_vertex(job->lines, end, 0), *before = line_end_vertex(job->lines, end, length < 6 ? length - 1 : 5);
+    const float *x = line_end_vertex(job->lines, end, 0),
+                *before = line_end_vertex(job->lines, end, length < 6 ? length - 1 : 5);
     float norm = 0.0f;
     for (int a = 0; a < 3; a++) norm += (x[a] - before[a]) * (x[a] - before[a]);
     for (int a = 0; a < 3; a++) {
@@ -177,7 +180,8 @@ static status find_joins(const struct join_job *job, struct join_list *joins, st
     uint32_t n_end = (uint32_t)(2 * job->lines->n_line);
     polyline_set_init(&points);
     status s = polyline_begin(&points, 0, err);
-    for (uint32_t e = 0; e < n_end && s == STATUS_OK; e++) s = polyline_add(&points, line_end_vertex(job->lines, e, 0), err);
+    for (uint32_t e = 0; e < n_end && s == STATUS_OK; e++)
+        s = polyline_add(&points, line_end_vertex(job->lines, e, 0), err);
     if (s == STATUS_OK) s = vertex_grid_init(&g, &points, job->v->n, reach, err);
     for (uint32_t e = 0; e < n_end && s == STATUS_OK; e++) {
         if (is_at_face(job, e)) continue;
@@ -192,7 +196,8 @@ static status find_joins(const struct join_job *job, struct join_list *joins, st
                     for (size_t k = g.first[cell]; k < g.first[cell + 1]; k++) {
                         uint32_t f = g.vertex[k];
                         const float *y = points.vertex[f];
-                        float d2 = (x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) + (x[2] - y[2]) * (x[2] - y[2]);
+                        float d2 = (x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) +
+                                   (x[2] - y[2]) * (x[2] - y[2]);
                         if (f <= e || f / 2 == e / 2 || d2 > reach * reach || is_at_face(job, f)) continue;
                         struct join join = best_join(job, e, f);
                         if (join.cost < INFINITY && !push_join(joins, join))
@@ -212,8 +217,8 @@ static uint32_t root_of(uint32_t *parent, uint32_t i)
     return i;
 }
 
-static void accept_joins(const struct join_list *joins, const struct polyline_set *lines, uint32_t *partner, uint8_t *trim, uint32_t *parent,
-                         struct join_counts *counts)
+static void accept_joins(const struct join_list *joins, const struct polyline_set *lines, uint32_t *partner,
+                         uint8_t *trim, uint32_t *parent, struct join_counts *counts)
 {
     for (size_t i = 0; i < joins->n; i++) {
         uint32_t a = joins->join[i].a, b = joins->join[i].b;
@@ -233,12 +238,14 @@ static void accept_joins(const struct join_list *joins, const struct polyline_se
 }
 
 /* Vertices about one voxel apart on the curve over a gap. */
-static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b, const uint8_t *trim, struct polyline_set *out, struct error *err)
+static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b, const uint8_t *trim,
+                       struct polyline_set *out, struct error *err)
 {
     struct join_curve j;
     const uint8_t own_trim[2] = {trim[a], trim[b]};
     status s = STATUS_OK;
-    if (!join_curve_fit(lines, a, b, own_trim, &j)) return error_set(err, STATUS_INTERNAL, "cannot join fibers: a join is gone");
+    if (!join_curve_fit(lines, a, b, own_trim, &j))
+        return error_set(err, STATUS_INTERNAL, "cannot join fibers: a join is gone");
     int n = (int)lrint(j.gap);
     for (int i = 1; i < n && s == STATUS_OK; i++) {
         double y[3];
@@ -249,17 +256,19 @@ static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b,
 }
 
 /* The vertices of a line, entered at end e, without what is trimmed. */
-static status append_line(const struct polyline_set *lines, uint32_t e, const uint8_t *trim, struct polyline_set *out, struct error *err)
+static status append_line(const struct polyline_set *lines, uint32_t e, const uint8_t *trim, struct polyline_set *out,
+                          struct error *err)
 {
     size_t n = polyline_length(lines, e / 2);
     status s = STATUS_OK;
-    for (size_t k = trim[e]; k + trim[e ^ 1u] < n && s == STATUS_OK; k++) s = polyline_add(out, line_end_vertex(lines, e, k), err);
+    for (size_t k = trim[e]; k + trim[e ^ 1u] < n && s == STATUS_OK; k++)
+        s = polyline_add(out, line_end_vertex(lines, e, k), err);
     return s;
 }
 
 /* Walk from every free end through partners to the other free end. */
-static status emit_joined(const struct polyline_set *lines, const uint32_t *partner, const uint8_t *trim, bool *done, struct polyline_set *out,
-                          struct error *err)
+static status emit_joined(const struct polyline_set *lines, const uint32_t *partner, const uint8_t *trim, bool *done,
+                          struct polyline_set *out, struct error *err)
 {
     status s = STATUS_OK;
     for (uint32_t e = 0; e < 2 * lines->n_line && s == STATUS_OK; e++) {

@@ -14,7 +14,7 @@
 #include "geometry/volume/volume.h"
 
 struct join_counts {
-    size_t n_duplicate; /* vertices removed by the last call */
+    size_t n_duplicate;             /* vertices removed by the last call */
     size_t n_gap_bridged, n_joined; /* added up over calls: start with zeros */
 };
 

@@ -9,10 +9,7 @@ static const double QUANTILE = 0.95, LEAST_LIMIT = 1.2; /* the last per diameter
 static const double END_DIAMETERS = 1.5, END_SHARE = 0.7;
 
 /* Vertices over which the turn is taken on either side. */
-static size_t span(double diameter_voxel)
-{
-    return (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5);
-}
+static size_t span(double diameter_voxel) { return (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5); }
 
 /* Angle between the chords to and from vertex i per voxel of their mean length; 0 near the ends. */
 static float turn_at(const struct polyline_set *p, size_t line, size_t i, size_t reach)
@@ -36,13 +33,15 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-status polylines_kink_limit(const struct polyline_set *lines, double diameter_voxel, double over_usual, double *limit_per_voxel, struct error *err)
+status polylines_kink_limit(const struct polyline_set *lines, double diameter_voxel, double over_usual,
+                            double *limit_per_voxel, struct error *err)
 {
     float *turn = malloc((lines->n_vertex + 1) * sizeof *turn);
     size_t n = 0, reach = span(diameter_voxel);
     if (turn == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for kinks: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
-        for (size_t i = lines->first[l] + reach; i + reach < lines->first[l + 1]; i++) turn[n++] = turn_at(lines, l, i, reach);
+        for (size_t i = lines->first[l] + reach; i + reach < lines->first[l + 1]; i++)
+            turn[n++] = turn_at(lines, l, i, reach);
     qsort(turn, n, sizeof *turn, ascending);
     double usual = n > 0 ? (double)turn[(size_t)(QUANTILE * (double)(n - 1))] : 0.0;
     *limit_per_voxel = fmax(LEAST_LIMIT / diameter_voxel, over_usual * usual);
@@ -50,8 +49,8 @@ status polylines_kink_limit(const struct polyline_set *lines, double diameter_vo
     return STATUS_OK;
 }
 
-status polylines_cut_kinks(const struct polyline_set *lines, double diameter_voxel, double over_usual, size_t min_vertex,
-                           struct polyline_set *result, size_t *n_cut, struct error *err)
+status polylines_cut_kinks(const struct polyline_set *lines, double diameter_voxel, double over_usual,
+                           size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
 {
     size_t reach = span(diameter_voxel), near = (size_t)(END_DIAMETERS * diameter_voxel + 0.5);
     double limit;

@@ -67,8 +67,9 @@ static void match(struct edge_list *edges, uint32_t *next, uint32_t *previous)
     }
 }
 
-static status emit_chains(const struct center_list *list, const struct slice_frame *frame, size_t min_vertex, const uint32_t *next,
-                          const uint32_t *previous, struct polyline_set *lines, size_t *n_chain, struct error *err)
+static status emit_chains(const struct center_list *list, const struct slice_frame *frame, size_t min_vertex,
+                          const uint32_t *next, const uint32_t *previous, struct polyline_set *lines, size_t *n_chain,
+                          struct error *err)
 {
     status s = STATUS_OK;
     for (size_t k = 0; k < list->n_slice; k++)
@@ -88,8 +89,9 @@ static status emit_chains(const struct center_list *list, const struct slice_fra
     return s;
 }
 
-status centers_link(const struct center_list *list, const struct slice_frame *frame, double sigma_voxel, double diameter_voxel, size_t min_vertex,
-                    struct polyline_set *lines, size_t *n_chain, struct error *err)
+status centers_link(const struct center_list *list, const struct slice_frame *frame, double sigma_voxel,
+                    double diameter_voxel, size_t min_vertex, struct polyline_set *lines, size_t *n_chain,
+                    struct error *err)
 {
     size_t n = list->first[list->n_slice];
     float reach = (float)fmin(sigma_voxel, fmax(1.5, LINK_REACH * diameter_voxel));

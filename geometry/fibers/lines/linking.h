@@ -9,14 +9,15 @@
 #ifndef SELVEDGE_GEOMETRY_LINKING_H
 #define SELVEDGE_GEOMETRY_LINKING_H
 
-#include "geometry/fibers/slices/centers.h"
 #include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/slices/centers.h"
 
 #define LINK_REACH 0.2
 
 /* Adds the chains of at least min_vertex centers to lines, as lines of subvolume frame->index. *n_chain: chains of two centers and more.
  * STATUS_NO_MEMORY. */
-status centers_link(const struct center_list *list, const struct slice_frame *frame, double sigma_voxel, double diameter_voxel, size_t min_vertex,
-                    struct polyline_set *lines, size_t *n_chain, struct error *err);
+status centers_link(const struct center_list *list, const struct slice_frame *frame, double sigma_voxel,
+                    double diameter_voxel, size_t min_vertex, struct polyline_set *lines, size_t *n_chain,
+                    struct error *err);
 
 #endif

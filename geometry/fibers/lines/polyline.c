@@ -15,7 +15,10 @@ void polyline_set_release(struct polyline_set *p)
     *p = (struct polyline_set){0};
 }
 
-static status no_memory(struct error *err) { return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory"); }
+static status no_memory(struct error *err)
+{
+    return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
+}
 
 status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err)
 {
@@ -49,7 +52,8 @@ status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
     return STATUS_OK;
 }
 
-status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end, struct error *err)
+status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
+                         struct error *err)
 {
     status s = polyline_begin(p, from->axis[line], err);
     for (; i < end && s == STATUS_OK; i++) s = polyline_add(p, from->vertex[i], err);

@@ -9,9 +9,9 @@
 
 struct polyline_set {
     size_t n_line, n_vertex, line_capacity, vertex_capacity;
-    size_t *first;      /* n_line + 1 */
+    size_t *first; /* n_line + 1 */
     float (*vertex)[3];
-    uint8_t *axis;      /* n_line: subvolume (slice frame) that the line was found in, later the axis class */
+    uint8_t *axis; /* n_line: subvolume (slice frame) that the line was found in, later the axis class */
 };
 
 void polyline_set_init(struct polyline_set *p);
@@ -20,12 +20,13 @@ void polyline_set_release(struct polyline_set *p);
 status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err);
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
 /* A line of `from` over again: its vertices i .. end - 1 (indices in from->vertex). */
-status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end, struct error *err);
+status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
+                         struct error *err);
 static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
 
 /* Every vertex filed by cell of a grid, for neighbour searches. */
 struct vertex_grid {
-    float cell;        /* edge, voxels */
+    float cell; /* edge, voxels */
     size_t n[3];
     size_t *first;     /* per cell (x fastest), and one more: where its vertices begin in `vertex` */
     uint32_t *vertex;  /* index into polyline_set.vertex */

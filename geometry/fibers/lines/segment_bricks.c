@@ -70,8 +70,8 @@ static status start(struct segment_bricks *s, size_t n_segment, const size_t n_v
     return STATUS_OK;
 }
 
-status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3], size_t edge,
-                           float reach, struct error *err)
+status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
+                           size_t edge, float reach, struct error *err)
 {
     status st = start(s, lines->n_vertex, n_voxel, edge, reach, err);
     if (st != STATUS_OK) return st;
@@ -132,9 +132,9 @@ struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_
 
 /* A segment seen from the lattice: what the inner loops need. */
 struct view {
-    float u[3], inverse2;      /* b - a, 1 / |u|^2 */
+    float u[3], inverse2;       /* b - a, 1 / |u|^2 */
     float from_voxel, to_voxel; /* slab along u, measured from a in voxels */
-    float across[3];           /* how far points at `reach` can lie beyond the segment's box on each axis */
+    float across[3];            /* how far points at `reach` can lie beyond the segment's box on each axis */
 };
 
 static struct view view_of(const struct segment *g, float reach)
@@ -146,7 +146,9 @@ static struct view view_of(const struct segment *g, float reach)
     w.to_voxel = length + (g->is_last || !(length2 > 0.0f) ? reach : 1.0f);
     for (int a = 0; a < 3; a++) {
         float c = length2 > 0.0f ? w.u[a] / length : 0.0f;
-        w.across[a] = g->is_first || g->is_last ? reach : fminf(reach, reach * sqrtf(fmaxf(0.0f, 1.0f - c * c)) + fabsf(c) + 0.1f);
+        w.across[a] = g->is_first || g->is_last
+                          ? reach
+                          : fminf(reach, reach * sqrtf(fmaxf(0.0f, 1.0f - c * c)) + fabsf(c) + 0.1f);
     }
     return w;
 }
@@ -173,13 +175,15 @@ static float reach_of_row(float px0, float spacing, size_t n)
 }
 
 /* The part of a row (n points from px0 on, relative to g->a) that lies in the slab. False when none does. */
-static bool slab_range(const struct view *w, float px0, float spacing, float py, float pz, size_t n, size_t *from, size_t *to)
+static bool slab_range(const struct view *w, float px0, float spacing, float py, float pz, size_t n, size_t *from,
+                       size_t *to)
 {
     float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (py * w->u[1] + pz * w->u[2]) * scale;
     *from = 0;
     *to = n;
-    if (fabsf(c) < 0.05f) return fixed > w->from_voxel - reach_of_row(px0, spacing, n) * 0.05f &&
-                                 fixed < w->to_voxel + reach_of_row(px0, spacing, n) * 0.05f;
+    if (fabsf(c) < 0.05f)
+        return fixed > w->from_voxel - reach_of_row(px0, spacing, n) * 0.05f &&
+               fixed < w->to_voxel + reach_of_row(px0, spacing, n) * 0.05f;
     float x0 = (w->from_voxel - fixed) / c, x1 = (w->to_voxel - fixed) / c;
     float lo = (fminf(x0, x1) - px0) / spacing, hi = (fmaxf(x0, x1) - px0) / spacing;
     if (hi < 0.0f || lo > (float)(n - 1)) return false;
@@ -240,8 +244,8 @@ void segment_distances(const struct segment_bricks *s, size_t i_brick, const str
                 if (nearest == NULL)
                     stamp_row(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, distance2 + row + i0);
                 else
-                    stamp_row_nearest(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, s->index[e], distance2 + row + i0,
-                                      nearest + row + i0);
+                    stamp_row_nearest(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, s->index[e],
+                                      distance2 + row + i0, nearest + row + i0);
             }
     }
 }

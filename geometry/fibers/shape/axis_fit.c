@@ -1,7 +1,7 @@
 #include "geometry/fibers/shape/axis_fit.h"
 
-#include "geometry/fibers/shape/axis_solve.h"
 #include "geometry/fibers/lines/segment_bricks.h"
+#include "geometry/fibers/shape/axis_solve.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@ static const double TAIL = 2.5; /* blurs beyond the radius that a fiber is seen 
 
 /* What one brick has to say: about the vertices of its segments, and about the profile. */
 struct brick_sum {
-    struct axis_pull *pull; /* two for every segment of the brick */
+    struct axis_pull *pull;                           /* two for every segment of the brick */
     double normal[4][4], gradient[4], square, weight; /* of the residuals */
     bool failed;
 };
@@ -29,7 +29,7 @@ struct fit_job {
     struct brick_scratch {
         float model[N_CELL], own2[N_CELL], by_radius[N_CELL], by_blur[N_CELL];
         uint32_t own[N_CELL], touched[N_CELL];
-    } *scratch; /* per thread */
+    } * scratch;           /* per thread */
     struct brick_sum *sum; /* per brick */
 };
 
@@ -90,13 +90,15 @@ static void row_range(const float u[3], float length2, float x, float y, float z
 }
 
 /* Voxels of the brick for which this segment is the nearest of its line so far. */
-static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], const size_t n[3], uint32_t segment, size_t n_touched)
+static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], const size_t n[3],
+                    uint32_t segment, size_t n_touched)
 {
     const struct segment *g = &job->bricks->segment[segment];
     size_t lo[3], hi[3];
     float u[3], length2 = 0.0f;
     for (int a = 0; a < 3; a++) {
-        float l = ceilf(fminf(g->a[a], g->b[a]) - job->reach - 0.5f), h = floorf(fmaxf(g->a[a], g->b[a]) + job->reach - 0.5f) + 1.0f;
+        float l = ceilf(fminf(g->a[a], g->b[a]) - job->reach - 0.5f),
+              h = floorf(fmaxf(g->a[a], g->b[a]) + job->reach - 0.5f) + 1.0f;
         float first = (float)from[a], end = (float)(from[a] + n[a]);
         if (h <= first || l >= end) return n_touched;
         lo[a] = l <= first ? 0 : (size_t)(l - first);
@@ -107,7 +109,8 @@ static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const si
     for (size_t k = lo[2]; k < hi[2]; k++)
         for (size_t j = lo[1]; j < hi[1]; j++) {
             size_t i0, i1;
-            float p[3] = {(float)(from[0] + lo[0]) + 0.5f - g->a[0], (float)(from[1] + j) + 0.5f - g->a[1], (float)(from[2] + k) + 0.5f - g->a[2]};
+            float p[3] = {(float)(from[0] + lo[0]) + 0.5f - g->a[0], (float)(from[1] + j) + 0.5f - g->a[1],
+                          (float)(from[2] + k) + 0.5f - g->a[2]};
             row_range(u, length2, p[0], p[1], p[2], hi[0] - lo[0], &i0, &i1);
             p[0] += (float)i0;
             for (size_t i = lo[0] + i0; i < lo[0] + i1; i++, p[0] += 1.0f) {
@@ -134,28 +137,32 @@ static void add_to_model(const struct fit_job *job, struct brick_scratch *s, siz
 }
 
 /* Residual and weight of a voxel. */
-static float residual(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3], uint32_t at, float *weight)
+static float residual(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3], uint32_t at,
+                      float *weight)
 {
     size_t i = from[0] + at % BRICK, j = from[1] + at / BRICK % BRICK, k = from[2] + at / (BRICK * BRICK);
-    float low = (float)job->profile.low, high = (float)job->profile.high, share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
+    float low = (float)job->profile.low, high = (float)job->profile.high,
+          share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
     float e = job->v->density[volume_index(job->v->n, i, j, k)] - low - (high - low) * share;
     float q = 1.0f / (1.0f + e * e / (OUTLIER * OUTLIER));
     *weight = q * q;
     return e;
 }
 
-static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], size_t n_touched, uint32_t first_segment,
-                      const uint32_t *slot, struct brick_sum *sum)
+static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], size_t n_touched,
+                      uint32_t first_segment, const uint32_t *slot, struct brick_sum *sum)
 {
     float amplitude = (float)(job->profile.high - job->profile.low);
     for (size_t i = 0; i < n_touched; i++) {
         uint32_t at = s->touched[i];
         const struct segment *g = &job->bricks->segment[s->own[at]];
-        float p[3] = {(float)(from[0] + at % BRICK) + 0.5f - g->a[0], (float)(from[1] + at / BRICK % BRICK) + 0.5f - g->a[1],
+        float p[3] = {(float)(from[0] + at % BRICK) + 0.5f - g->a[0],
+                      (float)(from[1] + at / BRICK % BRICK) + 0.5f - g->a[1],
                       (float)(from[2] + at / (BRICK * BRICK)) + 0.5f - g->a[2]};
         float t, offset[3], d2, weight;
         if (!foot_of(g, p, &t, offset, &d2) || !(d2 > 1e-6f)) continue;
-        float d = sqrtf(d2), e = residual(job, s, from, at, &weight), slope = -amplitude * look_up(job->slope, d * job->table_scale);
+        float d = sqrtf(d2), e = residual(job, s, from, at, &weight),
+              slope = -amplitude * look_up(job->slope, d * job->table_scale);
         for (int end = 0; end < 2; end++) {
             struct axis_pull *q = &sum->pull[2 * slot[s->own[at] - first_segment] + (uint32_t)end];
             float w = weight * (end == 0 ? 1.0f - t : t) * slope / d;
@@ -168,8 +175,8 @@ static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const 
 }
 
 /* All lines of a brick in turn: either their densities to the model, or their pulls. */
-static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t i_brick, const size_t from[3], const size_t n[3], bool pulls,
-                      uint32_t *slot, struct brick_sum *sum)
+static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t i_brick, const size_t from[3],
+                      const size_t n[3], bool pulls, uint32_t *slot, struct brick_sum *sum)
 {
     const struct segment_bricks *b = job->bricks;
     for (size_t e = b->first[i_brick], end; e < b->first[i_brick + 1]; e = end) {
@@ -193,7 +200,8 @@ static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t
 }
 
 /* Normal equations of the profile: radius, blur, low, high. */
-static void add_profile(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3], const size_t n[3], struct brick_sum *sum)
+static void add_profile(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3],
+                        const size_t n[3], struct brick_sum *sum)
 {
     double amplitude = job->profile.high - job->profile.low;
     for (size_t k = 0; k < n[2]; k++)
@@ -205,7 +213,8 @@ static void add_profile(const struct fit_job *job, const struct brick_scratch *s
                 double e = (double)residual(job, s, from, at, &weight), share = fmin(1.0, (double)s->model[at]);
                 sum->square += (double)weight * e * e;
                 sum->weight += (double)weight;
-                double by[4] = {amplitude * (double)s->by_radius[at], amplitude * (double)s->by_blur[at], 1.0 - share, share};
+                double by[4] = {amplitude * (double)s->by_radius[at], amplitude * (double)s->by_blur[at], 1.0 - share,
+                                share};
                 for (int a = 0; a < 4; a++) {
                     sum->gradient[a] += (double)weight * e * by[a];
                     for (int c = 0; c < 4; c++) sum->normal[a][c] += (double)weight * by[a] * by[c];
@@ -222,7 +231,8 @@ static void fit_brick(void *context, size_t i_brick, size_t i_thread)
     scratch_keep_within(job->v->space);
     struct brick_scratch *s = &job->scratch[i_thread];
     struct brick_sum *sum = &job->sum[i_brick];
-    for (size_t e = b->first[i_brick], start = e; e < b->first[i_brick + 1]; e++) { /* how far apart the segments of a line are numbered */
+    for (size_t e = b->first[i_brick], start = e; e < b->first[i_brick + 1];
+         e++) { /* how far apart the segments of a line are numbered */
         if (b->segment[b->index[e]].line != b->segment[b->index[start]].line) start = e;
         size_t apart = b->index[e] - b->index[start] + 1;
         longest = apart > longest ? apart : longest;
@@ -272,8 +282,9 @@ static void step_profile(const struct fit_job *job, size_t n_brick, double diame
     p->high = fmin(1.5, fmax(0.5, p->high + x[3]));
 }
 
-static status one_round(struct fit_job *job, struct polyline_set *lines, const uint32_t *first_vertex_of, struct axis_pull *total,
-                        double diameter, struct thread_pool *pool, const struct progress *progress, struct error *err)
+static status one_round(struct fit_job *job, struct polyline_set *lines, const uint32_t *first_vertex_of,
+                        struct axis_pull *total, double diameter, struct thread_pool *pool,
+                        const struct progress *progress, struct error *err)
 {
     struct segment_bricks bricks = {0};
     make_table(job);
@@ -305,8 +316,9 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, const u
     return s;
 }
 
-status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round, struct axis_profile *profile,
-                     struct thread_pool *pool, const struct progress *progress, struct error *err)
+status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round,
+                     struct axis_profile *profile, struct thread_pool *pool, const struct progress *progress,
+                     struct error *err)
 {
     struct fit_job *job = calloc(1, sizeof *job);
     uint32_t *first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *first_vertex_of);

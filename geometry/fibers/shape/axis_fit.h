@@ -21,8 +21,9 @@ struct axis_profile {
 
 /* lines (about one vertex a voxel; see polylines_resample) are moved, *profile is taken as the start and refined.
  * STATUS_CANCELLED, STATUS_NO_MEMORY. */
-status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round, struct axis_profile *profile,
-                     struct thread_pool *pool, const struct progress *progress, struct error *err);
+status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round,
+                     struct axis_profile *profile, struct thread_pool *pool, const struct progress *progress,
+                     struct error *err);
 
 /* Vertices one voxel apart along each line (the ends stay); out is initialised and empty. STATUS_NO_MEMORY. */
 status polylines_resample(const struct polyline_set *lines, struct polyline_set *out, struct error *err);

@@ -87,7 +87,8 @@ static void solve_line(void *context, size_t l, size_t i_thread)
             double bend = (double)p[i][a] - 2.0 * (double)p[i + 1][a] + (double)p[i + 2][a];
             for (size_t r = 0; r < 3; r++) {
                 x[3 * (i + r) + a] -= job->stiffness * second[r] * bend;
-                for (size_t c = 0; c <= r; c++) m[3 * (i + r) + a][3 * (r - c)] += job->stiffness * second[r] * second[c];
+                for (size_t c = 0; c <= r; c++)
+                    m[3 * (i + r) + a][3 * (r - c)] += job->stiffness * second[r] * second[c];
             }
         }
     if (!solve_banded(m, 3 * n, x)) goto out; /* stays as it is */
@@ -100,8 +101,8 @@ out:
     free(x);
 }
 
-status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness, struct thread_pool *pool,
-                        struct error *err)
+status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness,
+                        struct thread_pool *pool, struct error *err)
 {
     struct solve_job job = {.lines = lines, .pull = pull, .failed = calloc(lines->n_line + 1, sizeof(bool))};
     double mean = 0.0;

@@ -18,8 +18,8 @@ void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
 
 /* Moves the vertices of every line to the minimum of its data terms and of stiffness |second difference|^2, by at most one voxel.
  * STATUS_NO_MEMORY. */
-status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness, struct thread_pool *pool,
-                        struct error *err);
+status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness,
+                        struct thread_pool *pool, struct error *err);
 
 /* Cholesky on a dense symmetric n x n matrix (row-major, destroyed), solution in place of the right-hand side; false when not definite. */
 bool axis_solve_dense(double *m, int n, double *x);

@@ -14,8 +14,8 @@ struct radius_job {
     struct distance_histogram *histogram; /* per thread: RADIUS_PARTS */
     float *distance2;                     /* per thread: FINE^3 */
     uint32_t *nearest;
-    const uint32_t *chosen;               /* bricks */
-    uint8_t *part;                        /* of each segment */
+    const uint32_t *chosen; /* bricks */
+    uint8_t *part;          /* of each segment */
 };
 
 /* Where a point lies between voxel centres along one axis, edge values repeated: (1 - f) * value[i] + f * value[j]. */
@@ -33,10 +33,13 @@ static struct between between_centres(float x, size_t n)
 }
 
 /* Densities at the points of a row along x, trilinear between voxel centres. */
-static void row_densities(const struct volume *v, const struct between *x, size_t n_point, struct between y, struct between z, float *density)
+static void row_densities(const struct volume *v, const struct between *x, size_t n_point, struct between y,
+                          struct between z, float *density)
 {
-    const float *r00 = v->density + volume_index(v->n, 0, y.i, z.i), *r10 = v->density + volume_index(v->n, 0, y.j, z.i);
-    const float *r01 = v->density + volume_index(v->n, 0, y.i, z.j), *r11 = v->density + volume_index(v->n, 0, y.j, z.j);
+    const float *r00 = v->density + volume_index(v->n, 0, y.i, z.i),
+                *r10 = v->density + volume_index(v->n, 0, y.j, z.i);
+    const float *r01 = v->density + volume_index(v->n, 0, y.i, z.j),
+                *r11 = v->density + volume_index(v->n, 0, y.j, z.j);
     float a[BRICK + 2], b[BRICK + 2]; /* a row's points lie within a brick: its voxels and one on either side */
     size_t from = x[0].i;
     for (size_t i = from; i <= x[n_point - 1].j; i++) {
@@ -45,7 +48,8 @@ static void row_densities(const struct volume *v, const struct between *x, size_
     }
     for (size_t k = 0; k < n_point; k++) {
         size_t i = x[k].i - from, j = x[k].j - from;
-        density[k] = (1.0f - z.f) * ((1.0f - x[k].f) * a[i] + x[k].f * a[j]) + z.f * ((1.0f - x[k].f) * b[i] + x[k].f * b[j]);
+        density[k] =
+            (1.0f - z.f) * ((1.0f - x[k].f) * a[i] + x[k].f * a[j]) + z.f * ((1.0f - x[k].f) * b[i] + x[k].f * b[j]);
     }
 }
 
@@ -77,7 +81,8 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
     float inverse_bin = (float)(1.0 / own->bin_voxel), row[FINE];
     struct between x[FINE];
     size_t at = 0;
-    for (size_t i = 0; i < l.n[0]; i++) x[i] = between_centres(l.origin[0] + ((float)i + 0.5f) * l.spacing, job->v->n[0]);
+    for (size_t i = 0; i < l.n[0]; i++)
+        x[i] = between_centres(l.origin[0] + ((float)i + 0.5f) * l.spacing, job->v->n[0]);
     for (size_t k = 0; k < l.n[2]; k++)
         for (size_t j = 0; j < l.n[1]; j++) {
             row_densities(job->v, x, l.n[0], between_centres(l.origin[1] + ((float)j + 0.5f) * l.spacing, job->v->n[1]),
@@ -92,7 +97,8 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
                     continue;
                 }
                 const struct segment *g = &job->bricks->segment[nearest[at]];
-                struct distance_histogram *h = own + job->part[nearest[at]]; /* a fiber's mass goes where its length goes */
+                struct distance_histogram *h =
+                    own + job->part[nearest[at]]; /* a fiber's mass goes where its length goes */
                 uint8_t axis = g->axis;
                 (density >= job->eps_d ? h->inside : h->outside)[axis][bin]++;
                 h->density_sum[axis][bin] += (uint64_t)(255.0f * density + 0.5f);
@@ -134,7 +140,8 @@ static void add_lengths(const struct segment_bricks *bricks, const bool *is_chos
         double length2 = 0.0;
         size_t brick;
         for (int a = 0; a < 3; a++) length2 += (double)((g->b[a] - g->a[a]) * (g->b[a] - g->a[a]));
-        if (brick_of(bricks, g, &brick) && is_chosen[brick]) part[part_of(brick)].length_voxel[g->axis] += sqrt(length2);
+        if (brick_of(bricks, g, &brick) && is_chosen[brick])
+            part[part_of(brick)].length_voxel[g->axis] += sqrt(length2);
     }
 }
 
@@ -153,7 +160,8 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
 {
     struct segment_bricks bricks = {0};
     size_t n_thread = thread_pool_n_thread(pool);
-    for (size_t p = 0; p < RADIUS_PARTS; p++) part[p] = (struct distance_histogram){.bin_voxel = farthest_voxel / RADIUS_BINS};
+    for (size_t p = 0; p < RADIUS_PARTS; p++)
+        part[p] = (struct distance_histogram){.bin_voxel = farthest_voxel / RADIUS_BINS};
     struct radius_job job = {.v = v, .bricks = &bricks, .eps_d = (float)eps_d};
     status s = segment_bricks_init(&bricks, lines, v->n, BRICK, (float)farthest_voxel, err);
     job.histogram = calloc(n_thread * RADIUS_PARTS, sizeof *job.histogram);
@@ -163,7 +171,8 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
     bool *is_chosen = s == STATUS_OK ? calloc(segment_n_brick(&bricks), sizeof *is_chosen) : NULL;
     job.chosen = chosen;
     job.part = s == STATUS_OK ? malloc(bricks.n_segment + 1) : NULL;
-    if (s == STATUS_OK && (chosen == NULL || job.part == NULL || is_chosen == NULL || job.histogram == NULL || job.distance2 == NULL || job.nearest == NULL))
+    if (s == STATUS_OK && (chosen == NULL || job.part == NULL || is_chosen == NULL || job.histogram == NULL ||
+                           job.distance2 == NULL || job.nearest == NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     if (s == STATUS_OK) {
         for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) job.histogram[t].bin_voxel = part[0].bin_voxel;
@@ -185,7 +194,8 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
     return s;
 }
 
-void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], size_t without, struct distance_histogram *sum)
+void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], size_t without,
+                            struct distance_histogram *sum)
 {
     *sum = (struct distance_histogram){.bin_voxel = part[0].bin_voxel};
     for (size_t p = 0; p < RADIUS_PARTS; p++)
@@ -193,7 +203,8 @@ void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], 
 }
 
 /* Points of the classes in bin b. */
-static void bin_points(const struct distance_histogram *h, unsigned classes, size_t b, double *in, double *out, double *density)
+static void bin_points(const struct distance_histogram *h, unsigned classes, size_t b, double *in, double *out,
+                       double *density)
 {
     *in = *out = *density = 0.0;
     for (unsigned a = 0; a < 3; a++)
@@ -205,8 +216,8 @@ static void bin_points(const struct distance_histogram *h, unsigned classes, siz
 }
 
 /* Bins with their middle between two distances. */
-static void sum_points(const struct distance_histogram *h, unsigned classes, double from, double to, double *in, double *out,
-                       double *density)
+static void sum_points(const struct distance_histogram *h, unsigned classes, double from, double to, double *in,
+                       double *out, double *density)
 {
     *in = *out = *density = 0.0;
     for (size_t b = 0; b < RADIUS_BINS; b++) {
@@ -242,7 +253,8 @@ double radius_best_score(const struct distance_histogram *h, unsigned classes)
 }
 
 /* Mean density of the points between two distances; fallback where there are none. */
-static double mean_density(const struct distance_histogram *h, unsigned classes, double from, double to, double fallback)
+static double mean_density(const struct distance_histogram *h, unsigned classes, double from, double to,
+                           double fallback)
 {
     double in, out, density;
     sum_points(h, classes, from, to, &in, &out, &density);
@@ -258,7 +270,8 @@ double radius_from_mass(const struct distance_histogram *h, unsigned classes, do
     double nowhere = h->far_count > 1000 ? (double)h->far_density_sum / (255.0 * (double)h->far_count) : 0.0;
     for (int round = 0; round < 6; round++) {
         double in, out, density;
-        double solid = mean_density(h, classes, 0.0, 0.4 * r, 1.0), empty = fmin(nowhere, mean_density(h, classes, 1.6 * r, INFINITY, nowhere));
+        double solid = mean_density(h, classes, 0.0, 0.4 * r, 1.0),
+               empty = fmin(nowhere, mean_density(h, classes, 1.6 * r, INFINITY, nowhere));
         sum_points(h, classes, 0.0, 1.7 * r, &in, &out, &density);
         const double points_per_voxel = (double)(RADIUS_UPSAMPLING * RADIUS_UPSAMPLING * RADIUS_UPSAMPLING);
         double mass = (density - empty * (in + out)) / (solid - empty) / points_per_voxel;

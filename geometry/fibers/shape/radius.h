@@ -18,12 +18,12 @@ enum { RADIUS_BINS = 512, RADIUS_UPSAMPLING = 4, RADIUS_PARTS = 8 };
 
 /* Points of the fine grid by distance to the nearest polyline and the axis class of that polyline. */
 struct distance_histogram {
-    double bin_voxel;                        /* width of a bin */
-    uint64_t inside[3][RADIUS_BINS];         /* points of V */
+    double bin_voxel;                /* width of a bin */
+    uint64_t inside[3][RADIUS_BINS]; /* points of V */
     uint64_t outside[3][RADIUS_BINS];
-    uint64_t density_sum[3][RADIUS_BINS];    /* sum of round(255 density) over all points of the bin */
+    uint64_t density_sum[3][RADIUS_BINS];            /* sum of round(255 density) over all points of the bin */
     uint64_t far_inside, far_count, far_density_sum; /* points farther than the last bin from every polyline */
-    double length_voxel[3];                  /* of the polylines of each class */
+    double length_voxel[3];                          /* of the polylines of each class */
 };
 
 /* part: RADIUS_PARTS histograms, of disjoint sets of bricks scattered over the volume (their sum is that of the volume); they tell how
@@ -35,7 +35,8 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
                                   double farthest_voxel, struct thread_pool *pool, const struct progress *progress,
                                   struct distance_histogram part[RADIUS_PARTS], struct error *err);
 /* Sum of all parts but one; RADIUS_PARTS: of all. */
-void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], size_t without, struct distance_histogram *sum);
+void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], size_t without,
+                            struct distance_histogram *sum);
 
 /* score(r) / |V| over the classes with bit set in `classes`, V within reach of a polyline; and the r >= 0.25 voxels of the best score.
  * 0 when the classes have no polyline. */
@@ -51,7 +52,8 @@ double radius_from_mass(const struct distance_histogram *h, unsigned classes, do
 enum radius_rule { RADIUS_AUTO, RADIUS_COMMON, RADIUS_PER_AXIS };
 
 struct radius_measure {
-    double radius_voxel[3], se_voxel[3]; /* per axis class; the standard error by leaving out one part at a time (jackknife) */
+    double radius_voxel[3],
+        se_voxel[3]; /* per axis class; the standard error by leaving out one part at a time (jackknife) */
     bool per_axis;
 };
 
@@ -60,6 +62,7 @@ struct radius_measure {
  * without fibers take the common one. STATUS_NO_MEMORY. */
 #define RADIUS_SIGMAS 3.0
 #define RADIUS_SYSTEMATIC 0.05
-status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum radius_rule rule, struct radius_measure *m, struct error *err);
+status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum radius_rule rule,
+                     struct radius_measure *m, struct error *err);
 
 #endif

@@ -4,7 +4,8 @@
 #include <stdlib.h>
 
 /* Radius of some classes and its standard error: leaving out one part at a time (Efron 1979). */
-static double with_error(const struct distance_histogram part[RADIUS_PARTS], unsigned classes, struct distance_histogram *scratch, double *se)
+static double with_error(const struct distance_histogram part[RADIUS_PARTS], unsigned classes,
+                         struct distance_histogram *scratch, double *se)
 {
     double sum = 0.0, square = 0.0;
     size_t n = 0;
@@ -28,14 +29,17 @@ static bool differ(const struct radius_measure *m)
 {
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < a; b++) {
-            double gap = fabs(m->radius_voxel[a] - m->radius_voxel[b]), mean = 0.5 * (m->radius_voxel[a] + m->radius_voxel[b]);
+            double gap = fabs(m->radius_voxel[a] - m->radius_voxel[b]),
+                   mean = 0.5 * (m->radius_voxel[a] + m->radius_voxel[b]);
             if (!(m->radius_voxel[a] > 0.0) || !(m->radius_voxel[b] > 0.0)) continue;
-            if (gap > RADIUS_SIGMAS * hypot(m->se_voxel[a], m->se_voxel[b]) && gap > RADIUS_SYSTEMATIC * mean) return true;
+            if (gap > RADIUS_SIGMAS * hypot(m->se_voxel[a], m->se_voxel[b]) && gap > RADIUS_SYSTEMATIC * mean)
+                return true;
         }
     return false;
 }
 
-status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum radius_rule rule, struct radius_measure *m, struct error *err)
+status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum radius_rule rule,
+                     struct radius_measure *m, struct error *err)
 {
     struct distance_histogram *scratch = malloc(sizeof *scratch);
     double se;

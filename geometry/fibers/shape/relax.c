@@ -9,7 +9,7 @@
 #include <string.h>
 
 enum { BRICK = 32 };
-static const float FLOOR = 0.15f;  /* density taken as void */
+static const float FLOOR = 0.15f;   /* density taken as void */
 static const float MAX_MOVE = 0.7f; /* voxels a round */
 
 /* What the voxels of one brick say about a vertex. */
@@ -30,11 +30,11 @@ struct relax_job {
     const uint32_t *first_vertex_of; /* per segment: index of its first vertex */
     float *distance2;                /* per thread */
     uint32_t *nearest, *slot;
-    struct brick_pulls *result;      /* per brick */
+    struct brick_pulls *result; /* per brick */
 };
 
-static void pull_voxel(const struct relax_job *job, struct brick_pulls *r, uint32_t slot, uint32_t segment, const float x[3],
-                       float weight)
+static void pull_voxel(const struct relax_job *job, struct brick_pulls *r, uint32_t slot, uint32_t segment,
+                       const float x[3], float weight)
 {
     const struct segment *g = &job->bricks->segment[segment];
     float u[3], p[3], length2 = 0.0f, along = 0.0f;
@@ -90,7 +90,8 @@ static void relax_brick(void *context, size_t i_brick, size_t i_thread)
                 if (nearest[p] == UINT32_MAX) continue;
                 float w = job->v->density[volume_index(job->v->n, from[0] + i, from[1] + j, from[2] + k)] - FLOOR;
                 if (w <= 0.0f) continue;
-                const float x[3] = {(float)(from[0] + i) + 0.5f, (float)(from[1] + j) + 0.5f, (float)(from[2] + k) + 0.5f};
+                const float x[3] = {(float)(from[0] + i) + 0.5f, (float)(from[1] + j) + 0.5f,
+                                    (float)(from[2] + k) + 0.5f};
                 pull_voxel(job, r, slot[nearest[p]], nearest[p], x, w);
             }
 }
@@ -113,8 +114,7 @@ static void apply_pulls(const struct relax_job *job, size_t n_brick, struct poly
             for (size_t k = from; k <= to; k++)
                 for (int a = 0; a < 4; a++) total[a] += sum[k][a];
             if (!(total[3] > 0.0f)) continue;
-            for (int a = 0; a < 3; a++)
-                lines->vertex[i][a] += fminf(MAX_MOVE, fmaxf(-MAX_MOVE, total[a] / total[3]));
+            for (int a = 0; a < 3; a++) lines->vertex[i][a] += fminf(MAX_MOVE, fmaxf(-MAX_MOVE, total[a] / total[3]));
         }
 }
 
@@ -150,8 +150,9 @@ static size_t longest_line(const struct polyline_set *p)
     return longest;
 }
 
-status polylines_relax(struct polyline_set *lines, const struct volume *v, float reach_voxel, int n_round, double smooth_alpha,
-                       struct thread_pool *pool, const struct progress *progress, struct error *err)
+status polylines_relax(struct polyline_set *lines, const struct volume *v, float reach_voxel, int n_round,
+                       double smooth_alpha, struct thread_pool *pool, const struct progress *progress,
+                       struct error *err)
 {
     size_t n_thread = thread_pool_n_thread(pool), n_segment = 0;
     struct relax_job job = {.v = v};

@@ -12,7 +12,8 @@
 #include "geometry/volume/volume.h"
 
 /* Lines in place. reach_voxel: about 1.2 radii. STATUS_CANCELLED, STATUS_NO_MEMORY. */
-status polylines_relax(struct polyline_set *lines, const struct volume *v, float reach_voxel, int n_round, double smooth_alpha,
-                       struct thread_pool *pool, const struct progress *progress, struct error *err);
+status polylines_relax(struct polyline_set *lines, const struct volume *v, float reach_voxel, int n_round,
+                       double smooth_alpha, struct thread_pool *pool, const struct progress *progress,
+                       struct error *err);
 
 #endif

@@ -26,7 +26,8 @@ status polylines_resample(const struct polyline_set *lines, struct polyline_set 
             }
             step = distance(lines->vertex[i], lines->vertex[i + 1]);
             float f = step > 0.0f ? fminf(1.0f, (want - passed) / step) : 0.0f;
-            for (int a = 0; a < 3; a++) x[a] = lines->vertex[i][a] + f * (lines->vertex[i + 1][a] - lines->vertex[i][a]);
+            for (int a = 0; a < 3; a++)
+                x[a] = lines->vertex[i][a] + f * (lines->vertex[i + 1][a] - lines->vertex[i][a]);
             s = polyline_add(out, x, err);
         }
     }

@@ -22,11 +22,13 @@ static double off_diagonal(size_t i, size_t n) /* between i and i + 1 */
 void polyline_smooth(float (*vertex)[3], size_t n, double alpha, double *work)
 {
     if (n < 3) return;
-    double *d = work, *l1 = work + n, *l2 = work + 2 * n, *y = work + 3 * n; /* L has unit diagonal, l1[i] = L[i][i-1], l2[i] = L[i][i-2] */
+    double *d = work, *l1 = work + n, *l2 = work + 2 * n,
+           *y = work + 3 * n; /* L has unit diagonal, l1[i] = L[i][i-1], l2[i] = L[i][i-2] */
     for (size_t i = 0; i < n; i++) {
         l2[i] = i >= 2 ? 1.0 / d[i - 2] : 0.0;
         l1[i] = i >= 1 ? (off_diagonal(i - 1, n) - (i >= 2 ? l2[i] * l1[i - 1] * d[i - 2] : 0.0)) / d[i - 1] : 0.0;
-        d[i] = alpha + diagonal(i, n) - (i >= 1 ? l1[i] * l1[i] * d[i - 1] : 0.0) - (i >= 2 ? l2[i] * l2[i] * d[i - 2] : 0.0);
+        d[i] = alpha + diagonal(i, n) - (i >= 1 ? l1[i] * l1[i] * d[i - 1] : 0.0) -
+               (i >= 2 ? l2[i] * l2[i] * d[i - 2] : 0.0);
     }
     for (int a = 0; a < 3; a++) {
         for (size_t i = 0; i < n; i++) /* forward: L y = alpha p0 */

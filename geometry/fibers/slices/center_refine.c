@@ -65,7 +65,8 @@ static void move_to_centroid(const float *image, struct center *c, float index, 
             if (distance[at] >= r * r || owner[at] != index) continue;
             float w = image[at] - FLOOR;
             float mirror_u = 2.0f * c->u - (float)u - 0.5f, mirror_v = 2.0f * c->v - (float)v - 0.5f;
-            if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)width || mirror_v > (float)height) continue; /* cut by the border */
+            if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)width || mirror_v > (float)height)
+                continue; /* cut by the border */
             if (w <= 0.0f) continue;
             sum += w;
             su += w * ((float)u + 0.5f - c->u);
@@ -76,13 +77,12 @@ static void move_to_centroid(const float *image, struct center *c, float index, 
     c->v += fminf(1.0f, fmaxf(-1.0f, sv / sum));
 }
 
-void centers_refine(const float *image, size_t width, size_t height, double diameter_voxel, struct center *center, size_t n,
-                    float *owner, float *distance)
+void centers_refine(const float *image, size_t width, size_t height, double diameter_voxel, struct center *center,
+                    size_t n, float *owner, float *distance)
 {
     float r = WINDOW_RADII * 0.5f * (float)diameter_voxel;
     for (int round = 0; round < N_ROUND; round++) {
         claim_pixels(center, n, r, width, height, owner, distance);
-        for (size_t i = 0; i < n; i++)
-            move_to_centroid(image, &center[i], (float)i, r, width, height, owner, distance);
+        for (size_t i = 0; i < n; i++) move_to_centroid(image, &center[i], (float)i, r, width, height, owner, distance);
     }
 }

@@ -9,7 +9,7 @@
 #include "geometry/fibers/slices/centers.h"
 
 /* image: width x height densities of the slice; owner, distance: scratch of the same size. */
-void centers_refine(const float *image, size_t width, size_t height, double diameter_voxel, struct center *center, size_t n,
-                    float *owner, float *distance);
+void centers_refine(const float *image, size_t width, size_t height, double diameter_voxel, struct center *center,
+                    size_t n, float *owner, float *distance);
 
 #endif

@@ -28,10 +28,10 @@ struct detect_job {
     const struct direction_volume *d;
     const uint16_t *mask;
     const struct slice_frame *frame;
-    size_t first;             /* slice of the slab's task 0 */
-    float *image;             /* of the slab */
-    struct pixel_range *own;  /* per slice of the slab */
-    size_t margin;            /* pixels around what is its own that a picture needs */
+    size_t first;            /* slice of the slab's task 0 */
+    float *image;            /* of the slab */
+    struct pixel_range *own; /* per slice of the slab */
+    size_t margin;           /* pixels around what is its own that a picture needs */
     double sigma[N_SCALE];
     float min_distance;
     double diameter;
@@ -154,7 +154,8 @@ static bool collect_peaks(const struct detect_job *job, const struct view *w, st
                 size_t at = v * w->width + u;
                 if (map[at] < MIN_STRENGTH) continue;
                 if (!is_peak(w, map, u, v)) continue;
-                if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at])) continue;
+                if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at]))
+                    continue;
                 float offset[2];
                 refine_position(w, map, u, v, offset);
                 struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
@@ -184,7 +185,8 @@ static int lower_v_first(const void *a, const void *b)
 /* Of peaks nearer to each other than min_distance the strongest stays. Those that stay are filed in cells of that edge. */
 static bool thin_out(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
-    size_t kept = 0, n_cell[2] = {(size_t)((float)w->width / job->min_distance) + 3, (size_t)((float)w->height / job->min_distance) + 3};
+    size_t kept = 0, n_cell[2] = {(size_t)((float)w->width / job->min_distance) + 3,
+                                  (size_t)((float)w->height / job->min_distance) + 3};
     float limit = job->min_distance * job->min_distance;
     if (r->n == 0) return true;
     uint32_t *head = calloc(n_cell[0] * n_cell[1], sizeof *head), *next = malloc(r->n * sizeof *next);
@@ -224,9 +226,11 @@ static struct view cut_view(const struct detect_job *job, size_t i_task, float *
     const struct pixel_range *own = &job->own[i_task];
     size_t m = job->margin, u0 = own->u0 > m ? own->u0 - m : 0, v0 = own->v0 > m ? own->v0 - m : 0;
     size_t u1 = own->u1 + m < f->width ? own->u1 + m : f->width, v1 = own->v1 + m < f->height ? own->v1 + m : f->height;
-    struct view w = {job->first + i_task, u1 - u0, v1 - v0, {(float)u0, (float)v0}, scratch, scratch + (u1 - u0) * (v1 - v0)};
+    struct view w = {job->first + i_task,    u1 - u0, v1 - v0,
+                     {(float)u0, (float)v0}, scratch, scratch + (u1 - u0) * (v1 - v0)};
     const float *from = job->image + i_task * f->width * f->height;
-    for (size_t v = 0; v < w.height; v++) memcpy(w.image + v * w.width, from + (v0 + v) * f->width + u0, w.width * sizeof *from);
+    for (size_t v = 0; v < w.height; v++)
+        memcpy(w.image + v * w.width, from + (v0 + v) * f->width + u0, w.width * sizeof *from);
     return w;
 }
 
@@ -276,8 +280,8 @@ static status gather(struct detect_job *job, size_t n_slice, struct center_list 
 }
 
 /* Slabs of slices: their pictures, then the centers in them. */
-static status detect_slabs(struct detect_job *job, const struct slice_source *source, size_t n_slab, struct thread_pool *pool,
-                           const struct progress *progress, struct error *err)
+static status detect_slabs(struct detect_job *job, const struct slice_source *source, size_t n_slab,
+                           struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
     size_t n = job->frame->n_slice;
     const struct progress quiet = progress_silent(progress);

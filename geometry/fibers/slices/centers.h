@@ -14,7 +14,7 @@
 #include "geometry/volume/volume.h"
 
 struct center {
-    float u, v;              /* in pixels of the frame: a pixel's centre is at (i + 1/2) */
+    float u, v;             /* in pixels of the frame: a pixel's centre is at (i + 1/2) */
     float slope_u, slope_v; /* du, dv per slice, from the direction volume */
     float sigma;            /* scale of the strongest response, voxels: radius hint is sigma * sqrt 2 */
     float strength;         /* scale-normalised response; 0.74 for a lone disk of density 1 */
@@ -22,7 +22,7 @@ struct center {
 
 struct center_list {
     size_t n_slice;
-    size_t *first; /* n_slice + 1 */
+    size_t *first;         /* n_slice + 1 */
     struct center *center; /* of slice k: first[k] .. first[k + 1] - 1, sorted by v, then u */
 };
 

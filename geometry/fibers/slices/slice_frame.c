@@ -41,5 +41,6 @@ void slice_frame_init(struct slice_frame *f, int index, const size_t n[3])
     f->height = (size_t)ceilf(extent[1] - 0.01f);
     f->n_slice = (size_t)ceilf(extent[2] - 0.01f);
     for (int a = 0; a < 3; a++)
-        f->origin[a] = 0.5f * ((float)n[a] - (float)f->width * f->u[a] - (float)f->height * f->v[a] - (float)f->n_slice * f->w[a]);
+        f->origin[a] =
+            0.5f * ((float)n[a] - (float)f->width * f->u[a] - (float)f->height * f->v[a] - (float)f->n_slice * f->w[a]);
 }

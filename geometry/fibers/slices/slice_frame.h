@@ -11,7 +11,7 @@
 enum { N_SLICE_FRAME = 9 };
 
 struct slice_frame {
-    int index;                /* 0..2: perpendicular to x, y, z; 3..8: to diagonals */
+    int index; /* 0..2: perpendicular to x, y, z; 3..8: to diagonals */
     float origin[3], u[3], v[3], w[3];
     size_t width, height, n_slice;
 };

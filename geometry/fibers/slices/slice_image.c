@@ -12,8 +12,8 @@ enum { LINES = 16 }; /* of pixels in a task */
 struct fill_job {
     const struct slice_source *source;
     size_t first, n_slice;
-    bool by_column;          /* tasks are blocks of columns: u leads through z; else blocks of rows */
-    int third;               /* the axis that runs along v */
+    bool by_column; /* tasks are blocks of columns: u leads through z; else blocks of rows */
+    int third;      /* the axis that runs along v */
     float *image;
     struct pixel_range *own; /* per task and slice */
 };
@@ -72,7 +72,8 @@ static void extend(struct pixel_range *r, size_t u, size_t v)
 }
 
 /* Pixels (u, v0 .. v1 - 1) of one picture. */
-static void fill_column(const struct fill_job *job, size_t u, size_t v0, size_t v1, size_t i_slice, float *image, struct pixel_range *own)
+static void fill_column(const struct fill_job *job, size_t u, size_t v0, size_t v1, size_t i_slice, float *image,
+                        struct pixel_range *own)
 {
     const struct slice_source *s = job->source;
     size_t third = (size_t)job->third, step = third == 0 ? 1 : third == 1 ? s->v->n[0] : s->v->n[0] * s->v->n[1];
@@ -101,7 +102,8 @@ static void fill_lines(void *context, size_t i_task, size_t i_thread)
     (void)i_thread;
     const struct fill_job *job = context;
     const struct slice_frame *f = job->source->frame;
-    size_t first = i_task * LINES, end = job->by_column ? f->width : f->height, last = first + LINES < end ? first + LINES : end;
+    size_t first = i_task * LINES, end = job->by_column ? f->width : f->height,
+           last = first + LINES < end ? first + LINES : end;
     scratch_keep_within(job->source->v->space);
     for (size_t k = 0; k < job->n_slice; k++) {
         float *image = job->image + k * f->width * f->height;
@@ -113,11 +115,12 @@ static void fill_lines(void *context, size_t i_task, size_t i_thread)
     }
 }
 
-status slice_images_fill(const struct slice_source *source, size_t first, size_t n_slice, struct thread_pool *pool, float *image,
-                         struct pixel_range *own, struct error *err)
+status slice_images_fill(const struct slice_source *source, size_t first, size_t n_slice, struct thread_pool *pool,
+                         float *image, struct pixel_range *own, struct error *err)
 {
     const struct slice_frame *f = source->frame;
-    struct fill_job job = {.source = source, .first = first, .n_slice = n_slice, .image = image, .by_column = f->u[2] != 0.0f};
+    struct fill_job job = {
+        .source = source, .first = first, .n_slice = n_slice, .image = image, .by_column = f->u[2] != 0.0f};
     for (int a = 0; a < 3; a++)
         if (f->v[a] != 0.0f) job.third = a;
     size_t n_task = ((job.by_column ? f->width : f->height) + LINES - 1) / LINES;

@@ -10,13 +10,14 @@
 #include "geometry/fibers/slices/slice_frame.h"
 #include "geometry/volume/volume.h"
 
-#define SLICE_OUTSIDE 6.0f /* pixels farther than this beyond the faces of the volume are 0, nearer ones repeat the face */
+#define SLICE_OUTSIDE                                                                                                  \
+    6.0f /* pixels farther than this beyond the faces of the volume are 0, nearer ones repeat the face */
 
 struct slice_source {
     const struct volume *v;
-    const uint16_t *mask;           /* subvolumes.h */
+    const uint16_t *mask; /* subvolumes.h */
     const struct slice_frame *frame;
-    size_t from[3], to[3];          /* only this part of the volume is shown: the rest is void */
+    size_t from[3], to[3]; /* only this part of the volume is shown: the rest is void */
 };
 
 /* Pixels u0 <= u < u1, v0 <= v < v1; none when u0 >= u1. */
@@ -27,7 +28,7 @@ struct pixel_range {
 /* Slices first .. first + n_slice - 1 into image[n_slice][height][width]: density where the voxel shows in the frame, 0 elsewhere; between
  * voxels bilinear in the plane of the two diagonal axes. own[n_slice]: the pixels that kept voxels of the class reach.
  * STATUS_NO_MEMORY. */
-status slice_images_fill(const struct slice_source *source, size_t first, size_t n_slice, struct thread_pool *pool, float *image,
-                         struct pixel_range *own, struct error *err);
+status slice_images_fill(const struct slice_source *source, size_t first, size_t n_slice, struct thread_pool *pool,
+                         float *image, struct pixel_range *own, struct error *err);
 
 #endif

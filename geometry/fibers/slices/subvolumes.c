@@ -92,7 +92,8 @@ static void reduce(struct subvolumes *s, const struct mask_job *job)
         if (s->from[a] > s->to[a]) s->from[a] = s->to[a];
 }
 
-status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, struct thread_pool *pool, struct error *err)
+status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, struct thread_pool *pool,
+                       struct error *err)
 {
     void *mask;
     *s = (struct subvolumes){.space = d->space};

@@ -57,8 +57,9 @@ struct fit_problem {
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
     const struct progress *progress; /* fraction of the budget; cancel */
-    const struct gaussian_prior *prior; /* n_param, fit coordinates; NULL: none. Methods that know no priors ignore it */
-    double gain_sd;                     /* of ln gain of every configuration, marginalised; 0: none. Likewise */
+    const struct gaussian_prior
+        *prior;     /* n_param, fit coordinates; NULL: none. Methods that know no priors ignore it */
+    double gain_sd; /* of ln gain of every configuration, marginalised; 0: none. Likewise */
 };
 
 struct fit_result {

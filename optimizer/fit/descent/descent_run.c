@@ -75,7 +75,7 @@ status descent_estimate(struct descent_run *run, const double *param, uint32_t i
     for (size_t i = 0; i < e->n_configuration; i++) part.n_path_call += (double)run->n_path[i];
     run->n_path_step = 0;
     for (uint32_t q = 0; q < 2; q++) {
-        struct estimator_call call = {param, run->n_path, iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B,
+        struct estimator_call call = {param,         run->n_path,     iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B,
                                       want_jacobian, run->plain_paths};
         double wall_s = 0.0;
         status s = e->run(e->context, &call, &progress, run->replica[q], &wall_s, err);

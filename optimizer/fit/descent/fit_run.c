@@ -14,7 +14,7 @@ struct fit {
     struct fit_layout layout;
     struct estimate *buffer; /* what the renderer gave */
     size_t i_start;
-    size_t n_step;      /* of the starts before this one, as the next two */
+    size_t n_step; /* of the starts before this one, as the next two */
     uint64_t n_path;
     double wall_s;
     uint64_t path_budget; /* of one start; 0: the method's own */
@@ -66,7 +66,8 @@ static status report(void *context, const struct fit_step *step, struct error *e
     fit_layout_full(&f->layout, step->param, full);
     if (step->param_se != NULL) fit_layout_full(&f->layout, step->param_se, se);
     nuisance_of(&f->layout, step->param, step->param_se, NULL, &nuisance);
-    while (outer.n_configuration > 0 && observation_is_contrast(&f->problem->observation->item[outer.n_configuration - 1]))
+    while (outer.n_configuration > 0 &&
+           observation_is_contrast(&f->problem->observation->item[outer.n_configuration - 1]))
         outer.n_configuration--;
     if (f->option->n_start > 1) {
         snprintf(phase, sizeof phase, "start %zu of %zu: %.30s", f->i_start + 1, f->option->n_start, step->phase);
@@ -108,7 +109,9 @@ static void expand_uncertainty(const struct fit_layout *l, const struct param_in
         for (size_t q = 0; q < n; q++) {
             size_t j = l->owner[q];
             full->cov[p * n + q] = stretch * fit_layout_stretch(l, info, unknown, q) * u->cov[k * m + j];
-            full->correlation[p * n + q] = p == q ? 1.0 : k != j || !l->parameter[k].fixed ? u->correlation[k * m + j] : 0.0;
+            full->correlation[p * n + q] = p == q                             ? 1.0
+                                           : k != j || !l->parameter[k].fixed ? u->correlation[k * m + j]
+                                                                              : 0.0;
         }
     }
 }
@@ -153,8 +156,10 @@ static status run_start(struct fit *f, const struct descent_method *method, size
 {
     struct fit_layout layout = f->layout;
     struct fit_result reduced;
-    struct estimator e = {
-        .context = f, .n_configuration = f->problem->estimator->n_configuration, .n_param = layout.n_unknown, .run = estimate};
+    struct estimator e = {.context = f,
+                          .n_configuration = f->problem->estimator->n_configuration,
+                          .n_param = layout.n_unknown,
+                          .run = estimate};
     struct progress progress = {.report = report_progress,
                                 .context = f,
                                 .cancel = f->problem->progress != NULL ? f->problem->progress->cancel : NULL};

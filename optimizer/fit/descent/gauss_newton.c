@@ -23,8 +23,8 @@
  * Where the paths or iterations are used up before, it has converged if it had arrived.
  */
 #include "optimizer/fit/descent/descent_methods.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/objective/small_matrix.h"
+#include "optimizer/job/method_names.h"
 #include "renderer/transport/appearance_estimate.h"
 
 #include <math.h>
@@ -58,7 +58,7 @@ static const double largest_share = 0.1;
  * a prior does not, and lets go while most paths are still to come. Numbers chosen by trial on analytic cloth. */
 static const double early_caution = 4.0, cautious_until = 10000.0; /* effective paths */
 static const double pull_sd = 1.0, pull_until = 40000.0;           /* step limits; effective paths */
-static const double wide_share = 0.8; /* of the way from the narrowest lobe to the widest, in the logarithm */
+static const double wide_share = 0.8;         /* of the way from the narrowest lobe to the widest, in the logarithm */
 static const double least_limit = 1.0 / 32.0; /* of the step limits */
 static const double far_reach = 6.0;          /* step limits within which far_gain looks */
 
@@ -162,7 +162,8 @@ static void scale_model(const struct gauss_newton *g, bool cross, struct scaled_
     for (size_t a = 0; a < m->n; a++) {
         double limit = g->run.coordinate[m->index[a]].step_limit;
         for (size_t b = 0; b < m->n; b++)
-            m->h[a * m->n + b] = h[m->index[a] * n_param + m->index[b]] * limit * g->run.coordinate[m->index[b]].step_limit;
+            m->h[a * m->n + b] =
+                h[m->index[a] * n_param + m->index[b]] * limit * g->run.coordinate[m->index[b]].step_limit;
         m->g[a] = gradient[m->index[a]] * limit;
         m->trace += m->h[a * m->n + a];
     }
@@ -172,8 +173,8 @@ static void scale_model(const struct gauss_newton *g, bool cross, struct scaled_
 
 /* Its minimum inside the bounds and reach times the step limits, with `damping` on the diagonal: where it is, and by how
  * much it lies below zero. */
-static status lowest(const struct gauss_newton *g, const struct scaled_model *m, double reach, double damping, double y[N],
-                     double *gain, struct error *err)
+static status lowest(const struct gauss_newton *g, const struct scaled_model *m, double reach, double damping,
+                     double y[N], double *gain, struct error *err)
 {
     double h[N * N], lower[N], upper[N];
     memcpy(h, m->h, m->n * m->n * sizeof *h);
@@ -242,7 +243,8 @@ static double noise_ratio(const struct gauss_newton *g)
 
 static bool as_good_as_photographs(const struct gauss_newton *g)
 {
-    return g->run.problem->path_budget == 0 && g->model.n_effective >= least_effective && noise_ratio(g) <= photograph_share;
+    return g->run.problem->path_budget == 0 && g->model.n_effective >= least_effective &&
+           noise_ratio(g) <= photograph_share;
 }
 
 static status estimate_here(struct gauss_newton *g, struct error *err)
@@ -303,7 +305,8 @@ static bool plan_paths(struct gauss_newton *g, bool gain_is_clear, size_t n_obse
     double per_mean = 2.0 * (double)n_observation;
     if (!gain_is_clear) g->n_path_mean *= 1.3;
     double left = (double)g->run.path_budget - (double)g->run.n_path_total;
-    double share = fmax(largest_share * (double)g->run.path_budget, MIN_PATH * per_mean); /* small budgets: a few steps */
+    double share =
+        fmax(largest_share * (double)g->run.path_budget, MIN_PATH * per_mean); /* small budgets: a few steps */
     double most = fmin(share, left) / per_mean;
     g->n_path_mean = fmin(g->n_path_mean, most);
     return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
@@ -327,32 +330,36 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
         snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %g %%", f, se,
                  promised_percent(g));
     else
-        snprintf(text, n,
-                 "further steps promise to lower the objective by %g %%, and tracing adds %.1f times the photographs' own "
-                 "variance; exact renderings would narrow the errors by some %.0f %%",
-                 promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
+        snprintf(
+            text, n,
+            "further steps promise to lower the objective by %g %%, and tracing adds %.1f times the photographs' own "
+            "variance; exact renderings would narrow the errors by some %.0f %%",
+            promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
 
 /* Why a fit whose budget or iterations are used up has converged or not. */
-static void explain_early_end(const struct gauss_newton *g, const char *used, bool arrived, bool failed, double f, double se,
-                              struct fit_result *result)
+static void explain_early_end(const struct gauss_newton *g, const char *used, bool arrived, bool failed, double f,
+                              double se, struct fit_result *result)
 {
     char *text = result->reason;
     size_t n = sizeof result->reason;
     if (result->converged)
         snprintf(text, n,
-                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %g %%; more paths "
+                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %g %%; "
+                 "more paths "
                  "would narrow the errors",
                  used, f, se, promised_percent(g));
     else if (failed)
         snprintf(text, n, "%s ended with a step that made the objective worse and was taken back", used);
     else if (arrived)
-        snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used, g->history.n_step);
+        snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used,
+                 g->history.n_step);
     else
-        snprintf(text, n,
-                 "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about "
-                 "%.0f %%",
-                 used, f, se, promised_percent(g));
+        snprintf(
+            text, n,
+            "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about "
+            "%.0f %%",
+            used, f, se, promised_percent(g));
 }
 
 /* The pull ends with enough paths, or with half of what may be spent; where no row says anything there is none. */

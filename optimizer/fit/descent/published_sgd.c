@@ -12,8 +12,8 @@
  * come from 4 more estimates at the winner.
  */
 #include "optimizer/fit/descent/descent_methods.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/descent/rescale.h"
+#include "optimizer/job/method_names.h"
 #include "renderer/transport/appearance_estimate.h"
 
 #include <math.h>
@@ -21,15 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    N = SCATTERING_MAX_PARAM,
-    N_RUN = 6,
-    N_ITERATION = 60,
-    N_EXTRA = 10,
-    FIRST_I = 50,
-    N_FINAL = 4,
-    N_LAST = 5
-};
+enum { N = SCATTERING_MAX_PARAM, N_RUN = 6, N_ITERATION = 60, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5 };
 
 static const uint64_t published_path = 64 * 64 * 64;
 static const double first_move = 0.005, factor = 3.0, turn_limit = 0.3;
@@ -174,11 +166,12 @@ static void judge(const struct winner *best, struct fit_result *result)
 {
     bool at_end = best->i_run == 0 || best->i_run == N_RUN - 1, enough = best->n_compared >= N_EXTRA;
     result->converged = enough && best->turn <= turn_limit && !at_end;
-    int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest objective%s; ", best->i_run + 1, N_RUN,
-                     at_end ? ", which is at the end of the bracket" : "");
+    int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest objective%s; ",
+                     best->i_run + 1, N_RUN, at_end ? ", which is at the end of the bracket" : "");
     if (enough)
         snprintf(result->reason + n, sizeof result->reason - (size_t)n,
-                 "successive steps have a mean cosine of %.2f (below %.1f counts as converged)", best->turn, turn_limit);
+                 "successive steps have a mean cosine of %.2f (below %.1f counts as converged)", best->turn,
+                 turn_limit);
     else
         snprintf(result->reason + n, sizeof result->reason - (size_t)n,
                  "%zu pairs of successive steps are too few to tell whether it has converged (%d are needed)",
@@ -221,7 +214,8 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
 static double n_rendering(const struct fit_problem *problem, const struct coordinate *k)
 {
     size_t n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
-    return RESCALE_POINTS * (double)rescale_n_curve(problem, k) + 2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
+    return RESCALE_POINTS * (double)rescale_n_curve(problem, k) +
+           2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
 }
 
 /* Of one rendering of every configuration with as few paths as there can be. */
@@ -266,7 +260,8 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
     plan_paths(&g->run);
     struct fit_problem planned = *problem;
     planned.path_budget = g->run.path_budget;
-    s = rescale_measure(&planned, g->run.coordinate, g->run.n_path, g->curve, &g->run.n_path_total, &g->run.wall_s, err);
+    s = rescale_measure(&planned, g->run.coordinate, g->run.n_path, g->curve, &g->run.n_path_total, &g->run.wall_s,
+                        err);
     if (s != STATUS_OK) goto out;
     double a = 0.0;
     start_run(g, 0.0);

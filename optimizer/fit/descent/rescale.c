@@ -88,7 +88,8 @@ static double curve_step(const struct observation_set *o, const struct estimate 
 }
 
 /* The next rendering as a part of the whole fit. */
-static struct progress_part part_of_budget(const struct fit_problem *problem, const size_t *n_path, uint64_t n_path_used)
+static struct progress_part part_of_budget(const struct fit_problem *problem, const size_t *n_path,
+                                           uint64_t n_path_used)
 {
     double budget = (double)problem->path_budget, call = 0.0;
     for (size_t i = 0; i < problem->estimator->n_configuration; i++) call += (double)n_path[i];
@@ -107,7 +108,8 @@ static status measure_symbol(const struct fit_problem *problem, const struct coo
     const struct estimator *e = problem->estimator;
     for (size_t p = 0; p < problem->n_param; p++) param[p] = problem->param[p].start;
     for (size_t j = 0; j < curve->n; j++) {
-        for (size_t p = first; p < first + n_slot; p++) param[p] = fmin(fmax(curve->c[j], k[p].param_lower), k[p].param_upper);
+        for (size_t p = first; p < first + n_slot; p++)
+            param[p] = fmin(fmax(curve->c[j], k[p].param_lower), k[p].param_upper);
         struct estimator_call call = {param, n_path, 0, REPLICA_RESCALE, false, true};
         double seconds = 0.0;
         struct progress_part part = part_of_budget(problem, n_path, *n_path_used);

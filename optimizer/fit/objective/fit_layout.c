@@ -40,8 +40,8 @@ static void add_parameter_prior(struct fit_layout *l, size_t k, double mean, dou
 static bool said_before(const struct fit_layout *l, const struct param_info *info, const struct fit_option *o, size_t p)
 {
     for (size_t q = 0; q < p; q++)
-        if (l->owner[q] == l->owner[p] && strcmp(info[q].symbol, info[p].symbol) == 0 &&
-            o->ratio[q] == o->ratio[p] && o->prior_mean[q] == o->prior_mean[p] && o->prior_se[q] == o->prior_se[p])
+        if (l->owner[q] == l->owner[p] && strcmp(info[q].symbol, info[p].symbol) == 0 && o->ratio[q] == o->ratio[p] &&
+            o->prior_mean[q] == o->prior_mean[p] && o->prior_se[q] == o->prior_se[p])
             return true;
     return false;
 }
@@ -95,8 +95,8 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
         l->i_gain = add_nuisance(l, NUISANCE_GAIN, 1.0 / range, range, 1.0, 0.0, o->global_gain_sd);
     }
     if (o->stray_light_sd > 0.0)
-        l->i_stray = add_nuisance(l, NUISANCE_STRAY_LIGHT, 0.0, stray_range * o->stray_light_sd, 0.0, 0.0,
-                                  o->stray_light_sd);
+        l->i_stray =
+            add_nuisance(l, NUISANCE_STRAY_LIGHT, 0.0, stray_range * o->stray_light_sd, 0.0, 0.0, o->stray_light_sd);
     return STATUS_OK;
 }
 

@@ -28,7 +28,7 @@ struct gaussian_prior {
 struct history_step {
     double x[SCATTERING_MAX_PARAM];
     double slope[SCATTERING_MAX_PARAM]; /* d param / d x there */
-    struct estimate *replica[2]; /* one per observation, owned */
+    struct estimate *replica[2];        /* one per observation, owned */
 };
 
 struct linear_history {
@@ -44,11 +44,13 @@ struct linear_model {
     double x_ref[SCATTERING_MAX_PARAM];
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
-    double *photograph_var; /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
-    double *extra;      /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
-    double *contrast;   /* n_row: 1 for a row of a contrast (texture), 0 for one of a mean; set by linear_model_pool */
-    double *weight;     /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
-    double row_var;     /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
+    double
+        *photograph_var; /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
+    double *
+        extra; /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
+    double *contrast; /* n_row: 1 for a row of a contrast (texture), 0 for one of a mean; set by linear_model_pool */
+    double *weight;   /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
+    double row_var;   /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
     const struct gaussian_prior *prior; /* n_param, NULL: none; the caller's */
     double gain_sd;     /* of ln gain of each configuration, taken out of the residuals by linear_model_pool; 0: none */
     double n_effective; /* paths a configuration and replica that the averages amount to, mean over configurations */

@@ -144,10 +144,11 @@ static double per_path(const struct linear_history *h, size_t i, size_t k)
     return n > 0.0 ? 1.0 / strength(h, i, n) : INFINITY;
 }
 
-static double derivative_weight(const struct linear_history *h, size_t i, size_t k, const struct derivative_scale *scale,
-                                const struct bend *change)
+static double derivative_weight(const struct linear_history *h, size_t i, size_t k,
+                                const struct derivative_scale *scale, const struct bend *change)
 {
-    return 1.0 / (scale->path_variance * per_path(h, i, k) + bend_j * change->net * scale->square + hidden_j * change->j + 1e-12);
+    return 1.0 / (scale->path_variance * per_path(h, i, k) + bend_j * change->net * scale->square +
+                  hidden_j * change->j + 1e-12);
 }
 
 /* A step's way to x_ref: dx, how far that is, the change of the means as the derivatives of all steps say it, and the paths
@@ -187,7 +188,8 @@ static void carry(const struct linear_history *h, const double *mean, size_t i, 
 }
 
 /* Variance of a change over dx by the noise of derivatives. */
-static double change_variance(const struct derivative_scale *scale, size_t c, const double *dx, size_t n, double per_path)
+static double change_variance(const struct derivative_scale *scale, size_t c, const double *dx, size_t n,
+                              double per_path)
 {
     double sum = 0.0;
     for (size_t p = 0; p < n; p++) sum += dx[p] * dx[p] * scale->by[c][p];
@@ -223,8 +225,9 @@ static void pool_weights(const struct linear_history *h, size_t i, const struct 
 
 /* All steps are carried by the same derivatives, so their errors by these go together: as those of one step whose way is the
  * mean of theirs. */
-static void add_carried_noise(struct linear_model *m, const struct linear_history *h, size_t i, const struct derivative_scale *scale,
-                              const struct carried *carried, const struct pool_weight *weight)
+static void add_carried_noise(struct linear_model *m, const struct linear_history *h, size_t i,
+                              const struct derivative_scale *scale, const struct carried *carried,
+                              const struct pool_weight *weight)
 {
     double dx[SCATTERING_MAX_PARAM] = {0}, per_path = 0.0;
     for (size_t k = 0; k < h->n_step; k++) {
@@ -266,8 +269,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     memcpy(m->x_ref, x_ref, m->n_param * sizeof *x_ref);
     mean_derivatives(h, mean);
     m->n_effective = 0.0;
-    for (size_t i = 0; i < h->observation->n; i++)
-        pool_configuration(m, h, mean, i, carried, weight);
+    for (size_t i = 0; i < h->observation->n; i++) pool_configuration(m, h, mean, i, carried, weight);
     for (size_t row = 0; row < m->n_row; row++) {
         m->photograph_var[row] = objective_photograph_variance(&h->observation->item[row / 3], row % 3);
         m->extra[row] = h->observation->item[row / 3].weight;

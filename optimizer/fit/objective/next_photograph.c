@@ -42,7 +42,8 @@ static void take_covariance(struct design *d, const struct next_photograph_fit *
 }
 
 /* Derivatives of the residuals by the fit coordinates, and what the residuals vary by beside these. */
-static void take_derivatives(struct design *d, const struct next_photograph_fit *f, const struct estimate *const replica[2])
+static void take_derivatives(struct design *d, const struct next_photograph_fit *f,
+                             const struct estimate *const replica[2])
 {
     const struct fit_layout *l = f->layout;
     double mean[3], brightness, slope[N];
@@ -84,7 +85,8 @@ static void project(const struct design *d, double both[2][3 * N], double s[9])
         for (size_t e = 0; e < 3; e++) {
             double sum = 0.0;
             for (size_t a = 0; a < d->n; a++)
-                sum += 0.5 * (both[0][c * d->n + a] * d->j[1][e * d->n + a] + both[1][c * d->n + a] * d->j[0][e * d->n + a]);
+                sum += 0.5 *
+                       (both[0][c * d->n + a] * d->j[1][e * d->n + a] + both[1][c * d->n + a] * d->j[0][e * d->n + a]);
             s[c * 3 + e] = sum;
         }
     double mirrored[9];
@@ -167,7 +169,7 @@ void next_photograph_score(const struct next_photograph_fit *f, const struct est
     const struct estimate *const replica[2] = {&shown[0], &shown[1]};
     const struct uncertainty *u = f->uncertainty;
     double jc[2][3 * N], s[9], alone[9], inverse[9] = {0},
-        v = fmax(u->misfit_var + u->noise_var + u->photograph_var, least_var);
+                                         v = fmax(u->misfit_var + u->noise_var + u->photograph_var, least_var);
     memset(score, 0, sizeof *score);
     fit_layout_estimate(f->layout, f->unknown, true, a, &shown[0]);
     fit_layout_estimate(f->layout, f->unknown, true, b, &shown[1]);

@@ -32,8 +32,8 @@ static void likely_gain(const struct observation *o, const double rendered[3], c
     *se = sqrt(1.0 / bottom);
 }
 
-void nuisance_photograph_gain(const struct observation *o, const struct estimate *a, const struct estimate *b, double sd,
-                              double misfit_var, double *gain, double *se)
+void nuisance_photograph_gain(const struct observation *o, const struct estimate *a, const struct estimate *b,
+                              double sd, double misfit_var, double *gain, double *se)
 {
     double rendered[3], var[3];
     for (int c = 0; c < 3; c++) {

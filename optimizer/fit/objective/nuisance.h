@@ -30,8 +30,8 @@ void nuisance_show(const struct fit_nuisance *n, const struct estimate *e, struc
 
 /* Most likely gain of one photograph, with its standard error: Gaussian of sd `sd` about 1, residuals of variance
  * misfit_var (in units of the objective) beside the noise of the two replicas and of the photograph. */
-void nuisance_photograph_gain(const struct observation *o, const struct estimate *a, const struct estimate *b, double sd,
-                              double misfit_var, double *gain, double *se);
+void nuisance_photograph_gain(const struct observation *o, const struct estimate *a, const struct estimate *b,
+                              double sd, double misfit_var, double *gain, double *se);
 /* e times the gain that it says of itself, without the other replica: two of these are still independent of one another, so that
  * the product of their residuals has no bias by noise. */
 void nuisance_apply_own_gain(const struct observation *o, const struct estimate *e, double sd, double misfit_var,

@@ -28,8 +28,9 @@ static double common_variance(const struct linear_model *m, size_t row)
 }
 
 /* Noise that moves the three channels of a configuration together: they come from the same paths, the same exposure. */
-static void add_common_noise(const struct linear_model *m, size_t i, double (*variance)(const struct linear_model *m, size_t row),
-                             const size_t *index, size_t n, double *b)
+static void add_common_noise(const struct linear_model *m, size_t i,
+                             double (*variance)(const struct linear_model *m, size_t row), const size_t *index,
+                             size_t n, double *b)
 {
     double va[N] = {0}, vb[N] = {0};
     for (size_t row = 3 * i; row < 3 * i + 3; row++) {
@@ -44,8 +45,8 @@ static void add_common_noise(const struct linear_model *m, size_t i, double (*va
 }
 
 /* H and B of the parameters index[0..n-1]. */
-static void normal_matrices(const struct linear_model *m, const size_t *index,
-                            size_t n, const double misfit[2], double *h, double *b, double *mean_variance)
+static void normal_matrices(const struct linear_model *m, const size_t *index, size_t n, const double misfit[2],
+                            double *h, double *b, double *mean_variance)
 {
     memset(h, 0, n * n * sizeof *h);
     memset(b, 0, n * n * sizeof *b);
@@ -72,8 +73,8 @@ static void normal_matrices(const struct linear_model *m, const size_t *index,
 }
 
 /* Covariance of the parameters index[0..n-1], all others held. */
-static void covariance(const struct linear_model *m, const struct coordinate *k,
-                       const size_t *index, size_t n, const double misfit[2], double *cov)
+static void covariance(const struct linear_model *m, const struct coordinate *k, const size_t *index, size_t n,
+                       const double misfit[2], double *cov)
 {
     double h[N * N], b[N * N], inverse[N * N], half[N * N], s2, scale[N];
     normal_matrices(m, index, n, misfit, h, b, &s2);
@@ -141,8 +142,8 @@ static bool at_bound(const struct coordinate *k, double x)
     return value <= k->param_lower + margin || value >= k->param_upper - margin;
 }
 
-void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
-                         const bool *fixed, struct uncertainty *u)
+void uncertainty_compute(const struct linear_model *m, const struct coordinate *k, const bool *fixed,
+                         struct uncertainty *u)
 {
     size_t n = m->n_param, moving[N], n_moving = 0, n_inner = 0;
     double cov[N * N], misfit[2];

@@ -23,13 +23,16 @@
 struct uncertainty {
     size_t n_param;
     double cov[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* fit coordinates; rows of fixed parameters are zero */
-    double correlation[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed */
-    double se_param[SCATTERING_MAX_PARAM];    /* internal unit; 0 for fixed parameters */
+    double
+        correlation[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed */
+    double se_param[SCATTERING_MAX_PARAM];                        /* internal unit; 0 for fixed parameters */
     bool at_bound[SCATTERING_MAX_PARAM];
     bool determined[SCATTERING_MAX_PARAM]; /* uncertainty_determined; true for fixed ones */
-    double misfit_var; /* per residual of a mean (contrasts of a texture have a misfit of their own), in units of the objective:
+    double
+        misfit_var; /* per residual of a mean (contrasts of a texture have a misfit of their own), in units of the objective:
                           about the squared relative error that the model leaves */
-    double noise_var;  /* mean Monte-Carlo variance per residual of the pooled mean; this and the next without extra weights */
+    double
+        noise_var; /* mean Monte-Carlo variance per residual of the pooled mean; this and the next without extra weights */
     double photograph_var; /* mean variance per residual by the photographs' stated errors */
 };
 
@@ -39,7 +42,7 @@ struct uncertainty {
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param);
 
 /* m: pooled at the result. fixed: n_param flags. */
-void uncertainty_compute(const struct linear_model *m, const struct coordinate *k,
-                         const bool *fixed, struct uncertainty *u);
+void uncertainty_compute(const struct linear_model *m, const struct coordinate *k, const bool *fixed,
+                         struct uncertainty *u);
 
 #endif

@@ -154,7 +154,8 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
         if (!contrast_is_known(&item) && doc->texture_weight > 0.0 && warn != NULL) {
             char text[400];
             snprintf(text, sizeof text,
-                     "photographs[%zu] ('%s') is black in one of its channels, so its texture is not compared with the rendering's",
+                     "photographs[%zu] ('%s') is black in one of its channels, so its texture is not compared with the "
+                     "rendering's",
                      i, p->file);
             warn(context, text);
         }

@@ -16,9 +16,9 @@ struct observation {
     enum job_set set;
     struct configuration configuration;
     double mean_rgb[3];
-    double se_rgb[3]; /* 0 when the source states none */
-    double weight;    /* factor of the objective's weight of this observation; 1 */
-    size_t n_cell;    /* a side, of the contrast; 0: not measured */
+    double se_rgb[3];                           /* 0 when the source states none */
+    double weight;                              /* factor of the objective's weight of this observation; 1 */
+    size_t n_cell;                              /* a side, of the contrast; 0: not measured */
     double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
 };
 

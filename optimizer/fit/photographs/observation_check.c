@@ -154,7 +154,8 @@ static void check_contradictions(const struct observation_set *o, observation_wa
         for (size_t j = 0; j < i; j++) {
             const struct observation *a = &o->item[j], *b = &o->item[i];
             char text[500];
-            if (!(a->weight > 0.0 && b->weight > 0.0) || !same_configuration(&a->configuration, &b->configuration)) continue;
+            if (!(a->weight > 0.0 && b->weight > 0.0) || !same_configuration(&a->configuration, &b->configuration))
+                continue;
             double difference = contradiction(a, b);
             if (!(difference > 0.0) || ++n > NAMED) continue;
             snprintf(text, sizeof text,

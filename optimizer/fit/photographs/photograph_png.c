@@ -64,7 +64,8 @@ static status check_size(FILE *f, const char *name, size_t limit_pixel, struct e
     struct stat st; /* a row has at least a bit a pixel; deflate cannot do better than 1 : 1032 */
     if (fstat(fileno(f), &st) != 0) return error_set_errno(err, "cannot read photograph '%s'", name);
     if ((width / 8 + 1) * height / 1100 > (size_t)st.st_size)
-        return error_set(err, STATUS_FORMAT, "cannot read photograph '%s': its header promises %zu x %zu pixels, the file has %lld bytes",
+        return error_set(err, STATUS_FORMAT,
+                         "cannot read photograph '%s': its header promises %zu x %zu pixels, the file has %lld bytes",
                          name, width, height, (long long)st.st_size);
     rewind(f);
     return STATUS_OK;

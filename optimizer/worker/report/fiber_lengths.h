@@ -9,10 +9,10 @@
 enum { LENGTH_BINS = 24 };
 
 struct fiber_lengths {
-    size_t n[3];                              /* fibers of weft, warp, pile */
+    size_t n[3]; /* fibers of weft, warp, pile */
     double total_m[3];
     double shortest_m, p10_m, median_m, p90_m, longest_m, mean_m;
-    double edge_m[LENGTH_BINS + 1];           /* even steps from 0 to the longest */
+    double edge_m[LENGTH_BINS + 1]; /* even steps from 0 to the longest */
     size_t count[3][LENGTH_BINS];
     double length_in_bin_m[3][LENGTH_BINS];
 };

@@ -14,15 +14,22 @@
 enum { TOP_PIXELS = 700 };
 
 static const char style[] =
-    "body { font: 15px/1.45 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em; color: #1c1f24; background: #fff; }\n"
-    "h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin: 1.8em 0 .5em; border-bottom: 1px solid #ddd; padding-bottom: .2em; }\n"
-    "table { border-collapse: collapse; } th, td { text-align: left; padding: .18em 1.4em .18em 0; vertical-align: top; }\n"
+    "body { font: 15px/1.45 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em; color: "
+    "#1c1f24; background: #fff; }\n"
+    "h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin: 1.8em 0 .5em; border-bottom: 1px solid #ddd; "
+    "padding-bottom: .2em; }\n"
+    "table { border-collapse: collapse; } th, td { text-align: left; padding: .18em 1.4em .18em 0; vertical-align: "
+    "top; }\n"
     "th { font-weight: 600; } td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }\n"
-    "td.hint, p.hint { color: #667; } p.warning { background: #fff4d6; border-left: 4px solid #e0a100; padding: .4em .8em; margin: .4em 0; }\n"
-    "figure { margin: 0 0 1.2em; } figcaption { color: #667; font-size: .9em; } img { max-width: 100%; height: auto; max-height: 640px; background: #000; }\n"
-    "img.plot { background: #fff; } .slices { display: grid; grid-template-columns: repeat(auto-fit, minmax(320px, 1fr)); gap: 16px; }\n";
+    "td.hint, p.hint { color: #667; } p.warning { background: #fff4d6; border-left: 4px solid #e0a100; padding: .4em "
+    ".8em; margin: .4em 0; }\n"
+    "figure { margin: 0 0 1.2em; } figcaption { color: #667; font-size: .9em; } img { max-width: 100%; height: auto; "
+    "max-height: 640px; background: #000; }\n"
+    "img.plot { background: #fff; } .slices { display: grid; grid-template-columns: repeat(auto-fit, minmax(320px, "
+    "1fr)); gap: 16px; }\n";
 
-static status write_text(const struct pipeline_context *c, const char *name, const char *text, size_t n, struct error *err)
+static status write_text(const struct pipeline_context *c, const char *name, const char *text, size_t n,
+                         struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, name, path);
@@ -32,10 +39,11 @@ static status write_text(const struct pipeline_context *c, const char *name, con
 static json_t *lengths_json(const struct fiber_lengths *l)
 {
     const double mm = 1e3;
-    json_t *json = json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "n", json_count_list(l->n, 3), "total_mm", json_number_list(l->total_m, 3, mm),
-                             "mean_mm", json_number(l->mean_m * mm), "shortest_mm", json_number(l->shortest_m * mm), "p10_mm",
-                             json_number(l->p10_m * mm), "median_mm", json_number(l->median_m * mm), "p90_mm", json_number(l->p90_m * mm),
-                             "longest_mm", json_number(l->longest_m * mm));
+    json_t *json = json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "n", json_count_list(l->n, 3), "total_mm",
+                             json_number_list(l->total_m, 3, mm), "mean_mm", json_number(l->mean_m * mm), "shortest_mm",
+                             json_number(l->shortest_m * mm), "p10_mm", json_number(l->p10_m * mm), "median_mm",
+                             json_number(l->median_m * mm), "p90_mm", json_number(l->p90_m * mm), "longest_mm",
+                             json_number(l->longest_m * mm));
     json_object_set_new(json, "bin_edge_mm", json_number_list(l->edge_m, LENGTH_BINS + 1, mm));
     json_t *classes = json_array();
     for (int k = 0; k < 3; k++) json_array_append_new(classes, json_count_list(l->count[k], LENGTH_BINS));
@@ -45,8 +53,9 @@ static json_t *lengths_json(const struct fiber_lengths *l)
 
 static status write_json(struct pipeline_context *c, const struct fiber_lengths *l, struct error *err)
 {
-    json_t *json = json_pack("{s:i, s:s, s:o, s:o, s:o, s:s}", "format", 1, "sample", c->doc->sample, "geometry", result_geometry_json(c), "lengths",
-                             lengths_json(l), "warnings", result_warnings_json(c), "page", "quality.html");
+    json_t *json = json_pack("{s:i, s:s, s:o, s:o, s:o, s:s}", "format", 1, "sample", c->doc->sample, "geometry",
+                             result_geometry_json(c), "lengths", lengths_json(l), "warnings", result_warnings_json(c),
+                             "page", "quality.html");
     char *text = json_dumps(json, JSON_REAL_PRECISION(17) | JSON_INDENT(1));
     status s = text != NULL ? write_text(c, "quality.json", text, strlen(text), err)
                             : error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
@@ -57,14 +66,16 @@ static status write_json(struct pipeline_context *c, const struct fiber_lengths 
 
 /* What `print` writes becomes the file. */
 static status write_printed(struct pipeline_context *c, const struct fiber_lengths *l, const char *name,
-                            void (*print)(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out), struct error *err)
+                            void (*print)(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out),
+                            struct error *err)
 {
     char *text = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
     print(c, l, out);
-    status s = fclose(out) == 0 ? write_text(c, name, text, n, err) : error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
+    status s = fclose(out) == 0 ? write_text(c, name, text, n, err)
+                                : error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
     free(text);
     return s;
 }

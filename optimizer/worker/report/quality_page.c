@@ -1,5 +1,5 @@
-#include "optimizer/worker/report/quality.h"
 #include "geometry/volume/tile_crop.h"
+#include "optimizer/worker/report/quality.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -8,15 +8,21 @@
 static void escaped(const char *text, FILE *out)
 {
     for (const char *p = text; *p != '\0'; p++)
-        if (*p == '&') fputs("&amp;", out);
-        else if (*p == '<') fputs("&lt;", out);
-        else if (*p == '>') fputs("&gt;", out);
-        else if (*p == '"') fputs("&quot;", out);
-        else fputc(*p, out);
+        if (*p == '&')
+            fputs("&amp;", out);
+        else if (*p == '<')
+            fputs("&lt;", out);
+        else if (*p == '>')
+            fputs("&gt;", out);
+        else if (*p == '"')
+            fputs("&quot;", out);
+        else
+            fputc(*p, out);
 }
 
 /* A row of a table: name, value, what it means. */
-__attribute__((format(printf, 4, 5))) static void row(FILE *out, const char *name, const char *hint, const char *format, ...)
+__attribute__((format(printf, 4, 5))) static void row(FILE *out, const char *name, const char *hint, const char *format,
+                                                      ...)
 {
     va_list list;
     fprintf(out, "<tr><td>%s</td><td class=\"number\">", name);
@@ -33,30 +39,39 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
 {
     static const char *const name[] = {"along x (weft)", "along y (warp)", "along z (pile)"};
     const struct reconstruct_report *g = &c->geometry;
-    fputs("<h2>Fibers</h2>\n<table>\n<tr><th>class</th><th class=\"number\">fibers</th><th class=\"number\">length, mm</th><th class=\"number\">radius, um</th>",
+    fputs("<h2>Fibers</h2>\n<table>\n<tr><th>class</th><th class=\"number\">fibers</th><th class=\"number\">length, "
+          "mm</th><th class=\"number\">radius, um</th>",
           out);
-    if (c->doc->has_volume) fputs("<th class=\"number\">centers</th><th class=\"number\">chains</th><th class=\"number\">dropped as short</th>", out);
+    if (c->doc->has_volume)
+        fputs("<th class=\"number\">centers</th><th class=\"number\">chains</th><th class=\"number\">dropped as "
+              "short</th>",
+              out);
     fputs("</tr>\n", out);
     for (int k = 0; k < 3; k++) {
         double radius = 0.0;
         for (size_t i = 0; i < c->fiber.n_fiber; i++)
             if (c->fiber.axis_class[i] == k) radius += (double)c->fiber.radius_m[i] / (double)l->n[k];
-        fprintf(out, "<tr><td>%s</td><td class=\"number\">%zu</td><td class=\"number\">%.3g</td><td class=\"number\">", name[k], l->n[k], l->total_m[k] * 1e3);
+        fprintf(out, "<tr><td>%s</td><td class=\"number\">%zu</td><td class=\"number\">%.3g</td><td class=\"number\">",
+                name[k], l->n[k], l->total_m[k] * 1e3);
         if (l->n[k] > 0) fprintf(out, "%.2f", radius * 1e6);
-        if (l->n[k] > 0 && c->doc->has_volume && isfinite(g->radius_se_m[k])) fprintf(out, " &plusmn; %.2f", g->radius_se_m[k] * 1e6);
+        if (l->n[k] > 0 && c->doc->has_volume && isfinite(g->radius_se_m[k]))
+            fprintf(out, " &plusmn; %.2f", g->radius_se_m[k] * 1e6);
         fputs("</td>", out);
         if (c->doc->has_volume)
-            fprintf(out, "<td class=\"number\">%zu</td><td class=\"number\">%zu</td><td class=\"number\">%zu</td>", g->n_center[k], g->n_chain[k],
-                    g->n_short_dropped[k]);
+            fprintf(out, "<td class=\"number\">%zu</td><td class=\"number\">%zu</td><td class=\"number\">%zu</td>",
+                    g->n_center[k], g->n_chain[k], g->n_short_dropped[k]);
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
     if (c->doc->has_volume)
-        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", g->radius_per_axis ? "one for each class" : "one for all fibers");
-    fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n", l->median_m * 1e3, l->mean_m * 1e3,
-            l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
-    fputs("<figure><img class=\"plot\" src=\"pictures/fiber-lengths.svg\" alt=\"length distribution of the fibers\"><figcaption>Summed length over the length "
-          "of a fiber. Fibers that cross the tile end near its edge; many short ones mean broken fibers.</figcaption></figure>\n",
+        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n",
+                g->radius_per_axis ? "one for each class" : "one for all fibers");
+    fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n",
+            l->median_m * 1e3, l->mean_m * 1e3, l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
+    fputs("<figure><img class=\"plot\" src=\"pictures/fiber-lengths.svg\" alt=\"length distribution of the "
+          "fibers\"><figcaption>Summed length over the length "
+          "of a fiber. Fibers that cross the tile end near its edge; many short ones mean broken "
+          "fibers.</figcaption></figure>\n",
           out);
 }
 
@@ -69,9 +84,12 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);
     row(out, "gaps bridged", "missed centers within a fiber", "%zu", g->n_gap_bridged);
     row(out, "pieces joined", "of one fiber, end to end", "%zu", g->n_joined);
-    row(out, "fiber diameter", "measured before tracing; 7 and more tell touching fibers apart", "%.1f voxels", g->fiber_diameter_voxel);
-    row(out, "direction noise, filtered", "mean angle from voxel to voxel along the fiber", "%.2f&deg;", g->direction_noise_deg[0]);
-    row(out, "direction noise, transferred", "after taking the fibers' directions", "%.2f&deg;", g->direction_noise_deg[1]);
+    row(out, "fiber diameter", "measured before tracing; 7 and more tell touching fibers apart", "%.1f voxels",
+        g->fiber_diameter_voxel);
+    row(out, "direction noise, filtered", "mean angle from voxel to voxel along the fiber", "%.2f&deg;",
+        g->direction_noise_deg[0]);
+    row(out, "direction noise, transferred", "after taking the fibers' directions", "%.2f&deg;",
+        g->direction_noise_deg[1]);
     row(out, "change by the transfer", "mean angle between the two", "%.2f&deg;", g->direction_change_mean_deg);
     row(out, "noise of the scan", "standard deviation over the step from void to material", "%.3f", g->noise_sd);
     row(out, "separability", "of void and material: 0.64 noise alone, above 0.8 clear", "%.2f", g->separability);
@@ -81,16 +99,20 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
 /* A cell with a figure, or with a dash where there is none. */
 static void figure(FILE *out, double v)
 {
-    if (isfinite(v)) fprintf(out, "<td class=\"number\">%.2f</td>", v);
-    else fputs("<td class=\"number\">&ndash;</td>", out);
+    if (isfinite(v))
+        fprintf(out, "<td class=\"number\">%.2f</td>", v);
+    else
+        fputs("<td class=\"number\">&ndash;</td>", out);
 }
 
 static void print_seam(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
-    fputs("<h2>Tile and seams</h2>\n<table>\n<tr><th></th><th class=\"number\">across x</th><th class=\"number\">across y</th></tr>\n", out);
-    fprintf(out, "<tr><td>edge of the tile, mm</td><td class=\"number\">%.4f</td><td class=\"number\">%.4f</td></tr>\n", c->fiber.tile_size_m[0] * 1e3,
-            c->fiber.tile_size_m[1] * 1e3);
+    fputs("<h2>Tile and seams</h2>\n<table>\n<tr><th></th><th class=\"number\">across x</th><th "
+          "class=\"number\">across y</th></tr>\n",
+          out);
+    fprintf(out, "<tr><td>edge of the tile, mm</td><td class=\"number\">%.4f</td><td class=\"number\">%.4f</td></tr>\n",
+            c->fiber.tile_size_m[0] * 1e3, c->fiber.tile_size_m[1] * 1e3);
     if (c->doc->has_volume) {
         fputs("<tr><td>density step at the seam over that of neighbouring slices (1: no seam)</td>", out);
         for (int a = 0; a < 2; a++) figure(out, g->seam_density.ratio[a]);
@@ -99,8 +121,10 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
     const struct fiber_seam *s = &g->seam_fiber;
     fputs("<tr><td>fiber ends that continue in the next tile</td>", out);
     for (int a = 0; a < 2; a++)
-        if (s->n_end[a] > 0) fprintf(out, "<td class=\"number\">%.0f %% of %zu</td>", 100.0 * s->share[a], s->n_end[a]);
-        else fputs("<td class=\"number\">no ends</td>", out);
+        if (s->n_end[a] > 0)
+            fprintf(out, "<td class=\"number\">%.0f %% of %zu</td>", 100.0 * s->share[a], s->n_end[a]);
+        else
+            fputs("<td class=\"number\">no ends</td>", out);
     fputs("</tr>\n", out);
     if (g->n_seam_joined > 0) {
         fputs("<tr><td>their mean offset before the ends were brought together, um</td>", out);
@@ -108,12 +132,14 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
         fputs("</tr>\n", out);
     }
     if (c->option.crop) {
-        fprintf(out, "<tr><td>mismatch of the best box (0 is a repeat, 1 is chance; used up to %.1f)</td>", TILE_MOST_MISMATCH);
+        fprintf(out, "<tr><td>mismatch of the best box (0 is a repeat, 1 is chance; used up to %.1f)</td>",
+                TILE_MOST_MISMATCH);
         for (int a = 0; a < 2; a++) figure(out, g->tile.mismatch[a]);
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
-    if (g->n_seam_joined > 0) fprintf(out, "<p>%zu pairs of ends were brought together across the seams.</p>\n", g->n_seam_joined);
+    if (g->n_seam_joined > 0)
+        fprintf(out, "<p>%zu pairs of ends were brought together across the seams.</p>\n", g->n_seam_joined);
 }
 
 static void print_chosen(const struct pipeline_context *c, FILE *out)
@@ -121,18 +147,22 @@ static void print_chosen(const struct pipeline_context *c, FILE *out)
     const struct reconstruct_report *g = &c->geometry;
     const struct reconstruct_option *o = &c->option;
     open_table(out, "Parameters, given or chosen");
-    row(out, "volume.voxel_size_um", "", "%.4g, %.4g, %.4g", o->voxel_size_m[0] * 1e6, o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
+    row(out, "volume.voxel_size_um", "", "%.4g, %.4g, %.4g", o->voxel_size_m[0] * 1e6, o->voxel_size_m[1] * 1e6,
+        o->voxel_size_m[2] * 1e6);
     row(out, "volume.axes", "", "%s", o->axes);
-    row(out, "volume.matrix", g->aligned ? "from the fibers' directions" : "", "%.5f %.5f %.5f<br>%.5f %.5f %.5f<br>%.5f %.5f %.5f", o->matrix[0], o->matrix[1],
-        o->matrix[2], o->matrix[3], o->matrix[4], o->matrix[5], o->matrix[6], o->matrix[7], o->matrix[8]);
+    row(out, "volume.matrix", g->aligned ? "from the fibers' directions" : "",
+        "%.5f %.5f %.5f<br>%.5f %.5f %.5f<br>%.5f %.5f %.5f", o->matrix[0], o->matrix[1], o->matrix[2], o->matrix[3],
+        o->matrix[4], o->matrix[5], o->matrix[6], o->matrix[7], o->matrix[8]);
     if (o->align && g->align.outcome == ALIGN_DONE)
-        row(out, "weft turned, warp sheared, tilted", "before alignment, with standard errors in and out of the plane", "%.2f&deg;, %.2f&deg;, %.2f&deg; (%.2f, %.2f)",
-            g->align.rotation_deg, g->align.shear_deg, g->align.tilt_deg, g->align.se_deg, g->align.tilt_se_deg);
+        row(out, "weft turned, warp sheared, tilted", "before alignment, with standard errors in and out of the plane",
+            "%.2f&deg;, %.2f&deg;, %.2f&deg; (%.2f, %.2f)", g->align.rotation_deg, g->align.shear_deg,
+            g->align.tilt_deg, g->align.se_deg, g->align.tilt_se_deg);
     if (o->crop_voxel[3] > 0)
-        row(out, "volume.crop_voxel", o->crop ? "chosen to tile" : "", "%zu %zu %zu, %zu %zu %zu", o->crop_voxel[0], o->crop_voxel[1], o->crop_voxel[2],
-            o->crop_voxel[3], o->crop_voxel[4], o->crop_voxel[5]);
+        row(out, "volume.crop_voxel", o->crop ? "chosen to tile" : "", "%zu %zu %zu, %zu %zu %zu", o->crop_voxel[0],
+            o->crop_voxel[1], o->crop_voxel[2], o->crop_voxel[3], o->crop_voxel[4], o->crop_voxel[5]);
     row(out, "volume in use", "voxels", "%zu x %zu x %zu", g->n[0], g->n[1], g->n[2]);
-    row(out, "volume.density_low, density_high", "scanner values of void and solid fiber", "%.6g, %.6g", g->density_low, g->density_high);
+    row(out, "volume.density_low, density_high", "scanner values of void and solid fiber", "%.6g, %.6g", g->density_low,
+        g->density_high);
     row(out, "volume.filter s, t, h", "direction filter", "%.4g, %.4g, %zu", o->s, o->t, o->h);
     row(out, "volume.filter eps_d, eps_J", "its thresholds", "%.4g, %.4g", o->eps_d, o->eps_j);
     row(out, "volume.link_sigma_voxel, min_vertices", "", "%.3g, %zu", o->link_sigma_voxel, o->min_vertex);
@@ -148,9 +178,12 @@ static void print_pictures(const struct pipeline_context *c, FILE *out)
                  {"slice-z.png", "Middle slice across z: x to the right, y up"}};
     fputs("<h2>Pictures</h2>\n<div class=\"slices\">\n", out);
     for (int i = 0; i < 3 && c->doc->has_volume; i++)
-        fprintf(out, "<figure><a href=\"pictures/%s\"><img src=\"pictures/%s\" alt=\"%s\"></a><figcaption>%s. Red crosses: fibers that pass through.</figcaption></figure>\n",
+        fprintf(out,
+                "<figure><a href=\"pictures/%s\"><img src=\"pictures/%s\" alt=\"%s\"></a><figcaption>%s. Red crosses: "
+                "fibers that pass through.</figcaption></figure>\n",
                 slice[i].file, slice[i].file, slice[i].text, slice[i].text);
-    fputs("<figure><a href=\"pictures/top.png\"><img src=\"pictures/top.png\" alt=\"fibers from above\"></a><figcaption>The fibers of one tile from above, "
+    fputs("<figure><a href=\"pictures/top.png\"><img src=\"pictures/top.png\" alt=\"fibers from "
+          "above\"></a><figcaption>The fibers of one tile from above, "
           "brighter is higher.</figcaption></figure>\n</div>\n",
           out);
 }
@@ -158,14 +191,15 @@ static void print_pictures(const struct pipeline_context *c, FILE *out)
 void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
 {
     char text[600];
-    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+          "content=\"width=device-width, initial-scale=1\">\n"
           "<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"quality.css\">\n<title>Geometry of ",
           out);
     escaped(c->doc->sample, out);
     fputs("</title>\n</head>\n<body>\n<h1>Geometry of ", out);
     escaped(c->doc->sample, out);
-    fprintf(out, "</h1>\n<p>%zu fibers from %s. The same in numbers: <a href=\"quality.json\">quality.json</a>.</p>\n", c->fiber.n_fiber,
-            c->doc->has_volume ? "a scan" : "a fiber file");
+    fprintf(out, "</h1>\n<p>%zu fibers from %s. The same in numbers: <a href=\"quality.json\">quality.json</a>.</p>\n",
+            c->fiber.n_fiber, c->doc->has_volume ? "a scan" : "a fiber file");
     for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) {
         fputs("<p class=\"warning\">", out);
         escaped(text, out);

@@ -3,14 +3,16 @@
 
 static json_t *alignment_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
 {
-    static const char *const outcome[] = {[ALIGN_DONE] = "found", [ALIGN_NO_DIRECTION] = "no_direction", [ALIGN_OTHER_AXES] = "other_axes"};
+    static const char *const outcome[] = {
+        [ALIGN_DONE] = "found", [ALIGN_NO_DIRECTION] = "no_direction", [ALIGN_OTHER_AXES] = "other_axes"};
     if (!o->align) return json_null();
     const struct alignment *a = &g->align;
     const struct main_directions *m = &g->main;
-    json_t *json = json_pack("{s:s, s:b, s:o, s:o, s:o, s:o, s:o, s:o}", "outcome", outcome[a->outcome], "applied", (int)g->aligned, "n_system",
-                             json_count(m->n), "rotation_deg", json_number(a->rotation_deg), "shear_deg", json_number(a->shear_deg), "tilt_deg",
-                             json_number(a->tilt_deg), "standard_error_deg", json_number(a->se_deg), "tilt_standard_error_deg",
-                             json_number(a->tilt_se_deg));
+    json_t *json =
+        json_pack("{s:s, s:b, s:o, s:o, s:o, s:o, s:o, s:o}", "outcome", outcome[a->outcome], "applied",
+                  (int)g->aligned, "n_system", json_count(m->n), "rotation_deg", json_number(a->rotation_deg),
+                  "shear_deg", json_number(a->shear_deg), "tilt_deg", json_number(a->tilt_deg), "standard_error_deg",
+                  json_number(a->se_deg), "tilt_standard_error_deg", json_number(a->tilt_se_deg));
     json_object_set_new(json, "weft", json_number_list(m->direction[0], 3, 1.0));
     json_object_set_new(json, "warp", json_number_list(m->direction[1], 3, 1.0));
     json_object_set_new(json, "repeat_mm", json_number_list(m->repeat_m, 2, 1e3));
@@ -22,31 +24,33 @@ static json_t *alignment_json(const struct reconstruct_option *o, const struct r
 static json_t *crop_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
 {
     if (!o->crop) return json_null();
-    return json_pack("{s:o, s:o, s:o}", "keep", json_number(o->crop_keep), "valid", json_count_list(g->tile.valid, 4), "mismatch",
-                     json_number_list(g->tile.mismatch, 2, 1.0));
+    return json_pack("{s:o, s:o, s:o}", "keep", json_number(o->crop_keep), "valid", json_count_list(g->tile.valid, 4),
+                     "mismatch", json_number_list(g->tile.mismatch, 2, 1.0));
 }
 
 static json_t *seam_density_json(const struct seam_density *s)
 {
-    return json_pack("{s:o, s:o, s:o}", "across", json_number_list(s->across, 2, 1.0), "neighbour", json_number_list(s->neighbour, 2, 1.0),
-                     "ratio", json_number_list(s->ratio, 2, 1.0));
+    return json_pack("{s:o, s:o, s:o}", "across", json_number_list(s->across, 2, 1.0), "neighbour",
+                     json_number_list(s->neighbour, 2, 1.0), "ratio", json_number_list(s->ratio, 2, 1.0));
 }
 
 static json_t *seam_fibers_json(const struct reconstruct_report *g)
 {
     const struct fiber_seam *s = &g->seam_fiber;
     const double *found_m = g->seam_found.offset_m;
-    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "offset_found_um", g->n[0] > 0 ? json_number_list(found_m, 2, 1e6) : json_null(), "n_end", json_count_list(s->n_end, 2), "continued", json_number_list(s->share, 2, 1.0), "offset_um",
+    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "offset_found_um",
+                     g->n[0] > 0 ? json_number_list(found_m, 2, 1e6) : json_null(), "n_end",
+                     json_count_list(s->n_end, 2), "continued", json_number_list(s->share, 2, 1.0), "offset_um",
                      json_number_list(s->offset_m, 2, 1e6), "n_joined", json_count(g->n_seam_joined));
 }
 
 /* Everything that was given or chosen, under the names of the job document. */
 static json_t *options_json(const struct reconstruct_option *o)
 {
-    json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", json_number(o->s), "t", json_number(o->t), "h",
-                             json_count(o->h), "eps_d", json_number(o->eps_d), "eps_J", json_number(o->eps_j), "link_sigma_voxel",
-                             json_number(o->link_sigma_voxel), "min_vertices", json_count(o->min_vertex), "smooth_alpha",
-                             json_number(o->smooth_alpha));
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", json_number(o->s),
+                             "t", json_number(o->t), "h", json_count(o->h), "eps_d", json_number(o->eps_d), "eps_J",
+                             json_number(o->eps_j), "link_sigma_voxel", json_number(o->link_sigma_voxel),
+                             "min_vertices", json_count(o->min_vertex), "smooth_alpha", json_number(o->smooth_alpha));
     json_object_set_new(json, "density_low", json_number(o->density_low));
     json_object_set_new(json, "density_high", json_number(o->density_high));
     json_object_set_new(json, "matrix", json_number_list(o->matrix, 9, 1.0));

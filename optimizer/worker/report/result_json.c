@@ -1,7 +1,7 @@
 #include "optimizer/worker/report/result_json.h"
+#include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_geometry.h"
-#include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_options_json.h"
 
 #include <jansson.h>
@@ -152,8 +152,7 @@ static json_t *model_json(const struct pipeline_context *c, size_t i_model)
     return json;
 }
 
-static json_t *row_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i,
-                        const char *picture)
+static json_t *row_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, const char *picture)
 {
     const struct observation *o = &c->observation.item[i];
     const struct configuration *k = &o->configuration;
@@ -206,18 +205,18 @@ static json_t *radius_json(const struct pipeline_context *c)
     }
     return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:I, s:o, s:o}", "model",
                      c->model[r->i_model].appearance.id, "start_um", json_number(r->start_m * um), "radius_um",
-                     json_number(r->radius_m * um), "minimum_um", json_number(exp(r->curve.u) * um), "standard_error_um",
-                     json_number(r->se_m * um), "lower_um", json_number(r->lower_m * um), "upper_um", json_number(r->upper_m * um),
-                     "determined", (int)r->curve.determined, "at_bound", (int)r->curve.at_bound, "n_path",
-                     (json_int_t)r->n_path, "wall_s", json_number(r->wall_s), "curve", curve);
+                     json_number(r->radius_m * um), "minimum_um", json_number(exp(r->curve.u) * um),
+                     "standard_error_um", json_number(r->se_m * um), "lower_um", json_number(r->lower_m * um),
+                     "upper_um", json_number(r->upper_m * um), "determined", (int)r->curve.determined, "at_bound",
+                     (int)r->curve.at_bound, "n_path", (json_int_t)r->n_path, "wall_s", json_number(r->wall_s), "curve",
+                     curve);
 }
 
 static json_t *result_json(struct pipeline_context *c, picture_name *picture)
 {
     const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
     json_t *rows = json_array(), *models = json_array();
-    for (size_t i = 0; i < c->observation.n; i++)
-        json_array_append_new(rows, row_json(c, best, i, picture[i]));
+    for (size_t i = 0; i < c->observation.n; i++) json_array_append_new(rows, row_json(c, best, i, picture[i]));
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
     json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", c->doc->sample, "model",
                              best->appearance.id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed);

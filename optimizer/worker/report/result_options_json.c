@@ -18,16 +18,20 @@ void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *
                             : json_pack("{s:f, s:f}", "mean", o->prior_mean[p], "se", o->prior_se[p]));
 }
 
-static void row_gain(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *gain, double *se)
+static void row_gain(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *gain,
+                     double *se)
 {
     struct estimate a, b;
     nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
     nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
-    nuisance_photograph_gain(&c->observation.item[i], &a, &b, m->option->gain_prior_rel,
-                             m->fit.uncertainty.misfit_var, gain, se);
+    nuisance_photograph_gain(&c->observation.item[i], &a, &b, m->option->gain_prior_rel, m->fit.uncertainty.misfit_var,
+                             gain, se);
 }
 
-static json_t *rgb_json(const double v[3]) { return json_pack("[o, o, o]", json_number(v[0]), json_number(v[1]), json_number(v[2])); }
+static json_t *rgb_json(const double v[3])
+{
+    return json_pack("[o, o, o]", json_number(v[0]), json_number(v[1]), json_number(v[2]));
+}
 
 static json_t *texture_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t i)
 {
@@ -52,8 +56,9 @@ static json_t *nuisance_json(const struct fit_nuisance *n)
 {
     json_t *list = json_array();
     for (size_t i = 0; i < n->n; i++)
-        json_array_append_new(list, json_pack("{s:s, s:o, s:o, s:b}", "name", n->name[i], "value", json_number(n->value[i]),
-                                              "standard_error", json_number(n->se[i]), "at_bound", (int)n->at_bound[i]));
+        json_array_append_new(list,
+                              json_pack("{s:s, s:o, s:o, s:b}", "name", n->name[i], "value", json_number(n->value[i]),
+                                        "standard_error", json_number(n->se[i]), "at_bound", (int)n->at_bound[i]));
     return list;
 }
 
@@ -70,12 +75,12 @@ static json_t *starts_json(const struct pipeline_model *m)
     json_t *list = json_array();
     for (size_t k = 0; k < m->fit.n_start; k++) {
         const struct fit_start *s = &m->fit.start[k];
-        json_array_append_new(
-            list, json_pack("{s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:b, s:I}", "start", values_json(m, s->from), "value",
-                            values_json(m, s->param), "objective", json_number(s->objective), "objective_se",
-                            json_number(s->objective_se), "prior_penalty", json_number(s->prior_penalty), "converged",
-                            (int)s->converged, "kept", (int)s->kept, "elsewhere", (int)s->elsewhere, "n_path",
-                            (json_int_t)s->n_path));
+        json_array_append_new(list, json_pack("{s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:b, s:I}", "start",
+                                              values_json(m, s->from), "value", values_json(m, s->param), "objective",
+                                              json_number(s->objective), "objective_se", json_number(s->objective_se),
+                                              "prior_penalty", json_number(s->prior_penalty), "converged",
+                                              (int)s->converged, "kept", (int)s->kept, "elsewhere", (int)s->elsewhere,
+                                              "n_path", (json_int_t)s->n_path));
     }
     return list;
 }
@@ -86,11 +91,12 @@ static json_t *certificate_json(const struct pipeline_model *m)
     json_t *list = json_array();
     for (size_t p = 0; p < m->appearance.n_param; p++)
         if (k->checked[p])
-            json_array_append_new(list, json_pack("{s:s, s:o, s:o}", "name", m->appearance.param[p].name, "rel_error",
-                                                  json_number(k->error[p]), "rel_error_se", json_number(k->error_se[p])));
-    return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", json_number(k->error[k->worst]), "worst_rel_error_se",
-                     json_number(k->error_se[k->worst]), "worst_parameter", m->appearance.param[k->worst].name, "n_path",
-                     (json_int_t)k->n_path, "parameters", list);
+            json_array_append_new(list,
+                                  json_pack("{s:s, s:o, s:o}", "name", m->appearance.param[p].name, "rel_error",
+                                            json_number(k->error[p]), "rel_error_se", json_number(k->error_se[p])));
+    return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", json_number(k->error[k->worst]),
+                     "worst_rel_error_se", json_number(k->error_se[k->worst]), "worst_parameter",
+                     m->appearance.param[k->worst].name, "n_path", (json_int_t)k->n_path, "parameters", list);
 }
 
 static json_t *candidate_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t rank)
@@ -103,8 +109,8 @@ static json_t *candidate_json(const struct pipeline_context *c, const struct pip
     return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:o, s:o, s:o}", "candidate", (json_int_t)k->i_candidate,
                      "light_theta_deg", g->light_theta_deg, "light_phi_deg", g->light_phi_deg, "camera_theta_deg",
                      g->camera_theta_deg, "camera_phi_deg", g->camera_phi_deg, "cloth_rotation_deg",
-                     g->cloth_rotation_deg, "information_nats", json_number(k->score.information), "standard_error_after",
-                     values_json(m, k->score.se_after), "determines", determines);
+                     g->cloth_rotation_deg, "information_nats", json_number(k->score.information),
+                     "standard_error_after", values_json(m, k->score.se_after), "determines", determines);
 }
 
 /* Best first. */
@@ -140,8 +146,8 @@ static void print_textures(const struct pipeline_context *c, const struct pipeli
 {
     if (c->contrast.n == 0) return;
     fprintf(out, "\ntexture: scatter of the means of %.3g mm blocks, per cent of the mean%s\n%-14s %-8s %9s %9s %s\n",
-            job_texture_cell_mm(c->doc), c->doc->texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row", "set",
-            "measured", "rendered", "+-");
+            job_texture_cell_mm(c->doc), c->doc->texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row",
+            "set", "measured", "rendered", "+-");
     for (size_t i = 0; i < c->contrast.n; i++) {
         const struct observation *o = &c->contrast.item[i];
         double rendered[3], se[3];
@@ -176,7 +182,8 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
         fprintf(out, "one gain for each photograph: relative RMS error over the fitted rows with them %.2f %%\n",
                 100.0 * v->fit_with_gains.rel_rms);
     if (isfinite(v->held_out_with_gains.rel_rms))
-        fprintf(out, "                              over the held-out rows %.2f %%\n", 100.0 * v->held_out_with_gains.rel_rms);
+        fprintf(out, "                              over the held-out rows %.2f %%\n",
+                100.0 * v->held_out_with_gains.rel_rms);
     for (size_t k = 0; k < m->fit.n_start; k++) {
         const struct fit_start *s = &m->fit.start[k];
         fprintf(out, "start %-2zu objective %.5g +- %.2g%s%s%s\n", k + 1, s->objective, s->objective_se,

@@ -1,8 +1,8 @@
 #include "optimizer/worker/report/result_pictures.h"
 #include "base/durable.h"
 #include "geometry/volume/vol_file.h"
-#include "optimizer/job/job_folder.h"
 #include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
 #include "renderer/transport/appearance_render.h"
 
@@ -66,7 +66,8 @@ static status write_volumes(const struct pipeline_context *c, struct error *err)
     return put_in_place(c, vol_write_kept_density(temporary, &c->direction, err), temporary, path, err);
 }
 
-status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width, size_t height, struct error *err)
+status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width,
+                            size_t height, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
     status s = make_folder(c, "pictures", err);

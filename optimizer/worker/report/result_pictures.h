@@ -9,7 +9,8 @@
  * pictures/slice-{x,y,z}.png. */
 status result_geometry_write(struct pipeline_context *c, struct error *err);
 /* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
-status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width, size_t height, struct error *err);
+status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width,
+                            size_t height, struct error *err);
 /* renderings/<name>.exr and .png for every observation, photographs/<name>.png beside them. Reports progress from base
  * on. */
 status result_renderings_write(struct pipeline_context *c, double base, struct error *err);

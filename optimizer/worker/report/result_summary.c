@@ -19,7 +19,10 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
                  param_to_file_unit(info, k->upper), info->unit);
         fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, m->fit.param[p]),
-                param_to_file_unit(info, u->se_param[p]), allowed, k->fixed ? "fixed " : m->option->leader[p] != p ? "tied " : "",
+                param_to_file_unit(info, u->se_param[p]), allowed,
+                k->fixed                    ? "fixed "
+                : m->option->leader[p] != p ? "tied "
+                                            : "",
                 u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these photographs");
     }
 }
@@ -68,10 +71,11 @@ static void print_comparison(const struct pipeline_context *c, FILE *out)
         char fitted[48], held_out[48];
         percent(gains ? &m->validation.fit_with_gains : &m->validation.fit, fitted, sizeof fitted);
         percent(gains ? &m->validation.held_out_with_gains : &m->validation.held_out, held_out, sizeof held_out);
-        fprintf(out, "%-24s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, held_out, (double)m->fit.n_path, m->fit.wall_s,
-                i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
+        fprintf(out, "%-24s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, held_out, (double)m->fit.n_path,
+                m->fit.wall_s, i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
     }
-    fprintf(out, "relative RMS errors%s; what follows is of the best model\n\n", gains ? ", each photograph with its own gain" : "");
+    fprintf(out, "relative RMS errors%s; what follows is of the best model\n\n",
+            gains ? ", each photograph with its own gain" : "");
 }
 
 static void print_summary(struct pipeline_context *c, FILE *out)
@@ -86,12 +90,14 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
     if (c->doc->has_volume)
-        fprintf(out, "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those inside\n",
+        fprintf(out,
+                "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those "
+                "inside\n",
                 c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
     fprintf(out, "         quality.html shows how good the geometry is\n\n");
     if (c->doc->fit_radius)
-        fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m,
-                1e6 * c->radius.se_m, 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
+        fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m, 1e6 * c->radius.se_m,
+                1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
                 c->radius.curve.at_bound ? " (at the edge of its range)" : "");
     percent(&m->validation.fit, text, sizeof text);
     fprintf(out, "relative RMS error over the fitted rows    %s\n", text);

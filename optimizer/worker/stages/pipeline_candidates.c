@@ -40,14 +40,16 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
     struct fit_layout layout;
     double wall_s;
     pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
-    const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty, option.photograph_gain_sd};
+    const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty,
+                                            option.photograph_gain_sd};
     struct progress quiet = {.cancel = c->progress.cancel};
     status s = fit_layout_init(&layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
     if (s != STATUS_OK) return s;
     s = pipeline_trace_open(&trace, c, "report", "candidates.journal", i_model, o, err);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
         struct estimator e = estimate_journal_estimator(trace.journal);
-        struct estimator_call call = {m->fit.param, n_path, 0, q == 0 ? REPLICA_CANDIDATE_A : REPLICA_CANDIDATE_B, true};
+        struct estimator_call call = {m->fit.param, n_path, 0, q == 0 ? REPLICA_CANDIDATE_A : REPLICA_CANDIDATE_B,
+                                      true};
         s = e.run(e.context, &call, &quiet, replica[q], &wall_s, err);
     }
     for (size_t i = 0; i < o->n && s == STATUS_OK; i++) {

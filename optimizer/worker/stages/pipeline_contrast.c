@@ -18,7 +18,8 @@ status pipeline_validate_contrast(struct pipeline_context *c, size_t i_model, co
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
         struct estimator e = estimate_journal_estimator(trace.journal);
         struct progress half = pipeline_sub_progress(&part, progress, 0.5 * q, 0.5);
-        struct estimator_call call = {m->fit.param, n_path, ITERATION, q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B, false};
+        struct estimator_call call = {m->fit.param, n_path, ITERATION, q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B,
+                                      false};
         s = e.run(e.context, &call, &half, m->validation.contrast[q], &wall_s, err);
     }
     pipeline_trace_close(&trace);

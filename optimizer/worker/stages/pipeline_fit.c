@@ -97,7 +97,9 @@ static bool list_names(const struct pipeline_model *m, const bool *flag, size_t 
     size_t used = 0;
     text[0] = '\0';
     for (size_t p = 0; p < m->appearance.n_param && used < n_text; p++)
-        if (flag[p]) used += (size_t)snprintf(text + used, n_text - used, "%s%s", used > 0 ? ", " : "", m->appearance.param[p].name);
+        if (flag[p])
+            used +=
+                (size_t)snprintf(text + used, n_text - used, "%s%s", used > 0 ? ", " : "", m->appearance.param[p].name);
     return used > 0;
 }
 
@@ -111,11 +113,13 @@ static void warn_parameters(struct pipeline_context *c, const struct pipeline_mo
         unknown[p] = !m->parameter[p].fixed && !m->fit.uncertainty.determined[p] && !density;
     }
     if (list_names(m, at_bound, sizeof names, names)) {
-        snprintf(warning, sizeof warning, "at the edge of the allowed range in the fit of %s: %s", m->appearance.id, names);
+        snprintf(warning, sizeof warning, "at the edge of the allowed range in the fit of %s: %s", m->appearance.id,
+                 names);
         worker_status_warn(c->status, warning);
     }
     if (list_names(m, unknown, sizeof names, names)) {
-        snprintf(warning, sizeof warning, "not determined by these measurements in the fit of %s: %s", m->appearance.id, names);
+        snprintf(warning, sizeof warning, "not determined by these measurements in the fit of %s: %s", m->appearance.id,
+                 names);
         worker_status_warn(c->status, warning);
     }
 }

@@ -2,8 +2,8 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_FIT_OPTION_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_FIT_OPTION_H
 
-#include "optimizer/job/job_fit_option.h"
 #include "optimizer/fit/objective/fit_layout.h"
+#include "optimizer/job/job_fit_option.h"
 
 void pipeline_fit_option(const struct job_fit_option *from, const struct param_info *info, size_t n_param,
                          struct fit_option *to);

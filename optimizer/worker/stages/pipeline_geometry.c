@@ -36,7 +36,9 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
     if (doc->min_vertex > 0) o->min_vertex = doc->min_vertex;
     if (!isnan(doc->radius_um))
         for (int a = 0; a < 3; a++) o->radius_m[a] = doc->radius_um * um;
-    o->radius_rule = doc->radius_per_axis < 0 ? RADIUS_AUTO : doc->radius_per_axis > 0 ? RADIUS_PER_AXIS : RADIUS_COMMON;
+    o->radius_rule = doc->radius_per_axis < 0   ? RADIUS_AUTO
+                     : doc->radius_per_axis > 0 ? RADIUS_PER_AXIS
+                                                : RADIUS_COMMON;
 }
 
 static void warn_geometry(void *context, const char *text)
@@ -63,7 +65,8 @@ static status read_volume(struct pipeline_context *c, struct error *err)
     }
     s = reconstruct_read(path, n, &c->option, c->space, c->pool, &c->progress, &c->volume, &c->geometry, err);
     if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
-        log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files", c->memory_limit_bytes / 1000000);
+        log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files",
+                 c->memory_limit_bytes / 1000000);
 out:
     free(path);
     free(text);
@@ -194,10 +197,11 @@ static status check_radii(const struct fiber_set *f, const char *name, struct er
     double most_m = 0.5 * fmin(f->tile_size_m[0], f->tile_size_m[1]);
     for (size_t i = 0; i < f->n_fiber; i++)
         if ((double)f->radius_m[i] > most_m)
-            return error_set_field(err, STATUS_INVALID, "fibers.file",
-                                   "cannot use fibers '%s': fiber %zu has a radius of %g mm, the tile is %g x %g mm: the unit may "
-                                   "be wrong, lengths are millimetres",
-                                   name, i, (double)f->radius_m[i] / mm, f->tile_size_m[0] / mm, f->tile_size_m[1] / mm);
+            return error_set_field(
+                err, STATUS_INVALID, "fibers.file",
+                "cannot use fibers '%s': fiber %zu has a radius of %g mm, the tile is %g x %g mm: the unit may "
+                "be wrong, lengths are millimetres",
+                name, i, (double)f->radius_m[i] / mm, f->tile_size_m[0] / mm, f->tile_size_m[1] / mm);
     return STATUS_OK;
 }
 

@@ -1,10 +1,10 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
-#include "optimizer/worker/stages/pipeline_advice.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/quality.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/worker/stages/pipeline_advice.h"
 
 status stage_report(struct pipeline_context *c, struct error *err)
 {

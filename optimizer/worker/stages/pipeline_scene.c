@@ -19,10 +19,9 @@ static bool wants_volume_scene(const struct pipeline_context *c)
 /* The cloth came as fibers: volume models get the density of those. Cheap enough to be done again after a resume. */
 static status voxelise(struct pipeline_context *c, struct error *err)
 {
-    const struct voxelise_option option = {.voxel_size_m = c->doc->voxel_um * um,
-                                           .limit_bytes = c->memory_limit_bytes > 0
-                                                              ? c->memory_limit_bytes / VOXELISE_MEMORY_SHARE
-                                                              : SIZE_MAX};
+    const struct voxelise_option option = {
+        .voxel_size_m = c->doc->voxel_um * um,
+        .limit_bytes = c->memory_limit_bytes > 0 ? c->memory_limit_bytes / VOXELISE_MEMORY_SHARE : SIZE_MAX};
     double radius_m = 0.0, voxel_m;
     char warning[300];
     status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
@@ -30,8 +29,7 @@ static status voxelise(struct pipeline_context *c, struct error *err)
         if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, "fibers.voxel_um");
         return s;
     }
-    for (size_t i = 0; i < c->fiber.n_fiber; i++)
-        radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
+    for (size_t i = 0; i < c->fiber.n_fiber; i++) radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
     if (isnan(option.voxel_size_m) && voxel_m > 0.51 * radius_m) {
         snprintf(warning, sizeof warning,
                  "volume models see the fibers in voxels of %.3g um instead of %.3g um (half a radius): finer ones do "

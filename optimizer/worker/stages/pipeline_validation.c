@@ -34,8 +34,10 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
     double total = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         if (c->observation.item[i].weight > 0.0)
-            total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
-    double least = c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
+            total +=
+                relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
+    double least =
+        c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
     double budget = fmax(validation_share * (double)m->fit.n_path, least);
     double shrink = fmin(1.0, budget / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
@@ -48,17 +50,18 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
 }
 
 /* What row i's photograph would show by one replica. */
-static void show_row(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, int replica, bool own_gain,
-                     struct estimate *out)
+static void show_row(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, int replica,
+                     bool own_gain, struct estimate *out)
 {
     nuisance_show(&m->fit.nuisance, &m->validation.replica[replica][i], out);
     if (own_gain)
-        nuisance_apply_own_gain(&c->observation.item[i], out, m->option->gain_prior_rel, m->fit.uncertainty.misfit_var, out);
+        nuisance_apply_own_gain(&c->observation.item[i], out, m->option->gain_prior_rel, m->fit.uncertainty.misfit_var,
+                                out);
 }
 
 /* NaN when the set has no rows. */
-static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set, bool own_gains,
-                           struct objective_value *value, struct error *err)
+static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
+                           bool own_gains, struct objective_value *value, struct error *err)
 {
     struct observation_set part;
     size_t n = c->observation.n, n_part = 0;
@@ -139,12 +142,14 @@ static void warn_of_equals(struct pipeline_context *c)
     const bool held_out = isfinite(c->model[best].validation.held_out.rel_rms);
     char text[600];
     for (size_t i = 0; i < c->n_model && used < sizeof text; i++) {
-        const struct objective_value *x = pipeline_judged_error(&c->model[best]), *y = pipeline_judged_error(&c->model[i]);
+        const struct objective_value *x = pipeline_judged_error(&c->model[best]),
+                                     *y = pipeline_judged_error(&c->model[i]);
         if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
         if (used == 0)
-            used = (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.3g +- %.2g %%) from",
-                                    held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
-                                    100.0 * x->rel_rms_se);
+            used =
+                (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.3g +- %.2g %%) from",
+                                 held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
+                                 100.0 * x->rel_rms_se);
         n = used < sizeof text ? sizeof text - used : 0;
         used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.3g +- %.2g %%)", c->model[i].appearance.id,
                                  100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
@@ -170,7 +175,8 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     if (s == STATUS_OK) s = score_validation(c, m, err);
     if (s != STATUS_OK) goto out;
     log_info(c->log,
-             "validation of %s: relative RMS error %.4f +- %.4f over the fitted rows, %.4f +- %.4f over the held-out rows; rendered "
+             "validation of %s: relative RMS error %.4f +- %.4f over the fitted rows, %.4f +- %.4f over the held-out "
+             "rows; rendered "
              "means have a standard error below %.2f %%",
              m->appearance.id, m->validation.fit.rel_rms, m->validation.fit.rel_rms_se, m->validation.held_out.rel_rms,
              m->validation.held_out.rel_rms_se, 100.0 * m->validation.worst_rel_se);

@@ -7,8 +7,8 @@
  * as cos^p. Specular takes its share first, the rest is diffuse: energy <= C_S + C_D (1 - C_S) < 1 for all bounds.
  * Reciprocal.
  */
-#include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/surface/scattering_registry.h"
 
 #include <stdlib.h>

@@ -12,8 +12,8 @@
  * than one inner reflection are dropped, which only loses energy. Reciprocal. A(th_d) and its derivatives by C_T and
  * eta are tabulated over cos th_d (eta by central differences in double).
  */
-#include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/surface/scattering_registry.h"
 #include "renderer/scattering/von_mises.h"
 

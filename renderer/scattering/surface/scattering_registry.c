@@ -4,12 +4,8 @@
 #include <string.h>
 
 static const struct scattering_model *const registry[] = {
-    &scattering_two_lobe,
-    &scattering_two_lobe_balanced,
-    &scattering_isotropic,
-    &scattering_kajiya_kay,
-    &scattering_marschner,
-    NULL,
+    &scattering_two_lobe,   &scattering_two_lobe_balanced, &scattering_isotropic,
+    &scattering_kajiya_kay, &scattering_marschner,         NULL,
 };
 
 const struct scattering_model *const *scattering_registry(void) { return registry; }

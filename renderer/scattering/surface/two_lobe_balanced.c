@@ -16,7 +16,7 @@
 enum { N = TWO_LOBE_N_TABLE / 2 + 1 }; /* nodes over [0, pi/2]; all functions are even */
 
 struct balance {
-    double kernel[N][N]; /* g, or g (1 - k), folded to u >= 0: symmetric */
+    double kernel[N][N];   /* g, or g (1 - k), folded to u >= 0: symmetric */
     double d_kernel[N][N]; /* by its own beta */
     double weight[N];      /* cos^2 u du */
     double schlick[2 * N]; /* k of half an angle of so many nodes */

@@ -7,8 +7,8 @@
  * integrand so that f integrates to alpha. Extinction: s(w) = sine of the angle to the fiber (its visible width). Three
  * albedos beside the nine parameters of two_lobe.v1; sampling is that model's, whose density is exact here too.
  */
-#include "renderer/scattering/volume/phase_registry.h"
 #include "renderer/scattering/surface/two_lobe_core.h"
+#include "renderer/scattering/volume/phase_registry.h"
 
 #include <string.h>
 

@@ -8,9 +8,9 @@ enum { MAX_PIXEL = 1 << 26 };
 
 struct environment {
     size_t width, height;
-    float *radiance;    /* height x width x 3 */
-    float *row_cdf;     /* height + 1 */
-    float *column_cdf;  /* height x (width + 1) */
+    float *radiance;         /* height x width x 3 */
+    float *row_cdf;          /* height + 1 */
+    float *column_cdf;       /* height x (width + 1) */
     float pdf_per_luminance; /* density of a pixel per its luminance; 0: all black */
 };
 

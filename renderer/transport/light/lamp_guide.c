@@ -1,7 +1,8 @@
 #include "renderer/transport/light/lamp_guide.h"
 
 /* Samples of the model itself: a rank-1 lattice, the same for everybody. */
-void lamp_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s, struct lamp_guide_energy *e)
+void lamp_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
+                          struct lamp_guide_energy *e)
 {
     enum { N = 256 };
     const float wo[3] = {0, 1, 0}, near = 0.819f; /* cosine of 35 degrees */

@@ -8,8 +8,8 @@
 #define SELVEDGE_RENDERER_LAMP_GUIDE_H
 
 #include "renderer/scattering/scattering.h"
-#include "renderer/transport/surface/fiber_frame.h"
 #include "renderer/transport/light/lamp.h"
+#include "renderer/transport/surface/fiber_frame.h"
 
 #define LAMP_GUIDE_KAPPA 20.0f
 
@@ -19,7 +19,8 @@ struct lamp_guide_energy {
     float forward[3], all[3];
 };
 
-void lamp_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s, struct lamp_guide_energy *e);
+void lamp_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
+                          struct lamp_guide_energy *e);
 
 /* Unit direction from position_mm (unwrapped) to the lamp's centre. */
 static inline void lamp_guide_towards(const struct lamp *lamp, const float position_mm[3], float towards[3])

@@ -1,7 +1,7 @@
 #include "renderer/transport/surface/path_tracer.h"
 
-#include "renderer/transport/surface/fiber_frame.h"
 #include "renderer/transport/light/lamp_guide.h"
+#include "renderer/transport/surface/fiber_frame.h"
 
 #include <math.h>
 #include <string.h>
@@ -67,14 +67,14 @@ struct walk {
     size_t n_lamp;
     struct path_result *out; /* of one lamp: what is added now goes there */
     struct path_result *first_out;
-    size_t n_out;           /* a result for each lamp, one without lamps */
-    struct path_step *step; /* being recorded, or NULL */
+    size_t n_out;                         /* a result for each lamp, one without lamps */
+    struct path_step *step;               /* being recorded, or NULL */
     const struct scattering_state *state; /* of the fiber that was hit */
     size_t i_set;                         /* its parameter set */
     float throughput[3];
     float towards[PATH_MAX_LAMP][3]; /* the lamps, from the present vertex: where its probes go */
     float p_probe;                   /* probability of a probe there */
-    float share[PATH_MAX_LAMP];      /* of lamp connections at the present vertex: the rest is its predecessor's probes' */
+    float share[PATH_MAX_LAMP]; /* of lamp connections at the present vertex: the rest is its predecessor's probes' */
     float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
     float h[PATH_N_DERIVATIVE];            /* running score sums, laid out as path_result's derivatives */
 };
@@ -119,7 +119,8 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float share, 
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return 0;
     to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float light = share * lamp->radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3], most = 0;
+    float light = share * lamp->radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3],
+          most = 0;
     for (int c = 0; c < 3; c++) {
         value[c] = w->throughput[c] * s_rgb[c] * light;
         most = value[c] > most ? value[c] : most;

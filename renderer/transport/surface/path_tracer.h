@@ -19,16 +19,18 @@ struct path_setting {
     const struct scene *scene;
     const struct scattering_model *model;
     const struct scattering_state *state[SCATTERING_MAX_SET]; /* by material group */
-    size_t n_set;                                            /* 1: the first serves all groups */
+    size_t n_set;                                             /* 1: the first serves all groups */
     struct lamp lamp;
     bool has_lamp;
     bool has_environment;
     float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
     const struct environment *image; /* or NULL */
-    float image_turn[2]; /* cosine and sine of the angle from the cloth's frame to the world's */
-    bool probes; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
-    struct lamp_guide_energy energy[SCATTERING_MAX_SET]; /* by material group: probes are as frequent as light goes on forwards */
-    float roulette_below; /* throughput under which paths are ended at random; 0: never */
+    float image_turn[2];             /* cosine and sine of the angle from the cloth's frame to the world's */
+    bool
+        probes; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
+    struct lamp_guide_energy
+        energy[SCATTERING_MAX_SET]; /* by material group: probes are as frequent as light goes on forwards */
+    float roulette_below;           /* throughput under which paths are ended at random; 0: never */
     bool want_jacobian;
 };
 
@@ -54,12 +56,12 @@ struct path_step {
     float wo[3], wi[3];
     float weight; /* cos th_i / (density * survival) */
     float light_wi[3];
-    float light;     /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
-    float image_wi[3], image[3]; /* the same for a sample of the image environment, rgb */
+    float light; /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
+    float image_wi[3], image[3];                       /* the same for a sample of the image environment, rgb */
     float probe_wi[3], probe_wo[3], probe_light_wi[3]; /* the last two at the fiber that the probe met */
-    float probe_light;           /* with all weights of the probe; 0: no light found */
-    uint32_t i_probe_group;      /* material group of that fiber: S' is that group's */
-    uint32_t i_group;            /* material group: S is that group's */
+    float probe_light;                                 /* with all weights of the probe; 0: no light found */
+    uint32_t i_probe_group;                            /* material group of that fiber: S' is that group's */
+    uint32_t i_group;                                  /* material group: S is that group's */
     float escape[3]; /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
 };
 

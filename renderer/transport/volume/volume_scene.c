@@ -201,7 +201,8 @@ bool volume_ray_enter(const struct volume_scene *s, const double origin_mm[3], c
         ray->offset_mm[a] = floor(x / tile) * tile;
         ray->at[a] = (float)((x - ray->offset_mm[a]) / (double)s->voxel_mm[a]);
     }
-    ray->at[2] = nextafterf(s->high, 0); /* inside: a first step that is lost in rounding would else seem to have crossed the slab */
+    ray->at[2] = nextafterf(
+        s->high, 0); /* inside: a first step that is lost in rounding would else seem to have crossed the slab */
     volume_ray_turn(s, d, ray);
     return true;
 }

@@ -35,7 +35,7 @@ struct volume_setting {
     const struct phase_extinction *extinction;
     float multiplier_per_m; /* d */
     float majorant_per_mm;
-    float majorant_density; /* density times s at which extinction would equal the majorant */
+    float majorant_density;                   /* density times s at which extinction would equal the majorant */
     float inv_majorant_density, mean_step_mm; /* their inverses */
     struct lamp lamp;
     bool has_lamp;
@@ -43,8 +43,8 @@ struct volume_setting {
     float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
     const struct environment *image; /* or NULL */
     float image_turn[2];             /* cosine and sine of the angle from the cloth's frame to the world's */
-    float roulette_below; /* throughput under which paths are ended at random; 0: never */
-    float shadow_below;   /* light connections worth less are thinned out at random; 0: never */
+    float roulette_below;            /* throughput under which paths are ended at random; 0: never */
+    float shadow_below;              /* light connections worth less are thinned out at random; 0: never */
     bool want_jacobian;
 };
 

@@ -71,8 +71,9 @@ void fit_cloth_init(struct fit_cloth *c, const struct fit_cloth_option *option, 
     if (option->yarn_file != NULL) take_yarn(&o, option->yarn_file);
     if (option->flatness > 0.0) o.flatness = option->flatness;
     fit_check(phantom_generate(&o, pool, NULL, &c->fiber, &report, &err), &err);
-    fprintf(stderr, "phantom %s%s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n", option->yarn_file != NULL ? "plied " : "",
-            phantom_weave_name(option->weave), c->fiber.n_fiber, c->fiber.n_vertex, report.cover, report.volume_fraction);
+    fprintf(stderr, "phantom %s%s: %zu fibers, %zu vertices, covers %.3f, volume fraction %.2f\n",
+            option->yarn_file != NULL ? "plied " : "", phantom_weave_name(option->weave), c->fiber.n_fiber,
+            c->fiber.n_vertex, report.cover, report.volume_fraction);
     fit_check(scene_new(&c->fiber, &(struct scene_option){.black_sheet = true}, &c->scene, &err), &err);
     bool coarse = option->yarn_file != NULL || option->lofty;
     if (option->with_volume) make_volume(c, coarse ? 0.5 * o.fiber_radius_m[0] : 2e-6, pool);
@@ -90,7 +91,8 @@ void fit_cloth_release(struct fit_cloth *c)
 
 /* ---- phantom ---- */
 
-static void start(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const char *model_id, const double *truth_file_unit)
+static void start(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const char *model_id,
+                  const double *truth_file_unit)
 {
     struct error err = {0};
     *f = (struct fit_phantom){.pool = pool, .folder = folder};
@@ -110,11 +112,12 @@ void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_p
                       const char *model_id, const double *truth_file_unit)
 {
     start(f, folder, pool, model_id, truth_file_unit);
-    fit_cloth_init(&f->cloth, &(struct fit_cloth_option){.weave = weave, .with_volume = f->model.kind == APPEARANCE_VOLUME}, pool);
+    fit_cloth_init(&f->cloth,
+                   &(struct fit_cloth_option){.weave = weave, .with_volume = f->model.kind == APPEARANCE_VOLUME}, pool);
 }
 
-void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const struct fit_cloth *cloth,
-                         const char *model_id, const double *truth_file_unit)
+void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool,
+                         const struct fit_cloth *cloth, const char *model_id, const double *truth_file_unit)
 {
     start(f, folder, pool, model_id, truth_file_unit);
     f->cloth = *cloth;
@@ -164,18 +167,18 @@ static void run_counts(const struct fit_phantom *f, const struct kept_call *c, u
                        struct estimate *out)
 {
     struct error err = {0};
-    const struct appearance_request q = {.scene = {.fibers = f->cloth.scene,
-                                                   .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
-                                         .model = &f->model,
-                                         .param = c->param,
-                                         .configuration = c->configuration,
-                                         .n_configuration = c->n_configuration,
-                                         .n_path = count,
-                                         .seed = c->seed,
-                                         .iteration = iteration,
-                                         .replica = c->replica,
-                                         .want_jacobian = c->want_jacobian,
-                                         .no_probes = c->plain_paths};
+    const struct appearance_request q = {
+        .scene = {.fibers = f->cloth.scene, .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
+        .model = &f->model,
+        .param = c->param,
+        .configuration = c->configuration,
+        .n_configuration = c->n_configuration,
+        .n_path = count,
+        .seed = c->seed,
+        .iteration = iteration,
+        .replica = c->replica,
+        .want_jacobian = c->want_jacobian,
+        .no_probes = c->plain_paths};
     fit_check(appearance_estimate_run(&q, f->pool, NULL, out, &err), &err);
 }
 
@@ -361,7 +364,8 @@ static void scorer_release(struct scorer *s)
 static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept, s->replica[q]);
+        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept,
+                      s->replica[q]);
     append_here(s, f, at);
 }
 

@@ -44,10 +44,12 @@ void fit_check(status s, const struct error *err);
 /* One tile of a phantom: fibers of 14 um, black sheet below. */
 struct fit_cloth_option {
     enum phantom_weave weave;
-    const char *yarn_file; /* of a real yarn's parameters (phantom_yarn_read): plied, with hairs; NULL: 37 smooth parallel fibers */
-    double flatness;       /* of yarns; 0: the phantom's own, 1.8 */
-    bool lofty;            /* felt of 1 x 1 x 1 mm, an eighth of it fiber, as craft felts are; else 0.6 x 0.6 x 0.25 mm and a half */
-    bool with_volume;      /* also as densities and directions, on a grid of 2 um (plied or lofty: of half a radius) */
+    const char *
+        yarn_file; /* of a real yarn's parameters (phantom_yarn_read): plied, with hairs; NULL: 37 smooth parallel fibers */
+    double flatness; /* of yarns; 0: the phantom's own, 1.8 */
+    bool
+        lofty; /* felt of 1 x 1 x 1 mm, an eighth of it fiber, as craft felts are; else 0.6 x 0.6 x 0.25 mm and a half */
+    bool with_volume; /* also as densities and directions, on a grid of 2 um (plied or lofty: of half a radius) */
 };
 
 void fit_cloth_init(struct fit_cloth *c, const struct fit_cloth_option *option, struct thread_pool *pool);
@@ -57,8 +59,8 @@ void fit_cloth_release(struct fit_cloth *c);
 void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_pool *pool, enum phantom_weave weave,
                       const char *model_id, const double *truth_file_unit);
 /* The same on a cloth that was made before, and outlives f. */
-void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const struct fit_cloth *cloth,
-                         const char *model_id, const double *truth_file_unit);
+void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool,
+                         const struct fit_cloth *cloth, const char *model_id, const double *truth_file_unit);
 void fit_phantom_release(struct fit_phantom *f);
 
 struct fit_photography {

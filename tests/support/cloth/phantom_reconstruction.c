@@ -27,7 +27,8 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     return s;
 }
 
-status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r, struct error *err)
+status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r,
+                           struct error *err)
 {
     struct thread_pool *pool = NULL;
     struct phantom_scan_option scan;

@@ -19,7 +19,8 @@ struct phantom_reconstruction {
  * at least 38 fibers or 60 pieces of fiber in the tile. */
 void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weave, double diameter_voxel);
 /* Blur 0.7 voxels, Gaussian noise. r->option may be changed before; start from reconstruct_option_default. */
-status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r, struct error *err);
+status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r,
+                           struct error *err);
 void phantom_reconstruction_release(struct phantom_reconstruction *r);
 
 #endif

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-void repeated_cloth(enum phantom_weave weave, double diameter_voxel, const double n_repeat[2], struct fiber_set *f, struct volume *v,
-                    size_t n_tile[3])
+void repeated_cloth(enum phantom_weave weave, double diameter_voxel, const double n_repeat[2], struct fiber_set *f,
+                    struct volume *v, size_t n_tile[3])
 {
     struct phantom_option o;
     struct phantom_scan_option scan;
@@ -25,7 +25,8 @@ void repeated_cloth(enum phantom_weave weave, double diameter_voxel, const doubl
     assert_int_equal(phantom_generate(&o, NULL, NULL, f, &report, &err), STATUS_OK);
     assert_int_equal(phantom_scan(f, report.n_voxel, &scan, NULL, NULL, &tile, &err), STATUS_OK);
     for (int a = 0; a < 3; a++) n_tile[a] = tile.n[a];
-    const size_t n[3] = {(size_t)llround(n_repeat[0] * (double)tile.n[0]), (size_t)llround(n_repeat[1] * (double)tile.n[1]), tile.n[2]};
+    const size_t n[3] = {(size_t)llround(n_repeat[0] * (double)tile.n[0]),
+                         (size_t)llround(n_repeat[1] * (double)tile.n[1]), tile.n[2]};
     assert_int_equal(volume_init(v, n, tile.voxel_size_m, &err), STATUS_OK);
     const struct rng_key key = {.seed = 11};
     for (size_t k = 0; k < n[2]; k++)
@@ -35,7 +36,8 @@ void repeated_cloth(enum phantom_weave weave, double diameter_voxel, const doubl
             rng_start(&r, &key, (uint32_t)k, (uint32_t)j);
             for (size_t i = 0; i < n[0]; i++) {
                 rng_normal_pair(&r, noise);
-                v->density[volume_index(n, i, j, k)] = tile.density[volume_index(tile.n, i % tile.n[0], j % tile.n[1], k)] + (float)(0.2 * noise[0]);
+                v->density[volume_index(n, i, j, k)] =
+                    tile.density[volume_index(tile.n, i % tile.n[0], j % tile.n[1], k)] + (float)(0.2 * noise[0]);
             }
         }
     volume_release(&tile);

@@ -20,7 +20,8 @@ static double distance_to(const struct test_cylinder *c, const double x[3])
     return sqrt(fmax(0.0, square - along * along));
 }
 
-void test_fill_cylinders(struct volume *v, const struct test_cylinder *c, size_t n_cylinder, double noise_sd, uint64_t seed)
+void test_fill_cylinders(struct volume *v, const struct test_cylinder *c, size_t n_cylinder, double noise_sd,
+                         uint64_t seed)
 {
     const struct rng_key key = {.seed = seed};
     for (size_t k = 0; k < v->n[2]; k++)
@@ -50,7 +51,8 @@ static void write_tiles(TIFF *t, const struct test_page *p)
             memset(tile, 0, sizeof tile);
             for (uint32_t r = 0; r < EDGE && y + r < p->height; r++) {
                 size_t n = x + EDGE <= p->width ? EDGE : p->width - x;
-                memcpy(tile + r * EDGE * bytes, (const uint8_t *)p->pixel + ((y + r) * p->width + x) * bytes, n * bytes);
+                memcpy(tile + r * EDGE * bytes, (const uint8_t *)p->pixel + ((y + r) * p->width + x) * bytes,
+                       n * bytes);
             }
             TIFFWriteEncodedTile(t, TIFFComputeTile(t, x, y, 0, 0), tile, (tmsize_t)(EDGE * EDGE * bytes));
         }

@@ -12,11 +12,12 @@ struct test_cylinder {
 };
 
 /* Density 1 inside of any cylinder, ramp over one voxel at the surface, plus Gaussian noise (seeded). */
-void test_fill_cylinders(struct volume *v, const struct test_cylinder *c, size_t n_cylinder, double noise_sd, uint64_t seed);
+void test_fill_cylinders(struct volume *v, const struct test_cylinder *c, size_t n_cylinder, double noise_sd,
+                         uint64_t seed);
 
 struct test_page {
     uint32_t width, height;
-    uint16_t bits;         /* 8, 16 or 32 (float) */
+    uint16_t bits; /* 8, 16 or 32 (float) */
     const void *pixel;
 };
 

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void count(const struct direction_volume *d, const float *label, const size_t n[3], double *accuracy, double *kept)
+static void count(const struct direction_volume *d, const float *label, const size_t n[3], double *accuracy,
+                  double *kept)
 {
     size_t right = 0, total = 0, n_kept = 0;
     for (size_t z = 0; z < n[2]; z++)
@@ -26,7 +27,8 @@ static void count(const struct direction_volume *d, const float *label, const si
     *accuracy = (double)right / (double)n_kept;
 }
 
-status weave_label_accuracy(const struct direction_volume *d, const char *label_path, double *accuracy, double *kept, struct error *err)
+status weave_label_accuracy(const struct direction_volume *d, const char *label_path, double *accuracy, double *kept,
+                            struct error *err)
 {
     struct volume_source *source = NULL;
     size_t n[3];

@@ -6,6 +6,7 @@
 
 /* Labels 1: tows along the file's z (cloth x), 2: along its x (cloth y); directions of a scan read with axes "zxy".
  * accuracy: share of kept labelled voxels whose direction is nearest to their tow's axis; kept: share of labelled voxels with a direction. */
-status weave_label_accuracy(const struct direction_volume *d, const char *label_path, double *accuracy, double *kept, struct error *err);
+status weave_label_accuracy(const struct direction_volume *d, const char *label_path, double *accuracy, double *kept,
+                            struct error *err);
 
 #endif

@@ -91,8 +91,7 @@ double naive_volume_path(const struct naive_volume *n, const struct configuratio
         length += d[a] * d[a];
     }
     for (int a = 0; a < 3; a++) d[a] /= sqrt(length);
-    for (int a = 0; a < 3; a++)
-        p[a] = c->camera_distance_m * (back[a] - back[2] / d[2] * d[a]) + (a == 2 ? top : 0);
+    for (int a = 0; a < 3; a++) p[a] = c->camera_distance_m * (back[a] - back[2] / d[2] * d[a]) + (a == 2 ? top : 0);
     for (int bounce = 0; throughput > 1e-7; bounce++) {
         double tangent[3], local[3];
         if (!collide(n, d, -log(1 - rng_double(r)), p, tangent)) {

@@ -16,7 +16,7 @@ struct naive_volume {
     const struct direction_volume *v;
     double param[12], d_per_m;
     bool black_sheet;
-    double sky;                              /* the same radiance from everywhere */
+    double sky;                               /* the same radiance from everywhere */
     double furnace[NAIVE_VOLUME_N_TABLE + 1]; /* integral of S cos th_i over wi, by |th_o| */
 };
 

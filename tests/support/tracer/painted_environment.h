@@ -6,7 +6,8 @@
 
 /* theta from the normal, phi from x, in rad, at the middle of each pixel. Aborts the test when it cannot be made; free with
  * environment_free. */
-struct environment *painted_environment(size_t width, size_t height, void (*paint)(double theta, double phi, float rgb[3]));
+struct environment *painted_environment(size_t width, size_t height,
+                                        void (*paint)(double theta, double phi, float rgb[3]));
 /* (0.7, 1, 1.3) everywhere. */
 void paint_constant(double theta, double phi, float rgb[3]);
 /* A wide sun and a moon in a sky, nothing below the horizon but a dim floor. */

@@ -34,8 +34,10 @@ static void test_form_of_a_line(void **state)
     /* 2026-11-21T10:20:30.123Z INFO text */
     static const char form[] = "dddd-dd-ddTdd:dd:dd.dddZ INFO two lines  become one\n";
     for (size_t i = 0; i < 25; i++)
-        if (form[i] == 'd') assert_true(isdigit((unsigned char)text[i]));
-        else assert_int_equal(text[i], form[i]);
+        if (form[i] == 'd')
+            assert_true(isdigit((unsigned char)text[i]));
+        else
+            assert_int_equal(text[i], form[i]);
     assert_memory_equal(text + 24, form + 24, sizeof form - 1 - 24);
     assert_non_null(strstr(text, "Z WARNING w\n"));
     assert_non_null(strstr(text, "Z ERROR e\n"));
@@ -77,7 +79,8 @@ static void test_stream_null_and_failure(void **state)
     free(text);
     log_info(NULL, "nobody listens");
     log_close(NULL);
-    assert_int_equal(log_open(scratch_path(state, "no/such/folder/log.txt"), NULL, LOG_LEVEL_INFO, &log, &err), STATUS_NOT_FOUND);
+    assert_int_equal(log_open(scratch_path(state, "no/such/folder/log.txt"), NULL, LOG_LEVEL_INFO, &log, &err),
+                     STATUS_NOT_FOUND);
     assert_non_null(strstr(err.text, "no/such/folder"));
 }
 

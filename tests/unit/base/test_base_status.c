@@ -49,7 +49,8 @@ static void test_error_may_quote_itself(void **state)
     assert_string_equal(err.text, "outer (inner)");
     assert_int_equal(error_prefix(&err, STATUS_IO, "file %d", 7), STATUS_IO);
     assert_string_equal(err.text, "file 7: outer (inner)");
-    assert_int_equal(error_prefix(NULL, STATUS_IO, "file %d", 7), STATUS_IO); /* nobody wants the text: the code stays */
+    assert_int_equal(error_prefix(NULL, STATUS_IO, "file %d", 7),
+                     STATUS_IO); /* nobody wants the text: the code stays */
     error_set_field(&err, STATUS_IO, err.field, "again");
     assert_string_equal(err.field, "f");
 }
@@ -95,12 +96,16 @@ static void test_texts_are_utf8(void **state)
 {
     (void)state;
     struct error err = {0};
-    error_set_field(&err, STATUS_FORMAT, "f\xfc", "column 'gr\xf6\xdf" "e' of '\xc3\xa4\xe2\x82\xac\xf0\x9f\xa7\xb5'");
+    error_set_field(&err, STATUS_FORMAT, "f\xfc",
+                    "column 'gr\xf6\xdf"
+                    "e' of '\xc3\xa4\xe2\x82\xac\xf0\x9f\xa7\xb5'");
     assert_string_equal(err.text, "column 'gr??e' of '\xc3\xa4\xe2\x82\xac\xf0\x9f\xa7\xb5'");
     assert_string_equal(err.field, "f?");
     error_set(&err, STATUS_FORMAT, "'%.3s' is cut", "\xc3\xa4\xc3\xa4");
     assert_string_equal(err.text, "'\xc3\xa4?' is cut");
-    error_prefix(&err, STATUS_FORMAT, "gr\xf6\xdf" "e");
+    error_prefix(&err, STATUS_FORMAT,
+                 "gr\xf6\xdf"
+                 "e");
     assert_string_equal(err.text, "gr??e: '\xc3\xa4?' is cut");
     errno = EIO;
     error_set_errno(&err, "\xff");
@@ -113,10 +118,28 @@ static void test_what_is_no_utf8(void **state)
     static const struct {
         const char *text;
         size_t n;
-    } golden[] = {{"", 1},         {"a", 1},        {"\x7f", 1},         {"\x80", 0},         {"\xc0\x80", 0},
-                  {"\xc2\x80", 2}, {"\xc3", 0},     {"\xc3" "a", 0},     {"\xe0\x9f\xbf", 0}, {"\xe0\xa0\x80", 3},
-                  {"\xe2\x82", 0}, {"\xed\x9f\xbf", 3}, {"\xed\xa0\x80", 0}, {"\xf0\x8f\xbf\xbf", 0}, {"\xf0\x90\x80\x80", 4},
-                  {"\xf0\x9f", 0}, {"\xf4\x8f\xbf\xbf", 4}, {"\xf4\x90\x80\x80", 0}, {"\xf5\x80\x80\x80", 0}, {"\xff", 0}};
+    } golden[] = {{"", 1},
+                  {"a", 1},
+                  {"\x7f", 1},
+                  {"\x80", 0},
+                  {"\xc0\x80", 0},
+                  {"\xc2\x80", 2},
+                  {"\xc3", 0},
+                  {"\xc3"
+                   "a",
+                   0},
+                  {"\xe0\x9f\xbf", 0},
+                  {"\xe0\xa0\x80", 3},
+                  {"\xe2\x82", 0},
+                  {"\xed\x9f\xbf", 3},
+                  {"\xed\xa0\x80", 0},
+                  {"\xf0\x8f\xbf\xbf", 0},
+                  {"\xf0\x90\x80\x80", 4},
+                  {"\xf0\x9f", 0},
+                  {"\xf4\x8f\xbf\xbf", 4},
+                  {"\xf4\x90\x80\x80", 0},
+                  {"\xf5\x80\x80\x80", 0},
+                  {"\xff", 0}};
     for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++)
         assert_int_equal(utf8_sequence_bytes(golden[i].text), golden[i].n);
 }
@@ -124,9 +147,12 @@ static void test_what_is_no_utf8(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_code_has_its_own_name), cmocka_unit_test(test_error_says_where),
-        cmocka_unit_test(test_error_may_quote_itself),      cmocka_unit_test(test_errno_becomes_a_code),
-        cmocka_unit_test(test_long_texts_are_cut),          cmocka_unit_test(test_texts_are_utf8),
+        cmocka_unit_test(test_every_code_has_its_own_name),
+        cmocka_unit_test(test_error_says_where),
+        cmocka_unit_test(test_error_may_quote_itself),
+        cmocka_unit_test(test_errno_becomes_a_code),
+        cmocka_unit_test(test_long_texts_are_cut),
+        cmocka_unit_test(test_texts_are_utf8),
         cmocka_unit_test(test_what_is_no_utf8),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -80,7 +80,8 @@ static void test_make_folder(void **state)
     scratch_write(scratch_path(state, "a/file"), "x", 1);
     struct error err = {0};
     assert_int_not_equal(durable_make_folder(scratch_path(state, "a/file/under"), NULL), STATUS_OK);
-    assert_int_equal(durable_make_folder(scratch_path(state, "a/file"), &err), STATUS_EXISTS); /* no folder, though the name is taken */
+    assert_int_equal(durable_make_folder(scratch_path(state, "a/file"), &err),
+                     STATUS_EXISTS); /* no folder, though the name is taken */
     assert_non_null(strstr(err.text, "a/file': a file of that name"));
     assert_int_equal(symlink("b", scratch_path(state, "a/link")), 0);
     assert_int_equal(durable_make_folder(scratch_path(state, "a/link/d"), NULL), STATUS_OK);
@@ -340,7 +341,8 @@ static void test_rename(void **state)
     assert_int_equal(durable_rename(temporary, path, NULL), STATUS_OK);
     assert_true(watch.n_data == 1 && watch.n_folder == 1);
     assert_true(access(temporary, F_OK) != 0 && access(path, F_OK) == 0);
-    assert_int_equal(durable_rename(temporary, path, &err), STATUS_NOT_FOUND); /* nothing to rename; what is there stays */
+    assert_int_equal(durable_rename(temporary, path, &err),
+                     STATUS_NOT_FOUND); /* nothing to rename; what is there stays */
     assert_int_equal(access(path, F_OK), 0);
     scratch_write(temporary, "pixels", 6);
     watch = (struct watched_syncs){.fail_with = EIO};

@@ -13,8 +13,12 @@ static const struct {
     uint32_t counter[4], key[2], answer[4];
 } known[] = {
     {{0, 0, 0, 0}, {0, 0}, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}},
-    {{0xffffffff, 0xffffffff, 0xffffffff, 0xffffffff}, {0xffffffff, 0xffffffff}, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
-    {{0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xa4093822, 0x299f31d0}, {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
+    {{0xffffffff, 0xffffffff, 0xffffffff, 0xffffffff},
+     {0xffffffff, 0xffffffff},
+     {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
+    {{0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344},
+     {0xa4093822, 0x299f31d0},
+     {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}},
 };
 
 static void test_known_answers(void **state)
@@ -24,7 +28,8 @@ static void test_known_answers(void **state)
         struct rng r = {.n_left = 0};
         memcpy(r.counter.v, known[i].counter, sizeof known[i].counter);
         memcpy(r.key.v, known[i].key, sizeof known[i].key);
-        for (size_t k = 4; k-- > 0;) assert_int_equal(rng_u32(&r), known[i].answer[k]); /* a block is used from its end */
+        for (size_t k = 4; k-- > 0;)
+            assert_int_equal(rng_u32(&r), known[i].answer[k]); /* a block is used from its end */
     }
 }
 

@@ -3,6 +3,7 @@
 #include "base/scratch_space.h"
 #include "tests/support/cloth/scan_files.h"
 
+#include <cmocka.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -11,7 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <cmocka.h>
 
 enum { MIB = 1 << 20 };
 
@@ -82,7 +82,8 @@ static void test_errors(void **state)
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &old), 0);
     tight.rlim_max = old.rlim_max;
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
-    status s = scratch_new(space, 16 * MIB, "densities", &array, &err); /* no place for it: an error now, no signal later */
+    status s =
+        scratch_new(space, 16 * MIB, "densities", &array, &err); /* no place for it: an error now, no signal later */
     setrlimit(RLIMIT_FSIZE, &old);
     assert_int_equal(s, STATUS_IO);
     assert_null(array);

@@ -13,7 +13,7 @@ static void test_sizes(void **state)
     static const struct {
         double n;
         const char *text;
-    } golden[] = {{0, "0 B"},          {999, "999 B"},     {1000, "1.00 kB"},    {999499, "999 kB"}, {999600, "1.00 MB"},
+    } golden[] = {{0, "0 B"},           {999, "999 B"},      {1000, "1.00 kB"}, {999499, "999 kB"}, {999600, "1.00 MB"},
                   {1234567, "1.23 MB"}, {45.6e6, "45.6 MB"}, {100e9, "100 GB"}, {-1, "?"},          {(double)NAN, "?"}};
     char out[CLI_SHORT_TEXT];
     for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
@@ -95,8 +95,16 @@ static void test_no_terminal_escapes(void **state)
 static void test_progress_line(void **state)
 {
     (void)state;
-    struct job_view v = {.state = "running", .stage = "fit", .fraction = 0.5, .eta_s = 65, .objective = 0.0236, .objective_se = 0.0008,
-                         .rel_rms = (double)NAN, .step = 7, .i_stage = 5, .n_stage = 8};
+    struct job_view v = {.state = "running",
+                         .stage = "fit",
+                         .fraction = 0.5,
+                         .eta_s = 65,
+                         .objective = 0.0236,
+                         .objective_se = 0.0008,
+                         .rel_rms = (double)NAN,
+                         .step = 7,
+                         .i_stage = 5,
+                         .n_stage = 8};
     char out[256];
     text_progress(&v, 200, out, sizeof out);
     assert_non_null(strstr(out, " 50 %"));
@@ -105,7 +113,12 @@ static void test_progress_line(void **state)
     assert_non_null(strstr(out, "step 7  objective 0.02360 +- 0.00080"));
     text_progress(&v, 40, out, sizeof out);
     assert_int_equal(strlen(out), 40);
-    v = (struct job_view){.state = "queued", .fraction = (double)NAN, .eta_s = (double)NAN, .objective = (double)NAN, .step = -1, .i_stage = -1};
+    v = (struct job_view){.state = "queued",
+                          .fraction = (double)NAN,
+                          .eta_s = (double)NAN,
+                          .objective = (double)NAN,
+                          .step = -1,
+                          .i_stage = -1};
     text_progress_plain(&v, out, sizeof out);
     assert_string_equal(out, "  0 %  queued  ETA -");
 }

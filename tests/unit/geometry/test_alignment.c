@@ -46,7 +46,8 @@ static int release_cloth(void **state)
 static void motion(double rotation_deg, double tilt_deg, double shear, double m[9])
 {
     double c = cos(rotation_deg * deg), s = sin(rotation_deg * deg), ct = cos(tilt_deg * deg), st = sin(tilt_deg * deg);
-    const double in_plane[9] = {c, c * shear - s, 0.0, s, s * shear + c, 0.0, 0.0, 0.0, 1.0}, tilt[9] = {1.0, 0.0, 0.0, 0.0, ct, -st, 0.0, st, ct};
+    const double in_plane[9] = {c, c * shear - s, 0.0, s, s * shear + c, 0.0, 0.0, 0.0, 1.0},
+                 tilt[9] = {1.0, 0.0, 0.0, 0.0, ct, -st, 0.0, st, ct};
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             m[3 * i + j] = 0.0;
@@ -89,15 +90,19 @@ static void check_moved(const struct volume *v, const double m[9], double within
     assert_int_equal(found.n, 2);
     for (int p = 0; p < 2; p++) {
         const double want[3] = {m[p], m[3 + p], m[6 + p]}, *got = found.direction[p];
-        double in_plane = remainder(atan2(got[1], got[0]) - atan2(want[1], want[0]), M_PI) / deg, back[3], axis[3] = {0.0};
-        double tilt = asin(got[2]) / deg - asin(want[2] / sqrt(want[0] * want[0] + want[1] * want[1] + want[2] * want[2])) / deg;
-        print_message("  %s: error in the plane %+.2f degrees (standard error %.2f), out of it %+.2f (%.2f), repeat %.1f voxels (correlation %.2f)\n",
-                      p == 0 ? "weft" : "warp", in_plane, found.se_deg[p], tilt, found.tilt_se_deg[p], found.repeat_m[p] / v->voxel_size_m[0],
-                      found.correlation[p]);
+        double in_plane = remainder(atan2(got[1], got[0]) - atan2(want[1], want[0]), M_PI) / deg, back[3],
+               axis[3] = {0.0};
+        double tilt =
+            asin(got[2]) / deg - asin(want[2] / sqrt(want[0] * want[0] + want[1] * want[1] + want[2] * want[2])) / deg;
+        print_message("  %s: error in the plane %+.2f degrees (standard error %.2f), out of it %+.2f (%.2f), repeat "
+                      "%.1f voxels (correlation %.2f)\n",
+                      p == 0 ? "weft" : "warp", in_plane, found.se_deg[p], tilt, found.tilt_se_deg[p],
+                      found.repeat_m[p] / v->voxel_size_m[0], found.correlation[p]);
         assert_true(fabs(in_plane) <= within_deg && fabs(in_plane) <= 3.0 * found.se_deg[p]);
         assert_true(fabs(tilt) <= within_deg && fabs(tilt) <= 3.0 * found.tilt_se_deg[p]);
         axis[p] = 1.0;
-        for (int i = 0; i < 3; i++) back[i] = a.matrix[3 * i] * got[0] + a.matrix[3 * i + 1] * got[1] + a.matrix[3 * i + 2] * got[2];
+        for (int i = 0; i < 3; i++)
+            back[i] = a.matrix[3 * i] * got[0] + a.matrix[3 * i + 1] * got[1] + a.matrix[3 * i + 2] * got[2];
         assert_true(angle_deg(back, axis) < 1e-6);
     }
 }
@@ -144,7 +149,9 @@ static void test_one_system_and_none(void **state)
     struct test_cylinder c[25];
     const double u[3] = {0.1, 1.0, -0.15};
     for (size_t i = 0; i < 25; i++)
-        c[i] = (struct test_cylinder){.point = {(double)(i % 5) * 14.0, 32.0, (double)(i / 5) * 14.0}, .direction = {u[0], u[1], u[2]}, .radius = 3.5};
+        c[i] = (struct test_cylinder){.point = {(double)(i % 5) * 14.0, 32.0, (double)(i / 5) * 14.0},
+                                      .direction = {u[0], u[1], u[2]},
+                                      .radius = 3.5};
     assert_int_equal(volume_init(&v, n, (const double[3]){2e-6, 2e-6, 2e-6}, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, 25, 0.2, 5);
     find(&v, &m);
@@ -154,7 +161,8 @@ static void test_one_system_and_none(void **state)
     print_message("bundle: %.2f degrees off, standard error %.2f\n", angle_deg(m.direction[1], u), m.se_deg[1]);
     assert_true(angle_deg(m.direction[1], u) < 0.5);
     double back[3]; /* of the true direction */
-    for (int i = 0; i < 3; i++) back[i] = a.matrix[3 * i] * u[0] + a.matrix[3 * i + 1] * u[1] + a.matrix[3 * i + 2] * u[2];
+    for (int i = 0; i < 3; i++)
+        back[i] = a.matrix[3 * i] * u[0] + a.matrix[3 * i + 1] * u[1] + a.matrix[3 * i + 2] * u[2];
     assert_true(angle_deg(back, (const double[3]){0.0, 1.0, 0.0}) < 0.5);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) { /* a rotation */
@@ -164,7 +172,9 @@ static void test_one_system_and_none(void **state)
         }
     test_fill_cylinders(&v, c, 0, 0.3, 6);
     assert_int_equal(main_directions_find(&v, 0.0, NULL, NULL, &m, NULL), STATUS_OK);
-    print_message("noise: %zu samples, shares %.2f %.2f z %.2f concentration %.2f, (%.2f %.2f %.2f)\n", m.n_sample, m.share[0], m.share[1], m.share_z, m.concentration[0], m.direction[0][0], m.direction[0][1], m.direction[0][2]);
+    print_message("noise: %zu samples, shares %.2f %.2f z %.2f concentration %.2f, (%.2f %.2f %.2f)\n", m.n_sample,
+                  m.share[0], m.share[1], m.share_z, m.concentration[0], m.direction[0][0], m.direction[0][1],
+                  m.direction[0][2]);
     assert_true(m.n_sample > 500);
     assert_int_equal(m.n, 0);
     volume_release(&v);
@@ -188,7 +198,9 @@ static void test_wrong_axes(void **state)
     assert_int_equal(main_directions_find(&c->v, 0.5, NULL, NULL, &m, NULL), STATUS_OK);
     for (int p = 0; p < 2; p++) {
         double d[3];
-        for (int i = 0; i < 3; i++) d[i] = turned[3 * i] * m.direction[p][0] + turned[3 * i + 1] * m.direction[p][1] + turned[3 * i + 2] * m.direction[p][2];
+        for (int i = 0; i < 3; i++)
+            d[i] = turned[3 * i] * m.direction[p][0] + turned[3 * i + 1] * m.direction[p][1] +
+                   turned[3 * i + 2] * m.direction[p][2];
         memcpy(m.direction[p], d, sizeof d);
     }
     alignment_from_directions(&m, &a);
@@ -208,7 +220,8 @@ static void test_known_period(void **state)
     assert_int_equal(tile_crop_find(&v, 0.5, 0.0, 0.5, NULL, NULL, &crop, NULL), STATUS_OK);
     for (size_t a = 0; a < 2; a++) {
         size_t length = crop.box[3 + a] - crop.box[a];
-        print_message("%c: period %zu, box %zu..%zu of %zu, mismatch %.3f\n", "xy"[a], c->n_tile[a], crop.box[a], crop.box[3 + a], v.n[a], crop.mismatch[a]);
+        print_message("%c: period %zu, box %zu..%zu of %zu, mismatch %.3f\n", "xy"[a], c -> n_tile[a], crop.box[a],
+                      crop.box[3 + a], v.n[a], crop.mismatch[a]);
         assert_int_equal(length % c->n_tile[a], 0); /* two repeats: the largest box that tiles */
         assert_int_equal(length / c->n_tile[a], 2);
         assert_true(crop.mismatch[a] < 0.3); /* noise */
@@ -258,7 +271,8 @@ static void test_align_and_crop(void **state)
     }
     seam_density_measure(&y, &seam);
     print_message("seams %.2f %.2f\n", seam.ratio[0], seam.ratio[1]);
-    for (int e = 0; e < 2; e++) assert_true(seam.ratio[e] > 0.7 && seam.ratio[e] < 1.4); /* 1.5 to 1.6 for chance (test_known_period) */
+    for (int e = 0; e < 2; e++)
+        assert_true(seam.ratio[e] > 0.7 && seam.ratio[e] < 1.4); /* 1.5 to 1.6 for chance (test_known_period) */
     volume_release(&x);
     volume_release(&y);
 }
@@ -288,10 +302,12 @@ static void test_memory_limit(void **state)
         reconstruct_option_default(&o[i]);
         for (int a = 0; a < 3; a++) o[i].voxel_size_m[a] = 2e-6;
         o[i].align = o[i].crop = true;
-        assert_int_equal(reconstruct_read(&path, 1, &o[i], i == 0 ? NULL : space, NULL, NULL, &v[i], &r[i], &err), STATUS_OK);
+        assert_int_equal(reconstruct_read(&path, 1, &o[i], i == 0 ? NULL : space, NULL, NULL, &v[i], &r[i], &err),
+                         STATUS_OK);
     }
     assert_true(scratch_file_bytes(space) > 0);
-    assert_true(r[0].aligned && fabs(r[0].align.rotation_deg - 6.0) < 0.7 && r[0].tile.mismatch[0] < 0.4 && r[0].tile.mismatch[1] < 0.4);
+    assert_true(r[0].aligned && fabs(r[0].align.rotation_deg - 6.0) < 0.7 && r[0].tile.mismatch[0] < 0.4 &&
+                r[0].tile.mismatch[1] < 0.4);
     assert_memory_equal(o[0].matrix, o[1].matrix, sizeof o[0].matrix);
     assert_memory_equal(o[0].crop_voxel, o[1].crop_voxel, sizeof o[0].crop_voxel);
     assert_memory_equal(v[0].n, v[1].n, sizeof v[0].n);
@@ -308,9 +324,10 @@ static void test_memory_limit(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_matrices), cmocka_unit_test(test_threads),
-                                       cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
-                                       cmocka_unit_test(test_known_period), cmocka_unit_test(test_align_and_crop),
-                                       cmocka_unit_test(test_memory_limit)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_known_matrices),      cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
+        cmocka_unit_test(test_known_period),        cmocka_unit_test(test_align_and_crop),
+        cmocka_unit_test(test_memory_limit)};
     return cmocka_run_group_tests(tests, make_cloth, release_cloth);
 }

@@ -101,7 +101,9 @@ static void fill(struct volume *v, size_t n_fiber)
 {
     struct test_cylinder c[9];
     for (size_t i = 0; i < n_fiber; i++)
-        c[i] = (struct test_cylinder){.point = {0.0, 8.0 + 16.0 * (double)(i % 3), 8.0 + 16.0 * (double)(i / 3)}, .direction = {1.0, 0.05, 0.0}, .radius = 3.5};
+        c[i] = (struct test_cylinder){.point = {0.0, 8.0 + 16.0 * (double)(i % 3), 8.0 + 16.0 * (double)(i / 3)},
+                                      .direction = {1.0, 0.05, 0.0},
+                                      .radius = 3.5};
     assert_int_equal(volume_init(v, (const size_t[3]){N, N, N}, (const double[3]){2e-6, 2e-6, 2e-6}, NULL), STATUS_OK);
     test_fill_cylinders(v, c, n_fiber, 0.15, 3);
 }
@@ -125,7 +127,8 @@ static void write_metaimage(const char *name, const char *type, double spacing_m
     char text[400], raw[80];
     snprintf(raw, sizeof raw, "%s.raw", name);
     int n = snprintf(text, sizeof text,
-                     "ObjectType = Image\nNDims = 3\nDimSize = %d %d %d\nElementType = %s\nElementSpacing = %g %g %g\nElementByteOrderMSB = False\n"
+                     "ObjectType = Image\nNDims = 3\nDimSize = %d %d %d\nElementType = %s\nElementSpacing = %g %g "
+                     "%g\nElementByteOrderMSB = False\n"
                      "ElementDataFile = %s\n",
                      N, N, N, type, spacing_mm, spacing_mm, spacing_mm, raw);
     test_write_bytes(path_of(raw), data, n_byte);
@@ -248,7 +251,8 @@ static void test_not_finite(void **state)
         for (int option = 0; option < 2; option++) { /* with alignment the values are looked at earlier */
             chain_init(&c);
             c.o.align = c.o.crop = option == 1;
-            assert_refused(&c, chain_run(&c, &path, 1), STATUS_INVALID, "volume.files", kind == 0 ? "voxel (5, 6, 7) is NaN" : "voxel (5, 6, 7) is infinite");
+            assert_refused(&c, chain_run(&c, &path, 1), STATUS_INVALID, "volume.files",
+                           kind == 0 ? "voxel (5, 6, 7) is NaN" : "voxel (5, 6, 7) is infinite");
             chain_release(&c);
         }
     }
@@ -269,12 +273,14 @@ static void test_lying_header(void **state)
     chain_init(&c);
     assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, "volume.files", "which fits uint16, int16");
     chain_release(&c);
-    static const char deep[] = "ObjectType = Image\nNDims = 3\nDimSize = 48 48 900000\nElementType = MET_USHORT\nElementDataFile = short.raw\n";
+    static const char deep[] = "ObjectType = Image\nNDims = 3\nDimSize = 48 48 900000\nElementType = "
+                               "MET_USHORT\nElementDataFile = short.raw\n";
     test_write_bytes(path[0], deep, sizeof deep - 1);
     chain_init(&c);
     assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, "volume.files", "too short");
     chain_release(&c);
-    static const char huge[] = "ObjectType = Image\nNDims = 3\nDimSize = 900000 900000 900000\nElementType = MET_USHORT\nElementDataFile = short.raw\n";
+    static const char huge[] = "ObjectType = Image\nNDims = 3\nDimSize = 900000 900000 900000\nElementType = "
+                               "MET_USHORT\nElementDataFile = short.raw\n";
     test_write_bytes(path[0], huge, sizeof huge - 1);
     chain_init(&c);
     assert_refused(&c, chain_run(&c, path, 2), STATUS_TOO_LARGE, "volume.files", "short.mhd");
@@ -334,8 +340,9 @@ static int make_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_wrong_spacing), cmocka_unit_test(test_wrong_order_and_depth), cmocka_unit_test(test_noise_only),
-        cmocka_unit_test(test_one_fiber),     cmocka_unit_test(test_not_finite),            cmocka_unit_test(test_lying_header),
+        cmocka_unit_test(test_wrong_spacing), cmocka_unit_test(test_wrong_order_and_depth),
+        cmocka_unit_test(test_noise_only),    cmocka_unit_test(test_one_fiber),
+        cmocka_unit_test(test_not_finite),    cmocka_unit_test(test_lying_header),
         cmocka_unit_test(test_empty_slice),   cmocka_unit_test(test_good_scan_is_quiet),
     };
     return cmocka_run_group_tests(tests, make_folder, NULL);

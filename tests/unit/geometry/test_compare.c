@@ -16,7 +16,7 @@ enum { N_FIBER = 9, N_VERTEX = 101 };
 static const double voxel = 2e-6;
 
 struct piece {
-    size_t from, to; /* vertices */
+    size_t from, to;            /* vertices */
     double y, y_end, z, radius; /* voxels */
 };
 
@@ -66,9 +66,10 @@ static struct compare_report compare(const struct piece *found, size_t n)
     return r;
 }
 
-#define check_near(value, want, tolerance) \
-    do { \
-        if (!(fabs((value) - (want)) <= (tolerance))) fail_msg(#value " is %g, not %g", (double)(value), (double)(want)); \
+#define check_near(value, want, tolerance)                                                                             \
+    do {                                                                                                               \
+        if (!(fabs((value) - (want)) <= (tolerance)))                                                                  \
+            fail_msg(#value " is %g, not %g", (double)(value), (double)(want));                                        \
     } while (0)
 
 static void test_identical(void **state)
@@ -138,7 +139,8 @@ static void test_cut_and_missing(void **state)
     (void)state;
     struct piece p[N_FIBER + 2];
     nine(p);
-    p[9] = p[10] = p[4]; /* fiber 4 in three pieces with two gaps of 10 voxels, closed by the radius for 3.4 voxels from each side */
+    p[9] = p[10] = p
+        [4]; /* fiber 4 in three pieces with two gaps of 10 voxels, closed by the radius for 3.4 voxels from each side */
     p[4].to = 30;
     p[9].from = 40;
     p[9].to = 60;
@@ -146,7 +148,8 @@ static void test_cut_and_missing(void **state)
     struct compare_report r = compare(p, N_FIBER + 2);
     check_near(r.fragments_per_fiber, 11.0 / 9.0, 1e-12);
     check_near(r.gaps_per_fiber, 2.0 / 9.0, 1e-12);
-    check_near(r.center_recall, (900.0 - 2 * 4) / 900.0, 1e-12); /* samples at 33.5 .. 36.5 and their like are out of reach */
+    check_near(r.center_recall, (900.0 - 2 * 4) / 900.0,
+               1e-12); /* samples at 33.5 .. 36.5 and their like are out of reach */
     check_near(r.longest_run, (8.0 + 0.33) / 9.0, 0.005);
     check_near(r.center_precision, 1.0, 0);
     nine(p);
@@ -261,7 +264,8 @@ static void test_margin_and_errors(void **state)
     check_near(r.missed, 0.0, 0);
     assert_int_equal(compare_fibers(&t, &empty, &o, &r, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "found fibers"));
-    assert_int_equal(compare_fibers(&t, &empty, &o, &r, NULL), STATUS_INVALID); /* the same when nobody wants the text */
+    assert_int_equal(compare_fibers(&t, &empty, &o, &r, NULL),
+                     STATUS_INVALID); /* the same when nobody wants the text */
     assert_int_equal(compare_fibers(&empty, &f, &o, &r, &err), STATUS_INVALID);
     o.voxel_size_m = 0.0;
     assert_int_equal(compare_fibers(&t, &f, &o, &r, &err), STATUS_INVALID);
@@ -303,7 +307,10 @@ static void test_nearest_segment_by_brute_force(void **state)
                         double d[3], c[3], dd = 0, dc = 0, d2 = 0;
                         for (size_t a = 0; a < 3; a++) {
                             d[a] = (double)f.position_m[3 * v + 3 + a] - (double)f.position_m[3 * v + a];
-                            c[a] = p[a] - (double)f.position_m[3 * v + a] + (a == 0 ? wx * tile[0] : a == 1 ? wy * tile[1] : 0.0);
+                            c[a] = p[a] - (double)f.position_m[3 * v + a] +
+                                   (a == 0   ? wx * tile[0]
+                                    : a == 1 ? wy * tile[1]
+                                             : 0.0);
                             dd += d[a] * d[a];
                             dc += d[a] * c[a];
                         }

@@ -15,14 +15,14 @@ enum { HEADER = 128 };
 
 /* One fiber from (0, 0, 0) to (1, 0, 0) mm, diameter 0.5 mm, tile 1 x 2 mm. */
 static const unsigned char golden[HEADER + 2 + 24 + 8] = {
-    'H', 'A', 'I', 'R', 1, 0, 0, 0, 2, 0, 0, 0, 7, 0, 0, 0,
-    0, 0, 0, 0, 0, 0, 0, 0x3f, 0, 0, 0, 0, 0, 0, 0x80, 0x3f,
-    0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 's', 'e', 'l', 'v', 'e', 'd', 'g', 'e',
-    ' ', 't', 'i', 'l', 'e', '_', 'm', 'm', '=', '1', ',', '2', 0, 0, 0, 0,
-    [HEADER] = 1, 0,
-    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-    0, 0, 0x80, 0x3f, 0, 0, 0, 0, 0, 0, 0, 0,
-    0, 0, 0, 0x3f, 0, 0, 0, 0x3f,
+    'H',  'A', 'I',  'R',  1,    0,    0,    0,   2,    0,    0,    0,   7,
+    0,    0,   0,    0,    0,    0,    0,    0,   0,    0,    0x3f, 0,   0,
+    0,    0,   0,    0,    0x80, 0x3f, 0,    0,   0x80, 0x3f, 0,    0,   0x80,
+    0x3f, 's', 'e',  'l',  'v',  'e',  'd',  'g', 'e',  ' ',  't',  'i', 'l',
+    'e',  '_', 'm',  'm',  '=',  '1',  ',',  '2', 0,    0,    0,    0,   [HEADER] = 1,
+    0,    0,   0,    0,    0,    0,    0,    0,   0,    0,    0,    0,   0,
+    0,    0,   0x80, 0x3f, 0,    0,    0,    0,   0,    0,    0,    0,   0,
+    0,    0,   0x3f, 0,    0,    0,    0x3f,
 };
 
 static struct fiber_set one_fiber(size_t n_vertex)
@@ -71,7 +71,8 @@ static void test_round_trip_of_many(void **state)
     assert_int_equal(fiber_set_reserve(&f, N, N * (N + 3) / 2, NULL), STATUS_OK);
     for (size_t i = 0, k = 0; i < N; i++) {
         for (size_t j = 0; j < i + 2; j++, k++)
-            for (size_t a = 0; a < 3; a++) f.position_m[3 * k + a] = 1e-6f * (float)((i * 37 + j * (a == i % 3 ? 50 : 3) + a) % 9973);
+            for (size_t a = 0; a < 3; a++)
+                f.position_m[3 * k + a] = 1e-6f * (float)((i * 37 + j * (a == i % 3 ? 50 : 3) + a) % 9973);
         f.first_vertex[i + 1] = k;
         f.radius_m[i] = 1e-6f * (float)(i + 1);
     }
@@ -99,7 +100,8 @@ static void test_longest_fiber(void **state)
     assert_int_equal(g.n_vertex, 65536);
     fiber_set_release(&f);
     /* longer ones in pieces that share a vertex; nothing is lost */
-    static const size_t longer[][3] = {{65537, 2, 2}, {131071, 2, 65536}, {131072, 3, 2}, {200000, 4, 200000 - 3 * 65535}};
+    static const size_t longer[][3] = {
+        {65537, 2, 2}, {131071, 2, 65536}, {131072, 3, 2}, {200000, 4, 200000 - 3 * 65535}};
     for (size_t i = 0; i < sizeof longer / sizeof longer[0]; i++) {
         size_t n = longer[i][0], n_piece = longer[i][1], k = 0;
         f = one_fiber(n);
@@ -112,7 +114,8 @@ static void test_longest_fiber(void **state)
             assert_true(fabsf(g.radius_m[p] / f.radius_m[0] - 1.0f) < 1e-5f);
             for (size_t v = g.first_vertex[p]; v < g.first_vertex[p + 1]; v++, k++)
                 for (size_t a = 0; a < 3; a++)
-                    assert_true(fabsf(g.position_m[3 * v + a] - f.position_m[3 * k + a]) <= 2.4e-7f * fabsf(f.position_m[3 * k + a]));
+                    assert_true(fabsf(g.position_m[3 * v + a] - f.position_m[3 * k + a]) <=
+                                2.4e-7f * fabsf(f.position_m[3 * k + a]));
         }
         assert_int_equal(k + 1, n);
         fiber_set_release(&f);
@@ -193,7 +196,7 @@ static void expect_damaged(void **state, const unsigned char *data, size_t n)
     scratch_write(path, data, n);
     assert_int_equal(fiber_set_read_hair(&f, path, &err), STATUS_FORMAT);
     assert_non_null(strstr(err.text, "'damaged.hair'")); /* the user's name for it, not the server's */
-    assert_int_equal(f.n_vertex, 2); /* left as it was */
+    assert_int_equal(f.n_vertex, 2);                     /* left as it was */
     fiber_set_release(&f);
 }
 
@@ -207,13 +210,26 @@ static void test_damaged_files(void **state)
     static const struct {
         size_t at;
         uint32_t value;
-    } change[] = {{0, 0x20202020}, {4, 0}, {4, 2}, {4, 0xffffffff}, {8, 0xffffffff}, {8, 1}, {12, 5}, {12, 0x27},
-                  {12, 0xffffffff}, {HEADER, 0}, {HEADER, 2}, {HEADER + 2, 0x7fc00000}, {HEADER + 2, 0x7f800000},
+    } change[] = {{0, 0x20202020},
+                  {4, 0},
+                  {4, 2},
+                  {4, 0xffffffff},
+                  {8, 0xffffffff},
+                  {8, 1},
+                  {12, 5},
+                  {12, 0x27},
+                  {12, 0xffffffff},
+                  {HEADER, 0},
+                  {HEADER, 2},
+                  {HEADER + 2, 0x7fc00000},
+                  {HEADER + 2, 0x7f800000},
                   {HEADER + 26, 0xff800000}};
     for (size_t i = 0; i < sizeof change / sizeof change[0]; i++) {
         memcpy(data, golden, sizeof golden);
-        if (change[i].at == HEADER) data[HEADER] = (unsigned char)change[i].value;
-        else put_u32(data + change[i].at, change[i].value);
+        if (change[i].at == HEADER)
+            data[HEADER] = (unsigned char)change[i].value;
+        else
+            put_u32(data + change[i].at, change[i].value);
         expect_damaged(state, data, sizeof golden);
     }
     memcpy(data, golden, sizeof golden);
@@ -245,9 +261,12 @@ static void test_every_changed_byte(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_golden_bytes),          cmocka_unit_test(test_round_trip_of_many),
-        cmocka_unit_test(test_longest_fiber),         cmocka_unit_test(test_files_of_other_programs),
-        cmocka_unit_test(test_no_thickness_is_an_error), cmocka_unit_test(test_damaged_files),
+        cmocka_unit_test(test_golden_bytes),
+        cmocka_unit_test(test_round_trip_of_many),
+        cmocka_unit_test(test_longest_fiber),
+        cmocka_unit_test(test_files_of_other_programs),
+        cmocka_unit_test(test_no_thickness_is_an_error),
+        cmocka_unit_test(test_damaged_files),
         cmocka_unit_test(test_every_changed_byte),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);

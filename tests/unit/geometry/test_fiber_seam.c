@@ -26,7 +26,8 @@ static void test_phantom(void **state)
     make(&f);
     assert_int_equal(fiber_seam_measure(&f, &s, NULL), STATUS_OK);
     for (int a = 0; a < 2; a++) {
-        print_message("%c: %zu ends, %.3f continue, offset %.3f um\n", "xy"[a], s.n_end[a], s.share[a], s.offset_m[a] * 1e6);
+        print_message("%c: %zu ends, %.3f continue, offset %.3f um\n", "xy"[a], s.n_end[a], s.share[a],
+                      s.offset_m[a] * 1e6);
         assert_true(s.n_end[a] > 20);
         assert_true(s.share[a] > 0.97);
         assert_true(s.offset_m[a] < 0.01 * (double)f.radius_m[0]);
@@ -57,8 +58,8 @@ static void test_shifted(void **state)
     assert_true(fabs(before.offset_m[0] - (double)by) < 0.15 * (double)by);
     assert_int_equal(fiber_seam_join(&f, &n_joined, NULL), STATUS_OK);
     assert_int_equal(fiber_seam_measure(&f, &after, NULL), STATUS_OK);
-    print_message("%zu pairs joined: x %.3f -> %.3f continue, offset %.3f -> %.6f um\n", n_joined, before.share[0], after.share[0],
-                  before.offset_m[0] * 1e6, after.offset_m[0] * 1e6);
+    print_message("%zu pairs joined: x %.3f -> %.3f continue, offset %.3f -> %.6f um\n", n_joined, before.share[0],
+                  after.share[0], before.offset_m[0] * 1e6, after.offset_m[0] * 1e6);
     assert_true(n_joined >= (size_t)(0.45 * (double)(before.n_end[0] + before.n_end[1])));
     assert_true(after.share[0] >= before.share[0] && after.offset_m[0] < 1e-9);
     assert_true(after.share[1] > 0.97 && after.offset_m[1] < 1e-9);
@@ -88,6 +89,7 @@ static void test_no_ends(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_phantom), cmocka_unit_test(test_shifted), cmocka_unit_test(test_no_ends)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_phantom), cmocka_unit_test(test_shifted),
+                                       cmocka_unit_test(test_no_ends)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -104,7 +104,8 @@ static void test_text_round_trip(void **state)
     assert_int_equal(g.n_vertex, 5);
     assert_memory_equal(g.first_vertex, f.first_vertex, 3 * sizeof *f.first_vertex);
     assert_memory_equal(g.axis_class, f.axis_class, 2);
-    for (size_t i = 0; i < 15; i++) assert_true(fabsf(g.position_m[i] - f.position_m[i]) <= 1e-7f * fabsf(f.position_m[i]));
+    for (size_t i = 0; i < 15; i++)
+        assert_true(fabsf(g.position_m[i] - f.position_m[i]) <= 1e-7f * fabsf(f.position_m[i]));
     assert_true(fabsf(g.radius_m[1] - 7e-6f) < 1e-12f);
     assert_true(g.tile_size_m[0] == 0.0 && g.tile_size_m[1] == 0.0);
     fiber_set_release(&f);

@@ -1,8 +1,8 @@
 /* Lines that change over to the neighbouring fiber are cut where they do; lines that bend as fibers do are not; ends that run across the
  * measured directions are trimmed. */
-#include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/kinks.h"
+#include "geometry/fibers/shape/axis_fit.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -24,7 +24,8 @@ static void make_lines(struct polyline_set *even, size_t hopper)
         assert_int_equal(polyline_begin(lines, 0, NULL), STATUS_OK);
         for (size_t i = 0; i < N_VERTEX; i++) {
             double side = l == hopper ? 0.5 * DIAMETER * (1.0 + tanh(((double)i - 50.0) / 1.5)) : 0.0;
-            const float x[3] = {(float)i, (float)(20.0 + DIAMETER * (double)l + side), (float)(30.0 + height * sin(wave * (double)i))};
+            const float x[3] = {(float)i, (float)(20.0 + DIAMETER * (double)l + side),
+                                (float)(30.0 + height * sin(wave * (double)i))};
             assert_int_equal(polyline_add(lines, x, NULL), STATUS_OK);
         }
     }

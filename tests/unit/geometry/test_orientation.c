@@ -58,7 +58,8 @@ static void test_j_is_the_published_filter(void **state)
                 }
         largest = fmax(largest, fabs(want - (double)line_filter_j(f, &site, i)));
     }
-    assert_true(largest < 0.03 * j_full); /* interpolation blurs by a sixth of a square voxel; the rest is the line's ends */
+    assert_true(largest <
+                0.03 * j_full); /* interpolation blurs by a sixth of a square voxel; the rest is the line's ends */
     free(scratch);
     line_filter_free(f);
     direction_set_release(&set);
@@ -74,7 +75,8 @@ static void test_search_agrees_with_brute_force(void **state)
     const size_t n[3] = {N, N, N};
     struct test_cylinder c[6];
     for (int i = 0; i < 6; i++)
-        c[i] = (struct test_cylinder){{10.0 + 9.0 * i, 32.0 + 3.0 * (i % 2), 32.0 - 4.0 * (i % 3)}, {0.2 * i - 0.5, 0.9, 0.15 * i}, 3.5};
+        c[i] = (struct test_cylinder){
+            {10.0 + 9.0 * i, 32.0 + 3.0 * (i % 2), 32.0 - 4.0 * (i % 3)}, {0.2 * i - 0.5, 0.9, 0.15 * i}, 3.5};
     struct volume v, l;
     struct direction_volume d;
     struct reconstruct_option o;
@@ -96,7 +98,9 @@ static void test_search_agrees_with_brute_force(void **state)
                 size_t at = volume_index(n, i, j, k);
                 bool peak = d.density[at] > 0 && i + 1 < N && j + 1 < N && k + 1 < N;
                 for (int o3 = 0; o3 < 27 && peak; o3++)
-                    peak = l.density[at] >= l.density[volume_index(n, i + (size_t)(o3 % 3) - 1, j + (size_t)(o3 / 3 % 3) - 1, k + (size_t)(o3 / 9) - 1)];
+                    peak = l.density[at] >=
+                           l.density[volume_index(n, i + (size_t)(o3 % 3) - 1, j + (size_t)(o3 / 3 % 3) - 1,
+                                                  k + (size_t)(o3 / 9) - 1)];
                 if (!peak) continue;
                 struct line_filter_site site = line_filter_at(f, &l, i, j, k, scratch);
                 size_t best = 0;
@@ -105,7 +109,8 @@ static void test_search_agrees_with_brute_force(void **state)
                     float value = line_filter_j(f, &site, q);
                     if (value < least) least = value, best = q;
                 }
-                const double want[3] = {(double)dense.node[best].d[0], (double)dense.node[best].d[1], (double)dense.node[best].d[2]};
+                const double want[3] = {(double)dense.node[best].d[0], (double)dense.node[best].d[1],
+                                        (double)dense.node[best].d[2]};
                 direction_volume_get(&d, at, have);
                 n_near += angle_deg(have, want) < 1.0;
                 n_place++;
@@ -146,7 +151,8 @@ static void test_straight_fibers(void **state)
             sum += angle_deg(have, direction[k]);
             count += 1.0;
         }
-        print_message("direction %d: mean error %.2f degrees, diameter %.2f voxels (7)\n", k, sum / count, r.fiber_diameter_voxel);
+        print_message("direction %d: mean error %.2f degrees, diameter %.2f voxels (7)\n", k, sum / count,
+                      r.fiber_diameter_voxel);
         assert_true(count > 1500.0);
         assert_true(sum / count < 2.0);
         assert_true(fabs(r.fiber_diameter_voxel - 7.0) < 2.0);

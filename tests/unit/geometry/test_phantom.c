@@ -39,7 +39,8 @@ static void test_every_weave_is_a_valid_tile(void **state)
         assert_int_equal(fiber_set_validate(&f, NULL), STATUS_OK);
         fiber_set_z_range_m(&f, &low, &high);
         assert_true(fabs(low - 4.0 * o.voxel_size_m) < 0.5 * o.voxel_size_m);
-        for (int a = 0; a < 2; a++) assert_true(fabs((double)r.n_voxel[a] * o.voxel_size_m / f.tile_size_m[a] - 1.0) < 1e-9);
+        for (int a = 0; a < 2; a++)
+            assert_true(fabs((double)r.n_voxel[a] * o.voxel_size_m / f.tile_size_m[a] - 1.0) < 1e-9);
         assert_true((double)r.n_voxel[2] * o.voxel_size_m >= high + 3.9 * o.voxel_size_m);
         assert_true(r.overlap_mean < 0.03 && r.overlap_max < 0.35);
         assert_true(r.volume_fraction > 0.2 && r.volume_fraction < 0.8);
@@ -47,7 +48,8 @@ static void test_every_weave_is_a_valid_tile(void **state)
         for (size_t i = 0; i < f.n_fiber; i++) /* smooth: vertices 1.5 voxels apart, hardly more */
             for (size_t k = f.first_vertex[i]; k + 1 < f.first_vertex[i + 1]; k++) {
                 const float *p = f.position_m + 3 * k;
-                double step = sqrt(pow((double)(p[3] - p[0]), 2) + pow((double)(p[4] - p[1]), 2) + pow((double)(p[5] - p[2]), 2));
+                double step =
+                    sqrt(pow((double)(p[3] - p[0]), 2) + pow((double)(p[4] - p[1]), 2) + pow((double)(p[5] - p[2]), 2));
                 assert_true(step < 2.5 * o.voxel_size_m);
             }
         fiber_set_release(&f);
@@ -89,7 +91,8 @@ static void test_no_fiber_is_bent_until_it_breaks(void **state)
         struct fiber_set f;
         phantom_option_default(&o, want[i].weave);
         make(&o, 2, &f, &r);
-        print_message("%s: strain %.3f, overlap %.4f, at most %.3f\n", phantom_weave_name(want[i].weave), r.strain_p95, r.overlap_mean, r.overlap_max);
+        print_message("%s: strain %.3f, overlap %.4f, at most %.3f\n", phantom_weave_name(want[i].weave), r.strain_p95,
+                      r.overlap_mean, r.overlap_max);
         assert_true(r.strain_p95 < want[i].strain);
         assert_true(r.overlap_mean < 0.01 && r.overlap_max < 0.1);
         fiber_set_release(&f);
@@ -118,7 +121,8 @@ static void test_twill_has_no_seam(void **state)
     assert_true(r.cover > 0.99);
     for (size_t i = 0; i < f.n_fiber; i++) {
         size_t along = f.axis_class[i], n_next = 0;
-        const float *first = f.position_m + 3 * f.first_vertex[i], *last = f.position_m + 3 * (f.first_vertex[i + 1] - 1);
+        const float *first = f.position_m + 3 * f.first_vertex[i],
+                    *last = f.position_m + 3 * (f.first_vertex[i + 1] - 1);
         assert_true(fabs((double)first[along]) < 1e-9);
         assert_true(fabs((double)last[along] - f.tile_size_m[along]) < 1e-9);
         for (size_t j = 0; j < f.n_fiber; j++)
@@ -244,7 +248,8 @@ static void test_noise_is_as_asked(void **state)
     square = 0;
     count = 0;
     for (size_t k = 40 * 40 * 35; k < volume_n_voxel(n); k++, count++) square += pow((double)v[0].density[k], 2);
-    double want = 0.1 / 400.0 / 0.81, fourth = (1.0 + 3.0 * 40.0) / 40.0; /* of the fourth moment to the variance's square */
+    double want = 0.1 / 400.0 / 0.81,
+           fourth = (1.0 + 3.0 * 40.0) / 40.0; /* of the fourth moment to the variance's square */
     assert_true(fabs(square / count - want) < 5.0 * want * sqrt((fourth - 1.0) / count));
     volume_release(&v[0]);
     fiber_set_release(&f);
@@ -346,8 +351,11 @@ static void test_metaimage(void **state)
     uint16_t value[60];
     phantom_file_option_default(&o);
     assert_int_equal(phantom_write_metaimage(&v, &o, scratch_path(state, "w.mhd"), NULL), STATUS_OK);
-    char *header = scratch_read(scratch_path(state, "w.mhd"), NULL), *data = scratch_read(scratch_path(state, "w.raw"), &n);
-    assert_non_null(strstr(header, "DimSize = 5 4 3\nElementSpacing = 0.002 0.002 0.0025\nElementType = MET_USHORT\nElementDataFile = w.raw\n"));
+    char *header = scratch_read(scratch_path(state, "w.mhd"), NULL),
+         *data = scratch_read(scratch_path(state, "w.raw"), &n);
+    assert_non_null(strstr(
+        header,
+        "DimSize = 5 4 3\nElementSpacing = 0.002 0.002 0.0025\nElementType = MET_USHORT\nElementDataFile = w.raw\n"));
     assert_int_equal(n, sizeof value);
     memcpy(value, data, sizeof value);
     for (size_t k = 0; k < 60; k++) assert_true(value[k] == coded(((double)k - 10.0) / 20.0, &o));
@@ -358,11 +366,14 @@ static void test_metaimage(void **state)
     volume_release(&v);
 }
 
-static const char yarn_text[] =
-    "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: 0\nfiber_clock_wise: 1\nyarn_alpha: 0.45\nalpha: 0.36\n"
-    "yarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: 0.2\nR_max: 1\nuse_migration: 1\ns_i: 1\n"
-    "rho_min: 0.85\nrho_max: 1\nuse_flyaways: 1\nflyaway_hair_density: 30\nflyaway_hair_ze: 0.002 0.06\nflyaway_hair_r0: 0.02 0.005\n"
-    "flyaway_hair_re: 0.016 0.009\nflyaway_hair_pe: 0.39 0.34\nflyaway_loop_density: 19\nflyaway_loop_r1: 0.025 0.005\n";
+static const char yarn_text[] = "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: "
+                                "0\nfiber_clock_wise: 1\nyarn_alpha: 0.45\nalpha: 0.36\n"
+                                "yarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: "
+                                "0.2\nR_max: 1\nuse_migration: 1\ns_i: 1\n"
+                                "rho_min: 0.85\nrho_max: 1\nuse_flyaways: 1\nflyaway_hair_density: "
+                                "30\nflyaway_hair_ze: 0.002 0.06\nflyaway_hair_r0: 0.02 0.005\n"
+                                "flyaway_hair_re: 0.016 0.009\nflyaway_hair_pe: 0.39 0.34\nflyaway_loop_density: "
+                                "19\nflyaway_loop_r1: 0.025 0.005\n";
 
 /* A yarn file to a tile: every weave of yarns, twists that close it, a seam that every cut fiber crosses. */
 static void test_plied_yarns(void **state)
@@ -379,14 +390,16 @@ static void test_plied_yarns(void **state)
         o.packing = 0.4;
         o.n_relax = 40;
         assert_int_equal(phantom_yarn_read(path, &o.yarn, NULL), STATUS_OK);
-        assert_true(o.yarn.n_ply == 3 && o.yarn.n_fiber == 12 && o.yarn.fiber_pitch_m < 0.0 && fabs(o.yarn.ellipse_m[1] - 2e-4) < 1e-12);
+        assert_true(o.yarn.n_ply == 3 && o.yarn.n_fiber == 12 && o.yarn.fiber_pitch_m < 0.0 &&
+                    fabs(o.yarn.ellipse_m[1] - 2e-4) < 1e-12);
         make(&o, 2, &f, &r);
         assert_int_equal(r.n_fiber_per_yarn, 36);
         assert_true(r.plied.n_hair > 0 && r.plied.n_loop > 0);
         double turns = r.plied.ply_turns[0]; /* thirds, within a sixth of the yarn's own */
-        assert_true(fabs(3.0 * turns - round(3.0 * turns)) < 1e-9 && fabs(turns - r.plied.wanted_ply_turns[0]) < 1.0 / 6.0 + 1e-9);
+        assert_true(fabs(3.0 * turns - round(3.0 * turns)) < 1e-9 &&
+                    fabs(turns - r.plied.wanted_ply_turns[0]) < 1.0 / 6.0 + 1e-9);
         assert_true(turns * r.plied.fiber_turns[0] <= 0.0); /* opposite senses */
-        size_t n_end[2] = {0, 0}; /* of weft fibers at x = 0 and at x = tile */
+        size_t n_end[2] = {0, 0};                           /* of weft fibers at x = 0 and at x = tile */
         for (size_t i = 0; i < f.n_fiber; i++)
             for (int e = 0; e < 2; e++) {
                 size_t k = e == 0 ? f.first_vertex[i] : f.first_vertex[i + 1] - 1;
@@ -415,8 +428,10 @@ static double spread_m2(const struct fiber_set *f, double spacing_m)
                 double at[2] = {(double)p[0], (double)p[2]};
                 count[yarn] += pass == 0 ? 1.0 : 0.0;
                 for (size_t a = 0; a < 2; a++) {
-                    if (pass == 0) sum[yarn][a] += at[a];
-                    else square += pow(at[a] - sum[yarn][a] / count[yarn], 2.0);
+                    if (pass == 0)
+                        sum[yarn][a] += at[a];
+                    else
+                        square += pow(at[a] - sum[yarn][a] / count[yarn], 2.0);
                 }
             }
     return square / (count[0] + count[1]);
@@ -457,20 +472,26 @@ static void test_real_yarn_files(void **state)
             o.yarn = y;
             o.yarn_true_size = true_size == 1;
             make(&o, 2, &f, &r);
-            double section_m2 = M_PI * y.ellipse_m[0] * y.ellipse_m[1] * r.plied.scale * r.plied.scale, fiber_m2 = M_PI * radius_m * radius_m;
+            double section_m2 = M_PI * y.ellipse_m[0] * y.ellipse_m[1] * r.plied.scale * r.plied.scale,
+                   fiber_m2 = M_PI * radius_m * radius_m;
             double design = true_size ? (double)y.n_fiber * fiber_m2 / section_m2 : o.packing, plies_m = 0.0;
-            for (int a = 0; a < 2; a++) plies_m += 2.0 * (double)y.n_ply * r.plied.wanted_ply_turns[a] * y.ply_pitch_m * r.plied.scale;
+            for (int a = 0; a < 2; a++)
+                plies_m += 2.0 * (double)y.n_ply * r.plied.wanted_ply_turns[a] * y.ply_pitch_m * r.plied.scale;
             double share = fiber_m2 * fiber_set_length_m(&f) / (plies_m * section_m2);
-            packed[true_size] = (double)(y.n_ply * y.n_fiber) * fiber_m2 / (M_PI * spread_m2(&f, r.yarn_spacing_m[0])) / design;
-            print_message("%s%s: %.3f of a ply is fiber, designed %.3f; packed %.3f\n", name[i], true_size ? ", true size" : "", share,
-                          design, packed[true_size]);
+            packed[true_size] =
+                (double)(y.n_ply * y.n_fiber) * fiber_m2 / (M_PI * spread_m2(&f, r.yarn_spacing_m[0])) / design;
+            print_message("%s%s: %.3f of a ply is fiber, designed %.3f; packed %.3f\n", name[i],
+                          true_size ? ", true size" : "", share, design, packed[true_size]);
             assert_true(true_size ? r.plied.scale == 1.0 : r.plied.scale < 0.8);
-            double winding = hypot(1.0, 2.0 * M_PI * y.ply_distance_m / y.ply_pitch_m * r.plied.ply_turns[0] / r.plied.wanted_ply_turns[0]);
-            double excess = share / (design * winding); /* fibers are longer than their ply, which is longer than the yarn */
+            double winding = hypot(1.0, 2.0 * M_PI * y.ply_distance_m / y.ply_pitch_m * r.plied.ply_turns[0] /
+                                            r.plied.wanted_ply_turns[0]);
+            double excess =
+                share / (design * winding); /* fibers are longer than their ply, which is longer than the yarn */
             assert_true(excess > 1.0 && excess < 1.15);
             fiber_set_release(&f);
         }
-        assert_true(fabs(packed[1] / packed[0] - 1.0) < 0.1); /* fibers that keep a diameter from each other spread a little more */
+        assert_true(fabs(packed[1] / packed[0] - 1.0) <
+                    0.1); /* fibers that keep a diameter from each other spread a little more */
     }
 }
 
@@ -479,9 +500,12 @@ static void test_wrong_yarn_files(void **state)
     static const struct {
         const char *from, *to, *part;
     } change[] = {
-        {"ply_num: 3", "ply_num: 0", "line 1: out of range: 'ply_num'"}, {"alpha: 0.36", "alfa: 0.36", "unknown key 'alfa'"},
-        {"alpha: 0.36", "", "'alpha' is missing"},                        {"beta: 0.2", "beta: nan", "a number is missing after 'beta'"},
-        {"R_max: 1", "R_max: 1 2", "more than a value after 'R_max'"},    {"0.016 0.009", "0.016 -1", "negative: 'flyaway_hair_re'"},
+        {"ply_num: 3", "ply_num: 0", "line 1: out of range: 'ply_num'"},
+        {"alpha: 0.36", "alfa: 0.36", "unknown key 'alfa'"},
+        {"alpha: 0.36", "", "'alpha' is missing"},
+        {"beta: 0.2", "beta: nan", "a number is missing after 'beta'"},
+        {"R_max: 1", "R_max: 1 2", "more than a value after 'R_max'"},
+        {"0.016 0.009", "0.016 -1", "negative: 'flyaway_hair_re'"},
         {"epsilon: 0.1", "epsilon 0.1", "not 'key: value'"},
     };
     const char *path = scratch_path(state, "wrong.txt");
@@ -491,7 +515,8 @@ static void test_wrong_yarn_files(void **state)
         struct error err = {0};
         const char *at = strstr(yarn_text, change[i].from);
         while (strcmp(change[i].from, "alpha: 0.36") == 0 && at[-1] != '\n') at = strstr(at + 1, change[i].from);
-        int n = snprintf(text, sizeof text, "%.*s%s%s", (int)(at - yarn_text), yarn_text, change[i].to, at + strlen(change[i].from));
+        int n = snprintf(text, sizeof text, "%.*s%s%s", (int)(at - yarn_text), yarn_text, change[i].to,
+                         at + strlen(change[i].from));
         scratch_write(path, text, (size_t)n);
         assert_int_equal(phantom_yarn_read(path, &y, &err), STATUS_FORMAT);
         if (strstr(err.text, change[i].part) == NULL) fail_msg("'%s' is not in '%s'", change[i].part, err.text);

@@ -16,7 +16,7 @@
 enum { NX = 72, NY = 64, NZ = 48, N_CYLINDER = 5 };
 
 static const struct test_cylinder cylinder[N_CYLINDER] = {
-    {{0.0, 20.0, 12.0}, {1.0, 0.0, 0.0}, 3.5},   {{0.0, 27.2, 12.0}, {1.0, 0.0, 0.0}, 3.5},
+    {{0.0, 20.0, 12.0}, {1.0, 0.0, 0.0}, 3.5},    {{0.0, 27.2, 12.0}, {1.0, 0.0, 0.0}, 3.5},
     {{36.0, 45.0, 12.0}, {1.0, 0.15, 0.05}, 3.5}, {{20.0, 32.0, 30.0}, {0.1, 1.0, 0.0}, 3.5},
     {{50.0, 32.0, 32.0}, {0.0, 1.0, 0.9}, 3.5},
 };
@@ -44,7 +44,8 @@ struct result {
     struct reconstruct_report r;
 };
 
-static void run_with_in(struct scratch_space *space, const char *path, const struct reconstruct_option *o, size_t n_thread, struct result *x)
+static void run_with_in(struct scratch_space *space, const char *path, const struct reconstruct_option *o,
+                        size_t n_thread, struct result *x)
 {
     struct error err = {0};
     struct thread_pool *pool;
@@ -68,9 +69,15 @@ static void run_in(struct scratch_space *space, const char *path, const char *ax
     run_with_in(space, path, &o, n_thread, x);
 }
 
-static void run_with(const char *path, const struct reconstruct_option *o, size_t n_thread, struct result *x) { run_with_in(NULL, path, o, n_thread, x); }
+static void run_with(const char *path, const struct reconstruct_option *o, size_t n_thread, struct result *x)
+{
+    run_with_in(NULL, path, o, n_thread, x);
+}
 
-static void run(const char *path, const char *axes, size_t n_thread, struct result *x) { run_in(NULL, path, axes, n_thread, x); }
+static void run(const char *path, const char *axes, size_t n_thread, struct result *x)
+{
+    run_in(NULL, path, axes, n_thread, x);
+}
 
 static void release(struct result *x)
 {
@@ -117,7 +124,8 @@ static void test_chain(void **state)
     (void)state;
     struct result x;
     run(path, "xyz", 2, &x);
-    print_message("low %.0f high %.0f noise %.3f diameter %.2f radius %.3f um (7.0) rms %.3f voxels length %.1f um dice %.3f change %.2f\n",
+    print_message("low %.0f high %.0f noise %.3f diameter %.2f radius %.3f um (7.0) rms %.3f voxels length %.1f um "
+                  "dice %.3f change %.2f\n",
                   x.r.density_low, x.r.density_high, x.r.noise_sd, x.r.fiber_diameter_voxel, x.r.radius_m[0] * 1e6,
                   rms_from_axes(&x.f), x.r.total_length_m * 1e6, x.r.dice, x.r.direction_change_mean_deg);
     assert_true(fabs(x.r.density_low - 20000.0) < 500.0 && fabs(x.r.density_high - 30000.0) < 1500.0);
@@ -127,9 +135,11 @@ static void test_chain(void **state)
     assert_true(fabs(x.r.radius_m[0] / 7e-6 - 1.0) < 0.03);
     assert_true(x.r.dice > 0.85);
     for (size_t l = 0; l < N_CYLINDER; l++) { /* every fiber runs from face to face */
-        const float *a = x.f.position_m + 3 * x.f.first_vertex[l], *b = x.f.position_m + 3 * (x.f.first_vertex[l + 1] - 1);
+        const float *a = x.f.position_m + 3 * x.f.first_vertex[l],
+                    *b = x.f.position_m + 3 * (x.f.first_vertex[l + 1] - 1);
         int axis = x.f.axis_class[l];
-        double low = fmin((double)a[axis], (double)b[axis]) / 2e-6, high = fmax((double)a[axis], (double)b[axis]) / 2e-6;
+        double low = fmin((double)a[axis], (double)b[axis]) / 2e-6,
+               high = fmax((double)a[axis], (double)b[axis]) / 2e-6;
         double edge = axis == 0 ? NX : NY;
         bool leaning = fabs((double)(a[2] - b[2])) > 60e-6; /* leaves through the top and the bottom */
         assert_true(leaning || (low < 0.01 && high > edge - 0.01));
@@ -154,7 +164,8 @@ static void test_choices_are_reported_and_overridable(void **state)
     struct result x, y;
     run(path, "xyz", 2, &x);
     const struct reconstruct_option *o = &x.o;
-    const double chosen[] = {o->density_low, o->density_high, o->s, o->t, (double)o->h, o->eps_d, o->eps_j, o->radius_m[0], o->radius_m[1], o->radius_m[2]};
+    const double chosen[] = {o->density_low, o->density_high, o->s,           o->t,           (double)o->h,
+                             o->eps_d,       o->eps_j,        o->radius_m[0], o->radius_m[1], o->radius_m[2]};
     for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++) assert_true(isfinite(chosen[i]) && chosen[i] != 0.0);
     assert_true(x.r.density_low == o->density_low && x.r.density_high == o->density_high);
     for (int a = 0; a < 3; a++) assert_true(x.r.radius_m[a] == o->radius_m[a] && x.r.radius_se_m[a] > 0.0);
@@ -173,8 +184,10 @@ static void test_choices_are_reported_and_overridable(void **state)
     other.eps_j *= 0.9;
     for (int a = 0; a < 3; a++) other.radius_m[a] *= 1.1;
     run_with(path, &other, 2, &y);
-    assert_true(y.o.density_low == other.density_low && y.o.density_high == other.density_high && y.o.s == other.s && y.o.t == other.t);
-    assert_true(y.o.h == other.h && y.o.eps_d == other.eps_d && y.o.eps_j == other.eps_j && y.o.radius_m[1] == other.radius_m[1]);
+    assert_true(y.o.density_low == other.density_low && y.o.density_high == other.density_high && y.o.s == other.s &&
+                y.o.t == other.t);
+    assert_true(y.o.h == other.h && y.o.eps_d == other.eps_d && y.o.eps_j == other.eps_j &&
+                y.o.radius_m[1] == other.radius_m[1]);
     assert_true(y.r.density_low == other.density_low && y.r.radius_m[1] == other.radius_m[1]);
     assert_true(y.r.n_kept_voxel != x.r.n_kept_voxel);
     assert_true(fabs((double)y.f.radius_m[0] / other.radius_m[y.f.axis_class[0]] - 1.0) < 1e-6);
@@ -211,13 +224,16 @@ static void test_advice_to_crop_can_be_followed(void **state)
         for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
         memcpy(o.matrix, turned, sizeof o.matrix);
         memcpy(o.crop_voxel, box, sizeof o.crop_voxel);
-        if (i == 1) memcpy(o.crop_voxel, (const size_t[6]){advice[0].x0, advice[0].y0, 0, advice[0].x1, advice[0].y1, NZ}, sizeof o.crop_voxel);
+        if (i == 1)
+            memcpy(o.crop_voxel, (const size_t[6]){advice[0].x0, advice[0].y0, 0, advice[0].x1, advice[0].y1, NZ},
+                   sizeof o.crop_voxel);
         if (reconstruct_read(&file, 1, &o, NULL, NULL, NULL, &v, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
         reconstruct_warn_volume(&o, &r, take_advice, &advice[i]);
         volume_release(&v);
     }
     assert_int_equal(advice[0].n_said, 1);
-    assert_true(advice[0].x0 >= 30 && advice[0].x1 > 55 && advice[0].x1 <= NX && advice[0].y0 >= 2 && advice[0].y1 <= NY - 2);
+    assert_true(advice[0].x0 >= 30 && advice[0].x1 > 55 && advice[0].x1 <= NX && advice[0].y0 >= 2 &&
+                advice[0].y1 <= NY - 2);
     assert_int_equal(advice[1].n_said, 0);
 }
 
@@ -295,7 +311,8 @@ static bool starts_and_ends_at_faces(const struct result *x, size_t fiber)
     for (int last = 0; last < 2; last++) {
         const float *p = x->f.position_m + 3 * (last ? x->f.first_vertex[fiber + 1] - 1 : x->f.first_vertex[fiber]);
         double room = INFINITY;
-        for (int a = 0; a < 3; a++) room = fmin(room, fmin(fabs((double)p[a]), fabs((double)p[a] - (double)x->v.n[a] * 2e-6)));
+        for (int a = 0; a < 3; a++)
+            room = fmin(room, fmin(fabs((double)p[a]), fabs((double)p[a] - (double)x->v.n[a] * 2e-6)));
         if (!(room < 0.02e-6)) return false;
     }
     return true;
@@ -371,9 +388,14 @@ static void test_first_error_is_the_one_told(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain), cmocka_unit_test(test_choices_are_reported_and_overridable), cmocka_unit_test(test_advice_to_crop_can_be_followed),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_chain),
+                                       cmocka_unit_test(test_choices_are_reported_and_overridable),
+                                       cmocka_unit_test(test_advice_to_crop_can_be_followed),
                                        cmocka_unit_test(test_filter_that_finds_nothing),
-                                       cmocka_unit_test(test_threads), cmocka_unit_test(test_axes),
-                                       cmocka_unit_test(test_cancel), cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_first_error_is_the_one_told)};
+                                       cmocka_unit_test(test_threads),
+                                       cmocka_unit_test(test_axes),
+                                       cmocka_unit_test(test_cancel),
+                                       cmocka_unit_test(test_memory_limit),
+                                       cmocka_unit_test(test_first_error_is_the_one_told)};
     return cmocka_run_group_tests(tests, make_scan, NULL);
 }

@@ -3,6 +3,7 @@
 #include "geometry/volume/volume_source.h"
 #include "tests/support/cloth/scan_files.h"
 
+#include <cmocka.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,7 +12,6 @@
 #include <string.h>
 #include <tiffio.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 enum { W = 37, H = 23, N = 4 };
 
@@ -45,7 +45,8 @@ static void *make_pixels(size_t page, uint16_t bits)
     return p;
 }
 
-static void write_stack(const char *path, uint16_t bits, size_t n_page, uint16_t compression, enum test_tiff_layout layout)
+static void write_stack(const char *path, uint16_t bits, size_t n_page, uint16_t compression,
+                        enum test_tiff_layout layout)
 {
     struct test_page page[N];
     for (size_t i = 0; i < n_page; i++) page[i] = (struct test_page){W, H, bits, make_pixels(i, bits)};
@@ -74,7 +75,8 @@ static void check_stack(const char *const *path, size_t n_path, uint16_t bits)
 static void test_kinds(void **state)
 {
     (void)state;
-    static const uint16_t bits[] = {8, 16, 32}, compression[] = {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE};
+    static const uint16_t bits[] = {8, 16, 32},
+                          compression[] = {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE};
     char path[128];
     const char *list[1] = {path};
     path_of(path, "stack.tif");
@@ -128,14 +130,22 @@ static void test_sample_types(void **state)
         for (size_t i = 0; i < 4; i++) {
             double x = kind[k].value[i];
             bool is_int = kind[k].format == SAMPLEFORMAT_INT;
-            if (kind[k].format == SAMPLEFORMAT_IEEEFP && kind[k].bits == 64) pixel.f64[i] = x;
-            else if (kind[k].format == SAMPLEFORMAT_IEEEFP) pixel.f32[i] = (float)x;
-            else if (kind[k].bits == 8 && is_int) pixel.i8[i] = (int8_t)x;
-            else if (kind[k].bits == 8) pixel.u8[i] = (uint8_t)x;
-            else if (kind[k].bits == 16 && is_int) pixel.i16[i] = (int16_t)x;
-            else if (kind[k].bits == 16) pixel.u16[i] = (uint16_t)x;
-            else if (is_int) pixel.i32[i] = (int32_t)x;
-            else pixel.u32[i] = (uint32_t)x;
+            if (kind[k].format == SAMPLEFORMAT_IEEEFP && kind[k].bits == 64)
+                pixel.f64[i] = x;
+            else if (kind[k].format == SAMPLEFORMAT_IEEEFP)
+                pixel.f32[i] = (float)x;
+            else if (kind[k].bits == 8 && is_int)
+                pixel.i8[i] = (int8_t)x;
+            else if (kind[k].bits == 8)
+                pixel.u8[i] = (uint8_t)x;
+            else if (kind[k].bits == 16 && is_int)
+                pixel.i16[i] = (int16_t)x;
+            else if (kind[k].bits == 16)
+                pixel.u16[i] = (uint16_t)x;
+            else if (is_int)
+                pixel.i32[i] = (int32_t)x;
+            else
+                pixel.u32[i] = (uint32_t)x;
         }
         TIFF *t = TIFFOpen(path, "w");
         assert_non_null(t);
@@ -313,7 +323,8 @@ static void test_constant_slices(void **state)
 {
     (void)state;
     enum { EDGE = 1024 };
-    static const uint16_t compression[] = {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_LZMA, COMPRESSION_ZSTD, COMPRESSION_LERC};
+    static const uint16_t compression[] = {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_LZMA,
+                                           COMPRESSION_ZSTD, COMPRESSION_LERC};
     static uint16_t pixel[EDGE * EDGE];
     static float value[EDGE * EDGE];
     char path[128];
@@ -334,7 +345,8 @@ static void test_constant_slices(void **state)
         TIFFSetField(t, TIFFTAG_COMPRESSION, compression[c]);
         assert_int_equal(TIFFWriteEncodedStrip(t, 0, pixel, sizeof pixel), sizeof pixel);
         TIFFClose(t);
-        if (volume_source_open(list, 1, &s, &err) != STATUS_OK) fail_msg("compression %u: %s", compression[c], err.text);
+        if (volume_source_open(list, 1, &s, &err) != STATUS_OK)
+            fail_msg("compression %u: %s", compression[c], err.text);
         assert_int_equal(volume_source_read(s, 0, 1, value, &err), STATUS_OK);
         for (size_t i = 0; i < EDGE * EDGE; i++) assert_true(value[i] == 513.0f);
         volume_source_close(s);
@@ -367,7 +379,8 @@ static void test_white_is_zero(void **state)
     size_t n = read_file(path, data, sizeof data);
     patch_tag(data, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
     test_write_bytes(path, data, n);
-    expect_open_error(path, STATUS_UNSUPPORTED, "page 1 has PhotometricInterpretation 0 (white is zero): save the stack with black as zero");
+    expect_open_error(path, STATUS_UNSUPPORTED,
+                      "page 1 has PhotometricInterpretation 0 (white is zero): save the stack with black as zero");
 }
 
 static status read_whole(const char *path, struct reconstruct_option *o, struct error *err)
@@ -434,10 +447,13 @@ static void test_missing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sample_types),  cmocka_unit_test(test_kinds),         cmocka_unit_test(test_slices),     cmocka_unit_test(test_unlike_pages),
-        cmocka_unit_test(test_truncated),     cmocka_unit_test(test_damaged),    cmocka_unit_test(test_lying_header),
-        cmocka_unit_test(test_enormous_pages), cmocka_unit_test(test_constant_slices), cmocka_unit_test(test_compressed_pages_have_a_limit),
-        cmocka_unit_test(test_white_is_zero), cmocka_unit_test(test_bad_values),    cmocka_unit_test(test_missing),
+        cmocka_unit_test(test_sample_types),    cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_slices),          cmocka_unit_test(test_unlike_pages),
+        cmocka_unit_test(test_truncated),       cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_lying_header),    cmocka_unit_test(test_enormous_pages),
+        cmocka_unit_test(test_constant_slices), cmocka_unit_test(test_compressed_pages_have_a_limit),
+        cmocka_unit_test(test_white_is_zero),   cmocka_unit_test(test_bad_values),
+        cmocka_unit_test(test_missing),
     };
     return cmocka_run_group_tests(tests, make_folder, NULL);
 }

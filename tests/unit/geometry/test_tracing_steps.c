@@ -1,8 +1,8 @@
 /* The steps from directions to fibers, one by one: smoothing, linking, joining, relaxing, radius, alignment. */
 #include "base/rng.h"
-#include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/lines/joining.h"
 #include "geometry/fibers/lines/linking.h"
+#include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/fibers/shape/relax.h"
 #include "geometry/fibers/shape/smoothing.h"
@@ -36,7 +36,8 @@ static void test_smoothing(void **state)
         if (n < 3) assert_memory_equal(x, start, n * sizeof *x);
         for (int a = 0; a < 3 && n >= 3; a++) {
             memset(second, 0, sizeof second); /* second[i + 1]: second difference centred at i */
-            for (size_t i = 1; i + 1 < n; i++) second[i + 1] = (double)x[i - 1][a] - 2.0 * (double)x[i][a] + (double)x[i + 1][a];
+            for (size_t i = 1; i + 1 < n; i++)
+                second[i + 1] = (double)x[i - 1][a] - 2.0 * (double)x[i][a] + (double)x[i + 1][a];
             for (size_t i = 0; i < n; i++) {
                 double left = i > 0 ? second[i] : 0.0, right = i + 2 < n + 1 ? second[i + 2] : 0.0;
                 double gradient = 0.1 * ((double)x[i][a] - (double)start[i][a]) + left - 2.0 * second[i + 1] + right;
@@ -62,7 +63,8 @@ static void test_linking_leaning_neighbours(void **state)
     for (size_t k = 0; k <= N_SLICE; k++) first[k] = k * N_FIBER;
     for (size_t k = 0; k < N_SLICE; k++)
         for (size_t i = 0; i < N_FIBER; i++) /* 4 voxels apart along u, moving 0.8 along u a slice; sorted by v */
-            center[k * N_FIBER + i] = (struct center){.u = 5.0f + 4.0f * (float)i + 0.8f * (float)k, .v = 30.0f + 0.1f * (float)i, .slope_u = 0.8f};
+            center[k * N_FIBER + i] = (struct center){
+                .u = 5.0f + 4.0f * (float)i + 0.8f * (float)k, .v = 30.0f + 0.1f * (float)i, .slope_u = 0.8f};
     polyline_set_init(&lines);
     assert_int_equal(centers_link(&list, &frame, 5.0, 4.0, 10, &lines, &n_chain, NULL), STATUS_OK);
     assert_int_equal(n_chain, N_FIBER);
@@ -79,7 +81,8 @@ static void test_linking_leaning_neighbours(void **state)
 static void add_piece(struct polyline_set *p, uint8_t axis, float x0, float x1, float y)
 {
     assert_int_equal(polyline_begin(p, axis, NULL), STATUS_OK);
-    for (float x = x0; x <= x1; x += 1.0f) assert_int_equal(polyline_add(p, (const float[3]){x, y, 16.0f}, NULL), STATUS_OK);
+    for (float x = x0; x <= x1; x += 1.0f)
+        assert_int_equal(polyline_add(p, (const float[3]){x, y, 16.0f}, NULL), STATUS_OK);
 }
 
 static void test_duplicates_and_joins(void **state)
@@ -90,7 +93,8 @@ static void test_duplicates_and_joins(void **state)
     struct polyline_set in, single, out;
     struct join_counts counts = {0};
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
-    const struct test_cylinder c[2] = {{{0.0, 8.0, 16.0}, {1.0, 0.0, 0.0}, 3.0}, {{0.0, 22.0, 16.0}, {1.0, 0.0, 0.0}, 3.0}};
+    const struct test_cylinder c[2] = {{{0.0, 8.0, 16.0}, {1.0, 0.0, 0.0}, 3.0},
+                                       {{0.0, 22.0, 16.0}, {1.0, 0.0, 0.0}, 3.0}};
     test_fill_cylinders(&v, c, 2, 0.0, 1);
     for (size_t k = 0; k < 32; k++) /* the second fiber is cut in two at x = 50 */
         for (size_t j = 16; j < 32; j++)
@@ -124,7 +128,8 @@ static void test_relax(void **state)
 {
     (void)state;
     const size_t n[3] = {64, 32, 32};
-    const struct test_cylinder c[2] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 3.5}, {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
+    const struct test_cylinder c[2] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 3.5},
+                                       {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
     struct volume v;
     struct polyline_set lines;
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
@@ -135,7 +140,8 @@ static void test_relax(void **state)
     assert_int_equal(polylines_relax(&lines, &v, 4.2f, 6, 0.1, NULL, NULL, NULL), STATUS_OK);
     double square = 0.0;
     for (size_t i = 0; i < lines.n_vertex; i++) {
-        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5), dz = (double)lines.vertex[i][2] - 16.0;
+        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5),
+               dz = (double)lines.vertex[i][2] - 16.0;
         square += dy * dy + dz * dz;
     }
     print_message("rms distance from the axes %.3f voxels\n", sqrt(square / (double)lines.n_vertex));
@@ -168,7 +174,8 @@ static void test_axis_fit(void **state)
     assert_int_equal(polylines_fit(&lines, &v, 7.0, 6, &profile, NULL, NULL, NULL), STATUS_OK);
     double square = 0.0;
     for (size_t i = 0; i < lines.n_vertex; i++) {
-        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5), dz = (double)lines.vertex[i][2] - 16.0;
+        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5),
+               dz = (double)lines.vertex[i][2] - 16.0;
         square += dy * dy + dz * dz;
     }
     print_message("rms distance from the axes %.3f voxels, radius %.3f, blur %.2f, densities %.2f to %.2f\n",
@@ -192,11 +199,14 @@ static void test_radius(void **state)
     struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *h = part + RADIUS_PARTS;
     polyline_set_init(&lines);
     for (int i = 0; i < N_FIBER; i++) {
-        double y = 24.0 + (i > 0 ? 7.0 * cos(i * M_PI / 3.0) : 0.0), z = 24.0 + (i > 0 ? 7.0 * sin(i * M_PI / 3.0) : 0.0);
+        double y = 24.0 + (i > 0 ? 7.0 * cos(i * M_PI / 3.0) : 0.0),
+               z = 24.0 + (i > 0 ? 7.0 * sin(i * M_PI / 3.0) : 0.0);
         c[i] = (struct test_cylinder){{0.0, y, z}, {1.0, 0.0, 0.0}, 3.5};
         assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
         for (int x = 0; x <= 48; x++)
-            assert_int_equal(polyline_add(&lines, (const float[3]){(float)x, (float)y + (x % 2 ? 0.25f : -0.25f), (float)z}, NULL), STATUS_OK);
+            assert_int_equal(
+                polyline_add(&lines, (const float[3]){(float)x, (float)y + (x % 2 ? 0.25f : -0.25f), (float)z}, NULL),
+                STATUS_OK);
     }
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, N_FIBER, 0.0, 1);
@@ -208,7 +218,8 @@ static void test_radius(void **state)
         inside += h->inside[0][b];
     }
     assert_int_equal(total % 4096, 0); /* whole bricks of 16^3 voxels, 64 points a voxel */
-    double volume = (double)inside / 64.0 / (N_FIBER * M_PI * 3.5 * 3.5 * 48.0); /* interpolation fills the contacts a little */
+    double volume =
+        (double)inside / 64.0 / (N_FIBER * M_PI * 3.5 * 3.5 * 48.0); /* interpolation fills the contacts a little */
     assert_true(volume > 0.99 && volume < 1.04);
     assert_true(fabs(h->length_voxel[0] / (N_FIBER * 48.0 * sqrt(1.25)) - 1.0) < 1e-3);
     double score = radius_best_score(h, 1), mass = radius_from_mass(h, 1, score) * pow(1.25, 0.25);
@@ -232,7 +243,8 @@ static void test_radius_of_each_class(void **state)
         double along_y;
         enum radius_rule rule;
         bool per_axis;
-    } check[] = {{4.5, RADIUS_AUTO, true}, {3.5, RADIUS_AUTO, false}, {4.5, RADIUS_COMMON, false}, {3.5, RADIUS_PER_AXIS, true}};
+    } check[] = {
+        {4.5, RADIUS_AUTO, true}, {3.5, RADIUS_AUTO, false}, {4.5, RADIUS_COMMON, false}, {3.5, RADIUS_PER_AXIS, true}};
     struct distance_histogram *part = malloc(RADIUS_PARTS * sizeof *part);
     for (size_t k = 0; k < sizeof check / sizeof *check; k++) {
         struct test_cylinder c[6];
@@ -243,17 +255,25 @@ static void test_radius_of_each_class(void **state)
         for (int i = 0; i < 6; i++) {
             int along = i % 2;
             double at = 20.0 + 28.0 * (i / 2), z = along == 0 ? 8.0 : 23.0;
-            c[i] = (struct test_cylinder){{along == 0 ? 0.0 : at, along == 0 ? at : 0.0, z}, {along == 0, along == 1, 0.0}, along == 0 ? 3.5 : check[k].along_y};
+            c[i] = (struct test_cylinder){{along == 0 ? 0.0 : at, along == 0 ? at : 0.0, z},
+                                          {along == 0, along == 1, 0.0},
+                                          along == 0 ? 3.5 : check[k].along_y};
             assert_int_equal(polyline_begin(&lines, (uint8_t)along, NULL), STATUS_OK);
             for (int x = 0; x <= 96; x++)
-                assert_int_equal(polyline_add(&lines, (const float[3]){(float)(along == 0 ? x : at), (float)(along == 0 ? at : x), (float)z}, NULL), STATUS_OK);
+                assert_int_equal(
+                    polyline_add(&lines,
+                                 (const float[3]){(float)(along == 0 ? x : at), (float)(along == 0 ? at : x), (float)z},
+                                 NULL),
+                    STATUS_OK);
         }
         assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
         test_fill_cylinders(&v, c, 6, 0.1, 1);
-        for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i])); /* as the mapping does */
+        for (size_t i = 0; i < volume_n_voxel(n); i++)
+            v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i])); /* as the mapping does */
         assert_int_equal(distance_histogram_measure(&v, &lines, 0.5, 8.0, NULL, NULL, part, NULL), STATUS_OK);
         assert_int_equal(radius_choose(part, check[k].rule, &m, NULL), STATUS_OK);
-        print_message("radii 3.5 and %.1f: %.3f (%.3f) and %.3f (%.3f)\n", check[k].along_y, m.radius_voxel[0], m.se_voxel[0], m.radius_voxel[1], m.se_voxel[1]);
+        print_message("radii 3.5 and %.1f: %.3f (%.3f) and %.3f (%.3f)\n", check[k].along_y, m.radius_voxel[0],
+                      m.se_voxel[0], m.radius_voxel[1], m.se_voxel[1]);
         assert_int_equal(m.per_axis, check[k].per_axis);
         assert_int_equal(m.radius_voxel[0] != m.radius_voxel[1], check[k].per_axis);
         assert_true(m.radius_voxel[2] > 3.3 && m.se_voxel[2] > 0.0); /* no fiber along z: that of all */
@@ -276,10 +296,12 @@ static void test_alignment(void **state)
     assert_int_equal(axis_map_parse("-zxy", &map, &err), STATUS_OK);
     assert_true(map.source[0] == 2 && map.flip[0] && map.source[1] == 0 && !map.flip[1] && map.source[2] == 1);
     static const char *const bad[] = {"", "xy", "xxz", "xyzz", "xy-", "abc", "--xyz"};
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_int_equal(axis_map_parse(bad[i], &map, &err), STATUS_INVALID);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_int_equal(axis_map_parse(bad[i], &map, &err), STATUS_INVALID);
     /* A shear brings a leaning cylinder upright: the one that goes along (0.25, 0, 1) */
     const size_t n[3] = {40, 24, 32}, box[6] = {0, 0, 0, 40, 24, 32};
-    const double shear[9] = {1.0, 0.0, -0.25, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}, singular[9] = {1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    const double shear[9] = {1.0, 0.0, -0.25, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
+                 singular[9] = {1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0};
     struct volume v, out;
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, &(struct test_cylinder){{20.0, 12.0, 16.0}, {0.25, 0.0, 1.0}, 3.0}, 1, 0.0, 1);
@@ -304,9 +326,14 @@ static void test_alignment(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_smoothing), cmocka_unit_test(test_linking_leaning_neighbours),
-        cmocka_unit_test(test_duplicates_and_joins), cmocka_unit_test(test_relax), cmocka_unit_test(test_axis_fit),
-        cmocka_unit_test(test_radius), cmocka_unit_test(test_radius_of_each_class),    cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_smoothing),
+        cmocka_unit_test(test_linking_leaning_neighbours),
+        cmocka_unit_test(test_duplicates_and_joins),
+        cmocka_unit_test(test_relax),
+        cmocka_unit_test(test_axis_fit),
+        cmocka_unit_test(test_radius),
+        cmocka_unit_test(test_radius_of_each_class),
+        cmocka_unit_test(test_alignment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,9 +22,10 @@ static int make_folder(void **state)
     return 0;
 }
 
-static const uint8_t golden_density[] = {0x56, 0x4f, 0x4c, 3, 1, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
-                                         0,    0,    0,    0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f,
-                                         0,    0,    0,    0, 0, 0, 0x80, 0x3f};
+static const uint8_t golden_density[] = {0x56, 0x4f, 0x4c, 3, 1,    0,    0, 0, 2, 0, 0,    0,    1,    0,
+                                         0,    0,    1,    0, 0,    0,    1, 0, 0, 0, 0,    0,    0,    0,
+                                         0,    0,    0,    0, 0,    0,    0, 0, 0, 0, 0x80, 0x3f, 0,    0,
+                                         0x80, 0x3f, 0,    0, 0x80, 0x3f, 0, 0, 0, 0, 0,    0,    0x80, 0x3f};
 
 static void check_bytes(const uint8_t *want, size_t n)
 {
@@ -76,7 +77,8 @@ static void random_direction(struct rng *r, float d[3])
 
 static double angle_deg(const float a[3], const float b[3])
 {
-    double c[3] = {(double)a[1] * b[2] - (double)a[2] * b[1], (double)a[2] * b[0] - (double)a[0] * b[2], (double)a[0] * b[1] - (double)a[1] * b[0]};
+    double c[3] = {(double)a[1] * b[2] - (double)a[2] * b[1], (double)a[2] * b[0] - (double)a[0] * b[2],
+                   (double)a[0] * b[1] - (double)a[1] * b[0]};
     double dot = (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
     return atan2(sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]), fabs(dot)) * 180.0 / M_PI;
 }
@@ -117,7 +119,8 @@ static void test_round_trips(void **state)
         for (size_t i = 0; i < N * N * N; i++) {
             float want[3];
             direction_volume_get(&d, i, want);
-            double angle = angle_deg(want, x + 3 * i), length = hypot(hypot((double)x[3 * i], (double)x[3 * i + 1]), (double)x[3 * i + 2]);
+            double angle = angle_deg(want, x + 3 * i),
+                   length = hypot(hypot((double)x[3 * i], (double)x[3 * i + 1]), (double)x[3 * i + 2]);
             assert_true(fabs(length - (d.density[i] > 0 ? 1.0 : 0.0)) < 1e-5);
             if (d.density[i] == 0) continue;
             assert_true(angle < (encoding == VOL_FLOAT32 ? 0.001 : 0.8));

@@ -27,8 +27,8 @@ static size_t join(uint8_t *out, const char *header, const void *data, size_t n_
 }
 
 /* Opens path[0..n_path) and compares shape, spacing (millimetres; 0: unknown) and values. */
-static void check_values(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw, const size_t n[3],
-                         const double spacing_mm[3], const float *want)
+static void check_values(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
+                         const size_t n[3], const double spacing_mm[3], const float *want)
 {
     struct volume_source *source;
     struct error err = {0};
@@ -46,7 +46,8 @@ static void check_values(const char *const *path, size_t n_path, const struct vo
     for (int pass = 0; pass < 2; pass++) { /* all at once, then slices backwards */
         memset(value, 0, n_voxel * sizeof *value);
         for (size_t k = n[2]; k > 0 && pass == 1; k--)
-            if (volume_source_read(source, k - 1, 1, value + (k - 1) * n_slice, &err) != STATUS_OK) fail_msg("%s", err.text);
+            if (volume_source_read(source, k - 1, 1, value + (k - 1) * n_slice, &err) != STATUS_OK)
+                fail_msg("%s", err.text);
         if (pass == 0 && volume_source_read(source, 0, n[2], value, &err) != STATUS_OK) fail_msg("%s", err.text);
         for (size_t i = 0; i < n_voxel; i++) assert_true(value[i] == want[i]);
     }
@@ -54,7 +55,8 @@ static void check_values(const char *const *path, size_t n_path, const struct vo
     volume_source_close(source);
 }
 
-static void check_refused(const char *path, const struct volume_raw_declaration *raw, status code, const char *field, const char *part)
+static void check_refused(const char *path, const struct volume_raw_declaration *raw, status code, const char *field,
+                          const char *part)
 {
     struct volume_source *source = NULL;
     struct error err = {0};
@@ -88,11 +90,20 @@ static void test_nrrd_types_and_orders(void **state)
         float value[4];
     } golden[] = {
         {HEAD "uint8" SIZES "encoding: raw\n\n", {0, 1, 128, 255}, 4, {0, 1, 128, 255}},
-        {HEAD "unsigned short" SIZES "endian: little\nencoding: raw\n\n", {1, 0, 0, 1, 255, 255, 2, 1}, 8, {1, 256, 65535, 258}},
+        {HEAD "unsigned short" SIZES "endian: little\nencoding: raw\n\n",
+         {1, 0, 0, 1, 255, 255, 2, 1},
+         8,
+         {1, 256, 65535, 258}},
         {HEAD "ushort" SIZES "endian: big\nencoding: raw\n\n", {0, 1, 1, 0, 255, 255, 1, 2}, 8, {1, 256, 65535, 258}},
         {HEAD "int16" SIZES "endian: big\nencoding: raw\n\n", {0, 1, 1, 0, 255, 255, 128, 0}, 8, {1, 256, -1, -32768}},
-        {HEAD "float" SIZES "endian: little\nencoding: raw\n\n", {0, 0, 128, 63, 0, 0, 0, 191, 0, 0, 0, 0, 0, 0, 0, 64}, 16, {1, -0.5f, 0, 2}},
-        {HEAD "float" SIZES "endian: big\nencoding: raw\n\n", {63, 128, 0, 0, 191, 0, 0, 0, 0, 0, 0, 0, 64, 0, 0, 0}, 16, {1, -0.5f, 0, 2}},
+        {HEAD "float" SIZES "endian: little\nencoding: raw\n\n",
+         {0, 0, 128, 63, 0, 0, 0, 191, 0, 0, 0, 0, 0, 0, 0, 64},
+         16,
+         {1, -0.5f, 0, 2}},
+        {HEAD "float" SIZES "endian: big\nencoding: raw\n\n",
+         {63, 128, 0, 0, 191, 0, 0, 0, 0, 0, 0, 0, 64, 0, 0, 0},
+         16,
+         {1, -0.5f, 0, 2}},
     };
     static const size_t n[3] = {2, 1, 2};
     static const double none[3] = {0, 0, 0};
@@ -127,25 +138,36 @@ static void test_nrrd_gzip_and_skips(void **state)
     uint8_t file[1024], packed[256];
     const char *path = scratch_path(state, "z.nrrd");
     size_t n_packed = gzip(data, 6, packed, sizeof packed);
-    scratch_write(path, file, join(file, HEAD "uchar" SIZES "byte skip: 2\nencoding: gzip\nspacings: 0.002 0.002 0.004\n\n", packed, n_packed));
+    scratch_write(path, file,
+                  join(file, HEAD "uchar" SIZES "byte skip: 2\nencoding: gzip\nspacings: 0.002 0.002 0.004\n\n", packed,
+                       n_packed));
     check_values(&path, 1, NULL, n, mm, want);
     n_packed = gzip(data + 2, 2, packed, sizeof packed); /* two members, as written by pigz or by appending */
     n_packed += gzip(data + 4, 2, packed + n_packed, sizeof packed - n_packed);
-    scratch_write(path, file, join(file, HEAD "uchar" SIZES "encoding: gz\nspace units: \"um\" \"um\" \"um\"\nspacings: 2 2 4\n\n", packed, n_packed));
+    scratch_write(path, file,
+                  join(file, HEAD "uchar" SIZES "encoding: gz\nspace units: \"um\" \"um\" \"um\"\nspacings: 2 2 4\n\n",
+                       packed, n_packed));
     check_values(&path, 1, NULL, n, mm, want);
     scratch_write(path, file, join(file, HEAD "uchar" SIZES "encoding: gzip\n\n", packed, n_packed - 12));
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "ends or is damaged in slice 2");
-    scratch_write(path, file, join(file, HEAD "uchar\ndimension: 3\nsizes: 999 999 999\nencoding: gzip\n\n", packed, n_packed));
+    scratch_write(path, file,
+                  join(file, HEAD "uchar\ndimension: 3\nsizes: 999 999 999\nencoding: gzip\n\n", packed, n_packed));
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "too short");
-    static const char head[] = HEAD "uchar" SIZES "encoding: gzip\n\n"; /* a row too much shows when the last slice is read, one byte is padding */
+    static const char head[] = HEAD
+        "uchar" SIZES "encoding: gzip\n\n"; /* a row too much shows when the last slice is read, one byte is padding */
     for (size_t more = 0; more <= 2; more++) {
         n_packed = gzip(data + 2, 4 + more, packed, sizeof packed);
         scratch_write(path, file, join(file, head, packed, n_packed));
-        if (more < 2) check_values(&path, 1, NULL, n, (const double[3]){0}, want);
-        else check_refused(path, NULL, STATUS_FORMAT, "volume.files", "'z.nrrd' goes on behind the 2 x 1 x 2 uint8 voxels of its header");
+        if (more < 2)
+            check_values(&path, 1, NULL, n, (const double[3]){0}, want);
+        else
+            check_refused(path, NULL, STATUS_FORMAT, "volume.files",
+                          "'z.nrrd' goes on behind the 2 x 1 x 2 uint8 voxels of its header");
     }
-    n_packed = gzip(data + 2, 4, packed, sizeof packed); /* a second member is part of the data, zeros behind the first are none */
-    scratch_write(path, file, join(file, head, packed, n_packed + gzip(data, 2, packed + n_packed, sizeof packed - n_packed)));
+    n_packed = gzip(data + 2, 4, packed,
+                    sizeof packed); /* a second member is part of the data, zeros behind the first are none */
+    scratch_write(path, file,
+                  join(file, head, packed, n_packed + gzip(data, 2, packed + n_packed, sizeof packed - n_packed)));
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "goes on behind");
     memset(packed + n_packed, 0, 100);
     scratch_write(path, file, join(file, head, packed, n_packed + 100));
@@ -159,9 +181,12 @@ static void test_nrrd_detached(void **state)
     static const double mm[3] = {0.005, 0.002, 0.001};
     static const float want[4] = {0, 1, 0, 2};
     static const char *const header[] = {
-        HEAD "uchar" SIZES "encoding: raw\ndata file: voxels.raw\nline skip: 2\nspace directions: (0.003,0.004,0) (0,-0.002,0) (0,0,0.001)\n",
-        HEAD "uchar" SIZES "encoding: raw\nbyte skip: -1\nunits: \"um\" \"um\" \"um\"\nspacings: 5 2 1\ndatafile: ./voxels.raw\n\n",
-        HEAD "uchar" SIZES "encoding: raw\nbyte skip: 10\nspacings: 5e-3 2e-3 1e-3\ndata file: voxels.raw\nkey:=value\n\n",
+        HEAD "uchar" SIZES "encoding: raw\ndata file: voxels.raw\nline skip: 2\nspace directions: (0.003,0.004,0) "
+             "(0,-0.002,0) (0,0,0.001)\n",
+        HEAD "uchar" SIZES
+             "encoding: raw\nbyte skip: -1\nunits: \"um\" \"um\" \"um\"\nspacings: 5 2 1\ndatafile: ./voxels.raw\n\n",
+        HEAD "uchar" SIZES
+             "encoding: raw\nbyte skip: 10\nspacings: 5e-3 2e-3 1e-3\ndata file: voxels.raw\nkey:=value\n\n",
     };
     const char *path[2] = {scratch_path(state, "d.nhdr"), scratch_path(state, "voxels.raw")};
     scratch_write(path[1], data, sizeof data - 1);
@@ -169,7 +194,8 @@ static void test_nrrd_detached(void **state)
         scratch_write(path[0], header[i], strlen(header[i]));
         check_values(path, 1 + i % 2, NULL, n, mm, want);
     }
-    scratch_write(path[0], HEAD "uchar" SIZES "encoding: raw\ndata file: gone.raw\n", strlen(HEAD "uchar" SIZES "encoding: raw\ndata file: gone.raw\n"));
+    scratch_write(path[0], HEAD "uchar" SIZES "encoding: raw\ndata file: gone.raw\n",
+                  strlen(HEAD "uchar" SIZES "encoding: raw\ndata file: gone.raw\n"));
     check_refused(path[0], NULL, STATUS_NOT_FOUND, "volume.files", "'gone.raw' is missing");
 }
 
@@ -185,11 +211,13 @@ static void test_nrrd_refused(void **state)
     refuse_header(state, HEAD "uchar" SIZES "\n", "lacks");
     refuse_header(state, HEAD "uchar" SIZES "encoding: raw\ndata file: ../x.raw\n\n", "beside the header");
     refuse_header(state, HEAD "uchar" SIZES "encoding: raw\nspacings: 1 0 1\n\n", "spacings");
-    refuse_header(state, HEAD "uchar" SIZES "encoding: raw\nspace directions: (1,0,0) (0,x,0) (0,0,1)\n\n", "space directions");
+    refuse_header(state, HEAD "uchar" SIZES "encoding: raw\nspace directions: (1,0,0) (0,x,0) (0,0,1)\n\n",
+                  "space directions");
     refuse_header(state, HEAD "uchar" SIZES "encoding: raw\nunits: \"mm\" \"ft\" \"mm\"\n\n", "unknown unit");
     refuse_header(state, HEAD "uchar" SIZES "encoding: raw\nbyte skip: -2\n\n", "skip");
     refuse_header(state, HEAD "double" SIZES "endian: little\nencoding: raw\n\n", "too short");
-    refuse_header(state, HEAD "uchar" SIZES "encoding: raw\n\n", "which fits uint32, int32, float32"); /* 16 bytes for 4 voxels */
+    refuse_header(state, HEAD "uchar" SIZES "encoding: raw\n\n",
+                  "which fits uint32, int32, float32"); /* 16 bytes for 4 voxels */
     uint8_t file[256], data[4] = {0};
     const char *path = scratch_path(state, "e.nrrd");
     scratch_write(path, file, join(file, HEAD "uchar" SIZES "encoding: bzip2\n\n", data, 4));
@@ -228,7 +256,8 @@ static void test_raw(void **state)
 /* Every reader of the registry has an id of its own with a version, takes its own kind of file only, and refuses that cut short. */
 static void test_registry(void **state)
 {
-    static const char begin[][16] = {"II*", "NDims = 3\n", "NRRD0004\n", "VOL\3", "hello, there"}; /* one for each reader, and none */
+    static const char begin[][16] = {"II*", "NDims = 3\n", "NRRD0004\n", "VOL\3",
+                                     "hello, there"}; /* one for each reader, and none */
     assert_int_equal(volume_reader_count(), sizeof begin / sizeof begin[0] - 1);
     for (size_t i = 0; i < volume_reader_count(); i++) {
         const volume_reader *r = volume_reader_at(i);
@@ -242,7 +271,8 @@ static void test_registry(void **state)
         struct volume_source_info info;
         struct error err = {0};
         assert_int_equal(r->open(&path, 1, &handle, &info, &err), STATUS_FORMAT);
-        if (strstr(err.text, "'cut.short'") == NULL || strcmp(err.field, "volume.files") != 0) fail_msg("%s: %s", r->id, err.text);
+        if (strstr(err.text, "'cut.short'") == NULL || strcmp(err.field, "volume.files") != 0)
+            fail_msg("%s: %s", r->id, err.text);
         assert_null(handle);
     }
 }
@@ -279,7 +309,8 @@ static void test_metaimage(void **state)
     static const size_t n[3] = {2, 1, 2};
     static const double mm[3] = {0.002, 0.003, 0.004};
     static const float want[4] = {1, 256, 65535, 258};
-    static const char head[] = "ObjectType = Image\nNDims = 3\nDimSize = 2 1 2\nElementSpacing = 0.002 0.003 0.004\nElementType = MET_USHORT\n";
+    static const char head[] = "ObjectType = Image\nNDims = 3\nDimSize = 2 1 2\nElementSpacing = 0.002 0.003 "
+                               "0.004\nElementType = MET_USHORT\n";
     uint8_t file[1024], packed[256];
     char header[512];
     const char *path = scratch_path(state, "m.mha");
@@ -301,7 +332,11 @@ static void test_metaimage_units(void **state)
     static const struct {
         const char *line;
         double mm;
-    } unit[] = {{"", 2.0}, {"DistanceUnits = ?\n", 2.0}, {"DistanceUnits = mm\n", 2.0}, {"DistanceUnits = um\n", 0.002}, {"DistanceUnits = cm\n", 20.0}};
+    } unit[] = {{"", 2.0},
+                {"DistanceUnits = ?\n", 2.0},
+                {"DistanceUnits = mm\n", 2.0},
+                {"DistanceUnits = um\n", 0.002},
+                {"DistanceUnits = cm\n", 20.0}};
     static const size_t n[3] = {2, 1, 2};
     static const float want[4] = {1, 2, 3, 4};
     static const uint8_t data[4] = {1, 2, 3, 4};
@@ -310,22 +345,27 @@ static void test_metaimage_units(void **state)
     const char *path = scratch_path(state, "u.mha");
     for (size_t i = 0; i < sizeof unit / sizeof unit[0]; i++)
         for (int after = 0; after < 2; after++) { /* lines have no order */
-            snprintf(header, sizeof header, "NDims = 3\nDimSize = 2 1 2\n%sElementSpacing = 2 2 2\n%sElementType = MET_UCHAR\nElementDataFile = LOCAL\n",
+            snprintf(header, sizeof header,
+                     "NDims = 3\nDimSize = 2 1 2\n%sElementSpacing = 2 2 2\n%sElementType = MET_UCHAR\nElementDataFile "
+                     "= LOCAL\n",
                      after ? "" : unit[i].line, after ? unit[i].line : "");
             scratch_write(path, file, join(file, header, data, sizeof data));
             check_values(&path, 1, NULL, n, (const double[3]){unit[i].mm, unit[i].mm, unit[i].mm}, want);
         }
-    snprintf(header, sizeof header, "NDims = 3\nDimSize = 2 1 2\nDistanceUnits = inch\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n");
+    snprintf(header, sizeof header,
+             "NDims = 3\nDimSize = 2 1 2\nDistanceUnits = inch\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n");
     scratch_write(path, file, join(file, header, data, sizeof data));
     check_refused(path, NULL, STATUS_FORMAT, "volume.files", "DistanceUnits must be um, mm or cm, not 'inch'");
 }
 
 static void test_vol(void **state)
 {
-    static const uint8_t golden[] = {0x56, 0x4f, 0x4c, 3, 1, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-                                     0, 0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0, 0, 0, 0, 0x80, 0x3f};
-    static const uint8_t quantised[] = {0x56, 0x4f, 0x4c, 3, 4, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0,
-                                        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 255, 255, 127, 0};
+    static const uint8_t golden[] = {0x56, 0x4f, 0x4c, 3, 1,    0,    0, 0, 2,    0,    0, 0, 1, 0, 0, 0, 1,    0,   0,
+                                     0,    1,    0,    0, 0,    0,    0, 0, 0,    0,    0, 0, 0, 0, 0, 0, 0,    0,   0,
+                                     0x80, 0x3f, 0,    0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0, 0, 0, 0, 0x80, 0x3f};
+    static const uint8_t quantised[] = {
+        0x56, 0x4f, 0x4c, 3, 4, 0, 0, 0, 2, 0, 0, 0, 1,    0,    0, 0, 1,    0,    0, 0, 3,    0,    0,   0,   0,   0,
+        0,    0,    0,    0, 0, 0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f, 255, 255, 127, 0};
     static const size_t n[3] = {2, 1, 1};
     static const double mm[3] = {0.5, 1, 1};
     static const float want[2] = {0, 1};
@@ -382,7 +422,8 @@ static void test_raw_in_a_job(void **state)
         o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "float32"};
         for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
         status s = reconstruct_read(&path, 1, &o, NULL, pool, NULL, &v, &report, &err);
-        if (s != (nan ? STATUS_INVALID : STATUS_OK) || (nan && strstr(err.text, "(4, 10, 4) is NaN") == NULL)) fail_msg("%s", err.text);
+        if (s != (nan ? STATUS_INVALID : STATUS_OK) || (nan && strstr(err.text, "(4, 10, 4) is NaN") == NULL))
+            fail_msg("%s", err.text);
         if (!nan) assert_true(v.n[2] == N && v.density[0] > 0.9f && v.density[8] < 0.1f);
         volume_release(&v);
         value[700] = NAN;
@@ -394,10 +435,17 @@ static void test_raw_in_a_job(void **state)
 int main(void)
 {
     const struct CMUnitTest test[] = {
-        cmocka_unit_test(test_nrrd_types_and_orders), cmocka_unit_test(test_nrrd_gzip_and_skips), cmocka_unit_test(test_nrrd_detached),
-        cmocka_unit_test(test_nrrd_refused),          cmocka_unit_test(test_raw),                 cmocka_unit_test(test_wrong_byte_order),
-        cmocka_unit_test(test_metaimage),             cmocka_unit_test(test_metaimage_units),     cmocka_unit_test(test_vol),
-        cmocka_unit_test(test_raw_in_a_job),          cmocka_unit_test(test_registry),
+        cmocka_unit_test(test_nrrd_types_and_orders),
+        cmocka_unit_test(test_nrrd_gzip_and_skips),
+        cmocka_unit_test(test_nrrd_detached),
+        cmocka_unit_test(test_nrrd_refused),
+        cmocka_unit_test(test_raw),
+        cmocka_unit_test(test_wrong_byte_order),
+        cmocka_unit_test(test_metaimage),
+        cmocka_unit_test(test_metaimage_units),
+        cmocka_unit_test(test_vol),
+        cmocka_unit_test(test_raw_in_a_job),
+        cmocka_unit_test(test_registry),
     };
     return cmocka_run_group_tests(test, scratch_folder_setup, scratch_folder_teardown);
 }

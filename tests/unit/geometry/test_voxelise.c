@@ -54,7 +54,8 @@ static void slanted(struct fiber_set *f, size_t n, double tile_m, double radius_
 static void test_volume_is_kept(void **unused)
 {
     (void)unused;
-    const double tile = 300 * um, radius = 10 * um, length = tile * sqrt(1.0 + 0.37 * 0.37 + 0.04), want = M_PI * radius * radius * length;
+    const double tile = 300 * um, radius = 10 * um, length = tile * sqrt(1.0 + 0.37 * 0.37 + 0.04),
+                 want = M_PI * radius * radius * length;
     /* edges against the radius; the tolerance is that of cutting to voxels at the ends and of bytes for coarse ones */
     static const double edge[] = {0.3, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0};
     enum { N = 25 }; /* many, at all places between the centers of coarse voxels */
@@ -132,7 +133,8 @@ static void test_threads_do_not_matter(void **unused)
     assert_memory_equal(a.octahedral, b.octahedral, 4 * volume_n_voxel(a.n));
     /* no voxel above 1, and no more material than the fibers have */
     double fibers = 0.0;
-    for (size_t i = 0; i < f.n_fiber; i++) fibers += M_PI * (double)f.radius_m[i] * (double)f.radius_m[i] / (double)f.n_fiber;
+    for (size_t i = 0; i < f.n_fiber; i++)
+        fibers += M_PI * (double)f.radius_m[i] * (double)f.radius_m[i] / (double)f.n_fiber;
     double share = volume_of(&a) / (fibers * fiber_set_length_m(&f));
     assert_true(share > 0.7 && share < 1.01); /* strands of the hand-made weave overlap a little */
     fiber_set_release(&f);
@@ -156,7 +158,8 @@ static void test_limits(void **unused)
     assert_null(v.density);
     o.voxel_size_m = NAN; /* chosen: as fine as the limit allows */
     assert_int_equal(fibers_voxelise(&f, &o, pool, NULL, &v, &used, &err), STATUS_OK);
-    assert_true(used > 5 * um && 5 * volume_n_voxel(v.n) <= o.limit_bytes && 6 * volume_n_voxel(v.n) > o.limit_bytes / 2);
+    assert_true(used > 5 * um && 5 * volume_n_voxel(v.n) <= o.limit_bytes &&
+                6 * volume_n_voxel(v.n) > o.limit_bytes / 2);
     direction_volume_release(&v);
     o = (struct voxelise_option){.voxel_size_m = 1e-3, .limit_bytes = LIMIT};
     assert_int_equal(fibers_voxelise(&f, &o, pool, NULL, &v, &used, &err), STATUS_INVALID);

@@ -1,8 +1,8 @@
 /* Measurements that no one should have: too few, contradictory, dark, all zero; and an estimator that fails. A fit ends,
  * says what it does not know, and never gives a number that is not finite. */
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/photographs/observation_check.h"
+#include "optimizer/job/method_names.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
@@ -253,7 +253,7 @@ static void test_too_dark_and_too_bright(void **state)
     assert_int_equal(s.n, 1);
     assert_non_null(strstr(s.text[0], "'row-1' is dark: its brightness 0.0006 is 0.65 %"));
     check_rows(usual, (const double[5]){0.1, 0.0006, 0.09, 0.01, 0.01}, (const double[5]){1, 0, 1, 1, 1}, &s);
-    assert_int_equal(s.n, 0); /* nobody asks for it */
+    assert_int_equal(s.n, 0);                                                     /* nobody asks for it */
     check_rows(grazing, (const double[5]){0.1, 0.1, 0.003, 0.01, 0.01}, one, &s); /* little light falls on the cloth */
     assert_int_equal(s.n, 0);
     check_rows(usual, (const double[5]){0.1, 0.1, 0.1, 0.0001, 0.01}, one, &s); /* a dense cloth beside its gaps */

@@ -5,8 +5,8 @@
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/job/method_names.h"
-#include "tests/support/tracer/fake_estimator.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -146,8 +146,8 @@ static void test_progress(void **state)
             x.problem.estimator = &e;
             x.problem.progress = &progress;
             run(&x, *m, &r);
-            print_message("%s: progress %.3f after the first of %zu renderings, %.3f at the end\n", (*m)->id, h.after_first,
-                          h.n_call, h.fraction);
+            print_message("%s: progress %.3f after the first of %zu renderings, %.3f at the end\n", (*m)->id,
+                          h.after_first, h.n_call, h.fraction);
             assert_true(h.after_first > 0.0 && h.after_first < 4.0 / (double)h.n_call);
             assert_true(h.fraction > 0.9);
             observation_set_release(&x.observation);
@@ -411,12 +411,19 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kind_of_paths), cmocka_unit_test(test_progress), cmocka_unit_test(test_least_budget),
-        cmocka_unit_test(test_published_sgd_needs_steps), cmocka_unit_test(test_published_sgd_mean_cosine_has_no_start),
-        cmocka_unit_test(test_every_method_recovers), cmocka_unit_test(test_fixed_and_bounds),
-        cmocka_unit_test(test_every_method_repeats),  cmocka_unit_test(test_resume),
-        cmocka_unit_test(test_foreign_journal),       cmocka_unit_test(test_stale_writer),
-        cmocka_unit_test(test_bounded_quadratic),     cmocka_unit_test(test_bad_problems),
+        cmocka_unit_test(test_kind_of_paths),
+        cmocka_unit_test(test_progress),
+        cmocka_unit_test(test_least_budget),
+        cmocka_unit_test(test_published_sgd_needs_steps),
+        cmocka_unit_test(test_published_sgd_mean_cosine_has_no_start),
+        cmocka_unit_test(test_every_method_recovers),
+        cmocka_unit_test(test_fixed_and_bounds),
+        cmocka_unit_test(test_every_method_repeats),
+        cmocka_unit_test(test_resume),
+        cmocka_unit_test(test_foreign_journal),
+        cmocka_unit_test(test_stale_writer),
+        cmocka_unit_test(test_bounded_quadratic),
+        cmocka_unit_test(test_bad_problems),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

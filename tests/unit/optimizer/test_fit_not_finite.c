@@ -20,8 +20,8 @@ static atomic_long n_good; /* evaluations before the first that is not a number 
 
 static bool spoilt(void) { return atomic_fetch_sub(&n_good, 1) <= 0; }
 
-static float surface_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight,
-                              float rgb[3], float *score)
+static float surface_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3],
+                              const float *weight, float rgb[3], float *score)
 {
     const struct scattering_model *m = scattering_find("two_lobe.v1");
     float pdf = m->eval_pdf(s, wi, wo, weight, rgb, score);
@@ -44,7 +44,8 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
     struct fit_result r;
     observation_set_init(&o);
     for (size_t i = 0; i < N_ROW; i++) {
-        const struct observation item = {.mean_rgb = {0.2, 0.2, 0.2}, .weight = 1.0, .configuration = t->configuration[i]};
+        const struct observation item = {
+            .mean_rgb = {0.2, 0.2, 0.2}, .weight = 1.0, .configuration = t->configuration[i]};
         assert_int_equal(observation_set_append(&o, &item, NULL), STATUS_OK);
     }
     for (size_t p = 0; p < t->model->n_param; p++) {
@@ -52,13 +53,19 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
         parameter[p] = (struct fit_parameter){info->lower, info->upper, info->start, false};
     }
     struct estimator e = trace_estimator(t);
-    const struct fit_problem problem = {.n_param = t->model->n_param, .info = t->model->param, .param = parameter,
-                                        .observation = &o, .estimator = &e, .path_budget = 200000, .max_iteration = 3};
+    const struct fit_problem problem = {.n_param = t->model->n_param,
+                                        .info = t->model->param,
+                                        .param = parameter,
+                                        .observation = &o,
+                                        .estimator = &e,
+                                        .path_budget = 200000,
+                                        .max_iteration = 3};
     for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
         struct error err = {0};
         atomic_store(&n_good, n_before);
         if (fit_run(*m, &problem, NULL, &r, &err) != STATUS_NUMERIC) fail_msg("%s: %s", (*m)->id, err.text);
-        if (strstr(err.text, model) == NULL || strstr(err.text, "not finite") == NULL) fail_msg("%s: %s", (*m)->id, err.text);
+        if (strstr(err.text, model) == NULL || strstr(err.text, "not finite") == NULL)
+            fail_msg("%s: %s", (*m)->id, err.text);
         bool named = false;
         for (size_t i = 0; i < N_ROW; i++) {
             char view[CONFIGURATION_TEXT];
@@ -73,8 +80,13 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
 
 static struct configuration view(double light_rad)
 {
-    return (struct configuration){.light_theta_rad = light_rad, .camera_theta_rad = 0.2, .camera_phi_rad = M_PI, .light_distance_m = 0.61,
-                                  .lamp_side_m = 0.1, .camera_distance_m = 1.0, .crop_m = 0.01};
+    return (struct configuration){.light_theta_rad = light_rad,
+                                  .camera_theta_rad = 0.2,
+                                  .camera_phi_rad = M_PI,
+                                  .light_distance_m = 0.61,
+                                  .lamp_side_m = 0.1,
+                                  .camera_distance_m = 1.0,
+                                  .crop_m = 0.01};
 }
 
 static void test_surface(void **state)
@@ -92,7 +104,8 @@ static void test_surface(void **state)
     hand_weave_small(&f);
     assert_int_equal(scene_new(&f, &(struct scene_option){true}, &scene, NULL), STATUS_OK);
     fiber_set_release(&f);
-    struct trace_estimator t = {.model = &a, .scene = {.fibers = scene}, .seed = 3, .configuration = c, .n_configuration = N_ROW};
+    struct trace_estimator t = {
+        .model = &a, .scene = {.fibers = scene}, .seed = 3, .configuration = c, .n_configuration = N_ROW};
     fit(&t, 0, "broken.v1", "beta_R");
     fit(&t, 60000, "broken.v1", "beta_R"); /* in the midst of it */
     scene_free(scene);
@@ -110,8 +123,10 @@ static void test_volume(void **state)
     broken.eval_pdf = volume_eval_pdf;
     appearance_from_volume(&broken, &a);
     hand_volume_weave(&v, (const size_t[3]){16, 16, 8}, 10e-6, 0.4);
-    assert_int_equal(volume_scene_init(&scene, &v, &(struct volume_scene_option){.black_sheet = true}, NULL), STATUS_OK);
-    struct trace_estimator t = {.model = &a, .scene = {.volume = &scene}, .seed = 3, .configuration = c, .n_configuration = N_ROW};
+    assert_int_equal(volume_scene_init(&scene, &v, &(struct volume_scene_option){.black_sheet = true}, NULL),
+                     STATUS_OK);
+    struct trace_estimator t = {
+        .model = &a, .scene = {.volume = &scene}, .seed = 3, .configuration = c, .n_configuration = N_ROW};
     fit(&t, 0, "broken_flake.v1", NULL);
     fit(&t, 40000, "broken_flake.v1", NULL);
     volume_scene_release(&scene);

@@ -5,8 +5,8 @@
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/job/method_names.h"
 #include "renderer/scattering/appearance.h"
-#include "tests/support/tracer/fake_estimator.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -289,7 +289,8 @@ static void test_own_gains_leave_no_bias(void **state)
 {
     (void)state;
     enum { ROUND = 20000 };
-    const double noise = 0.02, mean[3] = {0.3, 0.4, 0.5}, off[3] = {0.01, 0.0, -0.01}; /* what no gain mends, relative */
+    const double noise = 0.02, mean[3] = {0.3, 0.4, 0.5},
+                 off[3] = {0.01, 0.0, -0.01}; /* what no gain mends, relative */
     double sum = 0.0, square = 0.0, exact = 0.0;
     struct observation o = {.weight = 1.0};
     struct rng rng;
@@ -307,8 +308,10 @@ static void test_own_gains_leave_no_bias(void **state)
             nuisance_apply_own_gain(&o, &e[q], 1.0, 1e-4, &e[q]);
         }
         for (int c = 0; c < 3; c++) product += (e[0].mean[c] - o.mean_rgb[c]) * (e[1].mean[c] - o.mean_rgb[c]);
-        if (round < 0) exact = product;
-        else sum += product / ROUND, square += product * product / ROUND;
+        if (round < 0)
+            exact = product;
+        else
+            sum += product / ROUND, square += product * product / ROUND;
     }
     double se = sqrt((square - sum * sum) / ROUND);
     print_message("squared error with own gains %.3g +- %.1g, without noise %.3g\n", sum, se, exact);
@@ -340,8 +343,10 @@ static void test_priors_of_tied_channels(void **state)
         assert_int_equal(fit_layout_init(&l, fake_param, parameter, FAKE_N_PARAM, &o, NULL), STATUS_OK);
         precision[kind] = l.prior[0].precision;
         double mean = 1.0 / (1.0 + exp(-l.prior[0].mean));
-        if (kind < 2) assert_true(fabs(mean - 0.2) < 1e-9);
-        else assert_true(mean > 0.21 && mean < 0.35); /* 0.2 +- 0.02 and 0.4 +- 0.04 together */
+        if (kind < 2)
+            assert_true(fabs(mean - 0.2) < 1e-9);
+        else
+            assert_true(mean > 0.21 && mean < 0.35); /* 0.2 +- 0.02 and 0.4 +- 0.04 together */
     }
     assert_true(precision[1] == precision[0] && precision[2] > 1.1 * precision[0]);
 }
@@ -483,7 +488,8 @@ static status wide_run(void *context, const struct estimator_call *call, const s
 }
 
 /* n_param parameters of one model beside two nuisance terms and a gain for each of 40 photographs. */
-static status fit_wide(size_t n_param, const struct fit_option *o, const char *method, struct fit_result *r, struct error *err)
+static status fit_wide(size_t n_param, const struct fit_option *o, const char *method, struct fit_result *r,
+                       struct error *err)
 {
     static char name[WIDE][8];
     struct param_info info[WIDE];
@@ -506,11 +512,17 @@ static status fit_wide(size_t n_param, const struct fit_option *o, const char *m
         memcpy(item.mean_rgb, shown.mean, sizeof item.mean_rgb);
         assert_int_equal(observation_set_append(&observation, &item, NULL), STATUS_OK);
     }
-    const struct fit_problem problem = {.n_param = n_param, .info = info, .param = parameter, .observation = &observation,
-                                        .estimator = &e, .path_budget = 3000000, .max_iteration = 25};
+    const struct fit_problem problem = {.n_param = n_param,
+                                        .info = info,
+                                        .param = parameter,
+                                        .observation = &observation,
+                                        .estimator = &e,
+                                        .path_budget = 3000000,
+                                        .max_iteration = 25};
     status s = fit_run(descent_find(method), &problem, o, r, err);
     for (size_t p = 0; s == STATUS_OK && p < n_param && strcmp(method, METHOD_GAUSS_NEWTON) == 0; p++)
-        if (!(fabs(r->param[p] - truth[p]) < 0.02)) fail_msg("%zu parameters: p%zu is %g, not %g", n_param, p, r->param[p], truth[p]);
+        if (!(fabs(r->param[p] - truth[p]) < 0.02))
+            fail_msg("%zu parameters: p%zu is %g, not %g", n_param, p, r->param[p], truth[p]);
     observation_set_release(&observation);
     return s;
 }
@@ -549,7 +561,8 @@ static void test_every_model_has_room_for_nuisance_terms(void **state)
         struct error err = {0};
         for (size_t p = 0; p < a.n_param; p++)
             parameter[p] = (struct fit_parameter){a.param[p].lower, a.param[p].upper, a.param[p].start, false};
-        if (fit_layout_init(&l, a.param, parameter, a.n_param, &o, &err) != STATUS_OK) fail_msg("%s: %s", a.id, err.text);
+        if (fit_layout_init(&l, a.param, parameter, a.n_param, &o, &err) != STATUS_OK)
+            fail_msg("%s: %s", a.id, err.text);
         assert_int_equal(l.n_unknown, a.n_param + FIT_MAX_NUISANCE);
     }
     assert_true(i >= 4);

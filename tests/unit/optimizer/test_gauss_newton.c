@@ -83,8 +83,8 @@ static void test_recovery_and_errors(void **state)
                 n_inside += fabs(r.param[p] - truth[p]) < 2.0 * r.uncertainty.se_param[p];
             }
         }
-        print_message("cloth %zu: relative RMS error %.4f fitted (worst %.4f), %.4f held out (means over %d seeds)\n", k, mean,
-                      worst, held, SEEDS);
+        print_message("cloth %zu: relative RMS error %.4f fitted (worst %.4f), %.4f held out (means over %d seeds)\n",
+                      k, mean, worst, held, SEEDS);
         assert_true(mean < 0.01 && held < 0.03);
         /* 190,000 paths give a mean to 1.2 %, 9 parameters from 16 means 0.9 %: two and a half times that */
         assert_true(worst < 0.0225);
@@ -118,8 +118,9 @@ static void test_ends_at_the_noise_of_the_photographs(void **state)
         }
     }
     double share = (double)n_inside / (double)n_judged;
-    print_message("%zu of %zu ended early; the truth lies within two standard errors for %.1f %% of %zu determined parameters\n",
-                  n_early, n_fit, 100.0 * share, n_judged);
+    print_message(
+        "%zu of %zu ended early; the truth lies within two standard errors for %.1f %% of %zu determined parameters\n",
+        n_early, n_fit, 100.0 * share, n_judged);
     assert_true(n_early >= n_fit / 2);
     assert_true(share > 0.9 && share < 0.99);
     fit(cloth[0], 1, 6000000, 1.0, 0.02, truth, &f, &r);
@@ -151,8 +152,8 @@ static void test_errors_where_a_width_ends_at_its_bound(void **state)
                          r.uncertainty.se_param[p], truth[p]);
         }
     }
-    print_message("%zu of %d fits end at the bound; C_TT is off by %.2f standard errors (RMS of %.0f)\n", n_at_bound, FITS,
-                  sqrt(square / n), n);
+    print_message("%zu of %d fits end at the bound; C_TT is off by %.2f standard errors (RMS of %.0f)\n", n_at_bound,
+                  FITS, sqrt(square / n), n);
     assert_true(n_at_bound >= 1);
     /* channels share their paths, so some 40 free numbers: 1 +- 0.11, and errors that are a little too large are allowed */
     assert_true(sqrt(square / n) > 0.6 && sqrt(square / n) < 1.33);
@@ -171,7 +172,8 @@ static void test_exact_renderings_of_noisy_photographs(void **state)
             if (!r.converged) fail_msg("cloth %zu, seed %d: %s", k, (int)seed, r.reason);
             /* each number to 2 %, 9 parameters of 48 numbers: 0.9 % of the means; three times that */
             if (fake_rel_rms(&f, 0, FAKE_N_FIT, r.param, truth) >= 0.026)
-                fail_msg("cloth %zu, seed %d: error %.4f: %s", k, (int)seed, fake_rel_rms(&f, 0, FAKE_N_FIT, r.param, truth), r.reason);
+                fail_msg("cloth %zu, seed %d: error %.4f: %s", k, (int)seed,
+                         fake_rel_rms(&f, 0, FAKE_N_FIT, r.param, truth), r.reason);
         }
     }
 }
@@ -280,7 +282,8 @@ static void test_pull(void **state)
         assert_true(r[k].converged && !r[k].uncertainty.determined[8]);
         r[k].param[8] = truth[8];
         for (size_t p = 0; p < 8; p++)
-            assert_true(r[k].uncertainty.at_bound[p] || fabs(r[k].param[p] - truth[p]) < 4.0 * r[k].uncertainty.se_param[p]);
+            assert_true(r[k].uncertainty.at_bound[p] ||
+                        fabs(r[k].param[p] - truth[p]) < 4.0 * r[k].uncertainty.se_param[p]);
         assert_true(fake_rel_rms(&f, 0, FAKE_N_FIT, r[k].param, truth) < 0.01);
     }
     (void)fit_blind(&width, width.start, 1, &r[0]); /* no fit ends with it, not even one of a single step */
@@ -289,7 +292,8 @@ static void test_pull(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact), cmocka_unit_test(test_recovery_and_errors),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact),
+                                       cmocka_unit_test(test_recovery_and_errors),
                                        cmocka_unit_test(test_ends_at_the_noise_of_the_photographs),
                                        cmocka_unit_test(test_errors_where_a_width_ends_at_its_bound),
                                        cmocka_unit_test(test_exact_renderings_of_noisy_photographs),

@@ -1,7 +1,7 @@
 /* The job document: what is accepted, and that every mistake is refused with the path of the field at fault. */
 #include "optimizer/fit/descent/descent.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/job/job_document.h"
+#include "optimizer/job/method_names.h"
 #include "optimizer/job/stage_table.h"
 #include "renderer/scattering/appearance.h"
 
@@ -77,7 +77,7 @@ static void test_everything_given(void **state)
         "\"lamp\":{\"side_cm\":5,\"distance_cm\":50},\"camera\":{\"distance_cm\":80,\"crop_cm\":0.5},\"black_sheet\":"
         "false,"
         "\"photographs\":[" PHOTO ",{\"file\":\"p1.png\",\"set\":\"held-out\",\"light_theta_deg\":150,\"light_phi_"
-                                  "deg\":-10,\"camera_theta_deg\":0,"
+        "deg\":-10,\"camera_theta_deg\":0,"
         "\"camera_phi_deg\":0,\"cloth_rotation_deg\":90,\"scale\":2,\"crop_px\":[1,2,3,4],\"transfer\":\"srgb\"}],"
         "\"fit\":{\"model\":\"two_lobe_balanced.v1\",\"method\":\"published_sgd.v1\",\"seed\":9,\"max_iterations\":5,"
         "\"path_budget\":100000,"
@@ -150,10 +150,12 @@ static void test_volume(void **state)
 static void test_alignment(void **state)
 {
     (void)state;
-    struct job_document *d = parse(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false"));
+    struct job_document *d =
+        parse(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false"));
     assert_true(d->align && d->crop && d->crop_keep == 0.3 && !d->join_seams);
     job_document_free(d);
-    d = parse(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"matrix\":[1,0,0,0,1,0,0,0,1],\"crop_voxel\":[0,0,0,9,9,9]"));
+    d = parse(
+        VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"matrix\":[1,0,0,0,1,0,0,0,1],\"crop_voxel\":[0,0,0,9,9,9]"));
     assert_true(!d->align && !d->crop && d->join_seams && isnan(d->crop_keep));
     job_document_free(d);
     check_error(VOLUME_OF("\"align\":\"yes\""), "volume.align", "auto");
@@ -216,16 +218,19 @@ static void test_fit_options(void **state)
 {
     (void)state;
     struct job_fit_parameter k[JOB_MAX_PARAM];
-    resolve(FIT_OF("{\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":0.5}],\"bounds\":{\"beta_R\":[2,8],\"gamma_TT\":[6,20]},"
-                   "\"start\":{\"gamma_TT\":8},\"priors\":{\"beta_R\":{\"mean\":3,\"se\":1}}}"),
-            k);
+    resolve(
+        FIT_OF(
+            "{\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":0.5}],\"bounds\":{\"beta_R\":[2,8],\"gamma_TT\":[6,20]},"
+            "\"start\":{\"gamma_TT\":8},\"priors\":{\"beta_R\":{\"mean\":3,\"se\":1}}}"),
+        k);
     assert_true(k[6].lower == 2.0 && k[6].upper == 8.0 && k[6].start == 3.0);
     assert_true(fabs(k[7].lower - 12.0) < 1e-12 && fabs(k[7].upper - 40.0) < 1e-12 && fabs(k[7].start - 16.0) < 1e-12);
     assert_true(fabs(k[8].lower - 6.0) < 1e-12 && fabs(k[8].upper - 20.0) < 1e-12 && k[8].start == 8.0);
     resolve(FIT_OF("{\"tied\":[[\"C_R.r\",\"C_R.b\"]],\"fixed\":{\"C_R.b\":0.3}}"), k);
     assert_true(k[0].fixed && k[0].start == 0.3 && !k[1].fixed && k[2].fixed);
-    struct job_document *d = parse(FIT_OF("{\"starts\":4,\"nuisance\":{\"gain\":\"per_photograph\",\"gain_prior_rel\":0.1,"
-                                          "\"stray_light\":true},\"models\":[\"two_lobe.v1\",\"two_lobe_balanced.v1\"]}"));
+    struct job_document *d =
+        parse(FIT_OF("{\"starts\":4,\"nuisance\":{\"gain\":\"per_photograph\",\"gain_prior_rel\":0.1,"
+                     "\"stray_light\":true},\"models\":[\"two_lobe.v1\",\"two_lobe_balanced.v1\"]}"));
     for (size_t i = 0; i < 2; i++) {
         const struct job_fit_option *o = &d->model[i].option;
         assert_true(o->n_start == 4 && o->gain == JOB_GAIN_PER_PHOTOGRAPH && o->gain_prior_rel == 0.1);
@@ -235,8 +240,10 @@ static void test_fit_options(void **state)
     d = parse(FIT_OF("{\"candidates\":{\"grid\":true}}"));
     assert_int_equal(d->n_candidate, 56);
     job_document_free(d);
-    d = parse(FIT_OF("{\"candidates\":[{\"light_theta_deg\":10,\"light_phi_deg\":1,\"camera_theta_deg\":2,\"camera_phi_deg\":3}]}"));
-    assert_true(d->n_candidate == 1 && d->candidate[0].camera_phi_deg == 3.0 && d->candidate[0].cloth_rotation_deg == 0.0);
+    d = parse(FIT_OF(
+        "{\"candidates\":[{\"light_theta_deg\":10,\"light_phi_deg\":1,\"camera_theta_deg\":2,\"camera_phi_deg\":3}]}"));
+    assert_true(d->n_candidate == 1 && d->candidate[0].camera_phi_deg == 3.0 &&
+                d->candidate[0].cloth_rotation_deg == 0.0);
     job_document_free(d);
 }
 
@@ -285,7 +292,8 @@ static void test_texture(void **state)
     d = parse(FIT_OF("{}"));
     assert_true(d->texture_block_mm == 0.0);
     job_document_free(d);
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"fit\":{\"texture\":{\"block_mm\":1}}}",
+    check_error("{\"sample\":\"s\"," VOLUME
+                ",\"measurements\":{\"file\":\"a.csv\"},\"fit\":{\"texture\":{\"block_mm\":1}}}",
                 "fit.texture", "needs photographs");
     check_error(FIT_OF("{\"texture\":{}}"), "fit.texture.block_mm", "missing");
     check_error(FIT_OF("{\"texture\":{\"block_mm\":5.1}}"), "fit.texture.block_mm", "2 to 32 blocks");
@@ -323,14 +331,16 @@ static void test_fit_option_errors(void **state)
                 "'gamma_TT' at 10: its bounds are 20 and 45, with those of what 'fit.tied' ties it to");
     check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"start\":{\"beta_TT\":40}}"), "fit.start",
                 "'beta_TT' at 40: its bounds are 10 and 22.5, with");
-    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":30},\"start\":{\"beta_TT\":20}}"),
-                "fit.start", "'beta_TT', which 'fit.fixed' holds fixed");
+    check_error(
+        FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":30},\"start\":{\"beta_TT\":20}}"),
+        "fit.start", "'beta_TT', which 'fit.fixed' holds fixed");
     check_error(FIT_OF("{\"fit_radius\":1}"), "fit.fit_radius", "true, false or an object of lower_um and upper_um");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5}}}"), "fit.priors.beta_R.se", "missing");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 10");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":0}}}"), "fit.priors.beta_R.se", "0");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"sd\":1}}}"), "fit.priors.beta_R.sd", "unknown field");
-    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"fixed\":{\"beta_R\":5}}"), "fit.priors", "fixed");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"fixed\":{\"beta_R\":5}}"), "fit.priors",
+                "fixed");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"method\":\"published_sgd.v1\"}"), "fit.priors",
                 METHOD_GAUSS_NEWTON);
     check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":0.2}],\"priors\":{\"gamma_TT\":{\"mean\":1,\"se\":1}}}"),
@@ -395,10 +405,13 @@ static void test_file_names(void **state)
 static void test_damage(void **state)
 {
     (void)state;
-    const char *text = FIT_OF("{\"fixed\":{\"beta_R\":5},\"start\":{\"C_TT\":[0.1,0.2,0.3]},\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":2}],"
-                               "\"bounds\":{\"C_TT\":[0.1,0.9]},\"priors\":{\"C_R.r\":{\"mean\":0.2,\"se\":0.1}},\"starts\":2,"
-                               "\"nuisance\":{\"gain\":\"global\",\"stray_light\":false},\"texture\":{\"block_mm\":1},\"candidates\":[{\"light_theta_deg\":1,"
-                               "\"light_phi_deg\":2,\"camera_theta_deg\":3,\"camera_phi_deg\":4}]}");
+    const char *text =
+        FIT_OF("{\"fixed\":{\"beta_R\":5},\"start\":{\"C_TT\":[0.1,0.2,0.3]},\"tied\":[[\"C_R\"],{\"beta_TT\":1,"
+               "\"gamma_TT\":2}],"
+               "\"bounds\":{\"C_TT\":[0.1,0.9]},\"priors\":{\"C_R.r\":{\"mean\":0.2,\"se\":0.1}},\"starts\":2,"
+               "\"nuisance\":{\"gain\":\"global\",\"stray_light\":false},\"texture\":{\"block_mm\":1},\"candidates\":[{"
+               "\"light_theta_deg\":1,"
+               "\"light_phi_deg\":2,\"camera_theta_deg\":3,\"camera_phi_deg\":4}]}");
     size_t n = strlen(text);
     char *copy = malloc(n + 1);
     for (size_t i = 0; i < n; i++) {
@@ -466,7 +479,9 @@ int main(void)
         cmocka_unit_test(test_volume),
         cmocka_unit_test(test_photographs),
         cmocka_unit_test(test_fit),
-        cmocka_unit_test(test_fit_options), cmocka_unit_test(test_start_of_density), cmocka_unit_test(test_texture),
+        cmocka_unit_test(test_fit_options),
+        cmocka_unit_test(test_start_of_density),
+        cmocka_unit_test(test_texture),
         cmocka_unit_test(test_fit_option_errors),
         cmocka_unit_test(test_bounds_are_values),
         cmocka_unit_test(test_file_names),

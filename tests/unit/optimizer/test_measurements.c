@@ -78,8 +78,8 @@ static void test_names(void **state)
     (void)state;
     static const struct {
         const char *given, *kept;
-    } golden[] = {{"a-b_c.9", "a-b_c.9"}, {"warp 45", "warp_45"}, {" blank ", "blank"}, {"", "fit-03"}, {".hidden", "_hidden"},
-                  {"../up", "_._up"},     {"r\xc3\xb6t", "r__t"}};
+    } golden[] = {{"a-b_c.9", "a-b_c.9"}, {"warp 45", "warp_45"}, {" blank ", "blank"},  {"", "fit-03"},
+                  {".hidden", "_hidden"}, {"../up", "_._up"},     {"r\xc3\xb6t", "r__t"}};
     char text[2000] = "name,set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b\n", longer[200];
     struct observation_set o;
     struct error err = {0};
@@ -120,7 +120,8 @@ static void test_too_many_renderings(void **state)
     static const struct {
         size_t n_all, n_one;
         bool good;
-    } golden[] = {{455, 1, true}, {455, 2, false}, {456, 1, false}, {0, 4096, true}, {0, 4097, false}, {1, 4088, false}};
+    } golden[] = {{455, 1, true},  {455, 2, false},  {456, 1, false},
+                  {0, 4096, true}, {0, 4097, false}, {1, 4088, false}};
     for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
         char *text = long_table(golden[i].n_all, golden[i].n_one);
         struct observation_set o;
@@ -128,7 +129,8 @@ static void test_too_many_renderings(void **state)
         if (golden[i].good)
             assert_int_equal(measurement_table_parse(text, strlen(text), "t.csv", &set_up, &o, NULL), STATUS_OK);
         else
-            check_error(text, STATUS_TOO_LARGE, golden[i].n_all > 0 ? "'all' takes 9, so at most 455" : "more than 4096 rows");
+            check_error(text, STATUS_TOO_LARGE,
+                        golden[i].n_all > 0 ? "'all' takes 9, so at most 455" : "more than 4096 rows");
         observation_set_release(&o);
         free(text);
     }
@@ -189,8 +191,8 @@ static void test_real_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_rotations), cmocka_unit_test(test_names),
-                                       cmocka_unit_test(test_too_many_renderings), cmocka_unit_test(test_errors),
-                                       cmocka_unit_test(test_real_tables)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read),   cmocka_unit_test(test_rotations),
+                                       cmocka_unit_test(test_names),  cmocka_unit_test(test_too_many_renderings),
+                                       cmocka_unit_test(test_errors), cmocka_unit_test(test_real_tables)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

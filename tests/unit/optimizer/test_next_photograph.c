@@ -47,7 +47,8 @@ static void set_before(struct before *k, const struct fit_option *o)
         k->slope[p] = coordinate_slope(&c, k->unknown[p]);
         double narrow = p < N ? 1.0 : 0.1; /* the gain */
         for (size_t q = 0; q <= p; q++)
-            k->u.cov[p * n + q] = k->u.cov[q * n + p] = narrow * (p == q ? 0.02 * narrow : 0.004 * cos((double)(p * q)));
+            k->u.cov[p * n + q] = k->u.cov[q * n + p] =
+                narrow * (p == q ? 0.02 * narrow : 0.004 * cos((double)(p * q)));
         k->u.se_param[p] = k->slope[p] * sqrt(k->u.cov[p * n + p]);
     }
 }
@@ -67,14 +68,16 @@ static void check_against_the_whole_matrix(const struct fit_option *o)
     struct before k;
     struct candidate_score score;
     struct estimate e = {.n_path = 1};
-    double before[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM], information[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM],
-        after[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM], j[3][SCATTERING_MAX_PARAM], v[9], v_inverse[9];
+    double before[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM],
+        information[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM], after[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM],
+        j[3][SCATTERING_MAX_PARAM], v[9], v_inverse[9];
     struct configuration c = {.light_theta_rad = 0.7, .camera_theta_rad = 0.6, .camera_phi_rad = M_PI};
     set_before(&k, o);
     const size_t n = k.layout.n_unknown;
     memcpy(before, k.u.cov, sizeof before);
     fake_radiance(&c, k.unknown, e.mean, e.jac);
-    next_photograph_score(&(struct next_photograph_fit){&k.layout, k.unknown, &k.u, o->photograph_gain_sd}, &e, &e, &score);
+    next_photograph_score(&(struct next_photograph_fit){&k.layout, k.unknown, &k.u, o->photograph_gain_sd}, &e, &e,
+                          &score);
     double a = (e.mean[0] + e.mean[1] + e.mean[2]) / 3.0;
     for (size_t i = 0; i < 9; i++)
         v[i] = (i % 4 == 0 ? 5e-4 : 0.0) + pow(o->photograph_gain_sd / a, 2.0) * e.mean[i / 3] * e.mean[i % 3];
@@ -151,9 +154,10 @@ static void covariance_of(const double (*row)[4], size_t n_row, const double *pa
 static void test_finds_what_is_missing(void **state)
 {
     (void)state;
-    static const double row[8][4] = {{20, 60, 0, 0}, {60, 30, 60, 0},  {70, 20, 0, 0},  {50, 50, 0, 0},
+    static const double row[8][4] = {{20, 60, 0, 0},  {60, 30, 60, 0},  {70, 20, 0, 0},  {50, 50, 0, 0},
                                      {20, 60, 0, 90}, {60, 30, 60, 90}, {70, 20, 0, 90}, {50, 50, 0, 90}};
-    static const double candidate[5][4] = {{30, 60, 0, 0}, {65, 0, 0, 45}, {75, 10, 0, 0}, {45, 41, 180, 0}, {60, 40, 0, 90}};
+    static const double candidate[5][4] = {
+        {30, 60, 0, 0}, {65, 0, 0, 45}, {75, 10, 0, 0}, {45, 41, 180, 0}, {60, 40, 0, 90}};
     static const double file_unit[N] = {0.15, 0.08, 0.05, 0.9, 0.6, 0.4, 4.0, 20.0, 20.0};
     const double v = 1e-4; /* photographs good to 1 % */
     static const bool fixed[N] = {true, true, true, false, false, false, false, true, false};

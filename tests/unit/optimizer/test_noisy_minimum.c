@@ -44,7 +44,8 @@ static status evaluate(void *context, double u, double *y, double *se, struct er
     return STATUS_OK;
 }
 
-static const struct noisy_minimum_option option = {.lower = -0.7, .upper = 0.7, .n_first = 5, .n_most = 11, .tolerance = 0.01};
+static const struct noisy_minimum_option option = {
+    .lower = -0.7, .upper = 0.7, .n_first = 5, .n_most = 11, .tolerance = 0.01};
 
 static void test_without_noise(void **unused)
 {
@@ -143,8 +144,8 @@ static void test_bad_input(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_without_noise),          cmocka_unit_test(test_error_is_honest),
-        cmocka_unit_test(test_flat_is_not_determined), cmocka_unit_test(test_slope_ends_at_the_bound),
+        cmocka_unit_test(test_without_noise),           cmocka_unit_test(test_error_is_honest),
+        cmocka_unit_test(test_flat_is_not_determined),  cmocka_unit_test(test_slope_ends_at_the_bound),
         cmocka_unit_test(test_same_values_same_search), cmocka_unit_test(test_bad_input),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -204,7 +204,8 @@ static void test_uncertainty(void **state)
     }
     m.x_ref[0] = m.x_ref[1] = log(fake_param[6].start);
     uncertainty_compute(&m, k, fixed, &u);
-    double want = 0.01 * sqrt(0.5 * jj + 0.5 * common) / jj; /* half of a photograph's variance is common to its channels */
+    double want =
+        0.01 * sqrt(0.5 * jj + 0.5 * common) / jj; /* half of a photograph's variance is common to its channels */
     assert_true(fabs(sqrt(u.cov[0]) / want - 1.0) < 1e-2);
     assert_true(fabs(u.se_param[0] / (want * fake_param[6].start) - 1.0) < 1e-2);
     assert_true(u.determined[0] && !u.determined[1] && !u.at_bound[0]);
@@ -224,7 +225,8 @@ static void test_bound_of_a_wide_range(void **state)
     const struct {
         double value;
         bool at_bound;
-    } want[] = {{10.0, true}, {10.05, true}, {10.5, false}, {105.0, false}, {4000.0, false}, {98000.0, false}, {99500.0, true}, {100000.0, true}};
+    } want[] = {{10.0, true},    {10.05, true},    {10.5, false},   {105.0, false},
+                {4000.0, false}, {98000.0, false}, {99500.0, true}, {100000.0, true}};
     struct coordinate k;
     struct linear_model m;
     const bool fixed = false;
@@ -274,7 +276,8 @@ static void test_contrasts_have_a_misfit_of_their_own(void **state)
         assert_true(with_contrasts ? fabs(misfit[1] / 0.09 - 1.0) < 0.3 : misfit[1] == 0.0);
         uncertainty_compute(&m, &k, &fixed, &u);
         assert_true(u.misfit_var == misfit[0]);
-        assert_true(fabs(u.noise_var / (0.5 * 0.002 * 0.002) - 1.0) < 1e-9 && fabs(u.photograph_var / (0.002 * 0.002) - 1.0) < 1e-9);
+        assert_true(fabs(u.noise_var / (0.5 * 0.002 * 0.002) - 1.0) < 1e-9 &&
+                    fabs(u.photograph_var / (0.002 * 0.002) - 1.0) < 1e-9);
         if (with_contrasts)
             assert_true(fabs(u.se_param[0] / se_means_alone - 1.0) < 0.2);
         else
@@ -364,11 +367,16 @@ static void test_weighted_objective(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_by_hand),     cmocka_unit_test(test_unbiased), cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_coordinates), cmocka_unit_test(test_matrices),
-        cmocka_unit_test(test_uncertainty), cmocka_unit_test(test_misfit_and_weights),
+        cmocka_unit_test(test_by_hand),
+        cmocka_unit_test(test_unbiased),
+        cmocka_unit_test(test_gradient),
+        cmocka_unit_test(test_coordinates),
+        cmocka_unit_test(test_matrices),
+        cmocka_unit_test(test_uncertainty),
+        cmocka_unit_test(test_misfit_and_weights),
         cmocka_unit_test(test_bound_of_a_wide_range),
-        cmocka_unit_test(test_contrasts_have_a_misfit_of_their_own), cmocka_unit_test(test_weighted_objective),
+        cmocka_unit_test(test_contrasts_have_a_misfit_of_their_own),
+        cmocka_unit_test(test_weighted_objective),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,7 @@
 /* Photographs of a phantom: the table of configurations, the parameters, and what is written. */
+#include "geometry/fibers/fiber_set.h"
 #include "optimizer/phantom/phantom_photographs.h"
 #include "optimizer/phantom/phantom_view_table.h"
-#include "geometry/fibers/fiber_set.h"
 #include "renderer/image/image.h"
 #include "tests/support/scratch_folder.h"
 
@@ -63,10 +63,14 @@ static void test_bad_tables(void **state)
 {
     expect_bad_table(state, "", "no rows");
     expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg\n", "camera_phi_deg");
-    expect_bad_table(state, "#\nset,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,2,3\n", "line 3");
-    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,2,x,4\n", "camera_theta_deg 'x'");
-    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,nan,3,4\n", "light_phi_deg");
-    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\ntest,1,2,3,4\n", "'test'");
+    expect_bad_table(state, "#\nset,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,2,3\n",
+                     "line 3");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,2,x,4\n",
+                     "camera_theta_deg 'x'");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\nfit,1,nan,3,4\n",
+                     "light_phi_deg");
+    expect_bad_table(state, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg\ntest,1,2,3,4\n",
+                     "'test'");
 }
 
 static void test_parameters(void **state)
@@ -84,8 +88,10 @@ static void test_parameters(void **state)
     assert_true(param[scattering_param_index(m, "C_R.b")] == 0.5);
     assert_int_equal(phantom_param_parse(m, "beta_R=6", param, NULL), STATUS_OK);
     assert_true(fabs(param[scattering_param_index(m, "beta_R")] - 6.0 * M_PI / 180.0) < 1e-12);
-    const char *const bad[] = {"C_R", "C_R=", "C_R=1,2", "C_R=0.1,0.2,0.3,0.4", "C_R=x", "beta_R=5,5,5", "C_X=1", "C_R=2", "=1", ""};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) assert_int_equal(phantom_param_parse(m, bad[i], param, &err), STATUS_INVALID);
+    const char *const bad[] = {"C_R",   "C_R=", "C_R=1,2", "C_R=0.1,0.2,0.3,0.4", "C_R=x", "beta_R=5,5,5", "C_X=1",
+                               "C_R=2", "=1",   ""};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_int_equal(phantom_param_parse(m, bad[i], param, &err), STATUS_INVALID);
 }
 
 /* Sixteen touching fibers along x: a little carpet. */
@@ -161,7 +167,8 @@ static void test_what_is_written(void **state)
                                          {"fit,45,0,45,180,0\nfit,120,0,0,0,0\n", "fit-01.exr' would be black"}};
     for (size_t i = 0; i < 3; i++) {
         char text[300];
-        snprintf(text, sizeof text, "%.*s%s", (int)(strchr(table, '\n') + 1 - table), table, i < 2 ? bad[i][0] : "fit,45,0,45,180,0\n");
+        snprintf(text, sizeof text, "%.*s%s", (int)(strchr(table, '\n') + 1 - table), table,
+                 i < 2 ? bad[i][0] : "fit,45,0,45,180,0\n");
         scratch_write(csv, text, strlen(text));
         o.crop_cm = i < 2 ? 1.0 : -1.0;
         assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
@@ -181,8 +188,8 @@ static void test_what_is_written(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_builtin_views), cmocka_unit_test(test_builtin_views_are_those_of_the_measurements),
-        cmocka_unit_test(test_bad_tables),    cmocka_unit_test(test_parameters),
+        cmocka_unit_test(test_builtin_views),   cmocka_unit_test(test_builtin_views_are_those_of_the_measurements),
+        cmocka_unit_test(test_bad_tables),      cmocka_unit_test(test_parameters),
         cmocka_unit_test(test_what_is_written),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);

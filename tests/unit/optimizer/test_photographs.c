@@ -175,7 +175,8 @@ static void test_small_files_of_huge_pictures(void **state)
     write_exr(scratch_path(state, "small.exr"), 16, ramp);
     char *bytes = scratch_read(scratch_path(state, "small.exr"), &n);
     while (memcmp(bytes + at, "dataWindow", 11) != 0) at++;
-    memcpy(bytes + at + 29, "\x5f\xea\0\0\xb7\x0b\0\0", 8); /* after "box2i", its length and the lower corner: 60000 x 3000 */
+    memcpy(bytes + at + 29, "\x5f\xea\0\0\xb7\x0b\0\0",
+           8); /* after "box2i", its length and the lower corner: 60000 x 3000 */
     scratch_write(scratch_path(state, "huge.exr"), bytes, n);
     free(bytes);
     assert_int_equal(photograph_measure(scratch_path(state, "huge.exr"), &p, &m, &err), STATUS_FORMAT);
@@ -192,9 +193,12 @@ static void test_small_files_of_huge_pictures(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_mean),    cmocka_unit_test(test_error_of_texture),
-        cmocka_unit_test(test_refused), cmocka_unit_test(test_not_uniform),
-        cmocka_unit_test(test_png),     cmocka_unit_test(test_truncated_png),
+        cmocka_unit_test(test_mean),
+        cmocka_unit_test(test_error_of_texture),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_not_uniform),
+        cmocka_unit_test(test_png),
+        cmocka_unit_test(test_truncated_png),
         cmocka_unit_test(test_small_files_of_huge_pictures),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);

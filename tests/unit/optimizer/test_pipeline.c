@@ -4,8 +4,8 @@
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/work_file.h"
 #include "optimizer/worker/worker_series.h"
-#include "tests/support/tracer/fake_estimator.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/fake_estimator.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -214,7 +214,8 @@ static void test_fibers_wider_than_the_tile(void **state)
         assert_int_equal(stage_fibers(&c, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
         if (i == 1) {
             assert_string_equal(err.field, "fibers.file");
-            assert_non_null(strstr(err.text, "'a.txt': fiber 1 has a radius of 0.501 mm, the tile is 1 x 2 mm: the unit may be wrong"));
+            assert_non_null(strstr(
+                err.text, "'a.txt': fiber 1 has a radius of 0.501 mm, the tile is 1 x 2 mm: the unit may be wrong"));
         }
         pipeline_context_release(&c);
         worker_folder_close(&f);
@@ -223,9 +224,9 @@ static void test_fibers_wider_than_the_tile(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file), cmocka_unit_test(test_work_file_of_many_sections),
-                                       cmocka_unit_test(test_folder),
-                                       cmocka_unit_test(test_series), cmocka_unit_test(test_inputs),
-                                       cmocka_unit_test(test_fibers_wider_than_the_tile)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_work_file), cmocka_unit_test(test_work_file_of_many_sections),
+        cmocka_unit_test(test_folder),    cmocka_unit_test(test_series),
+        cmocka_unit_test(test_inputs),    cmocka_unit_test(test_fibers_wider_than_the_tile)};
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -85,7 +85,8 @@ static void setup(struct fixture *x, size_t tight, double upper)
     x->estimator = fake_estimator(&x->cloth);
     for (size_t p = 0; p < FAKE_N_PARAM; p++) {
         x->start[p] = fake_param[p].start;
-        x->parameter[p] = (struct fit_parameter){fake_param[p].lower, p == tight ? upper : fake_param[p].upper, x->start[p], false};
+        x->parameter[p] =
+            (struct fit_parameter){fake_param[p].lower, p == tight ? upper : fake_param[p].upper, x->start[p], false};
         coordinate_init(&x->k[p], &fake_param[p], x->parameter[p].lower, x->parameter[p].upper);
     }
     observation_set_init(&x->observation);
@@ -96,8 +97,11 @@ static void measure(struct fixture *x, const struct estimator *e)
 {
     size_t n_path[FAKE_N_FIT];
     for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
-    const struct fit_problem problem = {
-        .n_param = FAKE_N_PARAM, .info = fake_param, .param = x->parameter, .observation = &x->observation, .estimator = e};
+    const struct fit_problem problem = {.n_param = FAKE_N_PARAM,
+                                        .info = fake_param,
+                                        .param = x->parameter,
+                                        .observation = &x->observation,
+                                        .estimator = e};
     assert_int_equal(rescale_measure(&problem, x->k, n_path, x->curve, &x->n_path, &x->wall_s, NULL), STATUS_OK);
 }
 
@@ -112,13 +116,14 @@ static void test_bounds_of_one_channel(void **state)
         assert_true(x.curve[p].c[x.curve[p].n - 1] == x.parameter[p].upper);
         assert_true(rescale_backward(&x.curve[p], 1e9) == x.parameter[p].upper);
     }
-    assert_true(x.curve[3].r[1] == x.curve[4].r[1] && x.curve[4].r[1] == x.curve[5].r[1]); /* a third of the colour's each */
+    assert_true(x.curve[3].r[1] == x.curve[4].r[1] &&
+                x.curve[4].r[1] == x.curve[5].r[1]); /* a third of the colour's each */
     observation_set_release(&x.observation);
 }
 
 /* An estimator that may not be asked for anything beyond the bounds of the fit's parameters. */
-static status run_strict(void *context, const struct estimator_call *call, const struct progress *progress, struct estimate *out,
-                         double *wall_s, struct error *err)
+static status run_strict(void *context, const struct estimator_call *call, const struct progress *progress,
+                         struct estimate *out, double *wall_s, struct error *err)
 {
     const struct fixture *x = context;
     for (size_t p = 0; p < FAKE_N_PARAM; p++)
@@ -175,9 +180,10 @@ static void test_measured_curve(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_published_table),
-                                       cmocka_unit_test(test_points_within_bounds), cmocka_unit_test(test_map),
+                                       cmocka_unit_test(test_points_within_bounds),
+                                       cmocka_unit_test(test_map),
                                        cmocka_unit_test(test_bounds_of_one_channel),
-        cmocka_unit_test(test_channels_stay_within_their_own_bounds),
+                                       cmocka_unit_test(test_channels_stay_within_their_own_bounds),
                                        cmocka_unit_test(test_measured_curve)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

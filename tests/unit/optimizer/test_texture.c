@@ -2,16 +2,16 @@
  * what a picture says; photographs measured alike; and a fit that only the contrast can determine, resumed bit by bit. */
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/fit/objective/linear_gain.h"
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
+#include "optimizer/job/method_names.h"
 #include "renderer/transport/appearance_estimate.h"
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
-#include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -203,12 +203,24 @@ static void test_against_picture(void **state)
     configuration[0].crop_m = 0.0011;
     assert_int_equal(scene_new(&f, &(struct scene_option){true}, &scene, NULL), STATUS_OK);
     assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
-    struct render_request picture = {.scene = scene, .model = model, .param = param, .configuration = configuration,
-                                     .width = SIDE, .height = SIDE, .n_sample = 1000, .seed = 3};
+    struct render_request picture = {.scene = scene,
+                                     .model = model,
+                                     .param = param,
+                                     .configuration = configuration,
+                                     .width = SIDE,
+                                     .height = SIDE,
+                                     .n_sample = 1000,
+                                     .seed = 3};
     assert_int_equal(render_run(&picture, pool, NULL, &im, NULL), STATUS_OK);
     configuration[0].contrast_cells = SIDE;
-    struct estimate_request q = {.scene = scene, .model = model, .param = param, .configuration = configuration,
-                                 .n_configuration = 1, .n_path = &n_path, .seed = 4, .want_jacobian = true};
+    struct estimate_request q = {.scene = scene,
+                                 .model = model,
+                                 .param = param,
+                                 .configuration = configuration,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .seed = 4,
+                                 .want_jacobian = true};
     assert_int_equal(estimate_run(&q, pool, NULL, &e, NULL), STATUS_OK);
     for (size_t c = 0; c < 3; c++) {
         double mean = 0.0, sum = 0.0, noise = 0.0, var = 0.0;
@@ -249,8 +261,7 @@ static double magnified_contrast(const struct image *im)
     assert_int_equal(image_init(&large, TIMES * im->width, TIMES * im->height, 3, NULL), STATUS_OK);
     for (size_t i = 0; i < large.width * large.height; i++)
         for (size_t c = 0; c < 3; c++)
-            large.pixel[3 * i + c] =
-                im->pixel[3 * (i / large.width / TIMES * im->width + i % large.width / TIMES) + c];
+            large.pixel[3 * i + c] = im->pixel[3 * (i / large.width / TIMES * im->width + i % large.width / TIMES) + c];
     assert_int_equal(image_contrast(&large, 0, 5, &contrast, &se, NULL), STATUS_OK);
     image_release(&large);
     return contrast;
@@ -325,7 +336,8 @@ static void test_photograph_error(void **state)
     assert_int_equal(image_contrast(&im, 2, SIDE, &contrast, &se, NULL), STATUS_OK);
     assert_true(contrast == 0.0 && se == 1.0);
     image_release(&im);
-    struct observation o = {.weight = 2.0, .n_cell = SIDE, .contrast_rgb = {0.04, 0.04, 0.0}, .contrast_se_rgb = {0.01, 0.01, 1.0}};
+    struct observation o = {
+        .weight = 2.0, .n_cell = SIDE, .contrast_rgb = {0.04, 0.04, 0.0}, .contrast_se_rgb = {0.01, 0.01, 1.0}};
     assert_true(observation_of_contrast(&o, 3.0).weight == 0.0);
     o.contrast_se_rgb[2] = 0.01;
     assert_true(observation_of_contrast(&o, 3.0).weight == 6.0);
@@ -370,7 +382,8 @@ static void setup(struct fixture *x, double gain, double weight)
     assert_int_equal(observation_set_append_contrasts(&means, weight, &x->observation, NULL), STATUS_OK);
     assert_int_equal(x->observation.n, 2 * N_VIEW);
     for (size_t p = 0; p < N_PARAM; p++)
-        x->parameter[p] = (struct fit_parameter){board_param[p].lower, board_param[p].upper, board_param[p].start, false};
+        x->parameter[p] =
+            (struct fit_parameter){board_param[p].lower, board_param[p].upper, board_param[p].start, false};
     x->problem = (struct fit_problem){.n_param = N_PARAM,
                                       .info = board_param,
                                       .param = x->parameter,
@@ -389,7 +402,8 @@ static void release(struct fixture *x)
 static void fit(struct fixture *x, struct fit_result *r)
 {
     struct error err = {0};
-    if (fit_run(descent_find(METHOD_GAUSS_NEWTON), &x->problem, &x->option, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (fit_run(descent_find(METHOD_GAUSS_NEWTON), &x->problem, &x->option, r, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
 }
 
 /* Means say nothing of t; the contrast does. */
@@ -450,7 +464,8 @@ static void test_gains_beside_contrasts_that_do_not_fit(void **state)
     for (size_t row = 0; row < m.n_row; row++) {
         const struct observation *item = &o.item[row / 3];
         double gain = row / 3 % 2 == 0 ? 0.05 : -0.05;
-        for (int q = 0; q < 2; q++) m.r[q][row] = row < 3 * N ? sqrt(objective_weight(item)) * item->mean_rgb[row % 3] * gain : 0.15;
+        for (int q = 0; q < 2; q++)
+            m.r[q][row] = row < 3 * N ? sqrt(objective_weight(item)) * item->mean_rgb[row % 3] * gain : 0.15;
     }
     linear_gain_absorb(&m, &o);
     for (size_t row = 0; row < m.n_row; row++) {

@@ -83,7 +83,8 @@ static void test_texts_that_are_no_utf8(void **state)
     struct error error = {.code = STATUS_FORMAT};
     snprintf(error.text, sizeof error.text, "x%s", longer);
     worker_status_warn(d.status, error.text); /* the limits of warnings and of messages cut a character in two */
-    worker_status_warn(d.status, "gr\xf6\xdf" "e");
+    worker_status_warn(d.status, "gr\xf6\xdf"
+                                 "e");
     json_t *json = finish(&d, &error);
     assert_string_equal(json_string_value(json_object_get(json, "state")), "failed");
     assert_int_equal(strlen(json_string_value(json_array_get(json_object_get(json, "warnings"), 0))), 511);
@@ -95,7 +96,8 @@ static void test_texts_that_are_no_utf8(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_warnings_beyond_the_list_are_counted, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_warnings_beyond_the_list_are_counted, scratch_folder_setup,
+                                        scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_texts_that_are_no_utf8, scratch_folder_setup, scratch_folder_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

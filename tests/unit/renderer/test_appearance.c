@@ -59,8 +59,13 @@ static void request_init(struct appearance_request *q, const struct appearance *
                          const struct configuration *c, const size_t *n_path)
 {
     for (size_t p = 0; p < a->n_param; p++) param[p] = a->param[p].start;
-    *q = (struct appearance_request){.model = a, .param = param, .configuration = c, .n_configuration = 2,
-                                     .n_path = n_path, .seed = 3, .want_jacobian = true};
+    *q = (struct appearance_request){.model = a,
+                                     .param = param,
+                                     .configuration = c,
+                                     .n_configuration = 2,
+                                     .n_path = n_path,
+                                     .seed = 3,
+                                     .want_jacobian = true};
 }
 
 static void test_same_figures_as_the_tracers(void **unused)
@@ -89,8 +94,14 @@ static void test_same_figures_as_the_tracers(void **unused)
     appearance_at(0, &a);
     request_init(&q, &a, param, c, n_path);
     q.scene.fibers = scene;
-    const struct estimate_request surface = {.scene = scene, .model = a.surface, .param = param, .configuration = c,
-                                             .n_configuration = 2, .n_path = n_path, .seed = 3, .want_jacobian = true};
+    const struct estimate_request surface = {.scene = scene,
+                                             .model = a.surface,
+                                             .param = param,
+                                             .configuration = c,
+                                             .n_configuration = 2,
+                                             .n_path = n_path,
+                                             .seed = 3,
+                                             .want_jacobian = true};
     assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, NULL), STATUS_OK);
     assert_int_equal(estimate_run(&surface, pool, NULL, there, NULL), STATUS_OK);
     assert_memory_equal(here, there, sizeof here);
@@ -101,9 +112,14 @@ static void test_same_figures_as_the_tracers(void **unused)
     assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, &err), STATUS_INVALID); /* no volume given */
     assert_non_null(strstr(err.text, a.id));
     q.scene.volume = &volume;
-    const struct volume_estimate_request volumetric = {.scene = &volume, .model = a.volume, .param = param,
-                                                       .multiplier_per_m = 4e5, .configuration = c,
-                                                       .n_configuration = 2, .n_path = n_path, .seed = 3,
+    const struct volume_estimate_request volumetric = {.scene = &volume,
+                                                       .model = a.volume,
+                                                       .param = param,
+                                                       .multiplier_per_m = 4e5,
+                                                       .configuration = c,
+                                                       .n_configuration = 2,
+                                                       .n_path = n_path,
+                                                       .seed = 3,
                                                        .want_jacobian = true};
     assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, NULL), STATUS_OK);
     assert_int_equal(volume_estimate_run(&volumetric, pool, NULL, there, NULL), STATUS_OK);
@@ -136,7 +152,8 @@ static void test_mean_over_rotations(void **unused)
     assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, NULL), STATUS_OK);
     appearance_at(0, &a);
     for (int k = 0; k < N; k++) by_hand[k] = c[k < N_ROTATION ? 1 : 0];
-    for (int k = 0; k < N_ROTATION; k++) by_hand[k].cloth_rotation_rad = c[1].cloth_rotation_rad + k * 2.0 * M_PI / N_ROTATION;
+    for (int k = 0; k < N_ROTATION; k++)
+        by_hand[k].cloth_rotation_rad = c[1].cloth_rotation_rad + k * 2.0 * M_PI / N_ROTATION;
     request_init(&q, &a, param, by_hand, n_turned);
     q.scene.fibers = scene;
     q.n_configuration = N;

@@ -2,8 +2,8 @@
 #include "base/clock.h"
 #include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
-#include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -125,7 +125,8 @@ static void agrees_without_avx512(void **state)
     for (int i = 0; i < 2; i++)
         for (int c = 0; c < 3; c++) {
             double se = sqrt(with[i].var[c]), off = fabs(with[i].mean[c] - without[i].mean[c]);
-            if (!(off < 0.3 * se)) fail_msg("configuration %d, channel %d: %g, without %g", i, c, with[i].mean[c], without[i].mean[c]);
+            if (!(off < 0.3 * se))
+                fail_msg("configuration %d, channel %d: %g, without %g", i, c, with[i].mean[c], without[i].mean[c]);
         }
     scene_free(plain);
     fiber_set_release(&f);
@@ -158,11 +159,13 @@ static void shared_paths_agree_with_separate_ones(void **state)
         for (int k = 0; k < 3 && i != 2; k++) {
             double se = sqrt(separate[i].var[k] + shared[i].var[k]);
             if (!(fabs(separate[i].mean[k] - shared[i].mean[k]) < 4 * se && shared[i].mean[k] > 0))
-                fail_msg("configuration %d, channel %d: %g and %g, +- %g", i, k, separate[i].mean[k], shared[i].mean[k], se);
+                fail_msg("configuration %d, channel %d: %g and %g, +- %g", i, k, separate[i].mean[k], shared[i].mean[k],
+                         se);
             for (int p = 0; p < N_PARAM; p++) {
                 double jac_se = sqrt(separate[i].jac_var[k * N_PARAM + p] + shared[i].jac_var[k * N_PARAM + p]);
                 if (fabs(separate[i].jac[k * N_PARAM + p] - shared[i].jac[k * N_PARAM + p]) > 4.5 * jac_se)
-                    fail_msg("configuration %d, derivative %d of channel %d: %g and %g, +- %g", i, p, k, separate[i].jac[k * N_PARAM + p], shared[i].jac[k * N_PARAM + p], jac_se);
+                    fail_msg("configuration %d, derivative %d of channel %d: %g and %g, +- %g", i, p, k,
+                             separate[i].jac[k * N_PARAM + p], shared[i].jac[k * N_PARAM + p], jac_se);
             }
         }
     /* a group of one has the paths of its own estimate when it is first: same key, same numbers */
@@ -190,7 +193,8 @@ static void shared_paths_without_a_lamp(void **state)
     run(&q, 2, separate);
     q.share_camera_paths = true;
     run(&q, 2, shared);
-    assert_memory_equal(shared[0].mean, separate[0].mean, sizeof shared[0].mean); /* first in the order: same key, same numbers */
+    assert_memory_equal(shared[0].mean, separate[0].mean,
+                        sizeof shared[0].mean); /* first in the order: same key, same numbers */
     for (int k = 0; k < 3; k++) {
         double se = sqrt(separate[1].var[k] + shared[1].var[k]);
         if (!(fabs(shared[1].mean[k] - separate[1].mean[k]) < 4 * se && shared[1].mean[k] > 0))

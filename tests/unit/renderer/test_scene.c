@@ -162,7 +162,8 @@ static void thin_fibers_are_as_wide_as_thick_ones(void **state)
         rng_start(&r, &(struct rng_key){13, 0, 0, 0}, (uint32_t)k, 0);
         int n_hit = 0;
         for (int i = 0; i < N; i++) {
-            double tilt = 2 * rng_double(&r) - 1, l = sqrt(1 + tilt * tilt), off = 1e3 * radius_m * (4 * rng_double(&r) - 2);
+            double tilt = 2 * rng_double(&r) - 1, l = sqrt(1 + tilt * tilt),
+                   off = 1e3 * radius_m * (4 * rng_double(&r) - 2);
             double d[3] = {tilt / l, 0, -1 / l}; /* the fiber lies along x: y is across the ray */
             double p[3] = {32 * rng_double(&r) - 16, 1e3 * 0.33 * tile_m + off, -1e3 * radius_m}, o[3];
             for (int a = 0; a < 3; a++) o[a] = p[a] - 1000 * d[a];
@@ -219,7 +220,8 @@ static void segments_beyond_all_numbers_are_refused(void **state)
         fclose(file);
         fiber_set_init(&f);
         for (int kind = 0; kind < 2; kind++) {
-            assert_int_equal(kind == 0 ? fiber_set_read_text(&f, txt, &err) : fiber_set_read_hair(&f, hair, &err), STATUS_OK);
+            assert_int_equal(kind == 0 ? fiber_set_read_text(&f, txt, &err) : fiber_set_read_hair(&f, hair, &err),
+                             STATUS_OK);
             f.tile_size_m[0] = f.tile_size_m[1] = 1e-3;
             assert_int_equal(scene_new(&f, &(struct scene_option){true}, &s, &err), want[k]);
             assert_non_null(strstr(err.text, k == 0 ? "too far beyond the tile" : "1.845e+19 vertices"));

@@ -3,8 +3,8 @@
 #include "renderer/transport/appearance_render.h"
 #include "renderer/transport/volume_render.h"
 #include "tests/support/cloth/hand_volume.h"
-#include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -93,7 +93,8 @@ static void agrees_with_estimate(void **state)
         struct error err = {0};
         q.n_sample = N_PATH / (24 * 20);
         render(&q, 2, &im);
-        const struct volume_estimate_request r = {&scene, q.model, param, 4e4, &configuration[k], 1, n_path, 6, 0, 0, true};
+        const struct volume_estimate_request r = {&scene, q.model, param, 4e4, &configuration[k], 1, n_path,
+                                                  6,      0,       0,     true};
         if (volume_estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
         double mean = 0, var = 0, by_alpha = 0, by_d = 0, n = 24 * 20;
         for (size_t i = 0; i < 24 * 20; i++) {
@@ -109,7 +110,8 @@ static void agrees_with_estimate(void **state)
         const double got[2] = {by_alpha, by_d};
         for (int i = 0; i < 2; i++)
             if (fabs(got[i] - e.jac[at[i]]) > 4 * sqrt(2 * e.jac_var[at[i]]))
-                fail_msg("derivative %d: render %g, estimate %g +- %g", i, got[i], e.jac[at[i]], sqrt(e.jac_var[at[i]]));
+                fail_msg("derivative %d: render %g, estimate %g +- %g", i, got[i], e.jac[at[i]],
+                         sqrt(e.jac_var[at[i]]));
         image_release(&im);
     }
 }
@@ -218,9 +220,15 @@ static void through_the_appearance(void **state)
     assert_true(appearance_find("phase_two_lobe.v1", &a));
     memcpy(flat, param, sizeof flat);
     flat[a.n_param - 1] = 4e4;
-    struct appearance_render_request q = {.scene = {NULL, &scene}, .model = &a, .param = flat,
-                                          .configuration = &configuration[1], .width = 24, .height = 20,
-                                          .n_sample = 32, .seed = 5, .want_derivative = true};
+    struct appearance_render_request q = {.scene = {NULL, &scene},
+                                          .model = &a,
+                                          .param = flat,
+                                          .configuration = &configuration[1],
+                                          .width = 24,
+                                          .height = 20,
+                                          .n_sample = 32,
+                                          .seed = 5,
+                                          .want_derivative = true};
     assert_int_equal(appearance_render_run(&q, NULL, NULL, &im, NULL), STATUS_OK);
     struct volume_render_request r = request(&configuration[1]);
     render(&r, 1, &straight);
@@ -235,10 +243,12 @@ static void through_the_appearance(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layers_and_threads), cmocka_unit_test(agrees_with_estimate),
+        cmocka_unit_test(layers_and_threads),
+        cmocka_unit_test(agrees_with_estimate),
         cmocka_unit_test_setup_teardown(files, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(cancelled_soon),
-        cmocka_unit_test(bad_requests),       cmocka_unit_test(through_the_appearance),
+        cmocka_unit_test(bad_requests),
+        cmocka_unit_test(through_the_appearance),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
