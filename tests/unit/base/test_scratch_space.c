@@ -3,7 +3,6 @@
 #include "base/scratch_space.h"
 #include "tests/support/cloth/scan_files.h"
 
-#include <cmocka.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -12,6 +11,8 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
+
+#include <cmocka.h>
 
 enum { MIB = 1 << 20 };
 

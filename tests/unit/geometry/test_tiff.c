@@ -3,7 +3,6 @@
 #include "geometry/volume/volume_source.h"
 #include "tests/support/cloth/scan_files.h"
 
-#include <cmocka.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,6 +11,8 @@
 #include <string.h>
 #include <tiffio.h>
 #include <unistd.h>
+
+#include <cmocka.h>
 
 enum { W = 37, H = 23, N = 4 };
 
