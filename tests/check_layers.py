@@ -17,7 +17,7 @@ SEES = {
     "clients": {"base", "clients"},
 }
 SERVER_MAY = {"optimizer/job/job_folder.h", "optimizer/job/job_document.h", "optimizer/job/stage_table.h"}
-SHARED_NAMES = {"README.md", "conftest.py", ".gitignore", "index.html"}
+SHARED_NAMES = {"README.md", "NOTES.md", "conftest.py", ".gitignore", "index.html"}
 
 
 def main():
