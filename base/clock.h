@@ -1,4 +1,4 @@
-/* Seconds from the monotonic clock (for durations) and from the wall clock (for time stamps, UTC since 1970). */
+/* Clocks in seconds: the monotonic clock for durations and the wall clock (UTC since 1970) for time stamps. */
 #ifndef SELVEDGE_BASE_CLOCK_H
 #define SELVEDGE_BASE_CLOCK_H
 

@@ -124,7 +124,8 @@ status file_read_all(const char *path, size_t limit_bytes, char **data, size_t *
 {
     status s = STATUS_OK;
     char *buffer = NULL;
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a pipe is refused below, not waited for */
+    /* O_NONBLOCK: opening a pipe must not wait; it is refused below */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0) return error_set_errno(err, "cannot read '%s'", path);
     struct stat st;
     if (fstat(fd, &st) != 0) {
@@ -185,7 +186,7 @@ status record_append(const char *path, const char *json, bool sync, struct error
     before = lseek(fd, 0, SEEK_END);
     if (write_all(fd, line, (size_t)n) != STATUS_OK || (sync && fdatasync(fd) != 0)) {
         s = error_set_errno(err, "cannot append to '%s'", path);
-        if (before >= 0 && ftruncate(fd, before) != 0) { /* the torn tail is found by its checksum */
+        if (before >= 0 && ftruncate(fd, before) != 0) { /* the checksum identifies an incomplete record */
         }
     } else if (sync && before == 0) {
         s = durable_sync_folder_of(path, err);
@@ -199,7 +200,7 @@ out:
 static bool record_valid(const char *line, size_t n)
 {
     if (n < 10 || line[8] != ' ') return false;
-    char want[16]; /* compared as text: strtoul would take blanks, signs and capitals as well */
+    char want[16]; /* compared as text, because strtoul would also accept blanks, signs and capital letters */
     snprintf(want, sizeof want, "%08lx", crc32(0, (const unsigned char *)line + 9, (unsigned)(n - 9)));
     return memcmp(line, want, 8) == 0;
 }
@@ -234,7 +235,8 @@ out:
 
 enum { SEEK_SPAN_BYTES = 64 * 1024 };
 
-/* The first record that begins behind `at`: its offset, and whether it is a good one that `before` holds for. */
+/* Finds the first record that begins after offset `at`: *begin is its offset. Returns true if it is valid and
+ * `before` holds for it. */
 static bool record_behind(FILE *f, uint64_t at, char **line, size_t *capacity, record_visitor before, void *context,
                           uint64_t *begin)
 {

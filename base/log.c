@@ -61,7 +61,7 @@ void log_write(struct log *l, enum log_level level, const char *format, ...)
         if (line[i] == '\n' || line[i] == '\r') line[i] = ' ';
     line[end++] = '\n';
     pthread_mutex_lock(&l->lock);
-    if (l->fd >= 0 && write(l->fd, line, end) < 0) { /* a log that cannot be written must not stop the work */
+    if (l->fd >= 0 && write(l->fd, line, end) < 0) { /* a failure to write the log must not stop the work */
     }
     if (l->also != NULL) fwrite(line, 1, end, l->also);
     pthread_mutex_unlock(&l->lock);

@@ -1,6 +1,6 @@
-/* Progress out, cancellation in: what a long computation takes from its caller.
- * `report` may be called from any thread, but one call at a time; fraction rises from 0 to 1.
- * Computations look at `cancel` at least every 100 ms and return STATUS_CANCELLED when it is set. */
+/* Progress reports and cancellation of a long computation, as its caller passes them in. `report` may be called from
+ * any thread, but by one at a time; its fraction rises from 0 to 1. Computations check `cancel` at least every 100
+ * ms and return STATUS_CANCELLED when it is set. */
 #ifndef SELVEDGE_BASE_PROGRESS_H
 #define SELVEDGE_BASE_PROGRESS_H
 
@@ -9,12 +9,12 @@
 #include <stddef.h>
 
 struct progress {
-    void (*report)(void *context, double fraction); /* NULL: nobody listens */
+    void (*report)(void *context, double fraction); /* NULL: progress is not reported */
     void *context;
     const atomic_bool *cancel; /* NULL: cannot be cancelled */
 };
 
-/* These accept p == NULL. */
+/* Both functions accept p == NULL. */
 static inline bool progress_cancelled(const struct progress *p)
 {
     return p != NULL && p->cancel != NULL && atomic_load_explicit(p->cancel, memory_order_relaxed);
@@ -25,15 +25,15 @@ static inline void progress_report(const struct progress *p, double fraction)
     if (p != NULL && p->report != NULL) p->report(p->context, fraction);
 }
 
-/* To be cancelled like p, but without its reports. */
+/* Returns a progress with the same cancellation as p that reports nothing. */
 static inline struct progress progress_silent(const struct progress *p)
 {
     return (struct progress){.cancel = p != NULL ? p->cancel : NULL};
 }
 
-/* A part of a longer computation: what it reports from 0 to 1 is from .. from + share of the whole. */
+/* A part of a longer computation: its reports from 0 to 1 are passed on to `outer` as `from` to `from` + `share`. */
 struct progress_part {
-    const struct progress *outer; /* NULL: nobody listens */
+    const struct progress *outer; /* NULL: progress is not reported */
     double from, share;
 };
 
@@ -43,7 +43,8 @@ static inline void progress_report_part(void *part, double fraction)
     progress_report(p->outer, p->from + p->share * fraction);
 }
 
-/* What the part's computation takes; part may be changed as long as it lives. */
+/* Returns the progress to pass to the computation of the part. `part` must outlive it; its members may be changed
+ * meanwhile. */
 static inline struct progress progress_of_part(struct progress_part *part)
 {
     return (struct progress){

@@ -4,7 +4,7 @@
 
 void rng_normal_pair(struct rng *r, double out[2])
 {
-    double u = 1.0 - rng_double(r); /* (0, 1]: the logarithm is finite */
+    double u = 1.0 - rng_double(r); /* in (0, 1], so that the logarithm is finite */
     double radius = sqrt(-2.0 * log(u));
     double angle = 2.0 * M_PI * rng_double(r);
     out[0] = radius * cos(angle);
@@ -31,7 +31,7 @@ static uint64_t poisson_ptrs(struct rng *r, double mean)
     const double a = -0.059 + 0.02483 * b;
     const double inv_alpha = 1.1239 + 1.1328 / (b - 3.4);
     const double v_r = 0.9277 - 3.6224 / (b - 2.0);
-    int sign; /* lgamma_r, as lgamma writes its sign where all threads see it */
+    int sign; /* lgamma_r, because lgamma writes the sign to a variable that all threads share */
     for (;;) {
         double u = rng_double(r) - 0.5;
         double v = 1.0 - rng_double(r);

@@ -1,10 +1,9 @@
-/* Counter-based random numbers: Philox4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"),
+/* Counter-based random numbers: Philox4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3")
  * from the Random123 library.
  *
- * A stream is named by (seed, iteration, replica, configuration, pixel, sample) and never by thread state,
- * so results do not depend on how work is divided. Numbers within a stream come in order of use.
- * Streams may be created on the stack; they own nothing.
- */
+ * A stream is identified by (seed, iteration, replica, configuration, pixel, sample) and does not depend on any
+ * thread state, so results do not depend on how the work is divided among threads. Numbers within a stream come in
+ * order of use. A stream is plain data without resources of its own and may be on the stack. */
 #ifndef SELVEDGE_BASE_RNG_H
 #define SELVEDGE_BASE_RNG_H
 
@@ -25,7 +24,7 @@ struct rng {
     uint32_t n_left;
 };
 
-/* Start the stream of one sample of one pixel. Key fields beyond their ranges wrap (callers check). */
+/* Starts the stream of one sample of one pixel. Key fields beyond their ranges wrap, so the caller checks them. */
 static inline void rng_start(struct rng *r, const struct rng_key *k, uint32_t pixel, uint32_t sample)
 {
     r->key.v[0] = (uint32_t)k->seed;
@@ -47,20 +46,20 @@ static inline uint32_t rng_u32(struct rng *r)
     return r->block.v[--r->n_left];
 }
 
-/* Uniform in [0, 1), 24 bits: never 1.0f. */
+/* Returns a number uniform in [0, 1) with 24 random bits; it is never 1.0f. */
 static inline float rng_float(struct rng *r) { return (float)(rng_u32(r) >> 8) * 0x1p-24f; }
 
-/* Uniform in [0, 1), 53 bits. */
+/* Returns a number uniform in [0, 1) with 53 random bits. */
 static inline double rng_double(struct rng *r)
 {
     uint64_t hi = rng_u32(r) >> 5, lo = rng_u32(r) >> 6;
     return (double)((hi << 26) | lo) * 0x1p-53;
 }
 
-/* Two independent standard normal deviates (Box-Muller). */
+/* Draws two independent standard normal deviates by the Box-Muller method. */
 void rng_normal_pair(struct rng *r, double out[2]);
 
-/* Poisson deviate of the given mean (>= 0): inversion below 30, Hoermann's PTRS above. */
+/* Draws a Poisson deviate with the given mean (>= 0): by inversion below 30, by Hoermann's PTRS above. */
 uint64_t rng_poisson(struct rng *r, double mean);
 
 #endif

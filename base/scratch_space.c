@@ -24,10 +24,10 @@ struct array {
 struct scratch_space {
     char *folder;
     size_t limit_bytes, page_bytes;
-    int statm_fd; /* -1: residence is not known, every call drops */
+    int statm_fd; /* -1: the resident size is unknown, and every call drops the mapped pages */
     pthread_mutex_t lock;
     struct array *array;
-    size_t memory_bytes; /* of arrays that are not in files */
+    size_t memory_bytes; /* of the arrays that are not in files */
     atomic_size_t file_bytes;
     atomic_bool dropping;
 };
@@ -63,14 +63,15 @@ void scratch_space_free(struct scratch_space *s)
     free(s);
 }
 
-/* A file without a name, its blocks reserved, mapped; the descriptor is not kept. */
+/* Maps a new nameless file with all blocks reserved. The descriptor is closed, because the mapping keeps the file
+ * alive. */
 static status map_file(struct scratch_space *s, size_t n_bytes, const char *what, void **address, struct error *err)
 {
     status st = STATUS_OK;
     char path[4096];
     int fd = open(s->folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
     if (fd < 0 && (errno == EOPNOTSUPP || errno == EISDIR || errno == ENOENT ||
-                   errno == EINVAL)) { /* file systems without O_TMPFILE */
+                   errno == EINVAL)) { /* this file system lacks O_TMPFILE */
         snprintf(path, sizeof path, "%s/scratch-XXXXXX", s->folder);
         fd = mkostemp(path, O_CLOEXEC);
         if (fd >= 0) unlink(path);
@@ -95,7 +96,8 @@ static status map_memory(size_t n_bytes, const char *what, void **address, struc
     *address = mmap(NULL, n_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (*address == MAP_FAILED)
         return error_set(err, STATUS_NO_MEMORY, "cannot get %zu MB for %s: out of memory", n_bytes / 1000000, what);
-    if (n_bytes >= 4 * (size_t)HUGE_PAGE) madvise(*address, n_bytes, MADV_HUGEPAGE); /* advice: failing does no harm */
+    /* only a hint, so its result is ignored */
+    if (n_bytes >= 4 * (size_t)HUGE_PAGE) madvise(*address, n_bytes, MADV_HUGEPAGE);
     return STATUS_OK;
 }
 
@@ -155,7 +157,7 @@ void scratch_release(struct scratch_space *s, void *address)
     free(found);
 }
 
-/* Resident bytes of the process; SIZE_MAX when the kernel does not say. */
+/* Returns the resident bytes of the process, or SIZE_MAX if the kernel does not report them. */
 static size_t resident_bytes(const struct scratch_space *s)
 {
     char text[128];
@@ -163,7 +165,7 @@ static size_t resident_bytes(const struct scratch_space *s)
     if (n <= 0) return SIZE_MAX;
     text[n] = '\0';
     char *end;
-    strtoull(text, &end, 10); /* the first number is the address space */
+    strtoull(text, &end, 10); /* skip the first number, the size of the address space */
     return (size_t)strtoull(end, NULL, 10) * s->page_bytes;
 }
 
@@ -171,7 +173,7 @@ void scratch_keep_within(struct scratch_space *s)
 {
     if (s == NULL || atomic_load_explicit(&s->file_bytes, memory_order_relaxed) == 0) return;
     if (resident_bytes(s) <= s->limit_bytes - s->limit_bytes / 8) return;
-    if (atomic_exchange(&s->dropping, true)) return; /* another thread does it */
+    if (atomic_exchange(&s->dropping, true)) return; /* another thread is already dropping pages */
     pthread_mutex_lock(&s->lock);
     for (struct array *a = s->array; a != NULL; a = a->next)
         if (a->in_file) madvise(a->address, a->n_bytes, MADV_DONTNEED); /* of a shared mapping: the contents stay */

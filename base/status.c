@@ -32,12 +32,12 @@ static void fill(struct error *err, status code, int errno_value, const char *wh
     err->code = code;
     err->errno_value = errno_value;
     snprintf(err->where, sizeof err->where, "%s", where);
-    /* format may print err->text or err->field themselves, so build aside */
+    /* format's arguments may point to err->text or err->field, so the text is built in a copy */
     char text[sizeof err->text];
     vsnprintf(text, sizeof text, format, args);
     char field_copy[sizeof err->field];
     snprintf(field_copy, sizeof field_copy, "%s", field == NULL ? "" : field);
-    utf8_repair(text); /* both end up in JSON, and quote files that may hold anything */
+    utf8_repair(text); /* both end up in JSON but may quote arbitrary bytes of files */
     utf8_repair(field_copy);
     memcpy(err->text, text, sizeof text);
     memcpy(err->field, field_copy, sizeof field_copy);

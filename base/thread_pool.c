@@ -12,9 +12,9 @@ struct thread_pool {
     pthread_mutex_t lock;
     pthread_cond_t work, done;
     pthread_t *thread;
-    size_t n_thread;   /* including the caller, who is thread 0 */
-    size_t n_started;  /* helper threads running */
-    size_t generation; /* counts jobs */
+    size_t n_thread;   /* including the caller of thread_pool_run, which is thread 0 */
+    size_t n_started;  /* number of helper threads that run */
+    size_t generation; /* number of the present call of thread_pool_run */
     size_t n_busy;
     bool stop;
 
@@ -31,7 +31,7 @@ struct start_argument {
     size_t i_thread;
 };
 
-/* Control word of the thread's floating-point unit. */
+/* Returns the control word of the thread's floating-point unit. */
 static unsigned long float_mode(void)
 {
 #if defined(__SSE2__)
@@ -191,7 +191,7 @@ static status run_in_all(struct thread_pool *p, size_t n_task, task_function run
     return complete ? STATUS_OK : STATUS_CANCELLED;
 }
 
-/* The caller computes as before when it is done: what it does later must not depend on whether this process has used a pool. */
+/* Restores the caller's floating-point mode, so that its later results do not depend on whether it has used a pool. */
 status thread_pool_run(struct thread_pool *p, size_t n_task, task_function run, void *context,
                        const struct progress *progress)
 {
