@@ -1,0 +1,59 @@
+/* The overlap score of the fiber radius (fabric thesis 5.6.5) on a histogram written by hand:
+ *     score(r) = |C(r) and V| - |C(r) xor V|, and a ring belongs to the best C(r) while more than a third of its points are
+ *     in V, because a point of V inside of C(r) counts twice (it joins the intersection and leaves the difference). */
+#include "geometry/fibers/shape/radius.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+/* Points of V and others in each bin of rings of 64 bins; each bin is 1/64 voxel wide, so a ring is one voxel wide. */
+static const uint64_t ring[RADIUS_BINS / 64][2] = {{100, 0}, {70, 30}, {40, 60}, {30, 70}, {20, 80}, {1, 99}};
+
+static void fill(struct distance_histogram *h)
+{
+    *h = (struct distance_histogram){.bin_voxel = 1.0 / 64.0};
+    for (size_t b = 0; b < RADIUS_BINS; b++) {
+        h->inside[1][b] = ring[b / 64][0];
+        h->outside[1][b] = ring[b / 64][1];
+    }
+}
+
+static void test_best_score(void **state)
+{
+    (void)state;
+    struct distance_histogram *h = malloc(sizeof *h);
+    assert_non_null(h);
+    fill(h);
+    assert_true(radius_best_score(h, 2u) == 3.0); /* 40 of 100 points are in V in the third ring, 30 in the fourth */
+    assert_true(radius_best_score(h, 7u) == 3.0);
+    assert_true(radius_best_score(h, 1u) == 0.0); /* no fiber of that class */
+    free(h);
+}
+
+static void test_score(void **state)
+{
+    (void)state;
+    struct distance_histogram *h = malloc(sizeof *h);
+    double all = 0.0, in = 0.0, out = 0.0;
+    assert_non_null(h);
+    fill(h);
+    for (size_t k = 0; k < RADIUS_BINS / 64; k++) all += (double)ring[k][0];
+    for (size_t k = 0; k < RADIUS_BINS / 64; k++) {
+        in += (double)ring[k][0];
+        out += (double)ring[k][1];
+        double want = (in - (out + (all - in))) / all;
+        assert_true(fabs(radius_score(h, 2u, (double)k + 1.0) - want) < 1e-12);
+    }
+    assert_true(radius_score(h, 1u, 3.0) == 0.0);
+    free(h);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_best_score), cmocka_unit_test(test_score)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,92 @@
+/* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a fiber
+ * takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels within r. */
+#include "geometry/reconstruct.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { N_FIBER = 2, NX = 40, NY = 40, NZ = 24 };
+
+static const double voxel_m[3] = {2e-6, 2e-6, 2e-6};
+static const size_t n_voxel[3] = {NX, NY, NZ};
+/* Fibers along x of different radii: y and z of the axis, and the radius, in voxels. */
+static const double fiber[N_FIBER][3] = {{10.3, 11.6, 2.6}, {28.4, 12.2, 3.7}};
+static const float before[3] = {0.0f, 0.6f, 0.8f};
+
+static void make_fibers(struct fiber_set *f)
+{
+    fiber_set_init(f);
+    assert_int_equal(fiber_set_reserve(f, N_FIBER, 2 * N_FIBER, NULL), STATUS_OK);
+    f->tile_size_m[0] = NX * voxel_m[0];
+    f->tile_size_m[1] = NY * voxel_m[1];
+    for (size_t i = 0; i < N_FIBER; i++) {
+        for (size_t end = 0; end < 2; end++) {
+            float *p = &f->position_m[3 * (2 * i + end)];
+            p[0] = (float)(((double)end * (NX + 20.0) - 10.0) * voxel_m[0]); /* its ends lie well outside */
+            p[1] = (float)(fiber[i][0] * voxel_m[1]);
+            p[2] = (float)(fiber[i][1] * voxel_m[2]);
+        }
+        f->first_vertex[i + 1] = 2 * (i + 1);
+        f->radius_m[i] = (float)(fiber[i][2] * voxel_m[0]);
+        f->axis_class[i] = 0;
+    }
+}
+
+/* Every voxel is material but for a slab at the bottom. */
+static bool is_kept(size_t z) { return z >= 10; }
+
+static void make_directions(struct direction_volume *d)
+{
+    assert_int_equal(direction_volume_init(d, n_voxel, voxel_m, NULL), STATUS_OK);
+    for (size_t at = 0; at < (size_t)NX * NY * NZ; at++) {
+        d->density[at] = is_kept(at / (NX * NY)) ? 200 : 0;
+        direction_volume_set(d, at, before);
+    }
+}
+
+/* Distance of a voxel's center from the axis of fiber i over its radius. */
+static double radii_away(size_t y, size_t z, size_t i)
+{
+    return hypot((double)y + 0.5 - fiber[i][0], (double)z + 0.5 - fiber[i][1]) / fiber[i][2];
+}
+
+static void test_transfer(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    struct direction_volume d;
+    struct reconstruct_report report = {0};
+    size_t n_changed = 0, n_fiber = 0, n_both = 0, n_kept = 0;
+    make_fibers(&f);
+    make_directions(&d);
+    assert_int_equal(reconstruct_transfer(&f, &d, NULL, NULL, &report, NULL), STATUS_OK);
+    for (size_t at = 0; at < (size_t)NX * NY * NZ; at++) {
+        size_t y = at / NX % NY, z = at / (NX * NY);
+        double away = fmin(radii_away(y, z, 0), radii_away(y, z, 1));
+        bool changes = is_kept(z) && away <= 2.0;
+        float got[3];
+        direction_volume_get(&d, at, got);
+        float cosine = changes ? got[0] : got[0] * before[0] + got[1] * before[1] + got[2] * before[2];
+        if (fabsf(cosine) < 0.9999f) fail_msg("voxel y %zu, z %zu, %.3f radii from a fiber", y, z, away);
+        n_changed += changes;
+        n_fiber += away <= 1.0;
+        n_both += away <= 1.0 && is_kept(z);
+        n_kept += is_kept(z);
+    }
+    assert_true(n_changed > 2 * n_both && n_both < n_fiber);
+    assert_true(fabs(report.dice - 2.0 * (double)n_both / (double)(n_fiber + n_kept)) < 1e-12);
+    assert_true(fabs(report.direction_change_mean_deg - 90.0) < 0.02);
+    fiber_set_release(&f);
+    direction_volume_release(&d);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transfer)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,119 @@
+/* The step rule of published_sgd.v1 (fabric thesis 5.5.4), on a problem whose gradient is the same everywhere: the i-th
+ * step of a run is a / (50 + i), a grows threefold from run to run, and a run that oscillates is followed by ten steps of
+ * a tenth of its last one. */
+#include "optimizer/fit/descent/descent.h"
+#include "optimizer/fit/descent/rescale.h"
+#include "optimizer/job/method_names.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { N_RUN = 6, N_ITERATION = 60, N_EXTRA = 10, N_FINAL = 4, MAX_STEP = N_RUN * N_ITERATION + N_EXTRA + N_FINAL };
+
+static const struct param_info one_param[1] = {{"x", "x", "", -1, 0.0, 1.0, 0.5}};
+
+struct slope {
+    bool alternates; /* the gradient changes its sign from one iteration to the next */
+    size_t n_step;
+    double param[MAX_STEP];
+};
+
+/* The picture as a function of x is measured once, for the rescaling curve: it is linear, so that steps in the rescaled
+ * parameter are proportional to steps in x. In the descent, picture and derivative do not depend on x. */
+static status run_estimator(void *context, const struct estimator_call *call, const struct progress *progress,
+                            struct estimate *out, double *wall_s, struct error *err)
+{
+    const struct slope *x = context;
+    bool down = x->alternates && call->iteration % 2 == 0;
+    (void)progress;
+    (void)err;
+    memset(out, 0, sizeof *out);
+    *wall_s = 0.25;
+    for (int c = 0; c < 3; c++) {
+        out->mean[c] = call->replica == REPLICA_RESCALE ? call->param[0] : 0.6;
+        out->var[c] = 1e-6;
+        out->jac[c] = down ? -1.0 : 1.0;
+    }
+    out->n_path = call->n_path[0];
+    return STATUS_OK;
+}
+
+static status on_step(void *context, const struct fit_step *step, struct error *err)
+{
+    struct slope *x = context;
+    (void)err;
+    assert_true(x->n_step < MAX_STEP);
+    x->param[x->n_step++] = step->param[0];
+    return STATUS_OK;
+}
+
+static void run(struct slope *x, double start)
+{
+    struct fit_parameter parameter = {one_param->lower, one_param->upper, start, false};
+    struct observation row = {.set = JOB_SET_FIT, .weight = 1.0, .mean_rgb = {0.5, 0.5, 0.5}};
+    struct observation_set observation;
+    struct estimator estimator = {x, 1, 1, run_estimator};
+    struct fit_result r;
+    struct error err = {0};
+    row.configuration = (struct configuration){
+        .light_theta_rad = 0.5, .light_distance_m = 0.6, .lamp_side_m = 0.1, .camera_distance_m = 1.0, .crop_m = 0.01};
+    observation_set_init(&observation);
+    assert_int_equal(observation_set_append(&observation, &row, NULL), STATUS_OK);
+    struct fit_problem problem = {.n_param = 1,
+                                  .info = one_param,
+                                  .param = &parameter,
+                                  .observation = &observation,
+                                  .estimator = &estimator,
+                                  .report = on_step,
+                                  .report_context = x};
+    if (descent_find(METHOD_PUBLISHED_SGD)->run(&problem, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    observation_set_release(&observation);
+}
+
+static double step_length(const struct slope *x, size_t i) { return fabs(x->param[i + 1] - x->param[i]); }
+
+/* The first step of the first run moves x by 0.5 % of its range, all others follow from it. */
+static void test_steps_decay(void **state)
+{
+    (void)state;
+    struct slope x = {0};
+    size_t n_checked = 0;
+    double a = 0.005 * 50.0;
+    run(&x, 0.9);
+    assert_int_equal(x.n_step, N_RUN * N_ITERATION + N_FINAL);
+    for (size_t k = 0; k < N_RUN; k++, a *= 3.0) {
+        const size_t first = k * N_ITERATION;
+        assert_true(x.param[first] == 0.9); /* every run starts anew */
+        for (size_t i = 0; i + 1 < N_ITERATION && x.param[first + i + 1] > one_param->lower; i++, n_checked++)
+            if (fabs(step_length(&x, first + i) - a / (50.0 + (double)i)) > 1e-9)
+                fail_msg("run %zu, step %zu: %.6f, published %.6f", k, i, step_length(&x, first + i),
+                         a / (50.0 + (double)i));
+    }
+    assert_true(n_checked >= 2 * (N_ITERATION - 1)); /* the longer runs reach the bound before their end */
+}
+
+/* All runs end at the same objective, so the first one wins; its steps point against each other. */
+static void test_steps_after_an_oscillation(void **state)
+{
+    (void)state;
+    struct slope x = {.alternates = true};
+    const size_t settling = N_RUN * N_ITERATION;
+    run(&x, 0.5);
+    assert_int_equal(x.n_step, MAX_STEP);
+    for (size_t i = 0; i + 1 < N_ITERATION; i++)
+        assert_true(fabs(step_length(&x, i) - 0.25 / (50.0 + (double)i)) < 1e-9);
+    for (size_t i = 0; i < N_EXTRA; i++)
+        assert_true(fabs(step_length(&x, settling + i) - 0.1 * 0.25 / (50.0 + N_ITERATION - 1.0)) < 1e-9);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_steps_decay),
+                                       cmocka_unit_test(test_steps_after_an_oscillation)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
