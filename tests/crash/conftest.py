@@ -5,6 +5,7 @@ import pytest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
 from daemon_under_test import Daemon  # noqa: E402
+from system_calls import build_shim  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -26,3 +27,9 @@ def daemon_maker(tmp_path):
     yield make
     for d in made:
         d.stop()
+
+
+@pytest.fixture(scope="module")
+def shim(tmp_path_factory):
+    """The library that makes system calls fail or records them (support/system_calls.py)."""
+    return build_shim(tmp_path_factory.mktemp("shim"))

@@ -1,5 +1,7 @@
-/* LD_PRELOAD: makes one system call fail, for tests. Environment: FAULT_CALL (write, sync, fallocate), FAULT_AT (1: the first call that
- * fits), FAULT_ERRNO (0: a short write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file made when it fired). */
+/* LD_PRELOAD, for tests: makes one system call fail, or records the calls.
+ * Environment of a fault: FAULT_CALL (write, sync, fallocate), FAULT_AT (1: the first call that fits), FAULT_ERRNO (0: a short
+ * write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file made when it fired).
+ * FAULT_TRACE: file to which every write and every sync that has succeeded appends a line "write PATH" or "sync PATH". */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -15,18 +17,25 @@ static atomic_int n_seen;
 /* the programs that this one starts work normally */
 __attribute__((constructor)) static void only_here(void) { unsetenv("LD_PRELOAD"); }
 
+/* Path of an open file; false: unknown. */
+static int find_path(int fd, char file[4096])
+{
+    char link[64];
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    ssize_t n = readlink(link, file, 4095);
+    if (n <= 0) return 0;
+    file[n] = '\0';
+    return 1;
+}
+
 /* true: this is the call that has to fail */
 static int fires(const char *call, int fd)
 {
     const char *wanted = getenv("FAULT_CALL"), *at = getenv("FAULT_AT"), *path = getenv("FAULT_PATH"),
                *mark = getenv("FAULT_MARK");
-    char link[64], file[4096];
+    char file[4096];
     if (wanted == NULL || at == NULL || path == NULL || mark == NULL || strcmp(wanted, call) != 0) return 0;
-    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
-    ssize_t n = readlink(link, file, sizeof file - 1);
-    if (n <= 0) return 0;
-    file[n] = '\0';
-    if (strstr(file, path) == NULL) return 0;
+    if (!find_path(fd, file) || strstr(file, path) == NULL) return 0;
     if (atomic_fetch_add(&n_seen, 1) + 1 != strtol(at, NULL, 10)) return 0;
     int m = open(mark, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     if (m >= 0) close(m);
@@ -41,6 +50,25 @@ static int wanted_errno(void)
 
 #define REAL(type, name, ...) ((type(*)(__VA_ARGS__))dlsym(RTLD_NEXT, name))
 
+static void record(const char *call, int fd)
+{
+    const char *trace = getenv("FAULT_TRACE");
+    char file[4096], line[4200];
+    int keep = errno;
+    if (trace == NULL || !find_path(fd, file)) return;
+    int n = snprintf(line, sizeof line, "%s %s\n", call, file),
+        t = open(trace, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    if (t < 0 || REAL(ssize_t, "write", int, const void *, size_t)(t, line, (size_t)n) != n) abort();
+    close(t);
+    errno = keep;
+}
+
+static ssize_t recorded(const char *call, int fd, ssize_t result)
+{
+    if (result >= 0) record(call, fd);
+    return result;
+}
+
 static ssize_t faulty_pwrite(const char *name, int fd, const void *data, size_t n, off_t offset)
 {
     if (fires("write", fd)) {
@@ -48,7 +76,7 @@ static ssize_t faulty_pwrite(const char *name, int fd, const void *data, size_t 
         if (errno != 0) return -1;
         n = n > 1 ? n / 2 : n;
     }
-    return REAL(ssize_t, name, int, const void *, size_t, off_t)(fd, data, n, offset);
+    return recorded("write", fd, REAL(ssize_t, name, int, const void *, size_t, off_t)(fd, data, n, offset));
 }
 
 ssize_t pwrite(int fd, const void *data, size_t n, off_t offset)
@@ -67,19 +95,19 @@ ssize_t write(int fd, const void *data, size_t n)
         if (errno != 0) return -1;
         n = n > 1 ? n / 2 : n;
     }
-    return REAL(ssize_t, "write", int, const void *, size_t)(fd, data, n);
+    return recorded("write", fd, REAL(ssize_t, "write", int, const void *, size_t)(fd, data, n));
 }
 
 int fsync(int fd)
 {
     if (fires("sync", fd)) return errno = wanted_errno(), -1;
-    return REAL(int, "fsync", int)(fd);
+    return (int)recorded("sync", fd, REAL(int, "fsync", int)(fd));
 }
 
 int fdatasync(int fd)
 {
     if (fires("sync", fd)) return errno = wanted_errno(), -1;
-    return REAL(int, "fdatasync", int)(fd);
+    return (int)recorded("sync", fd, REAL(int, "fdatasync", int)(fd));
 }
 
 int fallocate(int fd, int mode, off_t from, off_t n)

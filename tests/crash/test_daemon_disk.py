@@ -3,10 +3,9 @@ import ctypes
 import errno
 import os
 import shutil
-import subprocess
 
 import pytest
-from daemon_under_test import BUILD, FILES, ROOT, TUS, Daemon, document, problem, wait_until
+from daemon_under_test import FILES, TUS, Daemon, document, problem, wait_until
 
 
 @pytest.fixture
@@ -109,18 +108,6 @@ def test_a_paused_job_can_be_cancelled(small_disk):
         d.wait_state(job, "paused")
         assert d.post(f"/v1/jobs/{job}/cancel").status_code == 200
         assert d.job(job)["state"] == "cancelled"
-
-
-@pytest.fixture(scope="module")
-def shim(tmp_path_factory):
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler for the fault injector")
-    if "asan" in BUILD:
-        pytest.skip("the address sanitizer wants to be loaded first")
-    path = tmp_path_factory.mktemp("shim") / "fault_shim.so"
-    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", str(path), os.path.join(ROOT, "tests", "crash", "fault_shim.c"), "-ldl"], check=True)
-    return str(path)
 
 
 def insist(call):
