@@ -274,7 +274,7 @@ status record_seek(const char *path, record_visitor before, void *context, uint6
 status record_truncate(const char *path, uint64_t keep_bytes, struct error *err)
 {
     struct stat st;
-    if (stat(path, &st) != 0) return errno == ENOENT ? STATUS_OK : error_set_errno(err, "cannot look at '%s'", path);
+    if (stat(path, &st) != 0) return errno == ENOENT ? STATUS_OK : error_set_errno(err, "cannot examine '%s'", path);
     if ((uint64_t)st.st_size <= keep_bytes) return STATUS_OK;
     if (truncate(path, (off_t)keep_bytes) != 0) return error_set_errno(err, "cannot cut '%s'", path);
     return STATUS_OK;

@@ -1,4 +1,5 @@
-/* selvedged: HTTP, the database of jobs, and supervision of workers. It never parses volumes or pictures and computes nothing. */
+/* selvedged, the daemon: HTTP server, database of jobs and supervision of workers. It never reads volumes or
+ * pictures and computes nothing; workers do. */
 #include "base/durable.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
@@ -44,12 +45,13 @@ static status set_pair(struct settings *s, const char *pair, struct error *err)
     char key[128];
     const char *equal = strchr(pair, '=');
     if (equal == NULL || (size_t)(equal - pair) >= sizeof key)
-        return error_set(err, STATUS_INVALID, "--set wants KEY=VALUE, not '%.100s'", pair);
+        return error_set(err, STATUS_INVALID, "--set needs KEY=VALUE, not '%.100s'", pair);
     snprintf(key, sizeof key, "%.*s", (int)(equal - pair), pair);
     return settings_set(s, key, equal + 1, err);
 }
 
-/* Returns -1 to go on, or the exit code. The file is read first, whatever the order of the options. */
+/* Returns -1 to go on, or the exit code. The configuration file is read first, so that the other options override it
+ * wherever they stand. */
 static int read_options(int argc, char **argv, struct settings *s, struct error *err)
 {
     static const struct option option[] = {
@@ -77,7 +79,7 @@ static int read_options(int argc, char **argv, struct settings *s, struct error 
     return -1;
 }
 
-/* The worker beside this program, unless the settings name one. */
+/* Path of the worker program: from the settings, or beside this program. */
 static void worker_path(const struct settings *s, char out[PATH_BYTES])
 {
     char program[PATH_BYTES];
@@ -100,15 +102,15 @@ static status lock_data(const struct settings *s, int *fd, struct error *err)
     *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (*fd < 0) return error_set_errno(err, "cannot open '%s'", path);
     if (flock(*fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
-    return error_set(err, STATUS_CONFLICT, "cannot use data folder '%s': another selvedged has it", s->data);
+    return error_set(err, STATUS_CONFLICT, "cannot use data folder '%s': another selvedged is using it", s->data);
 }
 
-/* Paths given on the command line must not depend on the folder that a worker runs in. */
+/* Makes paths from the command line absolute, because workers run in other folders. */
 static status make_absolute(char path[SETTING_TEXT_BYTES], struct error *err)
 {
     char full[PATH_BYTES];
     if (path[0] == '\0' || path[0] == '/') return STATUS_OK;
-    if (getcwd(full, sizeof full) == NULL) return error_set_errno(err, "cannot find the present folder");
+    if (getcwd(full, sizeof full) == NULL) return error_set_errno(err, "cannot find the current folder");
     if (strlen(full) + strlen(path) + 2 > SETTING_TEXT_BYTES)
         return error_set(err, STATUS_INVALID, "path '%.200s' is too long", path);
     size_t n = strlen(full);
@@ -126,8 +128,8 @@ static void raise_descriptor_limit(const struct settings *s)
     setrlimit(RLIMIT_NOFILE, &now);
 }
 
-/* For clients on this machine: {"url","pid"}. Without it they can still be told where to ask: no reason to end on a
- * full disk. */
+/* Writes daemon.json, {"url", "pid"}, for clients on this machine. A failure is only logged: clients can be given
+ * the address, and a full disk is no reason to stop. */
 static void announce(const struct settings *s, unsigned port, struct log *log)
 {
     struct error err = {0};
@@ -138,19 +140,20 @@ static void announce(const struct settings *s, unsigned port, struct log *log)
     path_join(path, s->data, "daemon.json", NULL);
     if (durable_replace_volatile(path, text, (size_t)n, &err) != STATUS_OK) {
         log_warning(log, "%s", err.text);
-        unlink(path); /* an old one would name another port */
+        unlink(path); /* an old file would name another port */
     }
     log_info(log, "selvedged %s listens on %s", SELVEDGE_VERSION, url);
     printf("selvedged listens on %s\n", url);
     fflush(stdout);
 }
 
-/* On a full disk the database may not even open: the ballast is given up for it, so that something can be deleted. */
+/* Opens the service. On a full disk the database may fail to open; then the ballast file is released and it is tried
+ * once more, so that users can delete jobs. */
 static status open_service(const struct settings *s, struct log *log, struct job_service **service, struct error *err)
 {
     status r = job_service_open(s, log, service, err);
     if ((r != STATUS_DISK_FULL && r != STATUS_IO) || !ballast_release(s->data)) return r;
-    log_warning(log, "%s; the ballast file is given up and it is tried once more", err->text);
+    log_warning(log, "%s; the ballast file has been released to try once more", err->text);
     return job_service_open(s, log, service, err);
 }
 
@@ -186,7 +189,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     }
     if (service != NULL) atomic_store(&service->stopping, true);
 out:
-    http_server_stop(server); /* first: its threads wake the supervisor */
+    http_server_stop(server); /* first, because its threads wake the supervisor */
     supervisor_stop(supervisor);
     job_service_close(service);
     static_files_free(files);
@@ -212,7 +215,7 @@ int main(int argc, char **argv)
     sigaddset(&signals, SIGTERM);
     sigaddset(&signals, SIGINT);
     sigaddset(&signals, SIGHUP);
-    pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread: all of them inherit it */
+    pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread starts, so that all threads inherit the mask */
     raise_descriptor_limit(&settings);
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(settings.data, &err);

@@ -9,8 +9,8 @@
 struct setting {
     const char *section, *name;
     size_t offset;
-    const char *text;           /* default of a text setting; NULL: a number */
-    int64_t value, least, most; /* of a number */
+    const char *text;           /* default of a text setting; NULL for a number */
+    int64_t value, least, most; /* default and range of a number */
     const char *help;
 };
 
@@ -27,41 +27,48 @@ struct setting {
 #define GIB (INT64_C(1) << 30)
 
 static const struct setting table[] = {
-    TEXT("server", "listen", listen, "127.0.0.1", "address to listen on; without tokens only 127.0.0.1 or ::1"),
+    TEXT("server", "listen", listen, "127.0.0.1",
+         "IP address to listen on; only loopback addresses such as 127.0.0.1 and ::1 are allowed"),
     NUMBER("server", "port", port, 7878, 0, 65535, "TCP port; 0 picks a free one and prints it"),
-    TEXT("server", "data", data, "selvedge-data", "folder of the database and of all jobs (a local file system)"),
-    TEXT("server", "web", web, "", "folder of the dashboard; empty: found beside the program"),
-    TEXT("server", "openapi", openapi, "", "file served at /v1/openapi.json; empty: found beside the program"),
+    TEXT("server", "data", data, "selvedge-data", "folder of the database and of all jobs, on a local file system"),
+    TEXT("server", "web", web, "", "folder of the dashboard; empty: found from the folder of the program"),
+    TEXT("server", "openapi", openapi, "",
+         "file served at /v1/openapi.json; empty: found from the folder of the program"),
     NUMBER("server", "threads", threads, 4, 1, 64, "threads that answer requests"),
-    NUMBER("server", "max_connections", max_connections, 2048, 8, 60000, "open connections; more have to wait"),
-    NUMBER("server", "idle_timeout_s", idle_timeout_s, 60, 1, 3600, "a silent connection is closed after this time"),
+    NUMBER("server", "max_connections", max_connections, 2048, 8, 60000,
+           "number of open connections; further clients wait"),
+    NUMBER("server", "idle_timeout_s", idle_timeout_s, 60, 1, 3600,
+           "time in seconds after which a silent connection is closed"),
     NUMBER("server", "header_deadline_s", header_deadline_s, 20, 1, 3600,
-           "the head of a request must be complete after this time"),
+           "time in seconds in which the head of a request must arrive"),
     NUMBER("server", "min_rate_bytes_per_s", min_rate_bytes_per_s, 1024, 0, GIB,
-           "a body that comes slower than this for 10 s is cut off"),
-    NUMBER("server", "max_document_bytes", max_document_bytes, MIB, 1024, MIB, "largest JSON body"),
-    NUMBER("upload", "max_file_bytes", max_file_bytes, 1024 * GIB, 1, INT64_MAX / 2, "largest input file"),
-    NUMBER("upload", "max_patch_bytes", max_patch_bytes, 64 * MIB, MIB, GIB, "largest piece of an upload"),
-    NUMBER("upload", "max_files_per_job", max_files_per_job, 8192, 1, 1000000, "input files of one job"),
+           "requests whose body arrives more slowly on average are ended after 10 s; 0: no limit"),
+    NUMBER("server", "max_document_bytes", max_document_bytes, MIB, 1024, MIB, "size of the largest JSON body"),
+    NUMBER("upload", "max_file_bytes", max_file_bytes, 1024 * GIB, 1, INT64_MAX / 2, "size of the largest input file"),
+    NUMBER("upload", "max_patch_bytes", max_patch_bytes, 64 * MIB, MIB, GIB, "size of the largest piece of an upload"),
+    NUMBER("upload", "max_files_per_job", max_files_per_job, 8192, 1, 1000000, "number of input files of one job"),
     NUMBER("upload", "commit_bytes", commit_bytes, 8 * MIB, 65536, GIB,
-           "an upload is made durable at least this often"),
-    NUMBER("jobs", "max_jobs", max_jobs, 10000, 1, 10000000, "jobs kept; more are refused until some are deleted"),
-    NUMBER("jobs", "workers", workers, 1, 1, 64, "jobs that run at the same time"),
-    TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside this program"),
-    NUMBER("jobs", "nice", nice, 10, 0, 19, "scheduling priority of workers"),
+           "an upload is written to disk durably after this many bytes at the latest"),
+    NUMBER("jobs", "max_jobs", max_jobs, 10000, 1, 10000000,
+           "number of jobs kept; new jobs are refused until some are deleted"),
+    NUMBER("jobs", "workers", workers, 1, 1, 64, "number of jobs that run at the same time"),
+    TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside the daemon"),
+    NUMBER("jobs", "nice", nice, 10, 0, 19, "niceness of workers (their scheduling priority)"),
     NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2,
-           "address space of a worker (files that it maps count, see volume_memory_bytes); 0: not limited"),
+           "limit on a worker's address space, which includes the files that it maps (see volume_memory_bytes); 0: no "
+           "limit"),
     NUMBER("jobs", "volume_memory_bytes", volume_memory_bytes, 2 * GIB, 256 * MIB, INT64_MAX / 2,
-           "resident memory for scans; what is larger is worked on in files under the job's folder, some 22 bytes a "
-           "voxel"),
-    NUMBER("jobs", "cancel_grace_s", cancel_grace_s, 10, 0, 3600, "from SIGTERM to SIGKILL when a worker has to stop"),
-    NUMBER("jobs", "max_lost_attempts", max_lost_attempts, 3, 1, 100, "a job whose worker died this often has failed"),
+           "resident memory for scans; larger scans are processed in files of the job's folder (22 bytes per voxel)"),
+    NUMBER("jobs", "cancel_grace_s", cancel_grace_s, 10, 0, 3600,
+           "time in seconds from SIGTERM to SIGKILL when a worker must stop"),
+    NUMBER("jobs", "max_lost_attempts", max_lost_attempts, 3, 1, 100,
+           "a job fails after its worker has died this many times"),
     NUMBER("jobs", "heartbeat_timeout_s", heartbeat_timeout_s, 300, 2, 86400,
-           "a worker that is silent this long is killed (a lost attempt)"),
+           "a worker that reports nothing for this time in seconds is killed (a lost attempt)"),
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
-           "free space under which new work is refused and running jobs pause"),
+           "free space below which new work is refused and running jobs pause"),
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,
-           "space kept in a file and given up on a full disk, so that deleting still works"),
+           "size of the ballast file, which is released when the disk is full so that deleting jobs still works"),
 };
 enum { N_SETTING = sizeof table / sizeof table[0] };
 
@@ -88,7 +95,7 @@ static status set_one(struct settings *s, const struct setting *t, const char *v
     snprintf(key, sizeof key, "%s.%s", t->section, t->name);
     if (t->text != NULL) {
         if (strlen(value) >= SETTING_TEXT_BYTES)
-            return error_set_field(err, STATUS_INVALID, key, "setting '%s' is longer than %d bytes", key,
+            return error_set_field(err, STATUS_INVALID, key, "setting '%s' has more than %d bytes", key,
                                    SETTING_TEXT_BYTES - 1);
         snprintf(text_of(s, t), SETTING_TEXT_BYTES, "%s", value);
         return STATUS_OK;
@@ -97,9 +104,10 @@ static status set_one(struct settings *s, const struct setting *t, const char *v
     errno = 0;
     long long v = strtoll(value, &end, 10);
     if (*value == '\0' || *end != '\0' || errno != 0)
-        return error_set_field(err, STATUS_INVALID, key, "setting '%s' is '%.80s': not a whole number", key, value);
+        return error_set_field(err, STATUS_INVALID, key, "setting '%s' is '%.80s', which is not a whole number", key,
+                               value);
     if (v < t->least || v > t->most)
-        return error_set_field(err, STATUS_INVALID, key, "setting '%s' is %lld: outside %lld..%lld", key, v,
+        return error_set_field(err, STATUS_INVALID, key, "setting '%s' is %lld, which is outside %lld..%lld", key, v,
                                (long long)t->least, (long long)t->most);
     *number_of(s, t) = v;
     return STATUS_OK;
@@ -145,7 +153,7 @@ status settings_read_file(struct settings *s, const char *path, struct error *er
 void settings_print(FILE *out)
 {
     const char *section = "";
-    fprintf(out, "; Every setting of selvedged with its default. Options of the command line win over this file.\n");
+    fprintf(out, "; Every setting of selvedged with its default. Options of the command line override this file.\n");
     for (size_t i = 0; i < N_SETTING; i++) {
         const struct setting *t = &table[i];
         if (strcmp(section, t->section) != 0) fprintf(out, "\n[%s]\n", t->section);

@@ -1,5 +1,5 @@
-/* Every setting of the daemon: one table with name, kind, default, range and one line of explanation.
- * config/selvedge.conf is that table printed (`selvedged --print-config`); a test holds the two together. */
+/* The settings of the daemon, from one table with name, kind, default, range and a line of explanation.
+ * config/selvedge.conf is that table as `selvedged --print-config` prints it; a test compares the two. */
 #ifndef SELVEDGE_SERVER_SETTINGS_H
 #define SELVEDGE_SERVER_SETTINGS_H
 
@@ -24,12 +24,14 @@ struct settings {
     int64_t floor_bytes, ballast_bytes;
 };
 
+/* Sets all defaults. */
 void settings_init(struct settings *s);
-/* STATUS_INVALID names an unknown key (err->field) or a value outside its range; STATUS_IO when unreadable. */
+/* STATUS_INVALID for an unknown key (named in err->field) or a value outside its range, STATUS_IO when the file
+ * cannot be read. */
 status settings_read_file(struct settings *s, const char *path, struct error *err);
-/* key is "section.name". */
+/* key is "section.name". STATUS_INVALID as above. */
 status settings_set(struct settings *s, const char *key, const char *value, struct error *err);
-/* The table with the defaults as a configuration file. */
+/* Prints the table with the defaults as a configuration file. */
 void settings_print(FILE *out);
 
 #endif

@@ -21,9 +21,9 @@ struct connection_entry {
     int fd;
     enum phase phase;
     double since_s;
-    bool served; /* a request was answered on it: a 408 could be taken for the answer to the next */
+    bool served; /* a request was answered on this connection, so a 408 could be taken for the answer to the next one */
     bool ended;
-    atomic_uint_least64_t n_received; /* of the present body */
+    atomic_uint_least64_t n_received; /* bytes of the present body */
 };
 
 struct connection_table {
@@ -76,7 +76,8 @@ struct connection_entry *connection_opened(struct connection_table *t, int fd)
     return e;
 }
 
-/* The library calls this before it closes the socket, so under the lock the descriptor is still that connection's. */
+/* The library calls this before it closes the socket, so while the lock is held the descriptor still belongs to this
+ * connection. */
 void connection_closed(struct connection_table *t, struct connection_entry *e)
 {
     if (e == NULL) return;
@@ -114,15 +115,15 @@ void connection_received(struct connection_entry *e, size_t n_bytes)
 static bool too_slow(const struct connection_table *t, const struct connection_entry *e, double now)
 {
     double age_s = now - e->since_s;
-    /* between requests a connection may rest three times as long: it is the client's pool */
+    /* an idle connection of a client's pool may stay open three times as long */
     if (e->phase == PHASE_HEAD) return age_s > t->header_deadline_s * (e->served ? 3 : 1);
     if (e->phase == PHASE_BODY)
         return age_s > RATE_GRACE_S && (double)atomic_load(&e->n_received) < t->min_rate_bytes_per_s * age_s;
     return false;
 }
 
-/* A client that went away while its connection rested. The library should have seen it at once; when many close together on a busy machine
- * it now and then misses one, which would stay open until the deadline. */
+/* Returns whether the client has closed an idle connection. The library should notice that at once, but on a busy
+ * machine it occasionally misses one of many that close together, which would then stay open until the deadline. */
 static bool client_gone(const struct connection_entry *e, double now)
 {
     struct pollfd p = {.fd = e->fd, .events = POLLRDHUP};
@@ -144,10 +145,10 @@ void connection_table_reap(struct connection_table *t)
         if (e->ended || !(gone || too_slow(t, e, now))) continue;
         e->ended = true;
         if (gone) {
-            /* nobody is there to be told */
+            /* the client has gone, so no answer is sent */
         } else if (e->phase == PHASE_BODY || !e->served) {
             ssize_t n = send(e->fd, answer, (size_t)n_answer, MSG_DONTWAIT | MSG_NOSIGNAL);
-            (void)n; /* whether it arrives is the client's business */
+            (void)n; /* the connection ends whether or not the answer arrives */
         }
         shutdown(e->fd, SHUT_RDWR);
     }

@@ -1,5 +1,6 @@
-/* Every open connection with the time of its present phase. The library's timeout only sees silence; a client that sends one byte
- * now and then is ended here: the head of a request has a deadline, a body has a minimum rate. Thread-safe; entry may be NULL. */
+/* Table of the open connections, which ends those that are too slow. The library's timeout only detects silence;
+ * this table also limits clients that send a byte now and then: the head of a request has a deadline and a body has
+ * a minimum rate. All functions are thread-safe and accept entry == NULL. */
 #ifndef SELVEDGE_SERVER_CONNECTION_TABLE_H
 #define SELVEDGE_SERVER_CONNECTION_TABLE_H
 
@@ -10,14 +11,16 @@
 struct connection_table;
 struct connection_entry;
 
-/* min_rate 0: any rate will do */
+/* min_rate_bytes_per_s 0: no minimum rate. STATUS_NO_MEMORY. */
 status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **table,
                             struct error *err);
 void connection_table_free(struct connection_table *table);
 size_t connection_table_count(struct connection_table *table);
-/* Answers 408 to connections that are too slow and shuts them down. */
+/* Closes the connections that are too slow, after answering 408 where that is unambiguous. */
 void connection_table_reap(struct connection_table *table);
 
+/* A connection calls these in order: opened; then for each request body_begins, received for each piece of the body,
+ * replying, and idle until the next request; at last closed. connection_opened returns NULL when memory is out. */
 struct connection_entry *connection_opened(struct connection_table *table, int fd);
 void connection_closed(struct connection_table *table, struct connection_entry *entry);
 void connection_body_begins(struct connection_table *table, struct connection_entry *entry);

@@ -27,7 +27,7 @@ static status member_text(const json_t *j, const char *name, char *out, size_t n
 {
     const json_t *x = json_object_get(j, name);
     if (optional && (x == NULL || json_is_null(x))) return STATUS_OK;
-    if (!json_is_string(x)) return error_set_field(err, STATUS_INVALID, name, "member '%s' has to be a text", name);
+    if (!json_is_string(x)) return error_set_field(err, STATUS_INVALID, name, "member '%s' must be a string", name);
     if (json_string_length(x) >= n_out || strlen(json_string_value(x)) != json_string_length(x))
         return error_set_field(err, STATUS_INVALID, name, "member '%s' is too long", name);
     snprintf(out, n_out, "%s", json_string_value(x));
@@ -47,11 +47,12 @@ static status read_declaration(const json_t *j, struct file_row *row, struct err
         for (size_t i = 0; i < 4; i++) found = found || strcmp(key, known[i]) == 0;
         if (!found)
             return error_set_field(err, STATUS_INVALID, key,
-                                   "a file declaration has no member '%.80s': name, role, size, sha256", key);
+                                   "a file declaration has no member '%.80s'; its members are name, role, size, sha256",
+                                   key);
     }
     const json_t *size = json_object_get(j, "size");
     if (!json_is_integer(size))
-        return error_set_field(err, STATUS_INVALID, "size", "member 'size' has to be a whole number of bytes");
+        return error_set_field(err, STATUS_INVALID, "size", "member 'size' must be a whole number of bytes");
     row->size_bytes = json_integer_value(size);
     status s = member_text(j, "name", row->name, sizeof row->name, false, err);
     if (s == STATUS_OK) s = member_text(j, "role", row->role, sizeof row->role, false, err);
@@ -94,7 +95,7 @@ void handle_get_file(struct http_request *r)
     char path[PATH_BYTES];
     status s = job_get(r->service, r->param[0], &job, &err);
     job_row_release(&job);
-    /* the name only selects a row; the path is made of what the row says */
+    /* the name only selects a row; the path is built from the row, never from the request */
     if (s == STATUS_OK) s = store_file_find(r->service->store, r->param[0], r->param[1], &file, &err);
     if (s == STATUS_OK && file.state != FILE_COMPLETE)
         s = error_set(&err, STATUS_CONFLICT, "file '%s' is not complete", file.name);
@@ -110,7 +111,7 @@ void handle_get_file(struct http_request *r)
         return;
     }
     reply_file(r, fd, content_type_of(file.name));
-    /* what a user sent in is data: never a page of this site */
+    /* files from users are sandboxed, so that they never act as pages of this site */
     reply_header(r, "Content-Security-Policy", "sandbox");
 }
 

@@ -43,7 +43,7 @@ static void reply_refusal(struct http_request *r, const struct job_refusal *refu
     reply_problem(r, refusal->code, err, extra);
 }
 
-/* 400 when the body is not JSON at all: what the document's own check would call invalid is another matter. */
+/* Decides a 400 and returns false when the body is not JSON. JSON that is not a valid job document gets a 422 later. */
 static bool body_is_json(struct http_request *r)
 {
     json_error_t where;
@@ -69,7 +69,7 @@ void handle_create_job(struct http_request *r)
     for (size_t i = 0; key != NULL && i < n_key; i++)
         if (key[i] < 33 || key[i] > 126) n_key = 0;
     if (n_key < 1 || n_key > 128) {
-        error_set_field(&err, STATUS_INVALID, "Idempotency-Key", "the key has to have 1 to 128 printable characters");
+        error_set_field(&err, STATUS_INVALID, "Idempotency-Key", "the key must have 1 to 128 printable characters");
         reply_problem(r, NULL, &err, NULL);
         return;
     }
@@ -98,7 +98,8 @@ static status check_tag(void *context, const struct job_row *row, struct error *
     json_tag(view, tag);
     json_decref(view);
     p->failed = !tag_matches(p->wanted, tag);
-    return p->failed ? error_set_field(err, STATUS_CONFLICT, "If-Match", "the job has changed since: get it again")
+    return p->failed ? error_set_field(err, STATUS_CONFLICT, "If-Match",
+                                       "the job has changed since it was read; get it again")
                      : STATUS_OK;
 }
 
@@ -172,7 +173,7 @@ static bool read_query(struct http_request *r, struct job_query *q)
     if (!query_integer(r, "limit", 1, LIST_MOST, LIST_USUAL, &limit) ||
         !query_integer(r, "cursor", 1, INT64_MAX, 0, &cursor))
         return false;
-    q->limit = (size_t)limit + 1; /* one more: is there another page? */
+    q->limit = (size_t)limit + 1; /* one more than asked for, to know whether there is another page */
     q->before_serial = cursor;
     return true;
 }

@@ -16,7 +16,7 @@
 
 enum { SERIES_MOST = 5000, SERIES_USUAL = 500, LOG_MOST_BYTES = 1 << 20, LOG_USUAL_BYTES = 65536 };
 
-/* false after deciding a 404 */
+/* Returns false after deciding a 404. */
 static bool find_job(struct http_request *r, struct job_row *row)
 {
     struct error err = {0};
@@ -36,7 +36,7 @@ void handle_series(struct http_request *r)
         !query_integer(r, "max_points", 2, SERIES_MOST, SERIES_USUAL, &most))
         return;
     if (rendered != NULL && strcmp(rendered, "all") != 0 && strcmp(rendered, "last") != 0) {
-        error_set_field(&err, STATUS_INVALID, "rendered", "query parameter 'rendered' has to be 'last' or 'all'");
+        error_set_field(&err, STATUS_INVALID, "rendered", "query parameter 'rendered' must be 'last' or 'all'");
         reply_problem(r, NULL, &err, NULL);
         return;
     }
@@ -49,7 +49,8 @@ void handle_series(struct http_request *r)
         reply_json_tagged(r, view);
 }
 
-/* Reads at most n_most bytes from *offset on, which is brought into the file first. */
+/* Reads at most n_most bytes from *offset on. A negative *offset counts from the end of the file; one beyond the end
+ * becomes 0. Returns the number of bytes read, 0 if there is no log yet, or -1 on failure. */
 static ssize_t read_log(const char *path, long long *offset, long long *size, char *out, size_t n_most)
 {
     struct stat st;

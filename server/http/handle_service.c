@@ -66,7 +66,7 @@ static void print_counts(FILE *out, const struct http_request *r)
     fprintf(out, "# HELP selvedge_jobs Jobs by state.\n# TYPE selvedge_jobs gauge\n");
     for (int i = 0; i < JOB_N_STATE; i++)
         fprintf(out, "selvedge_jobs{state=\"%s\"} %lld\n", job_state_name((enum job_state)i), (long long)n[i]);
-    fprintf(out, "# HELP selvedge_jobs_finished_total Jobs that came to an end since the start.\n# TYPE "
+    fprintf(out, "# HELP selvedge_jobs_finished_total Jobs that have ended since the daemon started.\n# TYPE "
                  "selvedge_jobs_finished_total counter\n");
     for (int i = JOB_SUCCEEDED; i < JOB_N_STATE; i++)
         fprintf(out, "selvedge_jobs_finished_total{state=\"%s\"} %llu\n", job_state_name((enum job_state)i),
@@ -114,7 +114,7 @@ void handle_metrics(struct http_request *r)
     print_one(out, "selvedge_upload_bytes_total", "counter", "Bytes of input files received.",
               (double)upload_bytes_total(v->upload));
     print_one(out, "selvedge_disk_free_bytes", "gauge", "Free space under the data folder.", (double)free_bytes);
-    print_one(out, "selvedge_disk_floor_bytes", "gauge", "Free space under which work stops.",
+    print_one(out, "selvedge_disk_floor_bytes", "gauge", "Free space below which work stops.",
               (double)v->settings->floor_bytes);
     print_one(out, "selvedge_http_connections", "gauge", "Open connections.",
               (double)http_server_n_connection(r->server));

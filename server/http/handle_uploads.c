@@ -11,7 +11,7 @@ static bool check_version(struct http_request *r)
 {
     const char *version = request_header(r, "Tus-Resumable");
     if (version != NULL && strcmp(version, "1.0.0") == 0) return true;
-    reply_code(r, "tus_version", "Tus-Resumable", "uploads speak the tus protocol: send Tus-Resumable: 1.0.0");
+    reply_code(r, "tus_version", "Tus-Resumable", "uploads use the tus protocol; send Tus-Resumable: 1.0.0");
     reply_header(r, "Tus-Version", "1.0.0");
     return false;
 }
@@ -22,8 +22,8 @@ static void reply_upload_error(struct http_request *r, const struct error *err, 
     if (row->id[0] != '\0') reply_header_int(r, "Upload-Offset", row->offset_bytes);
 }
 
-/* Takes the upload over; on failure a reply is decided and nothing is held. */
-static bool take(struct http_request *r, struct upload **upload, struct file_row *row)
+/* Becomes the only writer of the upload named in the request. On failure decides a reply and holds nothing. */
+static bool take_upload(struct http_request *r, struct upload **upload, struct file_row *row)
 {
     struct error err = {0};
     uint64_t ticket;
@@ -46,7 +46,7 @@ void handle_upload_offset(struct http_request *r)
 {
     struct upload *upload;
     struct file_row row;
-    if (!check_version(r) || !take(r, &upload, &row)) return;
+    if (!check_version(r) || !take_upload(r, &upload, &row)) return;
     upload_release(r->service->upload, upload);
     reply_empty(r, MHD_HTTP_OK);
     reply_header_int(r, "Upload-Offset", row.offset_bytes);
@@ -62,18 +62,18 @@ void handle_upload_begin(struct http_request *r)
     const char *text = request_header(r, "Upload-Offset");
     if (!check_version(r)) return;
     if (text == NULL || *text == '\0' || strlen(text) > 18 || strspn(text, "0123456789") != strlen(text)) {
-        reply_code(r, "malformed", "Upload-Offset", "Upload-Offset has to be a whole number");
+        reply_code(r, "malformed", "Upload-Offset", "Upload-Offset must be a whole number");
         return;
     }
-    if (!take(r, &upload, &row)) return;
+    if (!take_upload(r, &upload, &row)) return;
     long long offset = strtoll(text, NULL, 10);
     if (offset != row.offset_bytes)
         error_set_field(&err, STATUS_CONFLICT, "Upload-Offset", "the upload of '%s' is at offset %lld, not %lld",
                         row.name, (long long)row.offset_bytes, offset);
     else if (r->content_length > row.size_bytes - row.offset_bytes)
         error_set_field(&err, STATUS_TOO_LARGE, "Content-Length",
-                        "'%s' was declared with %lld bytes: %lld are wanted, %lld were announced", row.name,
-                        (long long)row.size_bytes, (long long)(row.size_bytes - row.offset_bytes),
+                        "'%s' was declared with %lld bytes; %lld of them are missing, but the request has %lld",
+                        row.name, (long long)row.size_bytes, (long long)(row.size_bytes - row.offset_bytes),
                         (long long)r->content_length);
     if (err.code == STATUS_OK) {
         r->upload = upload;
@@ -83,7 +83,7 @@ void handle_upload_begin(struct http_request *r)
     reply_upload_error(r, &err, &row);
 }
 
-static void let_go(struct http_request *r)
+static void release_upload(struct http_request *r)
 {
     upload_release(r->service->upload, r->upload);
     r->upload = NULL;
@@ -98,7 +98,7 @@ void handle_upload_end(struct http_request *r)
         s = r->upload_status;
         err = r->upload_error;
     }
-    let_go(r);
+    release_upload(r);
     if (s != STATUS_OK) {
         reply_upload_error(r, &err, &row);
         return;
@@ -111,8 +111,9 @@ void handle_upload_abandoned(struct http_request *r)
 {
     struct error err = {0};
     status s = upload_commit(r->upload, r->ticket, NULL, &err);
-    if (s != STATUS_OK && s != STATUS_STALE) log_warning(r->service->log, "an upload broke off: %s", err.text);
-    let_go(r);
+    if (s != STATUS_OK && s != STATUS_STALE)
+        log_warning(r->service->log, "what an interrupted upload had received could not be stored: %s", err.text);
+    release_upload(r);
 }
 
 void handle_upload_delete(struct http_request *r)

@@ -1,4 +1,4 @@
-/* The endpoints of http_route.c. Each decides exactly one reply. */
+/* The handlers of the endpoints in http_route.c. Each decides exactly one reply. */
 #ifndef SELVEDGE_SERVER_HANDLERS_H
 #define SELVEDGE_SERVER_HANDLERS_H
 
@@ -24,7 +24,7 @@ void handle_upload_begin(struct http_request *r);
 void handle_upload_end(struct http_request *r);
 void handle_upload_delete(struct http_request *r);
 void handle_upload_options(struct http_request *r);
-/* The connection broke: keep what has arrived. */
+/* The connection broke during a PATCH: commits the bytes that have arrived. */
 void handle_upload_abandoned(struct http_request *r);
 /* handle_results.c */
 void handle_series(struct http_request *r);

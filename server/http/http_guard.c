@@ -27,16 +27,17 @@ bool guard_framing(struct http_request *r)
     MHD_get_connection_values(r->connection, MHD_HEADER_KIND, count_header, n);
     if (n[0] > 0 && n[2] > 0) {
         reply_code(r, "length_and_chunked", "Content-Length",
-                   "Content-Length and Transfer-Encoding together leave the end of the body open");
+                   "Content-Length and Transfer-Encoding together make the end of the body ambiguous");
         return false;
     }
     for (size_t i = 0; i < N_SINGLE; i++)
         if (n[i] > 1) {
-            reply_code(r, "duplicate_header", single[i], "this header may appear once");
+            reply_code(r, "duplicate_header", single[i], "this header may appear only once");
             return false;
         }
     if (n[2] > 0) {
-        reply_code(r, "length_required", "Transfer-Encoding", "chunked requests are not taken: send a Content-Length");
+        reply_code(r, "length_required", "Transfer-Encoding",
+                   "chunked requests are not accepted; send a Content-Length");
         return false;
     }
     const char *text = request_header(r, "Content-Length");
@@ -51,7 +52,7 @@ bool guard_framing(struct http_request *r)
     return true;
 }
 
-/* host, with or without ":port" */
+/* host: a name with or without ":port". */
 static bool host_is_local(const char *host, const char *listen)
 {
     const char *const known[] = {"localhost", "127.0.0.1", "[::1]", listen};
@@ -69,17 +70,17 @@ bool guard_site(struct http_request *r, const char *method)
 {
     const char *host = request_header(r, "Host"), *origin = request_header(r, "Origin");
     if (host != NULL && !host_is_local(host, r->service->settings->listen)) {
-        reply_code(r, "host", "Host", "this service answers to localhost, 127.0.0.1 and [::1] only");
+        reply_code(r, "host", "Host", "this service accepts only requests to localhost, 127.0.0.1 and [::1]");
         return false;
     }
     bool reads = strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0;
     if (reads || origin == NULL) return true;
     if (host != NULL && strncmp(origin, "http://", 7) == 0 && strcasecmp(origin + 7, host) == 0) return true;
-    reply_code(r, "origin", "Origin", "a page of another site may not change anything here");
+    reply_code(r, "origin", "Origin", "a page of another site must not change anything here");
     return false;
 }
 
-/* "application/json", also with parameters. */
+/* Compares a Content-Type without its parameters. */
 static bool type_is(const char *header, const char *want)
 {
     size_t n = strlen(want);
@@ -90,7 +91,7 @@ static bool type_is(const char *header, const char *want)
 static void too_large(struct http_request *r, long long most)
 {
     struct error err = {0};
-    error_set_field(&err, STATUS_TOO_LARGE, "Content-Length", "the body has %lld bytes, at most %lld are taken at once",
+    error_set_field(&err, STATUS_TOO_LARGE, "Content-Length", "the body has %lld bytes, but at most %lld are accepted",
                     (long long)r->content_length, most);
     reply_problem(r, NULL, &err, json_pack("{s:I}", "max_bytes", (json_int_t)most));
 }
@@ -105,8 +106,8 @@ bool guard_body(struct http_request *r)
         reply_code(r, "length_required", "Content-Length", "a body with a Content-Length is required");
     else if (!type_is(request_header(r, "Content-Type"), json ? "application/json" : "application/offset+octet-stream"))
         reply_code(r, "content_type", "Content-Type",
-                   json ? "Content-Type has to be application/json"
-                        : "Content-Type has to be application/offset+octet-stream");
+                   json ? "Content-Type must be application/json"
+                        : "Content-Type must be application/offset+octet-stream");
     else if (r->content_length > most)
         too_large(r, most);
     return r->reply == NULL;

@@ -3,8 +3,8 @@
 #include <string.h>
 
 static const struct http_problem of_status[STATUS_COUNT] = {
-    [STATUS_OK] = {"internal", 500, "An error without a reason"},
-    [STATUS_INVALID] = {"invalid", 422, "A value makes no sense"},
+    [STATUS_OK] = {"internal", 500, "An error without a known cause"},
+    [STATUS_INVALID] = {"invalid", 422, "A value is not allowed"},
     [STATUS_FORMAT] = {"format", 422, "A file is not what it claims to be"},
     [STATUS_IO] = {"io", 500, "The operating system refused"},
     [STATUS_NO_MEMORY] = {"no_memory", 503, "Out of memory"},

@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Everything comes from this server: no other host may supply scripts, pictures or connections. */
+/* Content Security Policy: pages may load scripts and pictures only from this server and connect only to it. */
 static const char csp[] = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; "
                           "form-action 'self'; frame-ancestors 'none'";
 
@@ -59,8 +59,8 @@ void reply_json(struct http_request *r, unsigned status_code, json_t *body)
 {
     char *text = json_dumps(body, JSON_COMPACT);
     json_decref(body);
-    if (text == NULL) { /* not UTF-8, or out of memory */
-        reply_code(r, "internal", "", "the answer cannot be written as JSON");
+    if (text == NULL) { /* the body contains text that is not UTF-8, or memory is out */
+        reply_code(r, "internal", "", "the reply cannot be written as JSON");
         return;
     }
     reply_response(r, status_code, MHD_create_response_from_buffer(strlen(text), text, MHD_RESPMEM_MUST_FREE));
@@ -116,7 +116,7 @@ void reply_problem(struct http_request *r, const char *code, const struct error 
     snprintf(type, sizeof type, "urn:selvedge:problem:%s", p->code);
     json_t *body =
         json_pack("{s:s,s:s,s:i,s:s}", "type", type, "title", p->title, "status", (int)p->status, "code", p->code);
-    json_t *detail = json_string(err->text); /* NULL when a hostile name is not UTF-8 */
+    json_t *detail = json_string(err->text); /* NULL when the text quotes a name that is not UTF-8 */
     json_object_set_new(body, "detail", detail != NULL ? detail : json_string(p->title));
     if (err->field[0] != '\0') json_object_set_new(body, "field", json_string(err->field));
     if (extra != NULL) json_object_update(body, extra);
@@ -146,13 +146,14 @@ bool query_integer(struct http_request *r, const char *name, long long least, lo
     if (*text != '\0' && *end == '\0' && errno == 0 && *out >= least && *out <= most) return true;
     struct error err = {0};
     error_set_field(&err, STATUS_INVALID, name,
-                    "query parameter '%s' is '%.40s': a whole number from %lld to %lld is wanted", name, text, least,
+                    "query parameter '%s' is '%.40s'; it must be a whole number from %lld to %lld", name, text, least,
                     most);
     reply_problem(r, NULL, &err, NULL);
     return false;
 }
 
-/* 0: no usable range (send everything), 1: [*from, *to] inclusive, -1: outside the file. */
+/* Returns 0 if there is no usable range (the whole file is sent), 1 for the range [*from, *to] inclusive, -1 if the
+ * range is outside the file. */
 static int parse_range(const char *header, long long size, long long *from, long long *to)
 {
     char *end;
@@ -200,7 +201,7 @@ void reply_file(struct http_request *r, int fd, const char *content_type)
     char tag[80], text[96];
     if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
         close(fd);
-        reply_code(r, "internal", "", "the file cannot be looked at");
+        reply_code(r, "internal", "", "the file cannot be read");
         return;
     }
     long long size = (long long)st.st_size, from = 0, to = size - 1;
@@ -215,7 +216,7 @@ void reply_file(struct http_request *r, int fd, const char *content_type)
         if_range != NULL && strcmp(if_range, tag) != 0 ? 0 : parse_range(request_header(r, "Range"), size, &from, &to);
     if (range < 0) {
         close(fd);
-        reply_code(r, "range", "Range", "the range begins behind the end of the file");
+        reply_code(r, "range", "Range", "the range begins after the end of the file");
         snprintf(text, sizeof text, "bytes */%lld", size);
         reply_header(r, "Content-Range", text);
         return;

@@ -1,34 +1,39 @@
-/* Deciding a reply. Every function sets request->reply once; a second call replaces the first. */
+/* Functions that decide the reply to a request. Each sets request->reply; a later call replaces an earlier reply. */
 #ifndef SELVEDGE_SERVER_HTTP_REPLY_H
 #define SELVEDGE_SERVER_HTTP_REPLY_H
 
 #include "server/http/http_server.h"
 
+/* Returns the value of a request header, or NULL if there is none. */
 const char *request_header(const struct http_request *request, const char *name);
 
 void reply_empty(struct http_request *request, unsigned status_code);
 void reply_text(struct http_request *request, unsigned status_code, const char *content_type, const char *text,
                 size_t n);
-/* Takes over body. */
+/* Takes ownership of body. */
 void reply_json(struct http_request *request, unsigned status_code, json_t *body);
-/* The same with a strong ETag over the body, and 304 when If-None-Match has it. */
+/* The same with a strong ETag of the body. Replies 304 if If-None-Match contains that tag. */
 void reply_json_tagged(struct http_request *request, json_t *body);
-/* Of the text that reply_json would send: "\"0123...\"". */
+/* Writes the ETag of the text that reply_json would send, with its quotes: "\"0123...\"". */
 void json_tag(const json_t *body, char out[40]);
+/* Returns whether the header, a list of tags or "*", contains the tag. */
 bool tag_matches(const char *header, const char *tag);
 
-/* code NULL: from err->code. extra (taken over, may be NULL): further members. */
+/* Replies with a problem document. code NULL: the code follows from err->code. extra: further members, owned by the
+ * callee (may be NULL). */
 void reply_problem(struct http_request *request, const char *code, const struct error *err, json_t *extra);
+/* The same from a code of http_problem.c, the name of the field at fault ("" if none) and a sentence. */
 void reply_code(struct http_request *request, const char *code, const char *field, const char *detail);
 void reply_header(struct http_request *request, const char *name, const char *value);
 void reply_header_int(struct http_request *request, const char *name, long long value);
 
-/* Takes over response. */
+/* Takes ownership of response. */
 void reply_response(struct http_request *request, unsigned status_code, struct MHD_Response *response);
-/* Takes over fd. Range, If-Range, If-None-Match; a strong tag from inode, size and time. */
+/* Replies with a file; takes ownership of fd. Supports Range, If-Range and If-None-Match; the strong ETag comes from
+ * inode, size and time of modification. */
 void reply_file(struct http_request *request, int fd, const char *content_type);
 
-/* A whole number from the query; absent: fallback; false after deciding a 422. */
+/* Reads a whole number from the query; `fallback` if it is absent. Returns false after deciding a 422. */
 bool query_integer(struct http_request *request, const char *name, long long least, long long most, long long fallback,
                    long long *out);
 

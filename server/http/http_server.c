@@ -33,15 +33,16 @@ void http_server_reap(struct http_server *s) { connection_table_reap(s->connecti
 
 static enum MHD_Result queue_reply(struct http_request *r)
 {
-    if (r->reply == NULL) reply_code(r, "internal", "", "no answer was made");
-    if (r->reply == NULL) return MHD_NO; /* out of memory: the connection is closed */
+    if (r->reply == NULL) reply_code(r, "internal", "", "the request has no reply");
+    if (r->reply == NULL) return MHD_NO; /* out of memory: close the connection */
     connection_replying(r->server->connection, r->entry);
     r->queued = true;
     if (r->reply_status < HTTP_MAX_STATUS) atomic_fetch_add(&r->server->n_reply[r->reply_status], 1);
     return MHD_queue_response(r->connection, r->reply_status, r->reply);
 }
 
-/* Decides what can be decided before the body. Returns true when the body must not be waited for. */
+/* Decides the reply to requests that can be refused before their body is read. Returns true if the reply must be
+ * sent without waiting for the body. */
 static bool examine(struct http_request *r, const char *method)
 {
     char allow[128];
@@ -49,7 +50,7 @@ static bool examine(struct http_request *r, const char *method)
     if (framing_bad) return true;
     bool skip_body = request_header(r, "Expect") != NULL || r->content_length > DRAIN_LIMIT_BYTES;
     if (atomic_load(&r->service->stopping)) {
-        reply_code(r, "stopping", "", "the service is stopping: try again in a moment");
+        reply_code(r, "stopping", "", "the service is stopping; try again in a moment");
         return skip_body;
     }
     if (!guard_site(r, method)) return skip_body;
@@ -57,7 +58,7 @@ static bool examine(struct http_request *r, const char *method)
     if (r->route == NULL && allow[0] == '\0')
         reply_code(r, "not_found", "", "there is nothing at this address");
     else if (r->route == NULL) {
-        reply_code(r, "method", "", "this address takes other methods: see Allow");
+        reply_code(r, "method", "", "this address accepts other methods; see Allow");
         reply_header(r, "Allow", allow);
     } else if (guard_body(r) && r->route->begin != NULL)
         r->route->begin(r);
@@ -88,11 +89,11 @@ static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *
     return queue_reply(r);
 }
 
-/* false: the connection has to be closed */
+/* Accepts a piece of the body. Returns false if the connection must be closed. */
 static bool consume(struct http_request *r, const char *data, size_t n)
 {
     connection_received(r->entry, n);
-    if (r->reply != NULL) return true; /* decided already: swallowed */
+    if (r->reply != NULL) return true; /* the reply is already decided, so the body is discarded */
     if (r->upload != NULL) {
         if (r->upload_status == STATUS_OK)
             r->upload_status = upload_write(r->upload, r->ticket, data, n, &r->upload_error);
@@ -158,7 +159,7 @@ static int hex_value(char c)
     return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
 }
 
-/* Like the library's, but %00 stays as it is: a name must not end where the client did not end it. */
+/* Decodes %XX like the library's function but leaves %00 as it is, so that a name cannot end before its end. */
 static size_t unescape(void *context, struct MHD_Connection *c, char *text)
 {
     (void)context;
@@ -185,10 +186,10 @@ static void on_library_log(void *context, const char *format, va_list args)
     log_write(s->service->log, LOG_LEVEL_DEBUG, "http: %s", text);
 }
 
-/* The library found itself in an impossible state: say so and end; the jobs' state is on disk. */
+/* The library calls this when its state is inconsistent. The process ends; the state of all jobs is on disk. */
 static void on_panic(void *context, const char *file, unsigned line, const char *reason)
 {
-    log_error(context, "http library gave up at %s:%u: %s", file, line, reason == NULL ? "" : reason);
+    log_error(context, "the HTTP library failed at %s:%u: %s", file, line, reason == NULL ? "" : reason);
     abort();
 }
 

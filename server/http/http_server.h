@@ -1,6 +1,7 @@
-/* libmicrohttpd behind one interface. What 0.9.75 does not do is done here: ambiguous framing is refused in the first
- * callback, requests have deadlines and a minimum rate, early answers swallow a body of moderate size so that the client can
- * read them. A reply is decided before or after the body, and queued once. */
+/* The HTTP server, built on libmicrohttpd. It adds what version 0.9.75 lacks: requests with ambiguous framing are
+ * refused in the first callback, requests have deadlines and a minimum rate, and after an early reply a body of
+ * moderate size is read to its end so that the client can receive the reply. A reply may be decided before or after
+ * the body; it is queued once. */
 #ifndef SELVEDGE_SERVER_HTTP_SERVER_H
 #define SELVEDGE_SERVER_HTTP_SERVER_H
 
@@ -20,14 +21,14 @@ struct http_request {
     struct MHD_Connection *connection;
     const struct http_route *route;
     const char *url;
-    char param[2][HTTP_PARAM_BYTES]; /* what {id}, {name}, {path...} stood for */
+    char param[2][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */
     int64_t content_length;          /* 0: no body */
-    char *body;                      /* JSON bodies: NUL-terminated */
+    char *body;                      /* JSON body, NUL-terminated */
     size_t n_body;
-    struct MHD_Response *reply; /* decided; queued when the body is through */
+    struct MHD_Response *reply; /* decided reply, queued after the whole body has arrived */
     unsigned reply_status;
     bool queued;
-    /* a PATCH on its way to disk */
+    /* the PATCH request that is being written to disk */
     struct upload *upload;
     uint64_t ticket;
     status upload_status;
@@ -35,34 +36,36 @@ struct http_request {
     struct connection_entry *entry;
 };
 
-/* How a request's body is used. */
+/* What a route does with the request's body. */
 enum http_body { HTTP_BODY_NONE, HTTP_BODY_JSON, HTTP_BODY_UPLOAD };
 
 struct http_route {
-    const char *method, *path; /* path segments in braces are parameters; {path...} takes the rest */
+    const char *method, *path; /* path segments in braces are parameters; {path...} matches the rest of the path */
     enum http_body body;
     void (*handle)(struct http_request *request);
-    /* before the body (HTTP_BODY_UPLOAD): decides a reply, or prepares request->upload */
+    /* called before the body (HTTP_BODY_UPLOAD): decides a reply or sets request->upload */
     void (*begin)(struct http_request *request);
 };
 
-/* The table of all endpoints (http_route.c). */
+/* The table of all endpoints, in http_route.c. */
 extern const struct http_route http_route_table[];
 extern const size_t http_n_route;
-/* NULL and *allow "" : no such path; NULL and *allow "GET, POST": other methods exist. */
+/* Returns the route. NULL and *allow "": there is no such path; NULL and *allow "GET, POST": the path has only these
+ * methods. */
 const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES],
                                          char *allow, size_t n_allow);
 
-/* listen address and port from the settings; *port is the real one. files: see static_files.h. */
+/* Starts the threads that answer requests. Address and port come from the settings; *port is the port in use. files:
+ * see static_files.h. STATUS_INVALID (listen address), STATUS_IO, STATUS_NO_MEMORY. */
 status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **server,
                          unsigned *port, struct error *err);
-/* Ends every connection: what uploads had received is kept. */
+/* Ends all connections and frees the server. What unfinished uploads have received is kept. */
 void http_server_stop(struct http_server *server);
-/* Call about once a second: ends connections that are too slow. */
+/* Ends connections that are too slow. To be called about once a second. */
 void http_server_reap(struct http_server *server);
 
 const struct static_files *http_server_files(const struct http_server *server);
-/* Replies sent with that status so far, and open connections. */
+/* The number of replies with the given status code so far, and of open connections. */
 uint64_t http_server_n_reply(const struct http_server *server, unsigned status_code);
 size_t http_server_n_connection(const struct http_server *server);
 

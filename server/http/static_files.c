@@ -68,7 +68,8 @@ static void add_folder(struct static_files *f, const char *folder, const char *u
     closedir(d);
 }
 
-/* The first of the usual places, seen from the program's folder, that exists. */
+/* Finds a file of the source tree or of the installation, relative to the folder of this program. Returns false if
+ * there is none. */
 static bool find_beside(const char *in_tree, const char *installed, char out[1024])
 {
     char program[800];
@@ -92,7 +93,7 @@ static status add_dashboard(struct static_files *f, const char *web, struct log 
     if (*web != '\0')
         snprintf(folder, sizeof folder, "%s", web);
     else if (!find_beside("clients/dashboard", "dashboard", folder)) {
-        log_warning(log, "there is no dashboard beside the program: only the API is served");
+        log_warning(log, "the dashboard was not found; only the API is served");
         return STATUS_OK;
     }
     if (*web != '\0' && access(folder, R_OK | X_OK) != 0)
@@ -102,7 +103,7 @@ static status add_dashboard(struct static_files *f, const char *web, struct log 
     if (access(index, R_OK) == 0)
         add(f, "/", index);
     else
-        log_warning(log, "the dashboard's folder has no index.html: only the API is served");
+        log_warning(log, "the dashboard's folder has no index.html; only the API is served");
     return STATUS_OK;
 }
 
@@ -128,7 +129,7 @@ status static_files_new(const char *web, const char *openapi, struct log *log, s
     else if (find_beside("config/openapi.json", "openapi.json", path))
         add(f, "/v1/openapi.json", path);
     else
-        log_warning(log, "openapi.json was not found beside the program");
+        log_warning(log, "openapi.json was not found, so /v1/openapi.json is not served");
     *out = f;
     return STATUS_OK;
 }

@@ -1,5 +1,6 @@
-/* The dashboard, the JavaScript libraries that it uses (from Debian packages) and the API's description: a table of addresses and
- * files made once at the start. Nothing else is ever served, whatever a request asks for. */
+/* The static files of the server: the dashboard, the JavaScript libraries that it uses (from Debian packages) and
+ * the description of the API. The table of addresses and files is made once at the start, and no other file is ever
+ * served. */
 #ifndef SELVEDGE_SERVER_STATIC_FILES_H
 #define SELVEDGE_SERVER_STATIC_FILES_H
 
@@ -13,12 +14,13 @@ struct static_file {
 
 struct static_files;
 
-/* web, openapi: from the settings, or "" to look beside the program (source tree or installed). A dashboard that is not there is
- * a warning in the log; a web folder that was asked for and is not there is an error. */
+/* web, openapi: paths from the settings; "" looks in the source tree or installation that the program belongs to. A
+ * dashboard that is not found there gives a warning in the log; a configured web folder that cannot be read is an
+ * error. STATUS_IO, STATUS_NOT_FOUND, STATUS_NO_MEMORY. */
 status static_files_new(const char *web, const char *openapi, struct log *log, struct static_files **files,
                         struct error *err);
 void static_files_free(struct static_files *files);
-/* NULL when the table has no such address. "/" is the dashboard's index.html. */
+/* Returns NULL when the table has no such address. "/" is the dashboard's index.html. */
 const struct static_file *static_files_find(const struct static_files *files, const char *url);
 
 #endif

@@ -17,10 +17,10 @@ struct tar_stream {
     struct result_file *file;
     size_t n_file, i_file;
     int fd;               /* of the file that is being sent, or -1 */
-    long long left_bytes; /* of that file, as announced in its header */
+    long long left_bytes; /* bytes of that file that are still to be sent, by the size in its header */
     struct archive *archive;
     bool closed, failed;
-    char *out; /* made and not yet sent: out[sent..n_out) */
+    char *out; /* bytes made and not yet sent: out[sent..n_out) */
     size_t sent, n_out, capacity;
     char chunk[READ_BYTES];
 };
@@ -43,7 +43,7 @@ static la_ssize_t on_write(struct archive *a, void *context, const void *data, s
     return (la_ssize_t)n;
 }
 
-/* A file that vanished since the listing is left out. */
+/* Writes the header of the next file. A file that vanished since the listing is left out. */
 static void next_file(struct tar_stream *t)
 {
     const struct result_file *f = &t->file[t->i_file++];
@@ -75,7 +75,7 @@ static void more_of_file(struct tar_stream *t)
         if (archive_write_data(t->archive, t->chunk, (size_t)n) != n) t->failed = true;
         t->left_bytes -= n;
     }
-    if (n < 0 || (n == 0 && t->left_bytes > 0)) t->failed = true; /* it shrank: the archive must not lie */
+    if (n < 0 || (n == 0 && t->left_bytes > 0)) t->failed = true; /* the file has become shorter than its header says */
     if (t->left_bytes > 0) return;
     close(t->fd);
     t->fd = -1;
@@ -116,7 +116,7 @@ static void on_free(void *context)
     if (t->fd >= 0) close(t->fd);
     t->fd = -1;
     if (t->archive != NULL) {
-        archive_write_fail(t->archive); /* no trailer for nobody */
+        archive_write_fail(t->archive); /* writes no trailer: nobody reads it */
         archive_write_free(t->archive);
     }
     free(t->file);

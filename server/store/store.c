@@ -11,7 +11,7 @@
 static const char *const state_name[JOB_N_STATE] = {"draft",     "queued", "running",  "paused",
                                                     "succeeded", "failed", "cancelled"};
 
-/* entry i brings version i to i + 1 */
+/* Entry i changes the schema from version i to version i + 1. */
 static const char *const migration[] = {
     "CREATE TABLE job (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, sample TEXT NOT NULL, "
     "document TEXT NOT NULL,"
@@ -139,12 +139,12 @@ static status refuse_network(const char *path, struct error *err)
     char *slash = strrchr(folder, '/');
     if (slash != NULL) *slash = '\0';
     struct statfs fs;
-    if (statfs(slash == NULL ? "." : folder, &fs) != 0) return error_set_errno(err, "cannot look at '%s'", folder);
+    if (statfs(slash == NULL ? "." : folder, &fs) != 0) return error_set_errno(err, "cannot examine '%s'", folder);
     static const unsigned long network[] = {0x6969, 0x517B, 0xFF534D42, 0xFE534D42, 0x5346414F, 0x00C36400, 0x01021997};
     for (size_t i = 0; i < sizeof network / sizeof network[0]; i++)
         if (((unsigned long)fs.f_type & 0xffffffffUL) == network[i])
             return error_set(err, STATUS_UNSUPPORTED,
-                             "cannot keep the database in '%s': a network file system does not lock safely", folder);
+                             "cannot keep the database in '%s': network file systems do not lock reliably", folder);
     return STATUS_OK;
 }
 
@@ -167,7 +167,8 @@ static status migrate(struct store *store, const char *path, struct error *err)
     status s = read_version(store, &version, err);
     if (s != STATUS_OK || version == N_MIGRATION) return s;
     if (version > N_MIGRATION)
-        return error_set(err, STATUS_UNSUPPORTED, "cannot open database '%s': its version is %d, this program knows %d",
+        return error_set(err, STATUS_UNSUPPORTED,
+                         "cannot open database '%s': its version is %d, but this program supports versions up to %d",
                          path, version, N_MIGRATION);
     if (version > 0) {
         char backup[4096 + 32];

@@ -83,7 +83,7 @@ status store_file_update(struct store *store, const struct file_row *r, struct e
         store_run(store, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs",
                   r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
     pthread_mutex_unlock(&store->lock);
-    if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' does not exist any more", r->name);
+    if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' no longer exists", r->name);
     return s;
 }
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* document: "document", or "NULL" where it is not needed: it may have a megabyte */
+/* document: "document", or "NULL" to leave it out where it is not needed, because it may have a megabyte. */
 #define COLUMNS(document)                                                                                              \
     "serial, id, sample, " document ", state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "  \
     "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss"

@@ -148,7 +148,7 @@ def test_a_thousand_idle_clients(daemon_maker):
 
 def test_one_daemon_per_data_folder(daemon):
     second = Daemon(daemon.data)
-    with pytest.raises(AssertionError, match="another selvedged has it"):
+    with pytest.raises(AssertionError, match="another selvedged is using it"):
         second.start()
     assert daemon.get("/livez").ok
 
