@@ -73,15 +73,14 @@ struct reconstruct_report {
 };
 
 /* Step "volume": read the file(s), honour axes/matrix/crop, map densities to [0, 1]. path: as for volume_source_open_declared. Errors name
- * the file, and the field of the job document as
- * "volume.<field>": STATUS_FORMAT (truncated, pages of different size or depth), STATUS_INVALID (NaN voxels, empty: nothing
+ * the file and the option at fault: STATUS_FORMAT (truncated, pages of different size or depth), STATUS_INVALID (NaN voxels, empty: nothing
  * above the threshold, constant), STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; the same for all steps). space NULL: memory, without a limit. */
 status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
                         struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                         struct volume *v, struct reconstruct_report *report, struct error *err);
 
 /* Step "orientation": the line filter (orientation/line_filter.h; structure tensor start, local refinement of J), v -> d.
- * STATUS_INVALID, field "volume.eps_d", when no voxel is kept. */
+ * STATUS_INVALID when no voxel is kept: field OPTION_FILTER_DENSITY when none is dense enough, else OPTION_FILTER_ANSWER. */
 status reconstruct_orientation(const struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                                const struct progress *progress, struct direction_volume *d,
                                struct reconstruct_report *report, struct error *err);
@@ -95,12 +94,14 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err);
 
-/* What a user should know about the geometry though it stops nothing; each text begins with the subject. Says the same again for a report
- * that was read back. f: the fibers in use. */
+/* Receives a warning: the option it is about (option_id.h; OPTION_NONE: the text begins with its subject) and its text. */
+typedef void (*reconstruct_warning)(void *context, const char *option, const char *text);
+/* What a user should know about the geometry though it stops nothing. Says the same again for a report that was read back.
+ * f: the fibers in use. */
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
-                             void (*warn)(void *context, const char *text), void *context);
-void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
-                             void (*warn)(void *context, const char *text), void *context);
+                             reconstruct_warning warn, void *context);
+void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f, reconstruct_warning warn,
+                             void *context);
 
 /* Grey PNG-ready picture of slice i_slice perpendicular to axis (0 x, 1 y, 2 z) with the fibers crossing it marked as red
  * crosses; y or z points up, x or y to the right; rgb is 3 bytes a pixel, malloc'ed, width x height filled in. */

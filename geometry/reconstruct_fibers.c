@@ -1,4 +1,5 @@
 /* Step "fibers": subvolumes, centers, chains, joins, smoothing, radius. */
+#include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
 #include "geometry/fibers/lines/disagreement.h"
@@ -286,7 +287,7 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         job->report->n_joined = counts.n_joined;
         finish_lines(job, lines);
         if (lines->n_line == 0)
-            s = error_set_field(err, STATUS_INVALID, "volume.files",
+            s = error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
                                 "cannot find fibers: none of the chains of centers has %zu vertices",
                                 job->o->min_vertex);
     }

@@ -5,6 +5,7 @@
  * voxel takes the ridge's direction and J. The descent starts from the structure tensor, which in dense bundles is not misled by the
  * rows of touching fibers that J takes for fibers, and ends on the paraboloid through J at the best node of a fine set of directions and
  * its neighbours. Where the neighbourhood agrees on another direction that J likes almost as well, that one is taken. Nothing depends on how the work is divided. */
+#include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/consensus.h"
@@ -330,7 +331,7 @@ static void choose_parameters(struct reconstruct_option *o, const struct volume 
 static status check_parameters(const struct reconstruct_option *o, struct error *err)
 {
     if (o->t > 0.5 * o->s) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "volume.filter.t",
+    return error_set_field(err, STATUS_INVALID, OPTION_FILTER_T,
                            "cannot find fibers: the direction filter's t, %g, must be above half of its s, %g", o->t,
                            o->s);
 }
@@ -406,7 +407,8 @@ static status count_voxels(const struct orientation_job *o, const struct reconst
     for (size_t t = 0; t < n_slice * n_band(o); t++) report->n_material_voxel += o->n_material[t];
     for (size_t k = 0; k < n_slice; k++) report->n_kept_voxel += o->n_kept[k];
     if (report->n_kept_voxel > 0) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "volume.eps_d",
+    const char *at_fault = report->n_material_voxel > 0 ? OPTION_FILTER_ANSWER : OPTION_FILTER_DENSITY;
+    return error_set_field(err, STATUS_INVALID, at_fault,
                            "cannot find fibers: %zu voxels reach the density eps_d %g, none of them J <= eps_j %g",
                            report->n_material_voxel, option->eps_d, option->eps_j);
 }

@@ -1,4 +1,5 @@
 /* Step "volume": from files to a density volume in the cloth frame. */
+#include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/repeat_direction.h"
@@ -7,6 +8,7 @@
 #include "geometry/volume/volume_source.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,17 +61,17 @@ static status plan_voxel_size(const struct volume_source_info *info, struct reco
         double w = o->voxel_size_m[a];
         if (isnan(w))
             return error_set_field(
-                err, STATUS_INVALID, "volume.voxel_size_um",
+                err, STATUS_INVALID, OPTION_VOXEL_SIZE,
                 "cannot use the volume: its voxel size is not given, and the file does not state it");
         if (!(w >= 1e-9) || !(w <= 1e-2))
-            return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
+            return error_set_field(err, STATUS_INVALID, OPTION_VOXEL_SIZE,
                                    "cannot use the volume: a voxel size of %g um makes no sense", w * 1e6);
         p->spacing_m[a] = o->voxel_size_m[p->map.source[a]];
         least = fmin(least, w);
         most = fmax(most, w);
     }
     if (most > 20.0 * least)
-        return error_set_field(err, STATUS_INVALID, "volume.voxel_size_um",
+        return error_set_field(err, STATUS_INVALID, OPTION_VOXEL_SIZE,
                                "cannot use the volume: voxels of %g x %g x %g um are too far from cubes",
                                o->voxel_size_m[0] * 1e6, o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
     p->voxel_m = least;
@@ -85,7 +87,7 @@ static status plan_crop(const struct reconstruct_option *o, struct plan *p, stru
         p->box[a] = all ? 0 : o->crop_voxel[a];
         p->box[3 + a] = all ? p->n_all[a] : o->crop_voxel[3 + a];
         if (p->box[3 + a] > p->n_all[a] || p->box[a] >= p->box[3 + a])
-            return error_set_field(err, STATUS_INVALID, "volume.crop_voxel",
+            return error_set_field(err, STATUS_INVALID, OPTION_CROP_BOX,
                                    "cannot crop the volume: %c from %zu to %zu, the aligned volume has 0 to %zu",
                                    "xyz"[a], p -> box[a], p -> box[3 + a], p -> n_all[a]);
         p->box_stored[a] = p->resample ? 0 : p->box[a];
@@ -210,9 +212,11 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     struct density_modes m;
     status s = density_modes_find(v, &m, err);
     if (s != STATUS_OK) return s;
+    const bool low_alone = !isnan(o->density_low) && isnan(o->density_high);
     if (isnan(o->density_low)) o->density_low = m.low;
     if (isnan(o->density_high)) o->density_high = m.high;
     s = density_map_apply(v, o->density_low, o->density_high, pool, err);
+    if (s == STATUS_INVALID && low_alone && err != NULL) snprintf(err->field, sizeof err->field, OPTION_DENSITY_LOW);
     if (s != STATUS_OK) return s;
     double threshold = isnan(o->eps_d) ? 0.5 : o->eps_d;
     size_t n_slice = v->n[0] * v->n[1], n_above = 0;
@@ -222,7 +226,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
         scratch_keep_within(v->space);
     }
     if (n_above == 0)
-        return error_set_field(err, STATUS_INVALID, "volume.files",
+        return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
                                "cannot use the volume: it is empty, no density reaches %g (scanner value %g)",
                                threshold, o->density_low + threshold * (o->density_high - o->density_low));
     report->density_low = o->density_low;

@@ -44,7 +44,7 @@ enum align_outcome {
 
 struct alignment {
     enum align_outcome outcome;
-    double matrix[9];           /* identity unless ALIGN_DONE; row-major, as "volume.matrix" */
+    double matrix[9];           /* identity unless ALIGN_DONE; row-major, as the option OPTION_MATRIX */
     double rotation_deg;        /* of weft (or the one system) within the plane, from x towards y; before alignment */
     double shear_deg;           /* angle between warp and weft less 90 degrees */
     double tilt_deg;            /* of the plane of warp and weft (or of the one system) against x and y */

@@ -1,4 +1,5 @@
 #include "geometry/volume/density_map.h"
+#include "base/option_id.h"
 
 #include "geometry/volume/volume_align.h"
 
@@ -38,7 +39,7 @@ static status check_values(const struct volume *v, float *least, float *most, st
         if (x == VOLUME_OUTSIDE) continue;
         if (!isfinite(x)) {
             size_t row = i / v->n[0];
-            return error_set_field(err, STATUS_INVALID, "volume.files",
+            return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
                                    "cannot use the volume: voxel (%zu, %zu, %zu) is %s", i % v->n[0], row % v->n[1],
                                    row / v->n[1], isnan(x) ? "NaN" : "infinite");
         }
@@ -46,7 +47,7 @@ static status check_values(const struct volume *v, float *least, float *most, st
         hi = fmaxf(hi, x);
     }
     if (!(hi > lo))
-        return error_set_field(err, STATUS_INVALID, "volume.files",
+        return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
                                "cannot use the volume: every voxel has the value %g", (double)hi);
     *least = lo;
     *most = hi;
@@ -162,7 +163,7 @@ status density_modes_find(const struct volume *v, struct density_modes *m, struc
     struct histogram h = {.first = least, .width = ((double)most - (double)least) / N_BIN};
     double total = collect(v, &h);
     if (total < 1000.0)
-        return error_set_field(err, STATUS_INVALID, "volume.files",
+        return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
                                "cannot find densities: %zu x %zu x %zu voxels are too few", v->n[0], v->n[1], v->n[2]);
     trim_range(&h, total);
     collect(v, &h);
@@ -199,7 +200,7 @@ status density_map_apply(struct volume *v, double low, double high, struct threa
 {
     if (!(high > low) || !isfinite(high - low))
         return error_set_field(
-            err, STATUS_INVALID, "volume.density",
+            err, STATUS_INVALID, OPTION_DENSITY_HIGH,
             "cannot map densities: the value for solid material, %g, is not above the one for void, %g", high, low);
     struct mapping m = {v, (float)low, (float)(1.0 / (high - low))};
     return thread_pool_run(pool, v->n[2], map_slice, &m, NULL);

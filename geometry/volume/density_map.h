@@ -16,11 +16,11 @@ struct density_modes {
 
 /* From the values of v averaged over 3 x 3 x 3 voxels (which brings the noise down 5-fold, so that modes part) at up to about
  * 4 million places; cells at VOLUME_OUTSIDE are left out. Otsu's threshold (1979), then the peaks of either side.
- * STATUS_INVALID, field "volume.files": NaN or infinite voxels (the first is named), constant volume, less than 1000 such places. */
+ * STATUS_INVALID, field OPTION_SCAN_FILES: NaN or infinite voxels (the first is named), constant volume, less than 1000 such places. */
 status density_modes_find(const struct volume *v, struct density_modes *m, struct error *err);
 
 /* density = clamp((value - low) / (high - low), 0, 1), cells at VOLUME_OUTSIDE 0. Clamping noise is symmetric about 1/2, so
- * surfaces at half density stay where they are. STATUS_INVALID, field "volume.density", when high <= low. */
+ * surfaces at half density stay where they are. STATUS_INVALID, field OPTION_DENSITY_HIGH, when high <= low. */
 status density_map_apply(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err);
 
 /* Standard deviation of the mapped density where the 3 x 3 x 3 mean is below 0.15 or above 0.85, from the median distance to 0 or 1 of what

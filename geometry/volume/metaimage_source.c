@@ -2,6 +2,7 @@
  * in one file (.mha, ElementDataFile = LOCAL). Lengths are in DistanceUnits, else millimetres. Compressed data is zlib's.
  * Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
@@ -24,7 +25,7 @@ struct metaimage {
 
 static status bad(const struct metaimage *m, struct error *err, const char *what, const char *value)
 {
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%s'", m->name, what,
+    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s '%s'", m->name, what,
                            value);
 }
 
@@ -101,7 +102,7 @@ static status parse_data_file(struct metaimage *m, const char *header_path, cons
         return m->data_path != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     }
     if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': data in a list of files is not supported", m->name);
     if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not reach outside its own folder */
         return bad(m, err, "ElementDataFile must be a file beside the header, not", value);
@@ -190,7 +191,7 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
     m->unit_m = 1e-3;
     FILE *header = fopen(path[0], "rbe");
     if (header == NULL) {
-        s = error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+        s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->name);
         goto fail;
     }
     s = parse_header(m, path[0], header, err);

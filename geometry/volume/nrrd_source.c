@@ -3,6 +3,7 @@
  * in the stated unit (millimetres when none is stated).
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
@@ -26,7 +27,7 @@ struct nrrd {
 
 static status bad(const struct nrrd *m, struct error *err, const char *what, const char *value)
 {
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s '%.100s'", m->name, what,
+    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s '%.100s'", m->name, what,
                            value);
 }
 
@@ -175,7 +176,7 @@ static status parse_encoding(struct nrrd *m, const char *value, struct error *er
     m->has_encoding = true;
     m->layout.compressed = strcasecmp(value, "gzip") == 0 || strcasecmp(value, "gz") == 0;
     if (m->layout.compressed || strcasecmp(value, "raw") == 0) return STATUS_OK;
-    return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+    return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                            "cannot read volume '%s': encoding '%.40s' is not supported: save it as raw or gzip",
                            m->name, value);
 }
@@ -191,7 +192,7 @@ static status parse_endian(struct nrrd *m, const char *value, struct error *err)
 static status parse_data_file(struct nrrd *m, const char *path, const char *value, struct error *err)
 {
     if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': data in a list of files is not supported", m->name);
     if (strncmp(value, "./", 2) == 0) value += 2;
     if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not reach outside its own folder */
@@ -282,7 +283,7 @@ static status find_data(struct nrrd *m, FILE *header, struct error *err)
     m->layout.offset_bytes = ftello(file);
     status s = m->layout.offset_bytes >= 0
                    ? STATUS_OK
-                   : error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+                   : error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->name);
     if (file != header) fclose(file);
     m->layout.skip_bytes = m->byte_skip > 0 ? m->byte_skip : 0;
     if (m->byte_skip == -1) m->layout.offset_bytes = -1;
@@ -324,7 +325,7 @@ static status nrrd_open(const char *const *path, size_t n_path, void **handle, s
     }
     status s = STATUS_OK;
     FILE *header = fopen(path[0], "rbe");
-    if (header == NULL) s = error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", m->name);
+    if (header == NULL) s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->name);
     if (s == STATUS_OK) s = parse_header(m, path[0], header, err);
     if (s == STATUS_OK) s = find_data(m, header, err);
     if (header != NULL) fclose(header);

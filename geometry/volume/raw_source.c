@@ -1,4 +1,5 @@
 #include "geometry/volume/raw_source.h"
+#include "base/option_id.h"
 
 #include "base/durable.h"
 #include "geometry/volume/voxel_stream.h"
@@ -24,18 +25,18 @@ status raw_source_open(const char *const *path, size_t n_path, const struct volu
     struct voxel_layout layout = {.offset_bytes = (long long)d->header_bytes};
     struct voxel_stream *stream = NULL;
     if (n_path != 1)
-        return error_set_field(err, STATUS_INVALID, "volume.raw",
+        return error_set_field(err, STATUS_INVALID, OPTION_RAW,
                                "cannot read the volume: 'raw' describes one file, %zu are given", n_path);
     if (!sample_type_of_name(d->type, &layout.sample))
-        return error_set_field(err, STATUS_INVALID, "volume.raw.type",
+        return error_set_field(err, STATUS_INVALID, OPTION_RAW_TYPE,
                                "cannot read volume '%s': unknown sample type '%s'", path_file_name(path[0]), d->type);
     for (int a = 0; a < 3; a++)
         if (d->n[a] == 0 || d->n[a] > VOXEL_STREAM_MAX_EDGE)
-            return error_set_field(err, STATUS_INVALID, "volume.raw.shape",
+            return error_set_field(err, STATUS_INVALID, OPTION_RAW_SHAPE,
                                    "cannot read volume '%s': a shape of %zu x %zu x %zu voxels makes no sense",
                                    path_file_name(path[0]), d->n[0], d->n[1], d->n[2]);
     if (d->header_bytes > LLONG_MAX) /* a negative offset would mean something else */
-        return error_set_field(err, STATUS_INVALID, "volume.raw.header_bytes",
+        return error_set_field(err, STATUS_INVALID, OPTION_RAW_HEADER,
                                "cannot read volume '%s': a header of %zu bytes makes no sense", path_file_name(path[0]),
                                d->header_bytes);
     memcpy(layout.n, d->n, sizeof layout.n);

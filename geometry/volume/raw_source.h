@@ -5,8 +5,8 @@
 #include "geometry/volume/volume_reader.h"
 
 /* One file that holds declaration's voxels and nothing else after declaration->header_bytes. STATUS_INVALID for more than one file (field
- * "volume.raw"), an unknown type ("volume.raw.type"), edges that are not 1 .. VOXEL_STREAM_MAX_EDGE ("volume.raw.shape") and a header of
- * over 2^63 bytes ("volume.raw.header_bytes"); else as voxel_stream_open. */
+ * OPTION_RAW), an unknown type (OPTION_RAW_TYPE), edges that are not 1 .. VOXEL_STREAM_MAX_EDGE (OPTION_RAW_SHAPE) and a header of
+ * over 2^63 bytes (OPTION_RAW_HEADER); else as voxel_stream_open. */
 status raw_source_open(const char *const *path, size_t n_path, const struct volume_raw_declaration *declaration,
                        void **handle, struct volume_source_info *info, struct error *err);
 status raw_source_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);

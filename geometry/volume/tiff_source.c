@@ -1,6 +1,7 @@
 /* TIFF volumes: one multi-page file, or several files in order. libtiff decodes, so any compression it knows is read.
  * Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our error text. */
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>
@@ -71,12 +72,13 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     struct stat st;
     if (stat(h->path[i_path], &st) != 0) {
         if (errno == ENOENT)
-            return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file",
+            return error_set_field(err, STATUS_NOT_FOUND, OPTION_SCAN_FILES, "cannot read volume '%s': no such file",
                                    name);
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", name);
     }
     if (st.st_size == 0)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': the file is empty", name);
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': the file is empty",
+                               name);
     TIFFOpenOptions *option = TIFFOpenOptionsAlloc();
     if (option == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", name);
     TIFFOpenOptionsSetErrorHandlerExtR(option, keep_message, h);
@@ -85,7 +87,7 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     h->tiff = TIFFOpenExt(h->path[i_path], "rm", option); /* m: no memory map, a file cut short must not be a SIGBUS */
     TIFFOpenOptionsFree(option);
     if (h->tiff == NULL)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s", name, cause(h));
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s", name, cause(h));
     return STATUS_OK;
 }
 
@@ -158,25 +160,25 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
     TIFFGetField(h->tiff, TIFFTAG_PHOTOMETRIC, &photometric);
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_COMPRESSION, &compression);
     if (width == 0 || height == 0)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu has no pixels",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': page %zu has no pixels",
                                name, i_page + 1);
     if (width > MAX_EDGE || height > MAX_EDGE)
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files",
+        return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu has %u x %u pixels, the limit is %d an edge", name,
                                i_page + 1, width, height, MAX_EDGE);
     if (per_pixel != 1 || photometric == PHOTOMETRIC_PALETTE)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is a color image",
-                               name, i_page + 1);
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
+                               "cannot read volume '%s': page %zu is a color image", name, i_page + 1);
     if (photometric ==
         PHOTOMETRIC_MINISWHITE) /* programs disagree whether the values or only their display are turned round */
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu has PhotometricInterpretation 0 (white is zero): "
                                "save the stack with black as "
                                "zero, so that denser material has higher values",
                                name, i_page + 1);
     enum sample_type t;
     if (!page_sample(bits, format, &t))
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu has %u-bit samples of an unsupported kind", name,
                                i_page + 1, bits);
     if (i_page == 0) {
@@ -185,25 +187,25 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
         h->sample = t;
     }
     if (width != h->width || height != h->height)
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu has %u x %u pixels, page 1 has %u x %u", name,
                                i_page + 1, width, height, h->width, h->height);
     if (t != h->sample && sample_bytes(t) != sample_bytes(h->sample))
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu is %u-bit, page 1 is %zu-bit", name, i_page + 1, bits,
                                8 * sample_bytes(h->sample));
     if (t != h->sample)
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu is %s, page 1 is %s", name, i_page + 1,
                                sample_name(t), sample_name(h->sample));
     h->message[0] = '\0';
     uint64_t page_bytes = (uint64_t)width * height * sample_bytes(t);
     if (compression != COMPRESSION_NONE && page_bytes > UINT32_MAX) /* as in voxel_stream.c */
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files",
+        return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu is compressed and over 4 GiB", name, i_page + 1);
     if (!page_fits_file(h->tiff, compression, page_bytes, file_bytes))
         return error_set_field(
-            err, STATUS_FORMAT, "volume.files",
+            err, STATUS_FORMAT, OPTION_SCAN_FILES,
             "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them", name,
             i_page + 1, width, height);
     return STATUS_OK;
@@ -212,7 +214,7 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
 static status add_page(struct tiff_handle *h, size_t *capacity, struct error *err)
 {
     if (h->n_page == MAX_PAGE)
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': over %d pages",
+        return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES, "cannot read volume '%s': over %d pages",
                                path_file_name(h->path[0]), MAX_PAGE);
     if (h->n_page == *capacity) {
         size_t n = *capacity == 0 ? 256 : *capacity * 2;
@@ -231,7 +233,7 @@ static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, 
     if (s != STATUS_OK) return s;
     struct stat st;
     if (fstat(TIFFFileno(h->tiff), &st) != 0)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'",
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'",
                                   path_file_name(h->path[i_path]));
     for (;;) {
         s = check_page(h, h->n_page, (uint64_t)st.st_size, err);
@@ -240,7 +242,7 @@ static status scan_file(struct tiff_handle *h, size_t i_path, size_t *capacity, 
         if (TIFFLastDirectory(h->tiff)) return STATUS_OK;
         h->message[0] = '\0';
         if (!TIFFReadDirectory(h->tiff))
-            return error_set_field(err, STATUS_FORMAT, "volume.files",
+            return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                    "cannot read volume '%s': page %zu is unreadable: %s",
                                    path_file_name(h->path[i_path]), h->n_page + 1, cause(h));
     }
@@ -299,7 +301,7 @@ static status reserve_block(struct tiff_handle *h, uint64_t n_byte, struct error
 
 static status block_error(struct tiff_handle *h, size_t i_page, struct error *err)
 {
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': page %zu is damaged: %s",
+    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': page %zu is damaged: %s",
                            path_file_name(h->path[h->i_open]), i_page + 1, cause(h));
 }
 

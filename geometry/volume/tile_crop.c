@@ -1,4 +1,5 @@
 #include "geometry/volume/tile_crop.h"
+#include "base/option_id.h"
 
 #include "geometry/volume/volume_align.h"
 
@@ -40,7 +41,7 @@ static status find_z_range(struct profile *p, struct error *err)
     size_t n = p->v->n[2];
     for (size_t k = 0; k < n; k++) total += p->n_material[k];
     if (!(total > 0.0))
-        return error_set_field(err, STATUS_INVALID, "volume.crop",
+        return error_set_field(err, STATUS_INVALID, OPTION_CROP,
                                "cannot crop the volume: no voxel reaches the density of material");
     p->z_low = 0;
     p->z_high = n;
@@ -141,7 +142,7 @@ static status find_valid(const struct profile *p, size_t valid[4], struct error 
     free(height);
     free(start);
     if (!(best > 0.0))
-        return error_set_field(err, STATUS_INVALID, "volume.crop",
+        return error_set_field(err, STATUS_INVALID, OPTION_CROP,
                                "cannot crop the volume: nothing of it lies in the scan after alignment");
     return STATUS_OK;
 }

@@ -24,7 +24,7 @@ struct tile_crop {
 };
 
 /* keep: least share of the valid box's edges that is kept, 0.1 .. 1 (1: only the valid box is cut out). material: value from which on a
- * voxel counts as material, void: what a cell from outside counts as. STATUS_INVALID, field "volume.crop", when no column of the volume
+ * voxel counts as material, void: what a cell from outside counts as. STATUS_INVALID, field OPTION_CROP, when no column of the volume
  * is valid or there is no material; STATUS_CANCELLED, STATUS_NO_MEMORY (a square of an axis' slices, 4 bytes each, is held). */
 status tile_crop_find(const struct volume *v, double material, double void_value, double keep, struct thread_pool *pool,
                       const struct progress *progress, struct tile_crop *crop, struct error *err);

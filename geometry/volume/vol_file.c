@@ -1,4 +1,5 @@
 #include "geometry/volume/vol_file.h"
+#include "base/option_id.h"
 
 #include "base/durable.h"
 #include "geometry/volume/volume_reader.h"
@@ -204,7 +205,7 @@ status vol_write_kept_density(const char *path, const struct direction_volume *d
 
 static status bad_header(const char *name, struct error *err, const char *what)
 {
-    return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': %s", name, what);
+    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s", name, what);
 }
 
 status vol_read_header(FILE *file, const char *name, struct vol_header *h, struct error *err)
@@ -228,17 +229,17 @@ status vol_read_header(FILE *file, const char *name, struct vol_header *h, struc
     bool density = n_channel == 1 && (encoding == VOL_FLOAT32 || encoding == VOL_UINT8);
     bool direction = n_channel == 3 && (encoding == VOL_FLOAT32 || encoding == VOL_QUANTISED);
     if (!density && !direction)
-        return error_set_field(err, STATUS_UNSUPPORTED, "volume.files",
+        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': encoding %u with %u channels is not supported", name, encoding,
                                n_channel);
     h->encoding = (enum vol_encoding)encoding;
     h->n_channel = n_channel;
     h->bytes_per_voxel = encoding == VOL_FLOAT32 ? 4 * n_channel : encoding == VOL_QUANTISED ? 2 : 1;
     if (fstat(fileno(file), &st) != 0)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", name);
     uint64_t have = (uint64_t)st.st_size - HEADER_BYTES, want = n_voxel * h->bytes_per_voxel;
     if (have < want || have - want >= h->n[0] * h->bytes_per_voxel) /* longer by a row: the header is of another file */
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': %zu x %zu x %zu voxels need %llu bytes, the file has %lld",
                                name, h->n[0], h->n[1], h->n[2], (unsigned long long)(want + HEADER_BYTES),
                                (long long)st.st_size);
@@ -273,7 +274,7 @@ static status vol_source_open(const char *const *path, size_t n_path, void **han
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     }
     h->file = fopen(path[0], "rbe");
-    if (h->file == NULL) s = error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", h->name);
+    if (h->file == NULL) s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", h->name);
     if (s == STATUS_OK && n_path > 1) s = bad_header(h->name, err, "one .vol file is a whole volume, more are given");
     if (s == STATUS_OK) s = vol_read_header(h->file, h->name, &h->header, err);
     if (s == STATUS_OK && h->header.n_channel != 1) s = bad_header(h->name, err, "it holds directions, not densities");
@@ -334,7 +335,7 @@ status vol_read_direction(const char *path, struct vol_header *header, float **d
     uint8_t *raw = NULL;
     *direction = NULL;
     FILE *file = fopen(path, "rbe");
-    if (file == NULL) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", name);
+    if (file == NULL) return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", name);
     status s = vol_read_header(file, name, header, err);
     if (s == STATUS_OK && header->n_channel != 3) s = bad_header(name, err, "it holds densities, not directions");
     if (s != STATUS_OK) goto out;

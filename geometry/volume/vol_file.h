@@ -29,7 +29,7 @@ status vol_write_direction(const char *path, const struct direction_volume *d, e
 status vol_write_kept_density(const char *path, const struct direction_volume *d, struct error *err);
 
 /* Header at the start of file, checked against the file's length. name is used in errors. STATUS_FORMAT, STATUS_UNSUPPORTED (other encodings
- * and channels), STATUS_IO; the field of all errors of reading is "volume.files". */
+ * and channels), STATUS_IO; the field of all errors of reading is OPTION_SCAN_FILES. */
 status vol_read_header(FILE *file, const char *name, struct vol_header *header, struct error *err);
 /* Density in one channel; the voxel size is taken from the box in millimetres (NaN for a box without extent). v: volume_release it. */
 status vol_read_density(const char *path, struct volume *v, struct error *err);

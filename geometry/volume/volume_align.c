@@ -1,4 +1,5 @@
 #include "geometry/volume/volume_align.h"
+#include "base/option_id.h"
 
 #include <math.h>
 #include <string.h>
@@ -16,7 +17,7 @@ status axis_map_parse(const char *text, struct axis_map *map, struct error *err)
         p++;
     }
     if (*p == '\0' && used[0] && used[1] && used[2]) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "volume.axes",
+    return error_set_field(err, STATUS_INVALID, OPTION_AXES,
                            "cannot use axes '%.16s': x, y and z are wanted once each, with '-' before a reversed one",
                            text);
 }
@@ -92,7 +93,7 @@ status volume_resample(const struct volume *in, const double matrix[9], double v
 {
     double inverse[9];
     if (!invert(matrix, inverse))
-        return error_set_field(err, STATUS_INVALID, "volume.matrix",
+        return error_set_field(err, STATUS_INVALID, OPTION_MATRIX,
                                "cannot align the volume: the matrix has no inverse");
     size_t n_all[3], n[3];
     volume_resampled_shape(in->n, in->voxel_size_m, voxel_m, n_all);

@@ -13,7 +13,7 @@ struct axis_map {
     bool flip[3];
 };
 
-/* "xyz", "xzy", "-zx-y": three different letters, each with an optional sign. STATUS_INVALID, field "volume.axes". */
+/* "xyz", "xzy", "-zx-y": three different letters, each with an optional sign. STATUS_INVALID, field OPTION_AXES. */
 status axis_map_parse(const char *text, struct axis_map *map, struct error *err);
 
 /* Value of cells that the matrix brings in from outside of the scan: below every density. */
@@ -21,7 +21,7 @@ status axis_map_parse(const char *text, struct axis_map *map, struct error *err)
 
 /* out(x) = in(c + M^-1 (x - c)) by trilinear interpolation, c the centre of the volume, lengths in metres; out has the
  * voxels of the box (x0 y0 z0 x1 y1 z1) of a grid of the same size as in, with cubic voxels of edge voxel_m (equal to the
- * smallest spacing of in). STATUS_INVALID, field "volume.matrix", for a matrix that cannot be inverted; STATUS_CANCELLED,
+ * smallest spacing of in). STATUS_INVALID, field OPTION_MATRIX, for a matrix that cannot be inverted; STATUS_CANCELLED,
  * and as volume_init_in, whose scratch space is that of in. */
 status volume_resample(const struct volume *in, const double matrix[9], double voxel_m, const size_t box[6],
                        struct thread_pool *pool, const struct progress *progress, struct volume *out,

@@ -1,4 +1,5 @@
 #include "geometry/volume/volume_source.h"
+#include "base/option_id.h"
 
 #include "base/durable.h"
 #include "geometry/volume/raw_source.h"
@@ -82,17 +83,17 @@ static status read_first_bytes(const char *path, uint8_t first_byte[16], struct 
     FILE *file = fopen(path, "rbe");
     if (file == NULL) {
         if (errno == ENOENT)
-            return error_set_field(err, STATUS_NOT_FOUND, "volume.files", "cannot read volume '%s': no such file",
+            return error_set_field(err, STATUS_NOT_FOUND, OPTION_SCAN_FILES, "cannot read volume '%s': no such file",
                                    path_file_name(path));
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(path));
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", path_file_name(path));
     }
     size_t n = fread(first_byte, 1, 16, file);
     int failed = ferror(file);
     fclose(file);
     if (failed)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", path_file_name(path));
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", path_file_name(path));
     if (n == 0)
-        return error_set_field(err, STATUS_FORMAT, "volume.files", "cannot read volume '%s': the file is empty",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': the file is empty",
                                path_file_name(path));
     return STATUS_OK;
 }
@@ -101,7 +102,8 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
                                    struct volume_source **source, struct error *err)
 {
     *source = NULL;
-    if (n_path == 0) return error_set_field(err, STATUS_INVALID, "volume.files", "cannot read volume: no file named");
+    if (n_path == 0)
+        return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES, "cannot read volume: no file named");
     uint8_t first_byte[16];
     status s = read_first_bytes(path[0], first_byte, err);
     if (s != STATUS_OK) return s;
@@ -110,9 +112,9 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
         if (reader[i]->recognise(first_byte, path[0])) found = reader[i];
     if (found == NULL)
         return error_set_field(
-            err, STATUS_UNSUPPORTED, "volume.files",
+            err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
             "cannot read volume '%s': neither TIFF nor MetaImage nor NRRD nor .vol (samples without a header are "
-            "described by 'volume.raw')",
+            "described by 'raw')",
             path_file_name(path[0]));
     struct volume_source *v = calloc(1, sizeof *v);
     if (v == NULL)

@@ -29,10 +29,10 @@ struct volume_source_info {
     const char *sample;     /* "uint8", "uint16", "int16", "float32" */
 };
 
-/* path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, or TIFF slices in order. The field of errors is "volume.files".
+/* path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, or TIFF slices in order. The field of errors is OPTION_SCAN_FILES.
  * STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files that are not what they claim to be; STATUS_UNSUPPORTED. */
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err);
-/* The same; with a declaration (n[0] > 0) the one file at path is raw samples. Fields "volume.raw", "volume.files". */
+/* The same; with a declaration (n[0] > 0) the one file at path is raw samples. Fields OPTION_RAW, OPTION_SCAN_FILES. */
 status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
                                    struct volume_source **source, struct error *err);
 void volume_source_close(struct volume_source *source);

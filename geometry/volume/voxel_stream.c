@@ -1,4 +1,5 @@
 #include "geometry/volume/voxel_stream.h"
+#include "base/option_id.h"
 
 #include "base/durable.h"
 
@@ -78,7 +79,7 @@ static status check_size(struct voxel_stream *v, uint64_t size, struct error *er
     have = have > skip ? have - skip : 0;
     if (want > have) goto too_short;
     if (have - want >= l->n[0] * sample_bytes(l->sample))
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s",
                                v->name, l->n[0], l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want,
                                path_file_name(v->data_path), (unsigned long long)have,
@@ -86,7 +87,7 @@ static status check_size(struct voxel_stream *v, uint64_t size, struct error *er
     return STATUS_OK;
 too_short:
     return error_set_field(
-        err, STATUS_FORMAT, "volume.files",
+        err, STATUS_FORMAT, OPTION_SCAN_FILES,
         "cannot read volume '%s': the file is too short: %zu x %zu x %zu %s voxels need %llu bytes, '%s' has %llu%s%s",
         v->name, l->n[0], l->n[1], l->n[2], sample_name(l->sample), (unsigned long long)want,
         path_file_name(v->data_path), (unsigned long long)have, l->compressed ? " (compressed)" : "",
@@ -99,22 +100,22 @@ static status open_data(struct voxel_stream *v, struct error *err)
     const struct voxel_layout *l = &v->layout;
     for (int a = 0; a < 3; a++)
         if (l->n[a] == 0 || l->n[a] > VOXEL_STREAM_MAX_EDGE)
-            return error_set_field(err, STATUS_FORMAT, "volume.files",
+            return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                    "cannot read volume '%s': an impossible size, %zu x %zu x %zu voxels", v->name,
                                    l->n[0], l->n[1], l->n[2]);
     v->slice_bytes = l->n[0] * l->n[1] * sample_bytes(l->sample);
     if (v->slice_bytes > UINT32_MAX)
-        return error_set_field(err, STATUS_TOO_LARGE, "volume.files", "cannot read volume '%s': a slice is over 4 GiB",
-                               v->name);
+        return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
+                               "cannot read volume '%s': a slice is over 4 GiB", v->name);
     v->file = fopen(v->data_path, "rbe");
     if (v->file == NULL && errno == ENOENT)
-        return error_set_field(err, STATUS_NOT_FOUND, "volume.files",
+        return error_set_field(err, STATUS_NOT_FOUND, OPTION_SCAN_FILES,
                                "cannot read volume '%s': its data file '%s' is missing", v->name,
                                path_file_name(v->data_path));
     if (v->file == NULL || fstat(fileno(v->file), &st) != 0)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", v->name);
     if (!S_ISREG(st.st_mode))
-        return error_set_field(err, STATUS_FORMAT, "volume.files",
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': '%s' is not a regular file", v->name,
                                path_file_name(v->data_path));
     status s = check_size(v, (uint64_t)st.st_size, err);
@@ -144,8 +145,9 @@ status voxel_stream_open(const char *name, const char *data_path, const struct v
 
 static status short_data(const struct voxel_stream *v, size_t i_slice, struct error *err)
 {
-    if (ferror(v->file)) return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
-    return error_set_field(err, STATUS_FORMAT, "volume.files",
+    if (ferror(v->file))
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", v->name);
+    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                            "cannot read volume '%s': '%s' ends or is damaged in slice %zu", v->name,
                            path_file_name(v->data_path), i_slice + 1);
 }
@@ -208,7 +210,7 @@ static status check_end(struct voxel_stream *v, struct error *err)
     const struct voxel_layout *l = &v->layout;
     size_t row_bytes = l->n[0] * sample_bytes(l->sample);
     if (inflate_bytes(v, l->n[2], v->slice, row_bytes, NULL) != STATUS_OK) return STATUS_OK;
-    return error_set_field(err, STATUS_FORMAT, "volume.files",
+    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                            "cannot read volume '%s': '%s' goes on behind the %zu x %zu x %zu %s voxels of its header",
                            v->name, path_file_name(v->data_path), l->n[0], l->n[1], l->n[2], sample_name(l->sample));
 }
@@ -217,7 +219,7 @@ static status next_plain(struct voxel_stream *v, size_t i_slice, struct error *e
 {
     off_t at = v->layout.offset_bytes + v->layout.skip_bytes + (off_t)(i_slice * v->slice_bytes);
     if (fseeko(v->file, at, SEEK_SET) != 0)
-        return error_set_errno_at(err, __func__, "volume.files", "cannot read volume '%s'", v->name);
+        return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", v->name);
     return fread(v->slice, 1, v->slice_bytes, v->file) == v->slice_bytes ? STATUS_OK : short_data(v, i_slice, err);
 }
 
@@ -268,7 +270,7 @@ status voxel_stream_check_order(struct voxel_stream *v, struct error *err)
     if (s != STATUS_OK) return s;
     if (correlation[0] < 0.1 && correlation[1] > 0.5)
         return error_set_field(
-            err, STATUS_FORMAT, "volume.files",
+            err, STATUS_FORMAT, OPTION_SCAN_FILES,
             "cannot read volume '%s': its %s values are noise in the stated byte order and a picture in the other: the "
             "endianness is stated wrongly",
             v->name, sample_name(l->sample));

@@ -1,6 +1,6 @@
 /* The voxels of a header-and-data format: plain or deflated (gzip, zlib) samples in a file, from some offset on, read slice by
  * slice. Deflated data are inflated while reading forwards; reading backwards starts over.
- * Threads: one thread a stream. Errors have the field "volume.files".
+ * Threads: one thread a stream. Errors have the field OPTION_SCAN_FILES.
  */
 #ifndef SELVEDGE_GEOMETRY_VOXEL_STREAM_H
 #define SELVEDGE_GEOMETRY_VOXEL_STREAM_H

@@ -1,8 +1,10 @@
 /* The stage table's computing side: runs what is not done, loads what is. */
 #include "base/clock.h"
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/option_key.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/pipeline_budget.h"
@@ -115,6 +117,15 @@ size_t pipeline_best_model(const struct pipeline_context *c)
     return best;
 }
 
+void pipeline_warn_option(void *context, const char *option, const char *text)
+{
+    struct pipeline_context *c = context;
+    char key[64], warning[600];
+    job_option_resolve(option, key, sizeof key);
+    snprintf(warning, sizeof warning, "%s%s%s", key, key[0] != '\0' ? ": " : "", text);
+    worker_status_warn(c->status, warning);
+}
+
 /* ---- inputs ---- */
 
 static void warn_observation(void *context, const char *text)
@@ -179,7 +190,7 @@ static status set_models(struct pipeline_context *c, struct error *err)
     c->n_model = c->doc->n_model;
     for (size_t i = 0; i < c->n_model; i++) {
         if (!appearance_find(c->doc->model[i].id, &c->model[i].appearance))
-            return error_set_field(err, STATUS_INVALID, "fit.model", "unknown model '%s'", c->doc->model[i].id);
+            return error_set_field(err, STATUS_INVALID, OPTION_MODEL, "unknown model '%s'", c->doc->model[i].id);
         status s = set_parameters(&c->doc->model[i], &c->model[i], err);
         if (s != STATUS_OK) return s;
     }
@@ -251,7 +262,8 @@ static status select_rows(struct pipeline_context *c, struct error *err)
     status s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
     observation_set_weigh(&c->fitted);
     if (s == STATUS_OK && c->fitted.n == 0)
-        s = error_set_field(err, STATUS_INVALID, doc->measurement_file[0] != '\0' ? "measurements.file" : "photographs",
+        s = error_set_field(err, STATUS_INVALID,
+                            doc->measurement_file[0] != '\0' ? OPTION_MEASUREMENT_FILE : OPTION_PHOTOGRAPHS,
                             "all rows of the set 'fit' have the weight 0: give at least one a weight above it");
     if (s == STATUS_OK) s = observation_set_select(&c->fitted, JOB_SET_FIT, &c->row, err);
     if (s != STATUS_OK || !(doc->texture_block_mm > 0.0)) return s;
@@ -275,7 +287,7 @@ static uint32_t program_sum(void)
     return sum;
 }
 
-status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
+static status read_inputs(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
     size_t n = 0;
@@ -292,6 +304,11 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);
     return s == STATUS_OK ? pipeline_warn_budget(c, err) : s;
+}
+
+status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
+{
+    return job_option_name_field(read_inputs(c, err), err);
 }
 
 /* ---- running ---- */
@@ -330,7 +347,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
     if (code->load != NULL) *earlier_ran = true;
     log_info(c->log, "stage %s", code->name);
     if (s == STATUS_OK) s = code->run(c, err);
-    if (s != STATUS_OK) return s;
+    if (s != STATUS_OK) return job_option_name_field(s, err);
     c->stage_wall_s[i] = clock_monotonic_s() - start_s;
     log_info(c->log, "stage %s: %.1f s", code->name, c->stage_wall_s[i]);
     return worker_folder_mark_stage(c->folder, code->name, err);

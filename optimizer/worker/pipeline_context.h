@@ -95,7 +95,8 @@ struct pipeline_context {
 void pipeline_context_init(struct pipeline_context *c);
 void pipeline_context_release(struct pipeline_context *c);
 
-/* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. */
+/* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. Here and in
+ * pipeline_run err->field is a key of the job document. */
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err);
 
 /* Runs all stages that are not done. memory: context of the caller with folder, status, log, pool filled in. */
@@ -118,6 +119,9 @@ status stage_validation(struct pipeline_context *c, struct error *err);
 status stage_validation_load(struct pipeline_context *c, struct error *err);
 status stage_report(struct pipeline_context *c, struct error *err);
 
+/* Adds a warning to the job's status, with the key of the option that it is about (base/option_id.h). context: a struct
+ * pipeline_context. */
+void pipeline_warn_option(void *context, const char *option, const char *text);
 /* The mapped volume in memory, from its checkpoint when it was let go. */
 status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */

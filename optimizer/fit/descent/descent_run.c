@@ -1,3 +1,4 @@
+#include "base/option_id.h"
 #include "optimizer/fit/descent/descent_methods.h"
 
 #include <math.h>
@@ -16,7 +17,7 @@ status descent_check(const struct fit_problem *problem, struct error *err)
         const struct fit_parameter *k = &problem->param[p];
         if (!(k->start >= k->lower && k->start <= k->upper))
             return error_set_field(
-                err, STATUS_INVALID, "fit.start", "parameter '%s' starts at %g: its bounds are %g and %g",
+                err, STATUS_INVALID, OPTION_START, "parameter '%s' starts at %g: its bounds are %g and %g",
                 problem->info[p].name, param_to_file_unit(&problem->info[p], k->start),
                 param_to_file_unit(&problem->info[p], k->lower), param_to_file_unit(&problem->info[p], k->upper));
     }

@@ -1,4 +1,5 @@
 #include "optimizer/fit/descent/fit_run.h"
+#include "base/option_id.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -257,7 +258,7 @@ status fit_run(const struct descent_method *method, const struct fit_problem *pr
     memset(result, 0, sizeof *result);
     status s = fit_layout_init(&f->layout, problem->info, problem->param, problem->n_param, f->option, err);
     if (s == STATUS_OK && (f->option->n_start < 1 || f->option->n_start > FIT_MAX_START))
-        s = error_set_field(err, STATUS_INVALID, "fit.starts", "cannot fit from %zu starts: allowed are 1 to %d",
+        s = error_set_field(err, STATUS_INVALID, OPTION_STARTS, "cannot fit from %zu starts: allowed are 1 to %d",
                             f->option->n_start, FIT_MAX_START);
     if (s != STATUS_OK) goto out;
     size_t n = problem->estimator->n_configuration;

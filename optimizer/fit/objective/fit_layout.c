@@ -1,4 +1,5 @@
 #include "optimizer/fit/objective/fit_layout.h"
+#include "base/option_id.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -66,7 +67,7 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
     size_t n_nuisance = (o->global_gain_sd > 0.0 ? 1u : 0u) + (o->stray_light_sd > 0.0 ? 1u : 0u), n_leader = 0;
     for (size_t p = 0; p < n_param && p < N; p++) n_leader += o->leader[p] == p;
     if (n_param > N || n_leader + n_nuisance > N)
-        return error_set_field(err, STATUS_INVALID, "fit.nuisance",
+        return error_set_field(err, STATUS_INVALID, OPTION_NUISANCE,
                                "cannot fit %zu parameters and %zu nuisance terms together: allowed are %d", n_leader,
                                n_nuisance, N);
     for (size_t p = 0; p < n_param; p++) {
@@ -84,7 +85,7 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
         const struct param_info *owner = &l->info[l->owner[p]];
         double mean = o->prior_mean[p] / o->ratio[p], slack = 1e-9 * (owner->upper - owner->lower); /* of rounding */
         if (mean < owner->lower - slack || mean > owner->upper + slack || !(o->prior_se[p] > 0.0))
-            return error_set_field(err, STATUS_INVALID, "fit.priors",
+            return error_set_field(err, STATUS_INVALID, OPTION_PRIORS,
                                    "the prior of '%s' lies outside the range of '%s' or has no width", info[p].name,
                                    owner->name);
         mean = fmin(fmax(mean, owner->lower), owner->upper);

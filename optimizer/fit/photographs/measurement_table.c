@@ -1,4 +1,5 @@
 #include "optimizer/fit/photographs/measurement_table.h"
+#include "base/option_id.h"
 
 #include <errno.h>
 #include <math.h>
@@ -58,7 +59,7 @@ struct table {
 };
 
 #define table_error(t, code, ...)                                                                                      \
-    error_set_field(err, (code), "measurements.file", "cannot use table '%s': line %zu: " __VA_ARGS__)
+    error_set_field(err, (code), OPTION_MEASUREMENT_FILE, "cannot use table '%s': line %zu: " __VA_ARGS__)
 
 /* Cuts a line into cells at commas and strips blanks, in place. */
 static status split(struct table *t, char *line, struct error *err)
@@ -224,7 +225,7 @@ status measurement_table_parse(const char *text, size_t n_bytes, const char *nam
     memcpy(copy, text, n_bytes);
     copy[n_bytes] = '\0';
     if (strlen(copy) != n_bytes) {
-        s = error_set_field(err, STATUS_FORMAT, "measurements.file",
+        s = error_set_field(err, STATUS_FORMAT, OPTION_MEASUREMENT_FILE,
                             "cannot use table '%s': it is not text (zero byte)", name);
         goto out;
     }
@@ -243,10 +244,10 @@ status measurement_table_parse(const char *text, size_t n_bytes, const char *nam
         header = true;
     }
     if (!header)
-        s = error_set_field(err, STATUS_FORMAT, "measurements.file", "cannot use table '%s': it has no header line",
+        s = error_set_field(err, STATUS_FORMAT, OPTION_MEASUREMENT_FILE, "cannot use table '%s': it has no header line",
                             name);
     else if (observation_set_count(o, JOB_SET_FIT) == 0)
-        s = error_set_field(err, STATUS_INVALID, "measurements.file",
+        s = error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE,
                             "cannot use table '%s': it has no row of the set 'fit'", name);
 out:
     free(copy);

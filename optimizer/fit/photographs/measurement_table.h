@@ -6,7 +6,7 @@
  * cloth_rotation_deg "all": the row is a mean over all rotations of the cloth, and is compared with renderings of that
  * (configuration.h, n_rotation), as it must be for data measured as isotropic. Rows may repeat. A name that
  * is no file name (job_document.h) gets '_' for every byte that is not allowed; a row without one is "fit-03". Errors are
- * STATUS_FORMAT or STATUS_INVALID with err->field "measurements.file" and a text that names file, line and column: a
+ * STATUS_FORMAT or STATUS_INVALID with err->field OPTION_MEASUREMENT_FILE and a text that names file, line and column: a
  * missing or unknown column, a wrong number of cells, what is no number, NaN or negative radiance, an angle of 90
  * degrees or more from the normal (lamp behind the cloth: only without a black sheet), no row of the set "fit".
  * STATUS_TOO_LARGE: more renderings than CONFIGURATION_MAX_COUNT, where a mean over rotations takes one a rotation.

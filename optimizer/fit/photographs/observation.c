@@ -1,5 +1,6 @@
 #include "optimizer/fit/photographs/observation.h"
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
@@ -121,7 +122,7 @@ static status load_table(const struct job_document *doc, const char *folder, str
     snprintf(path, sizeof path, "%s/%s", folder, doc->measurement_file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, "measurements.file");
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;
     }
     s = measurement_table_parse(text, n, doc->measurement_file, doc, o, err);
@@ -139,7 +140,7 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
     snprintf(path, sizeof path, "%s/%s", folder, p->file);
     status s = photograph_measure(path, p, &mean, err);
     if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, "photographs[%zu].file", i);
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
         return s;
     }
     if (mean.warning[0] != '\0' && warn != NULL) warn(context, mean.warning);
@@ -148,15 +149,15 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
         item.n_cell = job_texture_cells(doc);
         s = photograph_contrast(path, p, item.n_cell, item.contrast_rgb, item.contrast_se_rgb, err);
         if (s != STATUS_OK) {
-            if (err != NULL) snprintf(err->field, sizeof err->field, "fit.texture.block_mm");
+            if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_TEXTURE_BLOCK);
             return s;
         }
         if (!contrast_is_known(&item) && doc->texture_weight > 0.0 && warn != NULL) {
             char text[400];
             snprintf(text, sizeof text,
-                     "photographs[%zu] ('%s') is black in one of its channels, so its texture is not compared with the "
+                     "photograph '%s' is black in one of its channels, so its texture is not compared with the "
                      "rendering's",
-                     i, p->file);
+                     p->file);
             warn(context, text);
         }
     }

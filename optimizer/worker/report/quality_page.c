@@ -1,4 +1,6 @@
+#include "base/option_id.h"
 #include "geometry/volume/tile_crop.h"
+#include "optimizer/job/option_key.h"
 #include "optimizer/worker/report/quality.h"
 
 #include <math.h>
@@ -147,10 +149,10 @@ static void print_chosen(const struct pipeline_context *c, FILE *out)
     const struct reconstruct_report *g = &c->geometry;
     const struct reconstruct_option *o = &c->option;
     open_table(out, "Parameters, given or chosen");
-    row(out, "volume.voxel_size_um", "", "%.4g, %.4g, %.4g", o->voxel_size_m[0] * 1e6, o->voxel_size_m[1] * 1e6,
-        o->voxel_size_m[2] * 1e6);
-    row(out, "volume.axes", "", "%s", o->axes);
-    row(out, "volume.matrix", g->aligned ? "from the fibers' directions" : "",
+    row(out, job_option_key(OPTION_VOXEL_SIZE), "", "%.4g, %.4g, %.4g", o->voxel_size_m[0] * 1e6,
+        o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
+    row(out, job_option_key(OPTION_AXES), "", "%s", o->axes);
+    row(out, job_option_key(OPTION_MATRIX), g->aligned ? "from the fibers' directions" : "",
         "%.5f %.5f %.5f<br>%.5f %.5f %.5f<br>%.5f %.5f %.5f", o->matrix[0], o->matrix[1], o->matrix[2], o->matrix[3],
         o->matrix[4], o->matrix[5], o->matrix[6], o->matrix[7], o->matrix[8]);
     if (o->align && g->align.outcome == ALIGN_DONE)
@@ -158,14 +160,18 @@ static void print_chosen(const struct pipeline_context *c, FILE *out)
             "%.2f&deg;, %.2f&deg;, %.2f&deg; (%.2f, %.2f)", g->align.rotation_deg, g->align.shear_deg,
             g->align.tilt_deg, g->align.se_deg, g->align.tilt_se_deg);
     if (o->crop_voxel[3] > 0)
-        row(out, "volume.crop_voxel", o->crop ? "chosen to tile" : "", "%zu %zu %zu, %zu %zu %zu", o->crop_voxel[0],
-            o->crop_voxel[1], o->crop_voxel[2], o->crop_voxel[3], o->crop_voxel[4], o->crop_voxel[5]);
+        row(out, job_option_key(OPTION_CROP_BOX), o->crop ? "chosen to tile" : "", "%zu %zu %zu, %zu %zu %zu",
+            o->crop_voxel[0], o->crop_voxel[1], o->crop_voxel[2], o->crop_voxel[3], o->crop_voxel[4], o->crop_voxel[5]);
     row(out, "volume in use", "voxels", "%zu x %zu x %zu", g->n[0], g->n[1], g->n[2]);
-    row(out, "volume.density_low, density_high", "scanner values of void and solid fiber", "%.6g, %.6g", g->density_low,
-        g->density_high);
-    row(out, "volume.filter s, t, h", "direction filter", "%.4g, %.4g, %zu", o->s, o->t, o->h);
-    row(out, "volume.filter eps_d, eps_J", "its thresholds", "%.4g, %.4g", o->eps_d, o->eps_j);
-    row(out, "volume.link_sigma_voxel, min_vertices", "", "%.3g, %zu", o->link_sigma_voxel, o->min_vertex);
+    row(out, job_option_key(OPTION_DENSITY_LOW), "scanner value of void", "%.6g", g->density_low);
+    row(out, job_option_key(OPTION_DENSITY_HIGH), "scanner value of solid fiber", "%.6g", g->density_high);
+    row(out, job_option_key(OPTION_FILTER_S), "direction filter", "%.4g", o->s);
+    row(out, job_option_key(OPTION_FILTER_T), "direction filter", "%.4g", o->t);
+    row(out, job_option_key(OPTION_FILTER_LENGTH), "direction filter", "%zu", o->h);
+    row(out, job_option_key(OPTION_FILTER_DENSITY), "threshold", "%.4g", o->eps_d);
+    row(out, job_option_key(OPTION_FILTER_ANSWER), "threshold", "%.4g", o->eps_j);
+    row(out, job_option_key(OPTION_LINK_REACH), "", "%.3g", o->link_sigma_voxel);
+    row(out, job_option_key(OPTION_LEAST_VERTICES), "", "%zu", o->min_vertex);
     close_table(out);
 }
 

@@ -1,4 +1,6 @@
 #include "optimizer/worker/stages/pipeline_budget.h"
+#include "base/option_id.h"
+#include "optimizer/job/option_key.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
 
 #include <inttypes.h>
@@ -35,11 +37,10 @@ status pipeline_warn_budget(struct pipeline_context *c, struct error *err)
         if (s != STATUS_OK) return s;
         if (least <= c->doc->path_budget) continue;
         snprintf(warning, sizeof warning,
-                 "fit.path_budget: %" PRIu64
-                 " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
+                 "%s: %" PRIu64 " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
                  " all the same: that is the least%s",
-                 c->doc->path_budget, m->appearance.id, c->doc->method, c->fitted.n, least,
-                 m->option->n_start > 1 ? " for so many starts" : "");
+                 job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method, c->fitted.n,
+                 least, m->option->n_start > 1 ? " for so many starts" : "");
         worker_status_warn(c->status, warning);
     }
     return STATUS_OK;

@@ -1,4 +1,5 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
+#include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
 #include "optimizer/worker/stages/pipeline_radius.h"
@@ -40,7 +41,7 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
     const struct descent_method *method = descent_find(c->doc->method);
     struct pipeline_model *m = &c->model[listener->i_model];
     if (method == NULL)
-        return error_set_field(err, STATUS_INVALID, "fit.method", "unknown method '%s'", c->doc->method);
+        return error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
     struct fit_problem problem = {.n_param = m->appearance.n_param,
                                   .info = m->appearance.param,
                                   .param = m->parameter,

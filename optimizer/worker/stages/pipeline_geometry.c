@@ -1,5 +1,7 @@
 /* Stages "volume" to "scene": from the scan, or from a fiber file, to a cloth ready for ray tracing. */
+#include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/work_file.h"
 
@@ -41,12 +43,6 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
                                                 : RADIUS_COMMON;
 }
 
-static void warn_geometry(void *context, const char *text)
-{
-    struct pipeline_context *c = context;
-    worker_status_warn(c->status, text);
-}
-
 /* ---- volume ---- */
 
 static status read_volume(struct pipeline_context *c, struct error *err)
@@ -81,7 +77,7 @@ status stage_volume(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;
-    reconstruct_warn_volume(&c->option, &c->geometry, warn_geometry, c);
+    reconstruct_warn_volume(&c->option, &c->geometry, pipeline_warn_option, c);
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
                                      {c->volume.n, sizeof c->volume.n},
@@ -113,7 +109,7 @@ static status load_volume(struct pipeline_context *c, struct reconstruct_option 
 status stage_volume_load(struct pipeline_context *c, struct error *err)
 {
     status s = load_volume(c, &c->option, &c->geometry, err);
-    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, warn_geometry, c);
+    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, pipeline_warn_option, c);
     return s;
 }
 
@@ -198,7 +194,7 @@ static status check_radii(const struct fiber_set *f, const char *name, struct er
     for (size_t i = 0; i < f->n_fiber; i++)
         if ((double)f->radius_m[i] > most_m)
             return error_set_field(
-                err, STATUS_INVALID, "fibers.file",
+                err, STATUS_INVALID, OPTION_FIBER_FILE,
                 "cannot use fibers '%s': fiber %zu has a radius of %g mm, the tile is %g x %g mm: the unit may "
                 "be wrong, lengths are millimetres",
                 name, i, (double)f->radius_m[i] / mm, f->tile_size_m[0] / mm, f->tile_size_m[1] / mm);
@@ -213,18 +209,18 @@ static status read_fiber_file(struct pipeline_context *c, struct error *err)
     bool text = dot != NULL && strcmp(dot, ".txt") == 0;
     status s = text ? fiber_set_read_text(&c->fiber, path, err) : fiber_set_read_hair(&c->fiber, path, err);
     if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, "fibers.file");
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
         return s;
     }
     for (int a = 0; a < 2; a++)
         if (!isnan(c->doc->tile_mm[a])) c->fiber.tile_size_m[a] = c->doc->tile_mm[a] * mm;
     if (!(c->fiber.tile_size_m[0] > 0.0 && c->fiber.tile_size_m[1] > 0.0))
-        return error_set_field(
-            err, STATUS_INVALID, "fibers.tile_mm",
-            "'fibers.tile_mm' is missing: the file '%s' does not say with which period the cloth repeats", name);
+        return error_set_field(err, STATUS_INVALID, OPTION_TILE,
+                               "'%s' is missing: the file '%s' does not say with which period the cloth repeats",
+                               job_option_key(OPTION_TILE), name);
     fiber_set_classify(&c->fiber);
     s = fiber_set_validate(&c->fiber, err);
-    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, "fibers.file");
+    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
     return s == STATUS_OK ? check_radii(&c->fiber, name, err) : s;
 }
 

@@ -1,6 +1,8 @@
 #include "optimizer/worker/stages/pipeline_radius.h"
+#include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/job/method_names.h"
+#include "optimizer/job/option_key.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
 
@@ -156,8 +158,8 @@ static void tell(struct pipeline_context *c)
     if (r->curve.determined) return;
     if (r->curve.at_bound)
         snprintf(warning, sizeof warning,
-                 "the fiber radius ends at the edge of its range, %.4g um (fit.fit_radius: %.4g to %.4g um)",
-                 r->radius_m / um, r->lower_m / um, r->upper_m / um);
+                 "the fiber radius ends at the edge of its range, %.4g um (%s: %.4g to %.4g um)", r->radius_m / um,
+                 job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um);
     else
         snprintf(warning, sizeof warning,
                  "the fiber radius is not determined by these photographs: %.4g um is kept as it was", r->start_m / um);
@@ -179,16 +181,14 @@ static status check_range(struct pipeline_context *c, struct error *err)
     r->lower_m = isnan(doc->radius_lower_um) ? 0.5 * r->start_m : doc->radius_lower_um * um;
     r->upper_m = isnan(doc->radius_upper_um) ? 2.0 * r->start_m : doc->radius_upper_um * um;
     if (r->upper_m < 1.1 * r->lower_m) /* one of the two was given and lies beyond the other's default */
-        return error_set_field(err, STATUS_INVALID, "fit.fit_radius",
-                               "'fit.fit_radius' leaves no range to search: %.4g to %.4g um; the cloth's fibers have "
-                               "%.4g um",
-                               r->lower_m / um, r->upper_m / um, r->start_m / um);
+        return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
+                               "'%s' leaves no range to search: %.4g to %.4g um; the cloth's fibers have %.4g um",
+                               job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um, r->start_m / um);
     double tile_m = fmin(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]);
     if (r->upper_m > 0.25 * tile_m)
-        return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
-                               "'fit.fit_radius.upper_um' is %.4g: fibers of that radius are wider than half of the "
-                               "tile (%.4g um)",
-                               r->upper_m / um, tile_m / um);
+        return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS_UPPER,
+                               "'%s' is %.4g: fibers of that radius are wider than half of the tile (%.4g um)",
+                               job_option_key(OPTION_FIT_RADIUS_UPPER), r->upper_m / um, tile_m / um);
     return STATUS_OK;
 }
 
@@ -198,10 +198,11 @@ static void warn_of_range(struct pipeline_context *c)
     const struct pipeline_radius *r = &c->radius;
     char warning[300];
     if (r->start_m >= r->lower_m && r->start_m <= r->upper_m) return;
-    snprintf(warning, sizeof warning,
-             "'fit.fit_radius' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, "
-             "which is not in this range",
-             r->lower_m / um, r->upper_m / um, r->start_m / um);
+    snprintf(
+        warning, sizeof warning,
+        "'%s' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, which is not in this "
+        "range",
+        job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um, r->start_m / um);
     worker_status_warn(c->status, warning);
 }
 

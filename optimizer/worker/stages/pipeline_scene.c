@@ -1,4 +1,5 @@
 /* Stage "scene": the cloth ready for ray tracing, as fibers and, for volume models, as a volume. */
+#include "base/option_id.h"
 #include "geometry/fibers/voxelise.h"
 #include "geometry/reconstruct.h"
 #include "optimizer/worker/pipeline_context.h"
@@ -26,7 +27,7 @@ static status voxelise(struct pipeline_context *c, struct error *err)
     char warning[300];
     status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
     if (s != STATUS_OK) {
-        if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, "fibers.voxel_um");
+        if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, OPTION_DENSITY_VOXEL);
         return s;
     }
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
@@ -81,13 +82,8 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? make_volume_scene(c, err) : s;
 }
 
-static void warn(void *context, const char *text)
-{
-    struct pipeline_context *c = context;
-    worker_status_warn(c->status, text);
-}
 status stage_scene(struct pipeline_context *c, struct error *err)
 {
-    reconstruct_warn_fibers(&c->geometry, &c->fiber, warn, c); /* this stage runs in every attempt */
+    reconstruct_warn_fibers(&c->geometry, &c->fiber, pipeline_warn_option, c); /* this stage runs in every attempt */
     return pipeline_make_scene(c, err);
 }

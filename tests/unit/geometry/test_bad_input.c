@@ -1,4 +1,5 @@
 /* Scans that are not what they should be, through the whole chain: each is a clear error or a clear warning. */
+#include "base/option_id.h"
 #include "base/rng.h"
 #include "geometry/reconstruct.h"
 #include "tests/support/cloth/scan_files.h"
@@ -36,10 +37,11 @@ static const char *path_of(const char *name)
     return p;
 }
 
-static void keep(void *context, const char *text)
+static void keep(void *context, const char *option, const char *text)
 {
     struct chain *c = context;
-    if (c->n_warning < 8) snprintf(c->warning[c->n_warning++], sizeof c->warning[0], "%s", text);
+    if (c->n_warning < 8)
+        snprintf(c->warning[c->n_warning++], sizeof c->warning[0], "%s%s%s", option, option[0] ? ": " : "", text);
 }
 
 static void chain_init(struct chain *c)
@@ -168,11 +170,11 @@ static void test_wrong_spacing(void **state)
     write_metaimage("spacing", "MET_USHORT", 50.0, samples, N_VOXEL * 2);
     chain_init(&c);
     for (int a = 0; a < 3; a++) c.o.voxel_size_m[a] = NAN;
-    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, "volume.voxel_size_um", "makes no sense");
+    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "makes no sense");
     chain_release(&c);
     chain_init(&c);
     c.o.voxel_size_m[2] = 100e-6;
-    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, "volume.voxel_size_um", "too far from cubes");
+    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "too far from cubes");
     chain_release(&c);
     free(samples);
 }
@@ -186,11 +188,11 @@ static void test_wrong_order_and_depth(void **state)
     test_write_bytes(path, samples, N_VOXEL * 2);
     chain_init(&c);
     c.o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "uint16", .big_endian = true};
-    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, "volume.files", "endianness");
+    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, OPTION_SCAN_FILES, "endianness");
     chain_release(&c);
     chain_init(&c); /* 16-bit samples taken for 8-bit ones: twice as many bytes as declared */
     c.o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "uint8"};
-    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, "volume.files", "which fits uint16, int16");
+    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, OPTION_SCAN_FILES, "which fits uint16, int16");
     chain_release(&c);
     chain_init(&c); /* the same, with a shape that hides it: every other byte is noise */
     c.o.raw = (struct volume_raw_declaration){.n = {2 * N, N, N}, .type = "uint8"};
@@ -200,7 +202,7 @@ static void test_wrong_order_and_depth(void **state)
     chain_release(&c);
     chain_init(&c);
     c.o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "float32"};
-    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, "volume.files", "too short");
+    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     chain_release(&c);
     free(samples);
 }
@@ -251,7 +253,7 @@ static void test_not_finite(void **state)
         for (int option = 0; option < 2; option++) { /* with alignment the values are looked at earlier */
             chain_init(&c);
             c.o.align = c.o.crop = option == 1;
-            assert_refused(&c, chain_run(&c, &path, 1), STATUS_INVALID, "volume.files",
+            assert_refused(&c, chain_run(&c, &path, 1), STATUS_INVALID, OPTION_SCAN_FILES,
                            kind == 0 ? "voxel (5, 6, 7) is NaN" : "voxel (5, 6, 7) is infinite");
             chain_release(&c);
         }
@@ -267,23 +269,23 @@ static void test_lying_header(void **state)
     write_metaimage("short", "MET_USHORT", 0.002, samples, N_VOXEL);
     const char *path[] = {path_of("short.mhd"), path_of("short.raw")};
     chain_init(&c);
-    assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, "volume.files", "too short");
+    assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     chain_release(&c);
     write_metaimage("short", "MET_UCHAR", 0.002, samples, N_VOXEL * 2);
     chain_init(&c);
-    assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, "volume.files", "which fits uint16, int16");
+    assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, OPTION_SCAN_FILES, "which fits uint16, int16");
     chain_release(&c);
     static const char deep[] = "ObjectType = Image\nNDims = 3\nDimSize = 48 48 900000\nElementType = "
                                "MET_USHORT\nElementDataFile = short.raw\n";
     test_write_bytes(path[0], deep, sizeof deep - 1);
     chain_init(&c);
-    assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, "volume.files", "too short");
+    assert_refused(&c, chain_run(&c, path, 2), STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     chain_release(&c);
     static const char huge[] = "ObjectType = Image\nNDims = 3\nDimSize = 900000 900000 900000\nElementType = "
                                "MET_USHORT\nElementDataFile = short.raw\n";
     test_write_bytes(path[0], huge, sizeof huge - 1);
     chain_init(&c);
-    assert_refused(&c, chain_run(&c, path, 2), STATUS_TOO_LARGE, "volume.files", "short.mhd");
+    assert_refused(&c, chain_run(&c, path, 2), STATUS_TOO_LARGE, OPTION_SCAN_FILES, "short.mhd");
     chain_release(&c);
     free(samples);
 }
@@ -306,7 +308,7 @@ static void test_empty_slice(void **state)
         snprintf(name, sizeof name, "'slice-%zu.tif': the file is empty", k);
         test_write_bytes(path[k], "", 0);
         chain_init(&c);
-        assert_refused(&c, chain_run(&c, path, 3), STATUS_FORMAT, "volume.files", name);
+        assert_refused(&c, chain_run(&c, path, 3), STATUS_FORMAT, OPTION_SCAN_FILES, name);
         chain_release(&c);
         const struct test_page page = {N, N, 16, samples + k * N * N};
         test_write_tiff(path[k], &page, 1, COMPRESSION_NONE, TEST_STRIPS);

@@ -1,4 +1,5 @@
 /* The line filter and the search for its minimum. */
+#include "base/option_id.h"
 #include "geometry/orientation/fiber_diameter.h"
 #include "geometry/orientation/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
@@ -203,7 +204,7 @@ static void test_nothing_kept(void **state)
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, &(struct test_cylinder){{12.0, 12.0, 12.0}, {1.0, 0.0, 0.0}, 3.0}, 1, 0.0, 1);
     assert_int_equal(reconstruct_orientation(&v, &o, NULL, NULL, &d, &r, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "volume.eps_d");
+    assert_string_equal(err.field, OPTION_FILTER_ANSWER);
     volume_release(&v);
 }
 

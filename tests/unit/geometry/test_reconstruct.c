@@ -1,4 +1,5 @@
 /* The whole chain on small volumes with straight fibers: from a TIFF to fibers, the same for any number of threads. */
+#include "base/option_id.h"
 #include "geometry/reconstruct.h"
 #include "tests/support/cloth/scan_files.h"
 
@@ -200,8 +201,9 @@ struct advice {
     size_t x0, x1, y0, y1;
 };
 
-static void take_advice(void *context, const char *text)
+static void take_advice(void *context, const char *option, const char *text)
 {
+    (void)option;
     struct advice *a = context;
     const char *at = strstr(text, "crop to x ");
     if (at != NULL && sscanf(at, "crop to x %zu..%zu, y %zu..%zu", &a->x0, &a->x1, &a->y0, &a->y1) == 4) a->n_said++;
@@ -252,7 +254,7 @@ static void test_filter_that_finds_nothing(void **state)
     o.t = 0.01;
     assert_int_equal(reconstruct_read(&file, 1, &o, NULL, NULL, NULL, &v, &r, &err), STATUS_OK);
     assert_int_equal(reconstruct_orientation(&v, &o, NULL, NULL, &d, &r, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "volume.filter.t");
+    assert_string_equal(err.field, OPTION_FILTER_T);
     assert_non_null(strstr(err.text, "t, 0.01, must be above half of its s"));
     assert_null(d.density);
     volume_release(&v);

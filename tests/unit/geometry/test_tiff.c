@@ -1,4 +1,5 @@
 /* TIFF volumes: what is read, and the errors of files that are not what they claim to be. */
+#include "base/option_id.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume_source.h"
 #include "tests/support/cloth/scan_files.h"
@@ -96,7 +97,7 @@ static void expect_open_error(const char *path, status code, const char *text)
     if (volume_source_open(&path, 1, &s, &err) != code) fail_msg("%s: %s", status_name(err.code), err.text);
     assert_null(s);
     if (strstr(err.text, text) == NULL) fail_msg("'%s' lacks '%s'", err.text, text);
-    assert_string_equal(err.field, "volume.files");
+    assert_string_equal(err.field, OPTION_SCAN_FILES);
 }
 
 /* Every kind of sample, with values at the edges of its range; kinds that are none are refused. */
@@ -193,7 +194,7 @@ static void test_slices(void **state)
     struct volume_source *s;
     assert_int_equal(volume_source_open(list, N, &s, &err), STATUS_FORMAT);
     assert_string_equal(err.text, "cannot read volume 'slice2.tif': the file is empty");
-    assert_string_equal(err.field, "volume.files");
+    assert_string_equal(err.field, OPTION_SCAN_FILES);
 }
 
 static void test_unlike_pages(void **state)
@@ -407,7 +408,7 @@ static void test_bad_values(void **state)
     reconstruct_option_default(&o);
     test_write_tiff(path, page, N, COMPRESSION_NONE, TEST_STRIPS);
     assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "volume.voxel_size_um");
+    assert_string_equal(err.field, OPTION_VOXEL_SIZE);
     for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
     pixel[40] = NAN;
     test_write_tiff(path, page, N, COMPRESSION_NONE, TEST_STRIPS);
@@ -429,10 +430,10 @@ static void test_bad_values(void **state)
     assert_non_null(strstr(err.text, "it is empty, no density reaches 0.5"));
     o.density_high = 50.0;
     assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "volume.density");
+    assert_string_equal(err.field, OPTION_DENSITY_HIGH);
     memcpy(o.axes, "xyy", 4);
     assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "volume.axes");
+    assert_string_equal(err.field, OPTION_AXES);
 }
 
 static void test_missing(void **state)

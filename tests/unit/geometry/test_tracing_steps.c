@@ -1,4 +1,5 @@
 /* The steps from directions to fibers, one by one: smoothing, linking, joining, relaxing, radius, alignment. */
+#include "base/option_id.h"
 #include "base/rng.h"
 #include "geometry/fibers/lines/joining.h"
 #include "geometry/fibers/lines/linking.h"
@@ -319,7 +320,7 @@ static void test_alignment(void **state)
     }
     volume_release(&out);
     assert_int_equal(volume_resample(&v, singular, 2e-6, box, NULL, NULL, &out, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "volume.matrix");
+    assert_string_equal(err.field, OPTION_MATRIX);
     volume_release(&v);
 }
 

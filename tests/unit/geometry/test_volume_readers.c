@@ -1,4 +1,5 @@
 /* Readers of scans: golden bytes of NRRD, raw, MetaImage and .vol, and headers that lie. */
+#include "base/option_id.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/vol_file.h"
 #include "geometry/volume/volume_reader.h"
@@ -78,7 +79,7 @@ static void refuse_header(void **state, const char *header, const char *part)
     memset(data, 'x', sizeof data);
     const char *path = scratch_path(state, "bad.nrrd");
     scratch_write(path, file, join(file, header, data, sizeof data));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", part);
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, part);
 }
 
 static void test_nrrd_types_and_orders(void **state)
@@ -149,10 +150,10 @@ static void test_nrrd_gzip_and_skips(void **state)
                        packed, n_packed));
     check_values(&path, 1, NULL, n, mm, want);
     scratch_write(path, file, join(file, HEAD "uchar" SIZES "encoding: gzip\n\n", packed, n_packed - 12));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "ends or is damaged in slice 2");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "ends or is damaged in slice 2");
     scratch_write(path, file,
                   join(file, HEAD "uchar\ndimension: 3\nsizes: 999 999 999\nencoding: gzip\n\n", packed, n_packed));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "too short");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     static const char head[] = HEAD
         "uchar" SIZES "encoding: gzip\n\n"; /* a row too much shows when the last slice is read, one byte is padding */
     for (size_t more = 0; more <= 2; more++) {
@@ -161,14 +162,14 @@ static void test_nrrd_gzip_and_skips(void **state)
         if (more < 2)
             check_values(&path, 1, NULL, n, (const double[3]){0}, want);
         else
-            check_refused(path, NULL, STATUS_FORMAT, "volume.files",
+            check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES,
                           "'z.nrrd' goes on behind the 2 x 1 x 2 uint8 voxels of its header");
     }
     n_packed = gzip(data + 2, 4, packed,
                     sizeof packed); /* a second member is part of the data, zeros behind the first are none */
     scratch_write(path, file,
                   join(file, head, packed, n_packed + gzip(data, 2, packed + n_packed, sizeof packed - n_packed)));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "goes on behind");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "goes on behind");
     memset(packed + n_packed, 0, 100);
     scratch_write(path, file, join(file, head, packed, n_packed + 100));
     check_values(&path, 1, NULL, n, (const double[3]){0}, want);
@@ -196,7 +197,7 @@ static void test_nrrd_detached(void **state)
     }
     scratch_write(path[0], HEAD "uchar" SIZES "encoding: raw\ndata file: gone.raw\n",
                   strlen(HEAD "uchar" SIZES "encoding: raw\ndata file: gone.raw\n"));
-    check_refused(path[0], NULL, STATUS_NOT_FOUND, "volume.files", "'gone.raw' is missing");
+    check_refused(path[0], NULL, STATUS_NOT_FOUND, OPTION_SCAN_FILES, "'gone.raw' is missing");
 }
 
 static void test_nrrd_refused(void **state)
@@ -221,7 +222,7 @@ static void test_nrrd_refused(void **state)
     uint8_t file[256], data[4] = {0};
     const char *path = scratch_path(state, "e.nrrd");
     scratch_write(path, file, join(file, HEAD "uchar" SIZES "encoding: bzip2\n\n", data, 4));
-    check_refused(path, NULL, STATUS_UNSUPPORTED, "volume.files", "'bzip2'");
+    check_refused(path, NULL, STATUS_UNSUPPORTED, OPTION_SCAN_FILES, "'bzip2'");
 }
 
 static void test_raw(void **state)
@@ -233,24 +234,24 @@ static void test_raw(void **state)
     const char *path = scratch_path(state, "s.raw");
     scratch_write(path, data, sizeof data);
     check_values(&path, 1, &raw, raw.n, none, want);
-    check_refused(path, NULL, STATUS_UNSUPPORTED, "volume.files", "volume.raw");
+    check_refused(path, NULL, STATUS_UNSUPPORTED, OPTION_SCAN_FILES, OPTION_RAW);
     raw.header_bytes = 3;
-    check_refused(path, &raw, STATUS_FORMAT, "volume.files", "too short");
+    check_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     raw.header_bytes = 2;
     snprintf(raw.type, sizeof raw.type, "uint8");
-    check_refused(path, &raw, STATUS_FORMAT, "volume.files", "which fits uint16, int16");
+    check_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "which fits uint16, int16");
     snprintf(raw.type, sizeof raw.type, "bits");
-    check_refused(path, &raw, STATUS_INVALID, "volume.raw.type", "'bits'");
+    check_refused(path, &raw, STATUS_INVALID, OPTION_RAW_TYPE, "'bits'");
     raw.header_bytes = (size_t)1 << 62;
     snprintf(raw.type, sizeof raw.type, "uint8");
-    check_refused(path, &raw, STATUS_FORMAT, "volume.files", "too short");
+    check_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     raw.header_bytes = SIZE_MAX; /* as an offset it would mean 'at the end of the file' */
-    check_refused(path, &raw, STATUS_INVALID, "volume.raw.header_bytes", "makes no sense");
+    check_refused(path, &raw, STATUS_INVALID, OPTION_RAW_HEADER, "makes no sense");
     raw.header_bytes = 2;
     raw.n[1] = 0;
-    check_refused(path, &raw, STATUS_INVALID, "volume.raw.shape", "2 x 0 x 2");
+    check_refused(path, &raw, STATUS_INVALID, OPTION_RAW_SHAPE, "2 x 0 x 2");
     raw.n[1] = (1u << 20) + 1;
-    check_refused(path, &raw, STATUS_INVALID, "volume.raw.shape", "2 x 1048577 x 2");
+    check_refused(path, &raw, STATUS_INVALID, OPTION_RAW_SHAPE, "2 x 1048577 x 2");
 }
 
 /* Every reader of the registry has an id of its own with a version, takes its own kind of file only, and refuses that cut short. */
@@ -271,7 +272,7 @@ static void test_registry(void **state)
         struct volume_source_info info;
         struct error err = {0};
         assert_int_equal(r->open(&path, 1, &handle, &info, &err), STATUS_FORMAT);
-        if (strstr(err.text, "'cut.short'") == NULL || strcmp(err.field, "volume.files") != 0)
+        if (strstr(err.text, "'cut.short'") == NULL || strcmp(err.field, OPTION_SCAN_FILES) != 0)
             fail_msg("%s: %s", r->id, err.text);
         assert_null(handle);
     }
@@ -294,7 +295,7 @@ static void test_wrong_byte_order(void **state)
     const char *path = scratch_path(state, "o.raw");
     struct volume_source *source;
     scratch_write(path, picture, sizeof picture);
-    check_refused(path, &raw, STATUS_FORMAT, "volume.files", "endianness is stated wrongly");
+    check_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "endianness is stated wrongly");
     for (int i = 0; i < 5; i++) { /* the right order; noise and coarse values in both */
         raw.big_endian = i % 2 == 0;
         if (i > 0) scratch_write(path, i < 3 ? noise : coarse, sizeof noise);
@@ -318,13 +319,13 @@ static void test_metaimage(void **state)
     scratch_write(path, file, join(file, header, data, sizeof data));
     check_values(&path, 1, NULL, n, mm, want);
     scratch_write(path, file, join(file, header, data, sizeof data - 1));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "too short");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     snprintf(header, sizeof header, "%sCompressedData = True\nElementDataFile = LOCAL\n", head);
     scratch_write(path, file, join(file, header, packed, gzip(data, sizeof data, packed, sizeof packed)));
     check_values(&path, 1, NULL, n, mm, want);
     const uint8_t longer[12] = {1, 0, 0, 1, 255, 255, 2, 1};
     scratch_write(path, file, join(file, header, packed, gzip(longer, sizeof longer, packed, sizeof packed)));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "goes on behind");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "goes on behind");
 }
 
 static void test_metaimage_units(void **state)
@@ -355,7 +356,7 @@ static void test_metaimage_units(void **state)
     snprintf(header, sizeof header,
              "NDims = 3\nDimSize = 2 1 2\nDistanceUnits = inch\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n");
     scratch_write(path, file, join(file, header, data, sizeof data));
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "DistanceUnits must be um, mm or cm, not 'inch'");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "DistanceUnits must be um, mm or cm, not 'inch'");
 }
 
 static void test_vol(void **state)
@@ -383,19 +384,19 @@ static void test_vol(void **state)
     assert_memory_equal(bytes, golden, n_byte);
     free(bytes);
     scratch_write(path, golden, sizeof golden - 1);
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "need 56 bytes, the file has 55");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "need 56 bytes, the file has 55");
     memset(longer, 0, sizeof longer);
     memcpy(longer, golden, sizeof golden);
     scratch_write(path, longer, sizeof golden + 7);
     check_values(&path, 1, NULL, n, mm, want);
     scratch_write(path, longer, sizeof golden + 8); /* a row more */
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "need 56 bytes, the file has 64");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "need 56 bytes, the file has 64");
     memcpy(bad, golden, sizeof bad);
     bad[11] = 0x7f;
     scratch_write(path, bad, sizeof bad);
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "impossible size");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "impossible size");
     scratch_write(path, quantised, sizeof quantised);
-    check_refused(path, NULL, STATUS_FORMAT, "volume.files", "directions, not densities");
+    check_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "directions, not densities");
     struct vol_header h;
     float *d;
     assert_int_equal(vol_read_direction(path, &h, &d, NULL), STATUS_OK);

@@ -1,6 +1,7 @@
 /* Every method of the registry: it recovers a known cloth, honours fixed parameters and bounds, repeats itself bit by
  * bit, and resumes bit by bit from its journal wherever it was cut. */
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/estimate_journal.h"
@@ -400,7 +401,7 @@ static void test_bad_problems(void **state)
         setup(&x, 1, 100000);
         x.parameter[0].start = 5.0;
         assert_int_equal((*m)->run(&x.problem, &r, &err), STATUS_INVALID);
-        assert_string_equal(err.field, "fit.start");
+        assert_string_equal(err.field, OPTION_START);
         x.parameter[0].start = 0.1;
         x.estimator.n_configuration = 3;
         assert_int_equal((*m)->run(&x.problem, &r, &err), STATUS_INVALID);

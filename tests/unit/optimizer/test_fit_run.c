@@ -1,5 +1,6 @@
 /* What a job may ask of a fit beyond the method: ties, bounds, priors, nuisance terms, several starts; and that a fit
  * with any of them resumes bit by bit. */
+#include "base/option_id.h"
 #include "base/rng.h"
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/fit/descent/fit_run.h"
@@ -385,7 +386,7 @@ static void test_starts(void **state)
     x.option.n_start = 0;
     struct error err = {0};
     assert_int_equal(fit_run(descent_registry()[0], &x.problem, &x.option, &r, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "fit.starts");
+    assert_string_equal(err.field, OPTION_STARTS);
     release(&x);
 }
 
@@ -442,7 +443,7 @@ static void test_too_many_unknowns(void **state)
     assert_int_equal(fit_layout_init(&l, info, p, SCATTERING_MAX_PARAM, &o, &err), STATUS_OK);
     o.global_gain_sd = 0.1;
     assert_int_equal(fit_layout_init(&l, info, p, SCATTERING_MAX_PARAM, &o, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "fit.nuisance");
+    assert_string_equal(err.field, OPTION_NUISANCE);
 }
 
 /* ---- as many unknowns as there is room for ---- */
@@ -542,7 +543,7 @@ static void test_as_many_unknowns_as_there_is_room_for(void **state)
         if (fit_wide(WIDE, &plain, (*m)->id, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (fit_wide(WIDE - 1, &nuisance, METHOD_GAUSS_NEWTON, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_int_equal(fit_wide(WIDE, &nuisance, METHOD_GAUSS_NEWTON, &r, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "fit.nuisance");
+    assert_string_equal(err.field, OPTION_NUISANCE);
 }
 
 /* Every model of the program has room for all nuisance terms, with every parameter free. */

@@ -1,4 +1,5 @@
 /* Tables of measured radiances: what is read, and that mistakes are named with file, line and column. */
+#include "base/option_id.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 
 #include <math.h>
@@ -21,7 +22,7 @@ static void check_error(const char *text, status code, const char *part)
     struct error err = {0};
     observation_set_init(&o);
     assert_int_equal(measurement_table_parse(text, strlen(text), "t.csv", &set_up, &o, &err), code);
-    assert_string_equal(err.field, "measurements.file");
+    assert_string_equal(err.field, OPTION_MEASUREMENT_FILE);
     if (strstr(err.text, part) == NULL || strstr(err.text, "t.csv") == NULL)
         fail_msg("'%s' is not in '%s'", part, err.text);
     observation_set_release(&o);

@@ -1,5 +1,6 @@
 /* The worker's plumbing: checkpoint files, the hold on a job folder, the series across resumes, the inputs. */
 #include "base/durable.h"
+#include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/work_file.h"
@@ -213,7 +214,7 @@ static void test_fibers_wider_than_the_tile(void **state)
         if (pipeline_read_inputs(&c, &err) != STATUS_OK) fail_msg("%s", err.text);
         assert_int_equal(stage_fibers(&c, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
         if (i == 1) {
-            assert_string_equal(err.field, "fibers.file");
+            assert_string_equal(err.field, OPTION_FIBER_FILE);
             assert_non_null(strstr(
                 err.text, "'a.txt': fiber 1 has a radius of 0.501 mm, the tile is 1 x 2 mm: the unit may be wrong"));
         }
