@@ -1,6 +1,5 @@
 #include "geometry/orientation/consensus.h"
-
-#include "geometry/orientation/structure_tensor.h"
+#include "base/small_matrix.h"
 
 #include <string.h>
 
@@ -81,7 +80,7 @@ bool consensus_direction(const struct consensus *c, size_t i, size_t j, size_t k
     if (!(t[0] + t[1] + t[2] > 0.0f)) return false;
     double m[3][3] = {{t[0], t[3], t[4]}, {t[3], t[1], t[5]}, {t[4], t[5], t[2]}};
     float vector[3][3], value[3];
-    symmetric_eigen(m, vector, value);
+    small_eigen_3(m, vector, value);
     memcpy(d, vector[2], sizeof vector[2]);
     return true;
 }

@@ -1,4 +1,5 @@
 #include "geometry/orientation/direction_set.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -45,22 +46,6 @@ static void find_neighbours(struct direction_set *s, size_t i)
     s->node[i].reach = acosf(fminf(1.0f, best[n - 1]));
 }
 
-/* Solves the 5 x 5 normal equations a x = b for all 8 right-hand sides (Gauss-Jordan, positive definite). */
-static void solve5(double a[5][5], double b[5][DIRECTION_NEIGHBOURS])
-{
-    for (int p = 0; p < 5; p++) {
-        double inverse = 1.0 / a[p][p];
-        for (int r = 0; r < 5; r++) {
-            if (r == p) continue;
-            double f = a[r][p] * inverse;
-            for (int c = 0; c < 5; c++) a[r][c] -= f * a[p][c];
-            for (int c = 0; c < DIRECTION_NEIGHBOURS; c++) b[r][c] -= f * b[p][c];
-        }
-    }
-    for (int p = 0; p < 5; p++)
-        for (int c = 0; c < DIRECTION_NEIGHBOURS; c++) b[p][c] /= a[p][p];
-}
-
 static void prepare_fit(struct direction_set *s, size_t i)
 {
     double basis[DIRECTION_NEIGHBOURS][5], normal[5][5] = {{0.0}}, right[5][DIRECTION_NEIGHBOURS];
@@ -77,7 +62,8 @@ static void prepare_fit(struct direction_set *s, size_t i)
         }
     }
     for (int r = 0; r < 5; r++) normal[r][r] += 1e-6;
-    solve5(normal, right);
+    (void)small_factor(&normal[0][0], 5, 0.0); /* definite by the 1e-6 above */
+    for (int k = 0; k < DIRECTION_NEIGHBOURS; k++) small_solve(&normal[0][0], 5, &right[0][k], DIRECTION_NEIGHBOURS);
     for (int r = 0; r < 5; r++)
         for (int k = 0; k < DIRECTION_NEIGHBOURS; k++)
             s->node[i].fit[r][k] = (float)(right[r][k] * (r < 2 ? scale : scale * scale));

@@ -1,6 +1,5 @@
 #include "geometry/orientation/main_directions.h"
-
-#include "geometry/orientation/structure_tensor.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -114,7 +113,7 @@ static void tensor_sample(const struct finder *f, const size_t corner[3], const 
     for (int p = 0; p < 3; p++)
         for (int q = 0; q < 3; q++) m[p][q] *= scale[p] * scale[q];
     float vector[3][3], value[3];
-    symmetric_eigen(m, vector, value);
+    small_eigen_3(m, vector, value);
     float clear = value[1] + value[0] > 0.0f ? (value[1] - value[0]) / (value[1] + value[0]) : 0.0f;
     memcpy(s->d, vector[0], sizeof s->d);
     s->weight = clear * clear;

@@ -1,4 +1,5 @@
 #include "geometry/orientation/structure_tensor.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <string.h>
@@ -84,52 +85,6 @@ static void collect_border(const struct volume *v, const struct tensor_window *w
         }
 }
 
-/* Eigenvectors of a symmetric matrix by Jacobi rotations: columns of e. */
-static void jacobi(double m[3][3], double e[3][3])
-{
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) e[a][b] = a == b ? 1.0 : 0.0;
-    for (int sweep = 0; sweep < 12; sweep++)
-        for (int p = 0; p < 2; p++)
-            for (int q = p + 1; q < 3; q++) {
-                if (fabs(m[p][q]) <= 1e-14 * (fabs(m[p][p]) + fabs(m[q][q]))) continue;
-                double theta = 0.5 * (m[q][q] - m[p][p]) / m[p][q];
-                double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1.0));
-                double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
-                for (int k = 0; k < 3; k++) {
-                    double a = m[k][p], b = m[k][q];
-                    m[k][p] = c * a - s * b;
-                    m[k][q] = s * a + c * b;
-                }
-                for (int k = 0; k < 3; k++) {
-                    double a = m[p][k], b = m[q][k];
-                    m[p][k] = c * a - s * b;
-                    m[q][k] = s * a + c * b;
-                    a = e[k][p], b = e[k][q];
-                    e[k][p] = c * a - s * b;
-                    e[k][q] = s * a + c * b;
-                }
-            }
-}
-
-void symmetric_eigen(double m[3][3], float vector[3][3], float value[3])
-{
-    double e[3][3];
-    int order[3] = {0, 1, 2};
-    jacobi(m, e);
-    for (int a = 0; a < 2; a++)
-        for (int b = 0; b < 2 - a; b++)
-            if (m[order[b]][order[b]] > m[order[b + 1]][order[b + 1]]) {
-                int t = order[b];
-                order[b] = order[b + 1];
-                order[b + 1] = t;
-            }
-    for (int k = 0; k < 3; k++) {
-        value[k] = (float)m[order[k]][order[k]];
-        for (int a = 0; a < 3; a++) vector[k][a] = (float)e[a][order[k]];
-    }
-}
-
 void structure_tensor_direction(const struct volume *v, const struct tensor_window *w, size_t i, size_t j, size_t k,
                                 float d[3])
 {
@@ -141,6 +96,6 @@ void structure_tensor_direction(const struct volume *v, const struct tensor_wind
         collect_border(v, w, centre, sum);
     double m[3][3] = {{sum[0], sum[3], sum[4]}, {sum[3], sum[1], sum[5]}, {sum[4], sum[5], sum[2]}};
     float vector[3][3], value[3];
-    symmetric_eigen(m, vector, value);
+    small_eigen_3(m, vector, value);
     memcpy(d, vector[0], sizeof vector[0]);
 }

@@ -19,7 +19,4 @@ void tensor_window_init(struct tensor_window *w, double sd_voxel);
 void structure_tensor_direction(const struct volume *blurred, const struct tensor_window *w, size_t i, size_t j,
                                 size_t k, float d[3]);
 
-/* Unit eigenvectors (rows of vector) and eigenvalues, rising, of a symmetric matrix, which is destroyed. */
-void symmetric_eigen(double m[3][3], float vector[3][3], float value[3]);
-
 #endif

@@ -90,8 +90,9 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
     return -1;
 }
 
-/* Runs in threads that a library has started before main (OpenBLAS does): they do not block the signal. Block it there
- * for good and send it again, until the status thread's sigtimedwait takes it. */
+/* Handles a signal that reaches a thread which a library has started before main (OpenBLAS does, where OpenCV loads it)
+ * and which therefore does not block the signal: blocks it in that thread from now on and sends it again, until the
+ * status thread's sigtimedwait takes it. */
 static void pass_on(int signal_number, siginfo_t *info, void *context)
 {
     (void)info;

@@ -1,4 +1,5 @@
 #include "geometry/fibers/lines/join_curve.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <string.h>
@@ -31,30 +32,6 @@ static size_t take_side(const struct polyline_set *p, uint32_t end, size_t trim,
         arc[n] = n == 0 ? 0.0 : arc[n - 1] + distance(vertex[n], vertex[n - 1]);
     }
     return n;
-}
-
-/* Solves the symmetric 4 x 4 system m x = b for three right-hand sides by Cholesky; false when it is singular. */
-static bool solve(double m[4][4], double b[4][3])
-{
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j <= i; j++) {
-            double sum = m[i][j];
-            for (int k = 0; k < j; k++) sum -= m[i][k] * m[j][k];
-            if (i == j && !(sum > 1e-9)) return false;
-            m[i][j] = i == j ? sqrt(sum) : sum / m[j][j];
-        }
-    }
-    for (int a = 0; a < 3; a++) {
-        for (int i = 0; i < 4; i++) {
-            for (int k = 0; k < i; k++) b[i][a] -= m[i][k] * b[k][a];
-            b[i][a] /= m[i][i];
-        }
-        for (int i = 3; i >= 0; i--) {
-            for (int k = i + 1; k < 4; k++) b[i][a] -= m[k][i] * b[k][a];
-            b[i][a] /= m[i][i];
-        }
-    }
-    return true;
 }
 
 void join_curve_at(const struct join_curve *j, double u, double x[3])
@@ -114,7 +91,8 @@ bool join_curve_fit(const struct polyline_set *p, uint32_t a, uint32_t b, const 
     j->to = (sa[na - 1] + j->gap) / j->scale - 1.0;
     for (size_t i = 0; i < na; i++) add_vertex(m, j->c, j->from - sa[i] / j->scale, va[i]);
     for (size_t i = 0; i < nb; i++) add_vertex(m, j->c, j->to + sb[i] / j->scale, vb[i]);
-    if (!solve(m, j->c)) return false;
+    if (!small_factor(&m[0][0], 4, 1e-9)) return false;
+    for (int axis = 0; axis < 3; axis++) small_solve(&m[0][0], 4, &j->c[0][axis], 3);
     double sum = 0.0;
     for (size_t i = 0; i < na; i++) sum += residual2(j, j->from - sa[i] / j->scale, va[i]);
     for (size_t i = 0; i < nb; i++) sum += residual2(j, j->to + sb[i] / j->scale, vb[i]);

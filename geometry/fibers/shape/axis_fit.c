@@ -1,5 +1,5 @@
 #include "geometry/fibers/shape/axis_fit.h"
-
+#include "base/small_matrix.h"
 #include "geometry/fibers/lines/segment_bricks.h"
 #include "geometry/fibers/shape/axis_solve.h"
 
@@ -275,7 +275,8 @@ static void step_profile(const struct fit_job *job, size_t n_brick, double diame
             x[a] += job->sum[b].gradient[a];
             for (int c = 0; c < 4; c++) m[4 * a + c] += job->sum[b].normal[a][c];
         }
-    if (!axis_solve_dense(m, 4, x)) return;
+    if (!small_factor(m, 4, 0.0)) return;
+    small_solve(m, 4, x, 1);
     p->radius = fmin(0.75 * diameter, fmax(0.3 * diameter, p->radius + fmin(0.3, fmax(-0.3, x[0]))));
     p->blur = fmin(2.5, fmax(0.4, p->blur + fmin(0.2, fmax(-0.2, x[1]))));
     p->low = fmin(0.4, fmax(-0.2, p->low + x[2]));

@@ -1,4 +1,5 @@
 #include "geometry/fibers/shape/axis_solve.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,50 +11,6 @@ void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
 {
     for (int i = 0; i < 6; i++) to->normal[i] += from->normal[i];
     for (int i = 0; i < 3; i++) to->gradient[i] += from->gradient[i];
-}
-
-bool axis_solve_dense(double *m, int n, double *x)
-{
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = m[i * n + j];
-            for (int k = 0; k < j; k++) sum -= m[i * n + k] * m[j * n + k];
-            if (i == j && !(sum > 0.0)) return false;
-            m[i * n + j] = i == j ? sqrt(sum) : sum / m[j * n + j];
-        }
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < i; k++) x[i] -= m[i * n + k] * x[k];
-        x[i] /= m[i * n + i];
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++) x[i] -= m[k * n + i] * x[k];
-        x[i] /= m[i * n + i];
-    }
-    return true;
-}
-
-/* The same with m[i][k] the element (i, i - k). */
-static bool solve_banded(double (*m)[BAND], size_t n, double *x)
-{
-    for (size_t i = 0; i < n; i++) {
-        size_t first = i >= BAND - 1 ? i - (BAND - 1) : 0;
-        for (size_t j = first; j <= i; j++) {
-            double sum = m[i][i - j];
-            for (size_t k = first; k < j; k++)
-                if (j - k < BAND) sum -= m[i][i - k] * m[j][j - k];
-            if (i == j && !(sum > 0.0)) return false;
-            m[i][i - j] = i == j ? sqrt(sum) : sum / m[j][0];
-        }
-    }
-    for (size_t i = 0; i < n; i++) {
-        for (size_t k = 1; k < BAND && k <= i; k++) x[i] -= m[i][k] * x[i - k];
-        x[i] /= m[i][0];
-    }
-    for (size_t i = n; i-- > 0;) {
-        for (size_t k = 1; k < BAND && i + k < n; k++) x[i] -= m[i + k][k] * x[i + k];
-        x[i] /= m[i][0];
-    }
-    return true;
 }
 
 struct solve_job {
@@ -91,7 +48,7 @@ static void solve_line(void *context, size_t l, size_t i_thread)
                     m[3 * (i + r) + a][3 * (r - c)] += job->stiffness * second[r] * second[c];
             }
         }
-    if (!solve_banded(m, 3 * n, x)) goto out; /* stays as it is */
+    if (!small_solve_banded(m[0], 3 * n, BAND, x)) goto out; /* stays as it is */
     for (size_t i = 0; i < n; i++) {
         double length = sqrt(x[3 * i] * x[3 * i] + x[3 * i + 1] * x[3 * i + 1] + x[3 * i + 2] * x[3 * i + 2]);
         for (size_t a = 0; a < 3; a++) p[i][a] += (float)(x[3 * i + a] * (length > 1.0 ? 1.0 / length : 1.0));

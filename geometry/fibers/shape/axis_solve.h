@@ -5,8 +5,6 @@
 #include "base/thread_pool.h"
 #include "geometry/fibers/lines/polyline.h"
 
-#include <stdbool.h>
-
 /* Normal equations of the position of one vertex, from the data. */
 struct axis_pull {
     uint32_t segment;  /* where a sum over bricks comes from */
@@ -20,8 +18,5 @@ void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
  * STATUS_NO_MEMORY. */
 status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness,
                         struct thread_pool *pool, struct error *err);
-
-/* Cholesky on a dense symmetric n x n matrix (row-major, destroyed), solution in place of the right-hand side; false when not definite. */
-bool axis_solve_dense(double *m, int n, double *x);
 
 #endif

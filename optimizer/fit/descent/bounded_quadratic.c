@@ -1,5 +1,4 @@
 #include "optimizer/fit/descent/descent_methods.h"
-#include "optimizer/fit/objective/small_matrix.h"
 
 #include <math.h>
 #include <nlopt.h>

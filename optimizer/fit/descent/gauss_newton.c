@@ -22,8 +22,8 @@
  * where no budget was asked for, photograph_share of what the photographs' own errors make of a residual.
  * Where the paths or iterations are used up before, it has converged if it had arrived.
  */
+#include "base/small_matrix.h"
 #include "optimizer/fit/descent/descent_methods.h"
-#include "optimizer/fit/objective/small_matrix.h"
 #include "optimizer/job/method_names.h"
 #include "renderer/transport/appearance_estimate.h"
 

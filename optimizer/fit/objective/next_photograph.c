@@ -1,6 +1,6 @@
 #include "optimizer/fit/objective/next_photograph.h"
+#include "base/small_matrix.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/fit/objective/small_matrix.h"
 
 #include <math.h>
 #include <string.h>

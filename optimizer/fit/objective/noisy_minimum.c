@@ -1,5 +1,5 @@
 #include "optimizer/fit/objective/noisy_minimum.h"
-#include "optimizer/fit/objective/small_matrix.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,11 +1,12 @@
 #include "optimizer/fit/objective/uncertainty.h"
-#include "optimizer/fit/objective/small_matrix.h"
+#include "base/small_matrix.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { N = SCATTERING_MAX_PARAM };
+_Static_assert((int)SMALL_MATRIX_MAX >= (int)N, "small_matrix.h takes matrices of all parameters");
 /* A quantity that is positive and spans decades is not known when it may be half or twice as large (one standard error). */
 static const double log_determined = 0.69;
 

@@ -1,7 +1,7 @@
 /* Which photograph to take next: against the update of the whole covariance, and a parameter that one candidate alone
  * can determine. */
+#include "base/small_matrix.h"
 #include "optimizer/fit/objective/next_photograph.h"
-#include "optimizer/fit/objective/small_matrix.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>

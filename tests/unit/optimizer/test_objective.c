@@ -1,8 +1,7 @@
-/* Objective, coordinates, small matrices, what follows from a linear model, uncertainty. */
+/* Objective, coordinates, what follows from a linear model, uncertainty. */
 #include "base/rng.h"
 #include "optimizer/fit/objective/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/fit/objective/small_matrix.h"
 #include "optimizer/fit/objective/uncertainty.h"
 #include "tests/support/tracer/fake_estimator.h"
 
@@ -149,37 +148,6 @@ static void test_coordinates(void **state)
     assert_int_equal(k.kind, COORDINATE_LOG);
     coordinate_init(&k, &shift, shift.lower, shift.upper);
     assert_int_equal(k.kind, COORDINATE_LINEAR);
-}
-
-static void test_matrices(void **state)
-{
-    (void)state;
-    enum { N = 9 };
-    struct rng_key key = {.seed = 11};
-    struct rng r;
-    double half[N * N], a[N * N] = {0}, inverse[N * N], product[N * N], value[N], v[N * N];
-    rng_start(&r, &key, 0, 0);
-    for (size_t i = 0; i < N * N; i++) half[i] = rng_double(&r) - 0.5;
-    for (size_t i = 0; i < N; i++)
-        for (size_t j = 0; j < N; j++)
-            for (size_t k = 0; k < N; k++) a[i * N + j] += half[i * N + k] * half[j * N + k];
-    assert_true(small_invert(a, N, inverse));
-    small_multiply(a, inverse, N, product);
-    for (size_t i = 0; i < N * N; i++) assert_true(fabs(product[i] - (i % (N + 1) == 0 ? 1.0 : 0.0)) < 1e-6);
-    small_eigen(a, N, value, v);
-    for (size_t k = 0; k < N; k++) {
-        assert_true(value[k] > 0.0);
-        for (size_t i = 0; i < N; i++) {
-            double av = 0.0;
-            for (size_t j = 0; j < N; j++) av += a[i * N + j] * v[j * N + k];
-            assert_true(fabs(av - value[k] * v[i * N + k]) < 1e-10);
-        }
-    }
-    a[0] -= 5.0; /* indefinite now */
-    assert_false(small_invert(a, N, inverse));
-    small_clip_eigenvalues(a, N, 1e-3);
-    small_eigen(a, N, value, v);
-    for (size_t k = 0; k < N; k++) assert_true(value[k] > 0.9e-3);
 }
 
 /* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called
@@ -371,7 +339,6 @@ int main(void)
         cmocka_unit_test(test_unbiased),
         cmocka_unit_test(test_gradient),
         cmocka_unit_test(test_coordinates),
-        cmocka_unit_test(test_matrices),
         cmocka_unit_test(test_uncertainty),
         cmocka_unit_test(test_misfit_and_weights),
         cmocka_unit_test(test_bound_of_a_wide_range),
