@@ -1,4 +1,5 @@
 /* Step "fibers": subvolumes, centers, chains, joins, smoothing, radius. */
+#include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
@@ -27,7 +28,7 @@ enum {
 #define OVER_USUAL_TURN                                                                                                \
     2.1 /* kinks; less cuts fibers of plain weaves to pieces, more leaves changes from fiber to fiber */
 #define END_DIAMETERS 1.0 /* as far as an end may be astray */
-#define MAX_DISAGREEMENT_RAD (30.0 * M_PI / 180.0)
+#define MAX_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
 
 struct fiber_job {
     const struct volume *v;

@@ -1,4 +1,5 @@
 /* Step "directions": voxels near a fiber take its direction (fabric thesis, 5.6.7), and the share of material explained. */
+#include "base/angle.h"
 #include "geometry/reconstruct.h"
 
 #include "geometry/fibers/lines/segment_bricks.h"
@@ -45,7 +46,7 @@ static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size
         t[a] /= sqrtf(norm);
         cosine += t[a] * d[a];
     }
-    sum->angle_deg += acos(fmin(1.0, fabs((double)cosine))) * 180.0 / M_PI;
+    sum->angle_deg += angle_to_deg(acos(fmin(1.0, fabs((double)cosine))));
     sum->n_changed++;
     direction_volume_set(job->d, at, t);
 }

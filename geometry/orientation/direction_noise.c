@@ -1,4 +1,5 @@
 #include "geometry/orientation/direction_noise.h"
+#include "base/angle.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -45,7 +46,7 @@ status direction_noise_measure(const struct direction_volume *d, struct thread_p
         sum += job.sum[2 * k];
         count += job.sum[2 * k + 1];
     }
-    *mean_deg = count > 0.0 ? sum / count * 180.0 / M_PI : NAN;
+    *mean_deg = count > 0.0 ? angle_to_deg(sum / count) : NAN;
     free(job.sum);
     return s == STATUS_OK ? s : error_set(err, s, "measuring the noise of directions was cancelled");
 }

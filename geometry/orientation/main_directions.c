@@ -1,4 +1,5 @@
 #include "geometry/orientation/main_directions.h"
+#include "base/angle.h"
 #include "base/small_matrix.h"
 
 #include <math.h>
@@ -278,7 +279,7 @@ static void standard_error(const struct finder *f, double u[2][3], size_t n, siz
     for (int a = 0; a < 2; a++)
         se_deg[a] = used < 2.0
                         ? NAN
-                        : sqrt(fmax(0.0, (used - 1.0) * (square[a] / used - pow(sum[a] / used, 2.0)))) * 180.0 / M_PI;
+                        : angle_to_deg(sqrt(fmax(0.0, (used - 1.0) * (square[a] / used - pow(sum[a] / used, 2.0)))));
 }
 
 /* [0] shall be the one nearer to x; signs so that weft points along +x, warp along +y. */
@@ -419,8 +420,8 @@ static void align_one(const struct main_directions *m, int axis, const double u[
     double column[3][3];
     turned_frame(u, axis, column);
     inverse_of_columns(column[0], column[1], column[2], a->matrix);
-    a->rotation_deg = (axis == 0 ? atan2(u[1], u[0]) : atan2(-u[0], u[1])) * 180.0 / M_PI;
-    a->tilt_deg = asin(fmin(1.0, fabs(u[2]))) * 180.0 / M_PI;
+    a->rotation_deg = angle_to_deg(axis == 0 ? atan2(u[1], u[0]) : atan2(-u[0], u[1]));
+    a->tilt_deg = angle_to_deg(asin(fmin(1.0, fabs(u[2]))));
     a->se_deg = m->se_deg[axis];
     a->tilt_se_deg = m->tilt_se_deg[axis];
 }
@@ -450,9 +451,9 @@ void alignment_from_directions(const struct main_directions *m, struct alignment
     double norm = length(w);
     for (int i = 0; i < 3; i++) w[i] /= norm;
     inverse_of_columns(u, v, w, a->matrix);
-    a->rotation_deg = atan2(u[1], u[0]) * 180.0 / M_PI;
-    a->shear_deg = acos(dot) * 180.0 / M_PI - 90.0;
-    a->tilt_deg = acos(fmin(1.0, fabs(w[2]))) * 180.0 / M_PI;
+    a->rotation_deg = angle_to_deg(atan2(u[1], u[0]));
+    a->shear_deg = angle_to_deg(acos(dot)) - 90.0;
+    a->tilt_deg = angle_to_deg(acos(fmin(1.0, fabs(w[2]))));
     a->se_deg = fmax(m->se_deg[0], m->se_deg[1]);
     a->tilt_se_deg = fmax(m->tilt_se_deg[0], m->tilt_se_deg[1]);
 }

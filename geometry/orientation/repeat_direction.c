@@ -1,4 +1,5 @@
 #include "geometry/orientation/repeat_direction.h"
+#include "base/angle.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -158,12 +159,12 @@ static status refine(const struct cells *c, const struct cells *fine, struct thr
                    ((double)best.d[1] + off * (double)across[1]) * c->size_m[1]};
     double length = hypot(d[0], d[1]), sign = d[0] * u[0] + d[1] * u[1] < 0.0 ? -1.0 : 1.0;
     m->repeat_m[p] = length;
-    m->se_deg[p] = 0.5 * c->size_m[1 - s.axis] / length * 180.0 / M_PI;
+    m->se_deg[p] = angle_to_deg(0.5 * c->size_m[1 - s.axis] / length);
     d[2] = rise_m(fine, best.d, length);
     if (isnan(d[2]))
         d[2] = sign * length * u[2] / hypot(u[0], u[1]);
     else
-        m->tilt_se_deg[p] = 0.5 * fine->size_m[2] / length * 180.0 / M_PI;
+        m->tilt_se_deg[p] = angle_to_deg(0.5 * fine->size_m[2] / length);
     for (int a = 0; a < 3; a++) u[a] = sign * d[a] / hypot(length, d[2]);
     return STATUS_OK;
 }

@@ -1,4 +1,5 @@
 #include "geometry/phantom/compare.h"
+#include "base/angle.h"
 
 #include "geometry/phantom/segment_grid.h"
 
@@ -224,7 +225,7 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
         if (i == 0 || s[-1].other != s->other || s[-1].voxel != s->voxel) nearest = s->fiber;
         n_second += s->fiber != nearest;
         distance[n] = (float)((double)s->distance_m / voxel_size_m);
-        angle[n] = (float)(acos((double)s->cosine) * 180.0 / M_PI);
+        angle[n] = (float)angle_to_deg(acos((double)s->cosine));
         sum2 += (double)distance[n] * (double)distance[n];
         angle_sum += (double)angle[n];
         ratio_sum += (double)found->radius_m[s->fiber] / (double)truth->radius_m[s->other] - 1.0;

@@ -7,6 +7,7 @@
  *       (columns). Mean of the channels, a colour parameter's by its own component; white is 0, the ends of each scale
  *       are what 97 % of the column's pixels stay below.
  */
+#include "base/angle.h"
 #include "geometry/phantom/phantom.h"
 #include "renderer/transport/render.h"
 #include "tests/support/tiny_text.h"
@@ -15,8 +16,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define DEG (M_PI / 180)
 
 static status make_cloth(struct thread_pool *pool, struct scene **scene, struct error *err)
 {
@@ -46,15 +45,15 @@ static status make_twill(struct thread_pool *pool, const struct scene *scene, si
                          const char *path, struct error *err)
 {
     static const double param[3][9] = {
-        {0.10, 0.09, 0.07, 0.95, 0.87, 0.70, 6 * DEG, 16 * DEG, 30 * DEG}, /* weft: undyed */
-        {0.06, 0.08, 0.11, 0.18, 0.40, 0.76, 6 * DEG, 16 * DEG, 30 * DEG}, /* warp: blue */
-        {0.10, 0.09, 0.07, 0.95, 0.87, 0.70, 6 * DEG, 16 * DEG, 30 * DEG}, /* upright fibers */
+        {0.10, 0.09, 0.07, 0.95, 0.87, 0.70, 6 * RAD_PER_DEG, 16 * RAD_PER_DEG, 30 * RAD_PER_DEG}, /* weft: undyed */
+        {0.06, 0.08, 0.11, 0.18, 0.40, 0.76, 6 * RAD_PER_DEG, 16 * RAD_PER_DEG, 30 * RAD_PER_DEG}, /* warp: blue */
+        {0.10, 0.09, 0.07, 0.95, 0.87, 0.70, 6 * RAD_PER_DEG, 16 * RAD_PER_DEG, 30 * RAD_PER_DEG}, /* upright fibers */
     };
-    const struct configuration c = {.light_theta_rad = 52 * DEG,
-                                    .light_phi_rad = 205 * DEG,
-                                    .camera_theta_rad = 52 * DEG,
+    const struct configuration c = {.light_theta_rad = 52 * RAD_PER_DEG,
+                                    .light_phi_rad = 205 * RAD_PER_DEG,
+                                    .camera_theta_rad = 52 * RAD_PER_DEG,
                                     .camera_phi_rad = 0,
-                                    .cloth_rotation_rad = 28 * DEG,
+                                    .cloth_rotation_rad = 28 * RAD_PER_DEG,
                                     .light_distance_m = 0.61,
                                     .lamp_side_m = 0.6,
                                     .camera_distance_m = 0.008,
@@ -110,7 +109,7 @@ static double derivative(const struct image *im, size_t pixel, size_t column)
         size_t p = column_of[column].first_param + (column_of[column].colour ? c : 0);
         sum += (double)im->pixel[pixel * im->n_channel + 6 + 3 * p + c];
     }
-    return sum / 3 * (column_of[column].colour ? 1 : DEG);
+    return sum / 3 * (column_of[column].colour ? 1 : RAD_PER_DEG);
 }
 
 /* The size that 97 % of the values of a column stay below, rounded up to two digits. */
@@ -171,19 +170,20 @@ static void draw_column(uint8_t *rgb, const struct image im[N_ROW], size_t colum
 static status make_derivatives(struct thread_pool *pool, const struct scene *scene, size_t n_sample, size_t width,
                                const char *path, struct error *err)
 {
-    static const double param[9] = {0.25, 0.15, 0.10, 0.75, 0.55, 0.35, 8 * DEG, 22 * DEG, 30 * DEG};
+    static const double param[9] = {
+        0.25, 0.15, 0.10, 0.75, 0.55, 0.35, 8 * RAD_PER_DEG, 22 * RAD_PER_DEG, 30 * RAD_PER_DEG};
     const struct configuration c[N_ROW] = {
-        {.light_theta_rad = 35 * DEG,
-         .light_phi_rad = 180 * DEG,
-         .camera_theta_rad = 20 * DEG,
+        {.light_theta_rad = 35 * RAD_PER_DEG,
+         .light_phi_rad = 180 * RAD_PER_DEG,
+         .camera_theta_rad = 20 * RAD_PER_DEG,
          .light_distance_m = 0.61,
          .lamp_side_m = 0.1,
          .camera_distance_m = 1,
          .crop_m = 0.0014},
-        {.light_theta_rad = 60 * DEG,
-         .light_phi_rad = 90 * DEG,
-         .camera_theta_rad = 55 * DEG,
-         .cloth_rotation_rad = 30 * DEG,
+        {.light_theta_rad = 60 * RAD_PER_DEG,
+         .light_phi_rad = 90 * RAD_PER_DEG,
+         .camera_theta_rad = 55 * RAD_PER_DEG,
+         .cloth_rotation_rad = 30 * RAD_PER_DEG,
          .light_distance_m = 0.61,
          .lamp_side_m = 0.1,
          .camera_distance_m = 1,

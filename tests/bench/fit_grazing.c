@@ -1,4 +1,5 @@
 /* Lamp and camera in mirrored directions, from the normal to grazing: figures fit.grazing.* of bench_fit. */
+#include "base/angle.h"
 #include "optimizer/job/method_names.h"
 #include "tests/bench/fit_bench.h"
 #include "tests/support/cloth/fit_fabrics.h"
@@ -18,7 +19,7 @@ static void print_mirror(const char *of, double angle_deg, const double rgb[3], 
 /* The photographs of the fit that were taken in such directions. */
 static void print_mirror_photographs(const struct observation_set *o)
 {
-    const double deg = 180.0 / M_PI;
+    const double deg = DEG_PER_RAD;
     for (size_t i = 0; i < o->n; i++) {
         const struct configuration *k = &o->item[i].configuration;
         if (fabs(k->light_theta_rad - k->camera_theta_rad) > 1e-6 || k->cloth_rotation_rad != 0.0 ||

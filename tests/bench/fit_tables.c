@@ -1,4 +1,5 @@
 /* Measured tables: figures fit.real.* and fit.real_all_rotations.* of bench_fit. */
+#include "base/angle.h"
 #include "base/durable.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/job/method_names.h"
@@ -30,7 +31,7 @@ struct real_row {
 static void tell_rows(const struct fit_phantom *f, const double *param, size_t n_path)
 {
     struct estimate e[FIT_MAX_OBSERVATION];
-    const double deg = 180.0 / M_PI;
+    const double deg = DEG_PER_RAD;
     fit_phantom_render(f, param, n_path, e);
     fprintf(stderr, "  %-12s %5s %5s %5s %5s %5s  %-24s  %s\n", "row", "lamp", "phi", "cam", "phi", "turn", "measured",
             "rendered / measured");

@@ -1,4 +1,5 @@
 /* Sampling of every scattering model: the density integrates to 1 and samples follow it. */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
 #include "tests/support/statistics_test.h"
@@ -82,8 +83,8 @@ static void samples_follow_the_density(void **state)
         for (int set = 0; set < N_SET; set++)
             for (int a = 0; a < N_ANGLE; a++) {
                 const struct scattering_model *m = scattering_registry()[k];
-                double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * M_PI / 180,
-                                                    phi = angle_deg[a][1] * M_PI / 180;
+                double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * RAD_PER_DEG,
+                                                    phi = angle_deg[a][1] * RAD_PER_DEG;
                 for (size_t p = 0; p < m->n_param; p++) { /* start; everything widest; narrow lobes */
                     const struct param_info *i = &m->param[p];
                     bool angle = i->channel < 0;

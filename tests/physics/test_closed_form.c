@@ -1,6 +1,7 @@
 /* Light scattered once by straight parallel fibers, against quadrature over the lamp. Fibers so dark that a second
  * scattering does not show, so far apart that they neither shade nor light each other.
  */
+#include "base/angle.h"
 #include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/reference_two_lobe.h"
@@ -12,8 +13,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 static const double tile_m = 0.4e-3, radius_m = 5e-6;
 
@@ -82,8 +81,9 @@ static void check(const struct configuration *c, const double param[9], struct t
         double want = coverage * single_scattering(c, param, k), se = sqrt(e.var[k]);
         if (!(fabs(e.mean[k] - want) < 4 * se + 5e-3 * want) || se > 0.05 * want)
             fail_msg("camera %.0f/%.0f lamp %.0f/%.0f rotation %.0f, channel %d: %.6g +- %.2g, quadrature %.6g",
-                     c->camera_theta_rad / DEG, c->camera_phi_rad / DEG, c->light_theta_rad / DEG,
-                     c->light_phi_rad / DEG, c->cloth_rotation_rad / DEG, k, e.mean[k], se, want);
+                     c->camera_theta_rad / RAD_PER_DEG, c->camera_phi_rad / RAD_PER_DEG,
+                     c->light_theta_rad / RAD_PER_DEG, c->light_phi_rad / RAD_PER_DEG,
+                     c->cloth_rotation_rad / RAD_PER_DEG, k, e.mean[k], se, want);
         joint->sum +=
             want * want / (se * se) * (e.mean[k] / want - 1); /* channels share paths: their errors go together */
         joint->weight += want * want / (se * se);
@@ -108,10 +108,19 @@ static void single_scattering_from_straight_fibers(void **state)
     assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
     for (size_t i = 0; i < sizeof angle_deg / sizeof angle_deg[0]; i++) {
         const double *a = angle_deg[i];
-        struct configuration c = {a[2] * DEG, a[3] * DEG, a[0] * DEG, a[1] * DEG, a[4] * DEG,
-                                  0.61,       0.10,       100,        8 * tile_m};
-        const double narrow[9] = {0.02, 0.01, 0.03, 0.01, 0.02, 0.001, 2 * DEG, 12 * DEG, 20 * DEG};
-        const double wide[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
+        struct configuration c = {a[2] * RAD_PER_DEG,
+                                  a[3] * RAD_PER_DEG,
+                                  a[0] * RAD_PER_DEG,
+                                  a[1] * RAD_PER_DEG,
+                                  a[4] * RAD_PER_DEG,
+                                  0.61,
+                                  0.10,
+                                  100,
+                                  8 * tile_m};
+        const double narrow[9] = {
+            0.02, 0.01, 0.03, 0.01, 0.02, 0.001, 2 * RAD_PER_DEG, 12 * RAD_PER_DEG, 20 * RAD_PER_DEG};
+        const double wide[9] = {
+            0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * RAD_PER_DEG, 30 * RAD_PER_DEG, 40 * RAD_PER_DEG};
         check(&c, wide, pool, scene, &joint);
         check(&c, narrow, pool, scene, &joint);
     }

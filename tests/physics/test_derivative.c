@@ -2,6 +2,7 @@
  * (a) recorded paths evaluated again at shifted parameters (tight: the same paths, no tracing),
  * (b) traced again with common random numbers, judged by the standard error of paired batches.
  */
+#include "base/angle.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
 #include "renderer/transport/surface/path_tracer.h"
@@ -16,12 +17,11 @@
 
 #include <cmocka.h>
 
-#define DEG (M_PI / 180)
-
 static const struct configuration view[3] = {
-    {30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 0.10, 1.0, 0.01},
-    {60 * DEG, 150 * DEG, 45 * DEG, 0, 90 * DEG, 0.61, 0.10, 1.0, 0.01},
-    {82 * DEG, 200 * DEG, 30 * DEG, 10 * DEG, 30 * DEG, 0.61, 0.10, 1.0, 0.01}, /* lamp at a grazing angle */
+    {30 * RAD_PER_DEG, 180 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0, 0, 0.61, 0.10, 1.0, 0.01},
+    {60 * RAD_PER_DEG, 150 * RAD_PER_DEG, 45 * RAD_PER_DEG, 0, 90 * RAD_PER_DEG, 0.61, 0.10, 1.0, 0.01},
+    {82 * RAD_PER_DEG, 200 * RAD_PER_DEG, 30 * RAD_PER_DEG, 10 * RAD_PER_DEG, 30 * RAD_PER_DEG, 0.61, 0.10, 1.0,
+     0.01}, /* lamp at a grazing angle */
 };
 
 static struct scene *cloth(void)

@@ -1,6 +1,7 @@
 /* Every scattering model in the registry: no more light leaves a fiber than comes, whatever the direction it comes
  * from.
  */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
 
@@ -47,7 +48,7 @@ static void no_model_gains_energy(void **state)
             const double theta_deg[6] = {0, 20, -45, 70, -85, 89.5};
             for (int a = 0; a < 6; a++) {
                 double sum[3];
-                leaving(m, s, theta_deg[a] * M_PI / 180, sum);
+                leaving(m, s, theta_deg[a] * RAD_PER_DEG, sum);
                 /* 2e-3: quadrature, and the tables of two_lobe near the poles */
                 for (int c = 0; c < 3; c++)
                     if (!(sum[c] > 0 && sum[c] < 1 + 2e-3))

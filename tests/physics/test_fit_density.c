@@ -1,5 +1,6 @@
 /* The density multiplier of a volume model as a fitted parameter: with the lamp behind the cloth it comes back within
  * its standard error; and one that nothing depends on is said not to be determined. */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/trace_estimator.h"
@@ -16,7 +17,7 @@
 #include <cmocka.h>
 
 enum { N_FRONT = 5, N_BACK = 3, N = N_FRONT + N_BACK, TRUTH_PATHS = 100000, TRUE_PER_CM = 900 };
-static const double deg = M_PI / 180.0, photograph_noise = 0.005;
+static const double deg = RAD_PER_DEG, photograph_noise = 0.005;
 
 static struct configuration view(double light_deg, double camera_deg, double rotation_deg)
 {

@@ -1,6 +1,7 @@
 /* Energy: single fibers from the incident side (quadrature) and from the camera side (sampling against quadrature), and
  * a whole endless cloth in a uniform environment.
  */
+#include "base/angle.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -15,8 +16,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
 {
@@ -59,11 +58,11 @@ static void lossless_from_the_incident_side(void **state)
     const struct scattering_model *m = scattering_find("two_lobe.v1");
     static const double beta_deg[3] = {1, 5, 10};
     for (int k = 0; k < 3; k++) {
-        double param[9] = {0.3, 0.3, 0.3, 0.8, 0.8, 0.8, beta_deg[k] * DEG, 15 * DEG, 10 * DEG};
+        double param[9] = {0.3, 0.3, 0.3, 0.8, 0.8, 0.8, beta_deg[k] * RAD_PER_DEG, 15 * RAD_PER_DEG, 10 * RAD_PER_DEG};
         struct scattering_state *s = prepare(m, param);
         for (double t = -80; t <= 80; t += 20) {
-            double fresnel = 0.3 + 0.7 * pow(1 - cos(t * DEG), 5), want = fresnel + 0.8 * (1 - fresnel);
-            double got = incident_furnace(m, s, t * DEG);
+            double fresnel = 0.3 + 0.7 * pow(1 - cos(t * RAD_PER_DEG), 5), want = fresnel + 0.8 * (1 - fresnel);
+            double got = incident_furnace(m, s, t * RAD_PER_DEG);
             if (!(got <= want * 1.0005 && got >= want * 0.99))
                 fail_msg("beta_R %g, th_i %g: %.5f of %.5f come out", beta_deg[k], t, got, want);
         }
@@ -82,8 +81,8 @@ static void published_lobe_from_the_camera_side(void **state)
                                        {25, 1.132, 1.023, 0.669, 0.437, 0.364, 0.296}};
     for (int b = 0; b < 4; b++)
         for (int a = 0; a < 6; a++) { /* only R, without its Fresnel rise */
-            double param[9] = {1, 1, 1, 0, 0, 0, table[b][0] * DEG, 10 * DEG, 10 * DEG};
-            assert_true(fabs(reference_camera_furnace(param, angle[a] * DEG, 0) - table[b][a + 1]) < 6e-4);
+            double param[9] = {1, 1, 1, 0, 0, 0, table[b][0] * RAD_PER_DEG, 10 * RAD_PER_DEG, 10 * RAD_PER_DEG};
+            assert_true(fabs(reference_camera_furnace(param, angle[a] * RAD_PER_DEG, 0) - table[b][a + 1]) < 6e-4);
         }
 }
 
@@ -108,17 +107,17 @@ static void sampling_gives_the_camera_side_integral(void **state)
 {
     (void)state;
     static const double set[4][9] = {
-        {0.3, 0.3, 0.3, 0.8, 0.8, 0.8, 5 * DEG, 10 * DEG, 10 * DEG},
-        {0.999, 0.5, 0.5, 0.5, 0.8, 0.8, 1 * DEG, 10 * DEG, 1 * DEG},
-        {0.001, 0.5, 0.5, 0.999, 0.8, 0.8, 10 * DEG, 45 * DEG, 45 * DEG},
-        {0.5, 0.5, 0.5, 0.999, 0.8, 0.8, 10 * DEG, 25 * DEG, 20 * DEG},
+        {0.3, 0.3, 0.3, 0.8, 0.8, 0.8, 5 * RAD_PER_DEG, 10 * RAD_PER_DEG, 10 * RAD_PER_DEG},
+        {0.999, 0.5, 0.5, 0.5, 0.8, 0.8, 1 * RAD_PER_DEG, 10 * RAD_PER_DEG, 1 * RAD_PER_DEG},
+        {0.001, 0.5, 0.5, 0.999, 0.8, 0.8, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG},
+        {0.5, 0.5, 0.5, 0.999, 0.8, 0.8, 10 * RAD_PER_DEG, 25 * RAD_PER_DEG, 20 * RAD_PER_DEG},
     };
     const struct scattering_model *m = scattering_find("two_lobe.v1");
     for (int k = 0; k < 4; k++)
         for (double t = -85; t <= 85; t += 42.5) {
             struct sample_mean mean = {0};
-            sampled_camera_side(m, set[k], t * DEG, &mean);
-            double want = reference_camera_furnace(set[k], t * DEG, 0), se = sample_mean_se(&mean);
+            sampled_camera_side(m, set[k], t * RAD_PER_DEG, &mean);
+            double want = reference_camera_furnace(set[k], t * RAD_PER_DEG, 0), se = sample_mean_se(&mean);
             if (fabs(mean.mean - want) > 4 * se + 1e-3 * want)
                 fail_msg("set %d, th_o %g: sampled %.5f +- %.5f, quadrature %.5f", k, t, mean.mean, se, want);
         }
@@ -157,8 +156,10 @@ static void balanced_is_lossless_from_both_sides(void **state)
     rng_start(&r, &(struct rng_key){51, 0, 0, 0}, 0, 0);
     for (int k = 0; k < 16 + N_RANDOM; k++) { /* corners, then anywhere */
         double box[4], param[9];
-        static const double range[4][2] = {
-            {0.001, 0.999}, {1 * DEG, 10 * DEG}, {10 * DEG, 45 * DEG}, {1 * DEG, 45 * DEG}};
+        static const double range[4][2] = {{0.001, 0.999},
+                                           {1 * RAD_PER_DEG, 10 * RAD_PER_DEG},
+                                           {10 * RAD_PER_DEG, 45 * RAD_PER_DEG},
+                                           {1 * RAD_PER_DEG, 45 * RAD_PER_DEG}};
         for (int p = 0; p < 4; p++) {
             double t = k < 16 ? (k >> p & 1) : rng_double(&r);
             box[p] = range[p][0] + t * (range[p][1] - range[p][0]);
@@ -169,15 +170,16 @@ static void balanced_is_lossless_from_both_sides(void **state)
             param[6 + c] = box[1 + c];
         }
         struct scattering_state *s = prepare(m, param);
-        size_t n_phi = box[3] < 5 * DEG ? 400 : 100;
+        size_t n_phi = box[3] < 5 * RAD_PER_DEG ? 400 : 100;
         for (int a = 0; a < N_ANGLE; a++)
             for (int side = 0; side < 2; side++) {
                 double sum[3];
-                both_furnaces(m, s, angle_deg[a] * DEG, side == 0, n_phi, sum);
+                both_furnaces(m, s, angle_deg[a] * RAD_PER_DEG, side == 0, n_phi, sum);
                 double white = sum[0] + (sum[0] - sum[1]) * 0.001 / 0.5;
                 if (fabs(white - 1) > 1e-3)
-                    fail_msg("C_R %g, widths %g, %g, %g degrees, %s side at %g degrees: %.5f", box[0], box[1] / DEG,
-                             box[2] / DEG, box[3] / DEG, side == 0 ? "incident" : "camera", angle_deg[a], white);
+                    fail_msg("C_R %g, widths %g, %g, %g degrees, %s side at %g degrees: %.5f", box[0],
+                             box[1] / RAD_PER_DEG, box[2] / RAD_PER_DEG, box[3] / RAD_PER_DEG,
+                             side == 0 ? "incident" : "camera", angle_deg[a], white);
             }
         m->release(s);
     }
@@ -253,9 +255,10 @@ static void whole_cloth_balanced(void **state)
     struct scene *scene = small_cloth(false);
     struct configuration c[16];
     orbit_configurations_16(c);
-    const double set[3][9] = {{0.05, 0.05, 0.05, 0.999, 0.998, 0.997, 8 * DEG, 25 * DEG, 20 * DEG},
-                              {0.3, 0.3, 0.3, 0.999, 0.998, 0.997, 2 * DEG, 12 * DEG, 30 * DEG},
-                              {0.001, 0.001, 0.001, 0.999, 0.998, 0.997, 10 * DEG, 45 * DEG, 45 * DEG}};
+    const double set[3][9] = {
+        {0.05, 0.05, 0.05, 0.999, 0.998, 0.997, 8 * RAD_PER_DEG, 25 * RAD_PER_DEG, 20 * RAD_PER_DEG},
+        {0.3, 0.3, 0.3, 0.999, 0.998, 0.997, 2 * RAD_PER_DEG, 12 * RAD_PER_DEG, 30 * RAD_PER_DEG},
+        {0.001, 0.001, 0.001, 0.999, 0.998, 0.997, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG}};
     for (int i = 0; i < 6; i++) {
         struct sample_mean mean[3] = {{0}};
         double worst;

@@ -17,9 +17,8 @@
 
 #include <cmocka.h>
 
+#include "base/angle.h"
 #include "base/rng.h"
-
-#define DEG (M_PI / 180)
 
 static struct thread_pool *pool;
 static struct scene *weave[2]; /* without and with the black sheet */
@@ -73,7 +72,7 @@ static void same(const char *what, int i, const struct estimate *a, const struct
 
 static void coloured(double param[9])
 {
-    static const double p[9] = {0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 4 * DEG, 14 * DEG, 20 * DEG};
+    static const double p[9] = {0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 4 * RAD_PER_DEG, 14 * RAD_PER_DEG, 20 * RAD_PER_DEG};
     memcpy(param, p, sizeof p);
 }
 
@@ -85,7 +84,8 @@ static void directional_lamp_closed_form(void **state)
                                           {0, 0, 30, 90, 0},     {30, 0, 30, 180, 0}, {40, 90, 35, 270, 90},
                                           {20, 45, 30, 235, 45}, {60, 180, 62, 5, 0}, {10, 90, 150, 270, 0},
                                           {35, 45, 130, 215, 20}};
-    static const double param[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
+    static const double param[9] = {
+        0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * RAD_PER_DEG, 30 * RAD_PER_DEG, 40 * RAD_PER_DEG};
     const double tile_m = 0.4e-3, radius_m = 5e-6, y_z[1][2] = {{0.13e-3, 0}};
     struct fiber_set f;
     struct scene *with_sheet[2] = {NULL, NULL};
@@ -95,11 +95,11 @@ static void directional_lamp_closed_form(void **state)
     for (size_t i = 0; i < sizeof angle_deg / sizeof angle_deg[0]; i++) {
         const double *a = angle_deg[i];
         const struct scene *scene = with_sheet[a[2] < 90];
-        struct configuration c = {.light_theta_rad = a[2] * DEG,
-                                  .light_phi_rad = a[3] * DEG,
-                                  .camera_theta_rad = a[0] * DEG,
-                                  .camera_phi_rad = a[1] * DEG,
-                                  .cloth_rotation_rad = a[4] * DEG,
+        struct configuration c = {.light_theta_rad = a[2] * RAD_PER_DEG,
+                                  .light_phi_rad = a[3] * RAD_PER_DEG,
+                                  .camera_theta_rad = a[0] * RAD_PER_DEG,
+                                  .camera_phi_rad = a[1] * RAD_PER_DEG,
+                                  .cloth_rotation_rad = a[4] * RAD_PER_DEG,
                                   .crop_m = 8 * tile_m,
                                   .light = LIGHT_DIRECTIONAL,
                                   .camera = CAMERA_FAR_FIELD};
@@ -231,7 +231,8 @@ static void lights_add_up(void **state)
 static void picture_on_a_straight_fiber(void **state)
 {
     (void)state;
-    static const double param[9] = {0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * DEG, 30 * DEG, 40 * DEG};
+    static const double param[9] = {
+        0.01, 0.02, 0.03, 0.03, 0.02, 0.01, 8 * RAD_PER_DEG, 30 * RAD_PER_DEG, 40 * RAD_PER_DEG};
     const double tile_m = 0.4e-3, radius_m = 5e-6, y_z[1][2] = {{0.13e-3, 0}}, rotation[3] = {0, 0.4, 1.9};
     enum { FINE = 128 };
     struct environment *e = painted_environment(64, 32, paint_sky);

@@ -1,5 +1,6 @@
 /* Cloths of several fiber groups with a parameter set each. Equal sets change nothing; derivatives belong to their set.
  */
+#include "base/angle.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
 #include "renderer/transport/render.h"
@@ -15,11 +16,10 @@
 
 #include <cmocka.h>
 
-#define DEG (M_PI / 180)
-
 enum { N_PARAM = 9 };
-static const double set[2][N_PARAM] = {{0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 4 * DEG, 14 * DEG, 20 * DEG},
-                                       {0.4, 0.5, 0.1, 0.5, 0.9, 0.7, 7 * DEG, 25 * DEG, 12 * DEG}};
+static const double set[2][N_PARAM] = {
+    {0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 4 * RAD_PER_DEG, 14 * RAD_PER_DEG, 20 * RAD_PER_DEG},
+    {0.4, 0.5, 0.1, 0.5, 0.9, 0.7, 7 * RAD_PER_DEG, 25 * RAD_PER_DEG, 12 * RAD_PER_DEG}};
 static struct scene *one, *two; /* all fibers in one group; warp and weft apart */
 static struct configuration configuration[16];
 

@@ -1,6 +1,7 @@
 /* The renderer against the naive tracer of tests/support on a small woven cloth: two implementations that must agree.
  * The lamp is large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
  */
+#include "base/angle.h"
 #include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
@@ -13,8 +14,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 enum { N_TASK = 64, TASK_PATHS = 700 };
 
@@ -67,12 +66,16 @@ static void two_tracers_agree(void **state)
     (void)state;
     struct thread_pool *pool = NULL;
     assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
-    const double wide[9] = {0.12, 0.12, 0.12, 0.4, 0.4, 0.4, 10 * DEG, 45 * DEG, 45 * DEG};
-    const double narrower[9] = {0.2, 0.2, 0.2, 0.35, 0.35, 0.35, 10 * DEG, 38 * DEG, 40 * DEG};
-    agree(&(struct configuration){30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, wide, pool);
-    agree(&(struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, wide, pool);
-    agree(&(struct configuration){45 * DEG, 250 * DEG, 40 * DEG, 90 * DEG, 90 * DEG, 0.61, 1.2, 1.0, 0.02}, narrower,
-          pool);
+    const double wide[9] = {0.12, 0.12, 0.12, 0.4, 0.4, 0.4, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG};
+    const double narrower[9] = {0.2, 0.2, 0.2, 0.35, 0.35, 0.35, 10 * RAD_PER_DEG, 38 * RAD_PER_DEG, 40 * RAD_PER_DEG};
+    agree(&(struct configuration){30 * RAD_PER_DEG, 180 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0, 0, 0.61, 1.0, 1.0, 0.01},
+          wide, pool);
+    agree(&(struct configuration){60 * RAD_PER_DEG, 100 * RAD_PER_DEG, 50 * RAD_PER_DEG, 20 * RAD_PER_DEG,
+                                  35 * RAD_PER_DEG, 0.61, 1.0, 0.5, 0.01},
+          wide, pool);
+    agree(&(struct configuration){45 * RAD_PER_DEG, 250 * RAD_PER_DEG, 40 * RAD_PER_DEG, 90 * RAD_PER_DEG,
+                                  90 * RAD_PER_DEG, 0.61, 1.2, 1.0, 0.02},
+          narrower, pool);
     thread_pool_free(pool);
 }
 

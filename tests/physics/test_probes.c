@@ -2,6 +2,7 @@
  * the same means and derivatives. Lamps above, grazing, directional and, without the sheet, below; four models.
  * Tolerances are standard errors.
  */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/transport/estimate.h"
 #include "renderer/transport/light/lamp_guide.h"
@@ -15,8 +16,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 /* Counts in rings of equal probability and quarters of the turn. */
 static void test_guide(void **state)
@@ -105,10 +104,10 @@ static void test_same_means(void **state)
     for (size_t i = 0; i < n_view; i++) {
         const struct view *v = &view[i];
         const struct scattering_model *m = scattering_find(v->model);
-        struct configuration c = {.light_theta_rad = v->lamp_theta_deg * DEG,
-                                  .light_phi_rad = v->lamp_phi_deg * DEG,
-                                  .camera_theta_rad = v->camera_theta_deg * DEG,
-                                  .camera_phi_rad = v->camera_phi_deg * DEG,
+        struct configuration c = {.light_theta_rad = v->lamp_theta_deg * RAD_PER_DEG,
+                                  .light_phi_rad = v->lamp_phi_deg * RAD_PER_DEG,
+                                  .camera_theta_rad = v->camera_theta_deg * RAD_PER_DEG,
+                                  .camera_phi_rad = v->camera_phi_deg * RAD_PER_DEG,
                                   .light_distance_m = 0.61,
                                   .lamp_side_m = 0.1,
                                   .camera_distance_m = 1,

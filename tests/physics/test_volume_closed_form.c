@@ -2,6 +2,7 @@
  * d and gamma), the white furnace, and the surface tracer on a dilute cloud of fibers. Every tolerance is a number of
  * standard errors, with what a limit leaves out stated beside it.
  */
+#include "base/angle.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
@@ -18,8 +19,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 enum { N_VALUE = 3 + VOLUME_N_DERIVATIVE };
 
@@ -70,7 +69,7 @@ static void transmittance(void **state)
 {
     (void)state;
     const size_t n[3] = {5, 6, 7};
-    const double angle = 25 * DEG, voxel_m = 10e-6, d_per_m = 12000, rho = 200.0 / 255;
+    const double angle = 25 * RAD_PER_DEG, voxel_m = 10e-6, d_per_m = 12000, rho = 200.0 / 255;
     const double direction[3] = {sin(angle), 0, -cos(angle)}, length_m = 7 * voxel_m / cos(angle);
     const float along[3] = {0.6f, 0, 0.8f};
     const double sine = sqrt(1 - pow(0.6 * direction[0] + 0.8 * direction[2], 2));
@@ -125,7 +124,7 @@ static void single_scattering(void **state)
     prepare(m, (double[3]){alpha, alpha, alpha}, &s);
     const double angle_deg[3][2] = {{0, 40}, {60, 30}, {75, 80}};
     for (uint32_t a = 0; a < 3; a++) {
-        double theta_o = angle_deg[a][0] * DEG, theta_i = angle_deg[a][1] * DEG;
+        double theta_o = angle_deg[a][0] * RAD_PER_DEG, theta_i = angle_deg[a][1] * RAD_PER_DEG;
         const struct configuration c = {.light_theta_rad = theta_i,
                                         .light_phi_rad = 0.7,
                                         .light_distance_m = 200,
@@ -158,7 +157,7 @@ static void white_furnace(void **state)
 {
     (void)state;
     const size_t n[3] = {24, 24, 10};
-    const double angle = 50 * DEG, direction[3] = {0, sin(angle), -cos(angle)};
+    const double angle = 50 * RAD_PER_DEG, direction[3] = {0, sin(angle), -cos(angle)};
     struct direction_volume v;
     struct volume_scene scene;
     hand_volume_weave(&v, n, 5e-6, 0.4);
@@ -200,7 +199,7 @@ static void along_the_fiber(void **state)
     struct volume_scene scene;
     hand_volume_uniform(&v, n, 10e-6, 255, along);
     scene_of(&scene, &v, true);
-    const struct configuration c = {.light_theta_rad = 80 * DEG,
+    const struct configuration c = {.light_theta_rad = 80 * RAD_PER_DEG,
                                     .light_distance_m = 0.61,
                                     .lamp_side_m = 0.1,
                                     .camera_distance_m = 1,
@@ -293,15 +292,15 @@ static void agrees_with_the_surface_tracer(void **state)
     memset(difference, 0, sizeof difference);
     memset(surface, 0, sizeof surface);
     for (int i = 0; i < 2; i++)
-        c[i] = (struct configuration){.light_theta_rad = (i ? 60 : 20) * DEG,
+        c[i] = (struct configuration){.light_theta_rad = (i ? 60 : 20) * RAD_PER_DEG,
                                       .light_phi_rad = M_PI_2,
-                                      .camera_theta_rad = 35 * DEG,
+                                      .camera_theta_rad = 35 * RAD_PER_DEG,
                                       .camera_phi_rad = i ? -M_PI_2 : M_PI_2,
                                       .light_distance_m = 0.61,
                                       .lamp_side_m = 0.1,
                                       .camera_distance_m = 1,
-                                      .crop_m = cloud_tile_m * cos(35 * DEG)}; /* a whole tile on the cloth */
-    double param[12] = {0.3, 0.05, 0.1, 0.6, 0.3, 0.1, 8 * DEG, 15 * DEG, 40 * DEG};
+                                      .crop_m = cloud_tile_m * cos(35 * RAD_PER_DEG)}; /* a whole tile on the cloth */
+    double param[12] = {0.3, 0.05, 0.1, 0.6, 0.3, 0.1, 8 * RAD_PER_DEG, 15 * RAD_PER_DEG, 40 * RAD_PER_DEG};
     for (int k = 0; k < 3; k++) param[9 + k] = reference_camera_furnace(param, 0, k);
     assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
     for (uint32_t i_cloud = 0; i_cloud < N_CLOUD; i_cloud++) {

@@ -1,5 +1,6 @@
 /* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
  * bits for any number of threads. */
+#include "base/angle.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -11,8 +12,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 enum { N_CONFIGURATION = 2 };
 
@@ -32,9 +31,9 @@ static void cloth_init(struct cloth *k, size_t n_thread)
                      STATUS_OK);
     assert_int_equal(thread_pool_new(n_thread, &k->pool, NULL), STATUS_OK);
     for (int i = 0; i < N_CONFIGURATION; i++)
-        k->c[i] = (struct configuration){.light_theta_rad = (i ? 78 : 20) * DEG, /* one at grazing angles */
+        k->c[i] = (struct configuration){.light_theta_rad = (i ? 78 : 20) * RAD_PER_DEG, /* one at grazing angles */
                                          .light_phi_rad = i ? M_PI : 0.3,
-                                         .camera_theta_rad = (i ? 70 : 10) * DEG,
+                                         .camera_theta_rad = (i ? 70 : 10) * RAD_PER_DEG,
                                          .cloth_rotation_rad = 0.4,
                                          .light_distance_m = 0.61,
                                          .lamp_side_m = 0.1,
@@ -196,8 +195,8 @@ static void stored_voxels_are_the_volume(void **state)
                 volume_voxel_direction(voxel, b);
                 double cross[3] = {(double)(a[1] * b[2] - a[2] * b[1]), (double)(a[2] * b[0] - a[0] * b[2]),
                                    (double)(a[0] * b[1] - a[1] * b[0])};
-                worst =
-                    fmin(worst, 0.035 * DEG - sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]));
+                worst = fmin(worst, 0.035 * RAD_PER_DEG -
+                                        sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]));
             }
     assert_true(worst > 0);
     cloth_release(&k);

@@ -2,6 +2,7 @@
  * single scattering in a slab that scatters equally everywhere, from above and from below; the limits of distant lamps
  * and cameras; pictures against constants; lights that add up. Tolerances are standard errors, with what a closed form
  * leaves out beside them. */
+#include "base/angle.h"
 #include "renderer/transport/light/environment.h"
 #include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -15,8 +16,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 static struct direction_volume slab, weave;
 static struct volume_scene thin[2], woven[2]; /* without and with the black sheet */
@@ -98,9 +97,9 @@ static void directional_lamp_closed_form(void **state)
     const double param[3] = {alpha, alpha, alpha}, tau = slab_m * d_per_m;
     const double angle_deg[5][2] = {{0, 40}, {60, 30}, {75, 80}, {20, 150}, {60, 105}}; /* camera, lamp */
     for (int i = 0; i < 5; i++) {
-        const struct configuration c = {.light_theta_rad = angle_deg[i][1] * DEG,
+        const struct configuration c = {.light_theta_rad = angle_deg[i][1] * RAD_PER_DEG,
                                         .light_phi_rad = 0.7,
-                                        .camera_theta_rad = angle_deg[i][0] * DEG,
+                                        .camera_theta_rad = angle_deg[i][0] * RAD_PER_DEG,
                                         .crop_m = 0.01,
                                         .light = LIGHT_DIRECTIONAL,
                                         .camera = CAMERA_FAR_FIELD};
@@ -120,7 +119,8 @@ static void directional_lamp_closed_form(void **state)
 
 static void coloured(double param[12])
 {
-    static const double p[12] = {0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 6 * DEG, 18 * DEG, 25 * DEG, 0.9, 0.8, 0.6};
+    static const double p[12] = {0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 6 * RAD_PER_DEG, 18 * RAD_PER_DEG, 25 * RAD_PER_DEG,
+                                 0.9, 0.8, 0.6};
     memcpy(param, p, sizeof p);
 }
 
@@ -191,12 +191,13 @@ static void picture_on_the_slab(void **state)
         const struct configuration c = {.cloth_rotation_rad = 0.9 * i,
                                         .crop_m = 0.01,
                                         .light = LIGHT_NO_LAMP,
-                                        .camera_theta_rad = 35 * DEG,
+                                        .camera_theta_rad = 35 * RAD_PER_DEG,
                                         .camera_phi_rad = 0.5,
                                         .camera = CAMERA_FAR_FIELD,
                                         .environment = e};
         double want[3] = {0}, mo = cos(c.camera_theta_rad);
-        const float through[3] = {(float)(-sin(35 * DEG) * cos(0.5)), (float)(-sin(35 * DEG) * sin(0.5)), (float)-mo};
+        const float through[3] = {(float)(-sin(35 * RAD_PER_DEG) * cos(0.5)),
+                                  (float)(-sin(35 * RAD_PER_DEG) * sin(0.5)), (float)-mo};
         float rgb[3];
         for (int row = 0; row < (sheet ? FINE / 2 : FINE); row++)
             for (int column = 0; column < 2 * FINE; column++) {
@@ -263,7 +264,7 @@ static void no_ray_leaves_where_it_enters(void **state)
     struct direction_volume thick;
     struct volume_scene scene;
     const struct configuration c = {.light = LIGHT_NO_LAMP,
-                                    .camera_theta_rad = 80 * M_PI / 180,
+                                    .camera_theta_rad = 80 * RAD_PER_DEG,
                                     .camera_distance_m = 1,
                                     .crop_m = 1e-3,
                                     .environment_rgb = {1, 1, 1}};

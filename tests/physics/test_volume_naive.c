@@ -1,5 +1,6 @@
 /* The volume renderer against the naive volume tracer of tests/support: two implementations that must agree. The lamp is
  * large, so that the naive one finds it, and the lobes are wide, so that its directions serve. */
+#include "base/angle.h"
 #include "base/thread_pool.h"
 #include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -13,8 +14,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 enum { N_TASK = 64 };
 
@@ -99,16 +98,19 @@ static void two_tracers_agree(void **state)
     (void)state;
     struct thread_pool *pool = NULL;
     assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
-    const double wide[12] = {0.12, 0.12, 0.12, 0.4, 0.4, 0.4, 10 * DEG, 45 * DEG, 45 * DEG, 0.7, 0.7, 0.7};
-    const double narrower[12] = {0.3, 0.3, 0.3, 0.35, 0.35, 0.35, 10 * DEG, 38 * DEG, 40 * DEG, 0.9, 0.9, 0.9};
-    agree((struct configuration){30 * DEG, 180 * DEG, 20 * DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, 0, true, 5e4, wide, 1500,
-          pool);
-    agree((struct configuration){60 * DEG, 100 * DEG, 50 * DEG, 20 * DEG, 35 * DEG, 0.61, 1.0, 0.5, 0.01}, 0.2, true,
-          2e4, narrower, 4000, pool);
+    const double wide[12] = {0.12, 0.12, 0.12, 0.4, 0.4, 0.4, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG,
+                             0.7,  0.7,  0.7};
+    const double narrower[12] = {0.3, 0.3, 0.3, 0.35, 0.35, 0.35, 10 * RAD_PER_DEG, 38 * RAD_PER_DEG, 40 * RAD_PER_DEG,
+                                 0.9, 0.9, 0.9};
+    agree((struct configuration){30 * RAD_PER_DEG, 180 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0, 0, 0.61, 1.0, 1.0, 0.01}, 0,
+          true, 5e4, wide, 1500, pool);
+    agree((struct configuration){60 * RAD_PER_DEG, 100 * RAD_PER_DEG, 50 * RAD_PER_DEG, 20 * RAD_PER_DEG,
+                                 35 * RAD_PER_DEG, 0.61, 1.0, 0.5, 0.01},
+          0.2, true, 2e4, narrower, 4000, pool);
     /* back light, seen through the cloth and beside it */
-    agree((struct configuration){170 * DEG, 40 * DEG, 25 * DEG, 0, 0.3, 0.61, 1.0, 1.0, 0.01}, 0, false, 3e4, wide,
-          1000, pool);
-    struct configuration sky = {0, 0, 35 * DEG, 1, 0.3, 1, 1, 1.0, 0.01, .light = LIGHT_NO_LAMP};
+    agree((struct configuration){170 * RAD_PER_DEG, 40 * RAD_PER_DEG, 25 * RAD_PER_DEG, 0, 0.3, 0.61, 1.0, 1.0, 0.01},
+          0, false, 3e4, wide, 1000, pool);
+    struct configuration sky = {0, 0, 35 * RAD_PER_DEG, 1, 0.3, 1, 1, 1.0, 0.01, .light = LIGHT_NO_LAMP};
     agree(sky, 0.7, true, 4e4, narrower, 4000, pool);
     thread_pool_free(pool);
 }

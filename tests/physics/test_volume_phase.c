@@ -2,6 +2,7 @@
  * scores against central differences, nothing is NaN along the fiber; extinction of the microflakes against a double
  * integral.
  */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/scattering/phase_model.h"
 #include "tests/support/statistics_test.h"
@@ -122,7 +123,7 @@ static void integrals_and_samples(void **state)
                 float wo[3];
                 double param[SCATTERING_MAX_PARAM];
                 box_point(phase_registry()[k], 1 + set, 0.08, &r, param); /* what the grid resolves */
-                direction(angle_deg[a][0] * M_PI / 180, angle_deg[a][1] * M_PI / 180, wo);
+                direction(angle_deg[a][0] * RAD_PER_DEG, angle_deg[a][1] * RAD_PER_DEG, wo);
                 check_integrals(phase_registry()[k], param, wo, a % 2 ? worth : NULL, &r,
                                 0.01 / (double)(n_model * N_SET * N_ANGLE));
             }

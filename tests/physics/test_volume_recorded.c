@@ -1,6 +1,7 @@
 /* Recorded volume paths, evaluated again for other parameters with everything else held fixed: the recorded value is the
  * traced one, and its differences are the traced derivatives, to 1e-3, for every parameter and the density multiplier.
  * And white cloth without roulette. */
+#include "base/angle.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/statistics_test.h"
@@ -12,8 +13,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 enum { N_EVENT = 4000, N_PATH = 3000, N_VALUE = 3 + VOLUME_N_DERIVATIVE };
 
@@ -47,7 +46,7 @@ static int tear_down(void **state)
 /* A lamp, grazing for every other one, and the sky. */
 static struct configuration configuration(int i)
 {
-    return (struct configuration){.light_theta_rad = (i % 2 ? 78 : 25) * DEG,
+    return (struct configuration){.light_theta_rad = (i % 2 ? 78 : 25) * RAD_PER_DEG,
                                   .light_phi_rad = 0.4,
                                   .light_distance_m = 0.61,
                                   .lamp_side_m = 0.2,

@@ -1,4 +1,5 @@
 #include "optimizer/fit/photographs/observation.h"
+#include "base/angle.h"
 #include "base/durable.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/measurement_table.h"
@@ -98,7 +99,7 @@ struct configuration observation_configuration(const struct job_document *doc, d
                                                double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
                                                double cloth_rotation_deg)
 {
-    const double rad = M_PI / 180.0, cm = 0.01;
+    const double rad = RAD_PER_DEG, cm = 0.01;
     struct configuration c = {
         .light_theta_rad = light_theta_deg * rad,
         .light_phi_rad = light_phi_deg * rad,

@@ -1,4 +1,5 @@
 #include "optimizer/worker/report/result_json.h"
+#include "base/angle.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_geometry.h"
@@ -156,7 +157,7 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
 {
     const struct observation *o = &c->observation.item[i];
     const struct configuration *k = &o->configuration;
-    const double deg = 180.0 / M_PI;
+    const double deg = DEG_PER_RAD;
     double rendered[3], se[3];
     char png[200], exr[200], photograph[200];
     rendered_mean(m, i, rendered, se);

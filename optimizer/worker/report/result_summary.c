@@ -1,4 +1,5 @@
 /* results/summary.txt: the result on one page, for people. */
+#include "base/angle.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_options_json.h"
@@ -29,7 +30,7 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
 
 static void print_rows(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
-    const double deg = 180.0 / M_PI;
+    const double deg = DEG_PER_RAD;
     fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi",
             "turn", "measured r g b", "rendered r g b", "error");
     for (size_t i = 0; i < c->observation.n; i++) {

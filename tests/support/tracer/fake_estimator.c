@@ -1,12 +1,11 @@
 #include "tests/support/tracer/fake_estimator.h"
+#include "base/angle.h"
 #include "base/rng.h"
 #include "optimizer/fit/objective/objective.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-#define DEG (M_PI / 180.0)
 
 const struct param_info fake_param[FAKE_N_PARAM] = {
     {"C_R.r", "C_R", "", 0, 0.001, 0.999, 0.1},
@@ -15,9 +14,9 @@ const struct param_info fake_param[FAKE_N_PARAM] = {
     {"C_TT.r", "C_TT", "", 0, 0.001, 0.999, 0.85},
     {"C_TT.g", "C_TT", "", 1, 0.001, 0.999, 0.85},
     {"C_TT.b", "C_TT", "", 2, 0.001, 0.999, 0.85},
-    {"beta_R", "beta_R", "deg", -1, 1.0 * DEG, 10.0 * DEG, 5.0 * DEG},
-    {"beta_TT", "beta_TT", "deg", -1, 10.0 * DEG, 45.0 * DEG, 10.0 * DEG},
-    {"gamma_TT", "gamma_TT", "deg", -1, 1.0 * DEG, 45.0 * DEG, 10.0 * DEG},
+    {"beta_R", "beta_R", "deg", -1, 1.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG},
+    {"beta_TT", "beta_TT", "deg", -1, 10.0 * RAD_PER_DEG, 45.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG},
+    {"gamma_TT", "gamma_TT", "deg", -1, 1.0 * RAD_PER_DEG, 45.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG},
 };
 
 /* light theta, camera theta, camera phi; light phi is 0; every row twice, with the cloth turned by 0 and by 90 degrees
@@ -30,10 +29,10 @@ static const double held_row[12][3] = {{10, 30, 180}, {30, 50, 180}, {50, 70, 18
 
 static struct configuration make_configuration(const double row[3], double rotation_deg)
 {
-    struct configuration c = {.light_theta_rad = row[0] * DEG,
-                              .camera_theta_rad = row[1] * DEG,
-                              .camera_phi_rad = row[2] * DEG,
-                              .cloth_rotation_rad = rotation_deg * DEG,
+    struct configuration c = {.light_theta_rad = row[0] * RAD_PER_DEG,
+                              .camera_theta_rad = row[1] * RAD_PER_DEG,
+                              .camera_phi_rad = row[2] * RAD_PER_DEG,
+                              .cloth_rotation_rad = rotation_deg * RAD_PER_DEG,
                               .light_distance_m = 0.61,
                               .lamp_side_m = 0.1,
                               .camera_distance_m = 1.0,

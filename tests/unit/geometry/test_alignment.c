@@ -1,4 +1,5 @@
 /* Main directions of cloths that were turned and sheared by known matrices, and the box that tiles. */
+#include "base/angle.h"
 #include "base/scratch_space.h"
 #include "geometry/orientation/main_directions.h"
 #include "geometry/orientation/repeat_direction.h"
@@ -18,7 +19,7 @@
 
 #include <cmocka.h>
 
-static const double deg = M_PI / 180.0;
+static const double deg = RAD_PER_DEG;
 
 struct cloth {
     struct fiber_set truth;

@@ -1,4 +1,5 @@
 /* The comparison of fiber sets on cases with known answers. */
+#include "base/angle.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/phantom/segment_grid.h"
 
@@ -171,7 +172,7 @@ static void test_merged(void **state)
     check_near(r.fragments_per_fiber, 1.0, 1e-12); /* nine pairs on nine fibers */
     check_near(r.missed, 0.0, 0);
     check_near(r.center_recall, (7.0 + 2 * 0.37) / 9.0, 1e-9); /* within 3.4 of 10 voxels; and across the face */
-    double slope_deg = atan(0.1) * 180.0 / M_PI;
+    double slope_deg = angle_to_deg(atan(0.1));
     check_near(r.direction_mean_deg, slope_deg * 0.68 / 7.68, 0.02);
     check_near(r.direction_p95_deg, slope_deg, 0.01);
 }

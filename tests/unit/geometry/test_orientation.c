@@ -1,4 +1,5 @@
 /* The line filter and the search for its minimum. */
+#include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/orientation/fiber_diameter.h"
 #include "geometry/orientation/line_filter.h"
@@ -23,7 +24,7 @@ static double angle_deg(const float a[3], const double b[3])
         dot += (double)a[c] * b[c];
         norm += b[c] * b[c];
     }
-    return acos(fmin(1.0, fabs(dot) / sqrt(norm))) * 180.0 / M_PI;
+    return angle_to_deg(acos(fmin(1.0, fabs(dot) / sqrt(norm))));
 }
 
 /* J by its definition, q over all voxels with |d.p| <= h / 2 (trapezoid ends), against the sum of samples along the line. */

@@ -1,4 +1,5 @@
 /* Phantoms: seamless tiles, fibers that do not interpenetrate, volumes with the material and the noise that were asked for. */
+#include "base/angle.h"
 #include "geometry/phantom/phantom.h"
 #include "tests/support/scratch_folder.h"
 
@@ -135,7 +136,7 @@ static void test_twill_has_no_seam(void **state)
                     a2 += a * a;
                     b2 += b * b;
                 }
-                assert_true(cosine / sqrt(a2 * b2) > cos(5.0 * M_PI / 180.0));
+                assert_true(cosine / sqrt(a2 * b2) > cos(5.0 * RAD_PER_DEG));
                 n_next++;
             }
         assert_int_equal(n_next, 1);

@@ -1,4 +1,5 @@
 /* `.vol` files: golden bytes, round trips, the quantised directions' error. */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "geometry/volume/vol_file.h"
 #include "tests/support/cloth/scan_files.h"
@@ -80,7 +81,7 @@ static double angle_deg(const float a[3], const float b[3])
     double c[3] = {(double)a[1] * b[2] - (double)a[2] * b[1], (double)a[2] * b[0] - (double)a[0] * b[2],
                    (double)a[0] * b[1] - (double)a[1] * b[0]};
     double dot = (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
-    return atan2(sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]), fabs(dot)) * 180.0 / M_PI;
+    return angle_to_deg(atan2(sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]), fabs(dot)));
 }
 
 static void test_round_trips(void **state)

@@ -1,5 +1,6 @@
 /* Fibers into voxels: their volume is kept at any voxel size, directions are the tangents, the grid repeats, and the
  * result does not depend on threads. */
+#include "base/angle.h"
 #include "geometry/fibers/voxelise.h"
 #include "tests/support/cloth/hand_weave.h"
 
@@ -86,7 +87,7 @@ static void test_directions_are_tangents(void **unused)
         if (v.density[i] == 0) continue;
         direction_volume_get(&v, i, d);
         double cosine = fabs(((double)d[0] + 0.37 * (double)d[1] + 0.2 * (double)d[2]) / t);
-        assert_true(cosine > cos(0.02 * M_PI / 180.0));
+        assert_true(cosine > cos(0.02 * RAD_PER_DEG));
         n++;
     }
     assert_true(n > 1000);

@@ -1,5 +1,6 @@
 /* Measurements that no one should have: too few, contradictory, dark, all zero; and an estimator that fails. A fit ends,
  * says what it does not know, and never gives a number that is not finite. */
+#include "base/angle.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/job/method_names.h"
@@ -230,7 +231,7 @@ static void check_rows(const double light_theta_deg[3], const double value[5], c
     const struct observation_set o = {.n = 5, .capacity = 5, .item = item};
     for (size_t i = 0; i < 5; i++) {
         double theta_deg = i < 3 ? light_theta_deg[i] : 150.0;
-        item[i] = (struct observation){.configuration = {.light_theta_rad = theta_deg * M_PI / 180.0,
+        item[i] = (struct observation){.configuration = {.light_theta_rad = theta_deg * RAD_PER_DEG,
                                                          .camera_theta_rad = 0.1 * (double)i,
                                                          .light_distance_m = 0.61,
                                                          .lamp_side_m = 0.1},
@@ -284,7 +285,7 @@ static size_t warnings_of(const struct configuration *a, const struct configurat
 static void test_names_of_one_configuration(void **state)
 {
     (void)state;
-    static const double deg = M_PI / 180.0;
+    static const double deg = RAD_PER_DEG;
     static const struct case_of {
         double a[5], b[5]; /* degrees: light theta, phi, camera theta, phi, rotation */
         uint32_t n_rotation;

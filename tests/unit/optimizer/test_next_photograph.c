@@ -1,5 +1,6 @@
 /* Which photograph to take next: against the update of the whole covariance, and a parameter that one candidate alone
  * can determine. */
+#include "base/angle.h"
 #include "base/small_matrix.h"
 #include "optimizer/fit/objective/next_photograph.h"
 #include "tests/support/tracer/fake_estimator.h"
@@ -112,7 +113,7 @@ static void test_against_the_whole_matrix(void **state)
 
 static struct configuration configuration_of(const double angle_deg[4])
 {
-    const double deg = M_PI / 180.0;
+    const double deg = RAD_PER_DEG;
     return (struct configuration){.light_theta_rad = angle_deg[0] * deg,
                                   .camera_theta_rad = angle_deg[1] * deg,
                                   .camera_phi_rad = angle_deg[2] * deg,
@@ -182,7 +183,7 @@ static void test_finds_what_is_missing(void **state)
         fake_radiance(&c, param, e.mean, e.jac);
         next_photograph_score(&fit, &e, &e, &score);
         print_message("candidate %zu: %.2f nats, beta_R %.2f -> %.2f degrees%s\n", i, score.information,
-                      u.se_param[6] * 180.0 / M_PI, score.se_after[6] * 180.0 / M_PI,
+                      angle_to_deg(u.se_param[6]), angle_to_deg(score.se_after[6]),
                       score.determines[6] ? ", determined" : "");
         assert_true(score.information >= 0.0 && score.se_after[7] == 0.0);
         assert_int_equal(score.determines[6], i == 3);

@@ -1,4 +1,5 @@
 /* Photographs of a phantom: the table of configurations, the parameters, and what is written. */
+#include "base/angle.h"
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/phantom/phantom_photographs.h"
 #include "optimizer/phantom/phantom_view_table.h"
@@ -87,7 +88,7 @@ static void test_parameters(void **state)
     assert_int_equal(phantom_param_parse(m, "C_R.b=0.5", param, NULL), STATUS_OK);
     assert_true(param[scattering_param_index(m, "C_R.b")] == 0.5);
     assert_int_equal(phantom_param_parse(m, "beta_R=6", param, NULL), STATUS_OK);
-    assert_true(fabs(param[scattering_param_index(m, "beta_R")] - 6.0 * M_PI / 180.0) < 1e-12);
+    assert_true(fabs(param[scattering_param_index(m, "beta_R")] - 6.0 * RAD_PER_DEG) < 1e-12);
     const char *const bad[] = {"C_R",   "C_R=", "C_R=1,2", "C_R=0.1,0.2,0.3,0.4", "C_R=x", "beta_R=5,5,5", "C_X=1",
                                "C_R=2", "=1",   ""};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)

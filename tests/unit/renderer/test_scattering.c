@@ -5,6 +5,7 @@
 #include "renderer/scattering/von_mises.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 
+#include "base/angle.h"
 #include "base/rng.h"
 
 #include <math.h>
@@ -14,8 +15,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
 {
@@ -48,8 +47,8 @@ static void golden_values(void **state)
 {
     (void)state;
     double d_s;
-    assert_true(fabs(lobe_normaliser(0, 5 * DEG, NULL, &d_s) - 0.992544020) < 5e-10);
-    double x = -12 * DEG, m = -15 * DEG, s = 8 * DEG;
+    assert_true(fabs(lobe_normaliser(0, 5 * RAD_PER_DEG, NULL, &d_s) - 0.992544020) < 5e-10);
+    double x = -12 * RAD_PER_DEG, m = -15 * RAD_PER_DEG, s = 8 * RAD_PER_DEG;
     double g = exp(-(x - m) * (x - m) / (2 * s * s)) / (sqrt(2 * M_PI) * s);
     assert_true(fabs(g / lobe_normaliser(m, s, NULL, NULL) - 2.905650400) < 5e-9);
     assert_true(fabs(reference_gbar(x, m, s) - 2.905650400) < 5e-7);
@@ -60,7 +59,7 @@ static void normaliser_against_quadrature(void **state)
     (void)state;
     for (double s = 1; s <= 45; s *= 1.5)
         for (double m = -90; m <= 90; m += 7.5) {
-            double d_m, d_s, h = 1e-5, sr = s * DEG, mr = m * DEG;
+            double d_m, d_s, h = 1e-5, sr = s * RAD_PER_DEG, mr = m * RAD_PER_DEG;
             double g = lobe_normaliser(mr, sr, &d_m, &d_s);
             assert_true(fabs(g / reference_normaliser(mr, sr) - 1) < 1e-6);
             double fd_s = (lobe_normaliser(mr, sr + h, NULL, NULL) - lobe_normaliser(mr, sr - h, NULL, NULL)) / (2 * h);
@@ -145,7 +144,7 @@ static void agrees_with_reference(void **state)
                 double want = reference_s(param, di, dout, c);
                 /* float angles carry 1e-7, a 1 degree lobe turns that into up to 6 * 1e-7 / 0.0175; the table of G into
                  * 2e-3 at the poles */
-                double tolerance = fabs(asin(di[0])) > 80 * DEG ? 3e-3 : 3e-4;
+                double tolerance = fabs(asin(di[0])) > 80 * RAD_PER_DEG ? 3e-3 : 3e-4;
                 if (fabs((double)rgb[c] - want) > tolerance * want + 1e-12)
                     fail_msg("set %u: S = %.8g, reference %.8g", k, (double)rgb[c], want);
             }

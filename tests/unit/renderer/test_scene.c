@@ -4,6 +4,7 @@
 #include "renderer/transport/light/lamp.h"
 #include "tests/support/cloth/hand_weave.h"
 
+#include "base/angle.h"
 #include "base/rng.h"
 
 #include <math.h>
@@ -15,8 +16,6 @@
 #include <unistd.h>
 
 #include <cmocka.h>
-
-#define DEG (M_PI / 180)
 
 static struct scene *straight_scene(bool black_sheet)
 {
@@ -238,7 +237,8 @@ static void camera_looks_at_the_orbit_centre(void **state)
     (void)state;
     struct scene *s = straight_scene(true);
     for (int i = 0; i < 12; i++) {
-        struct configuration c = {0, 0, i * 7 * DEG, i * 40 * DEG, i * 15 * DEG, 0.61, 0.1, 1.0, 0.01};
+        struct configuration c = {0,   0,   i * 7 * RAD_PER_DEG, i * 40 * RAD_PER_DEG, i * 15 * RAD_PER_DEG, 0.61, 0.1,
+                                  1.0, 0.01};
         struct camera m;
         struct scene_ray r;
         camera_init(&m, &c);
@@ -273,7 +273,8 @@ static void lamp_is_calibrated(void **state)
     rng_start(&r, &(struct rng_key){9, 0, 0, 0}, 0, 0);
     static const double shape[3][2] = {{0.61, 0.1}, {0.61, 1.0}, {0.2, 0.3}};
     for (int k = 0; k < 3; k++) {
-        struct configuration c = {40 * DEG, 70 * DEG, 0, 0, 20 * DEG, shape[k][0], shape[k][1], 1.0, 0.01};
+        struct configuration c = {40 * RAD_PER_DEG, 70 * RAD_PER_DEG, 0,   0,   20 * RAD_PER_DEG,
+                                  shape[k][0],      shape[k][1],      1.0, 0.01};
         struct lamp l;
         lamp_init(&l, &c);
         double sum = 0, n = 200000, x2 = 0;
