@@ -1,12 +1,12 @@
 /* selvedged, the daemon: HTTP server, database of jobs and supervision of workers. It never reads volumes or
  * pictures and computes nothing; workers do. */
 #include "base/durable.h"
+#include "base/version.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/supervisor.h"
-#include "server/version.h"
 
 #include <errno.h>
 #include <fcntl.h>

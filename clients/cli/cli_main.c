@@ -1,4 +1,5 @@
 /* selvedge: the command line client. Sees the daemon through HTTP only. */
+#include "base/version.h"
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_text.h"
 
@@ -9,8 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#define CLI_VERSION "0.1"
 
 static volatile sig_atomic_t interrupted; /* written by the signal handler alone */
 
@@ -69,7 +68,7 @@ int main(int argc, char **argv)
         return CLI_EXIT_OK;
     }
     if (args.version) {
-        puts("selvedge " CLI_VERSION);
+        puts("selvedge " SELVEDGE_VERSION);
         return CLI_EXIT_OK;
     }
     struct sigaction action = {.sa_handler = on_signal};

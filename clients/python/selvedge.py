@@ -18,6 +18,7 @@ import uuid
 
 import requests
 
+__version__ = "0.1.0"
 PIECE = 16 << 20
 ENDED = ("succeeded", "failed", "cancelled")
 

@@ -1,4 +1,5 @@
 /* selvedge-phantom: cloth with known answers, to try the whole chain on and to measure it. */
+#include "base/version.h"
 #include "optimizer/phantom/phantom_commands.h"
 
 #include <stdio.h>
@@ -12,6 +13,8 @@ static const char usage[] =
     "                                                    render photographs with known parameters\n"
     "  selvedge-phantom compare --truth FILE --fibers FILE [options]\n"
     "                                                    measure reconstructed fibers against true ones\n"
+    "\n"
+    "  selvedge-phantom --version                        print the version\n"
     "\n"
     "Each command has a --help of its own. Exit codes: 0 done, 1 failed, 2 wrong use.\n";
 
@@ -28,6 +31,10 @@ int main(int argc, char **argv)
 {
     if (argc >= 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
         fputs(usage, stdout);
+        return 0;
+    }
+    if (argc >= 2 && strcmp(argv[1], "--version") == 0) {
+        puts("selvedge-phantom " SELVEDGE_VERSION);
         return 0;
     }
     for (size_t i = 0; argc >= 2 && i < sizeof command / sizeof *command; i++)

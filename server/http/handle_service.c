@@ -1,3 +1,4 @@
+#include "base/version.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/stage_table.h"
 #include "server/http/handlers.h"
@@ -5,7 +6,6 @@
 #include "server/http/static_files.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
-#include "server/version.h"
 
 #include <fcntl.h>
 #include <stdio.h>

@@ -33,9 +33,10 @@
 #ifndef SELVEDGE_OPTIMIZER_RESULT_JSON_H
 #define SELVEDGE_OPTIMIZER_RESULT_JSON_H
 
+#include "base/version.h"
 #include "optimizer/worker/pipeline_context.h"
 
-#define RESULT_PROGRAM "selvedge-worker 0.1.0"
+#define RESULT_PROGRAM "selvedge-worker " SELVEDGE_VERSION
 
 /* Picture names per observation (without folder and ending), unique; free() the array. */
 typedef char picture_name[JOB_MAX_NAME_BYTES + 8];

@@ -1,0 +1,8 @@
+/* The version that every program, GET /v1/about and result.json state. tests/api/test_version.py holds the copy in
+ * clients/python/selvedge.py to it. */
+#ifndef SELVEDGE_BASE_VERSION_H
+#define SELVEDGE_BASE_VERSION_H
+
+#define SELVEDGE_VERSION "0.1.0"
+
+#endif
