@@ -1,5 +1,6 @@
 #include "clients/cli/cli_args.h"
 
+#include <getopt.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -72,7 +73,7 @@ static const struct cli_option {
     {OPT_HELP, 'h', "help", NULL, "show this text"},
     {OPT_VERSION, 'V', "version", NULL, "show the version"},
 };
-enum { N_OPTION = sizeof option_table / sizeof option_table[0] };
+enum { N_OPTION = sizeof option_table / sizeof option_table[0], OPTION_CODE = 256 };
 
 const char *cli_command_name(enum cli_command_id id)
 {
@@ -113,23 +114,12 @@ static status find_command(const char *word, enum cli_command_id *id, struct err
     return error_set(err, STATUS_INVALID, "unknown command '%s'; `selvedge --help` lists them", word);
 }
 
-static const struct cli_option *find_option(const char *word, const char **value)
+/* The option of a code that getopt_long gives: OPTION_CODE + index, or a letter. NULL: there is none. */
+static const struct cli_option *option_of(int code)
 {
-    *value = NULL;
-    for (size_t i = 0; i < N_OPTION; i++) {
-        const struct cli_option *o = &option_table[i];
-        if (word[1] != '-') {
-            if (o->letter != 0 && word[1] == o->letter && word[2] == '\0') return o;
-            continue;
-        }
-        size_t n = strlen(o->name);
-        if (strncmp(word + 2, o->name, n) != 0) continue;
-        if (word[2 + n] == '\0') return o;
-        if (word[2 + n] == '=') {
-            *value = word + 3 + n;
-            return o;
-        }
-    }
+    if (code >= OPTION_CODE) return &option_table[code - OPTION_CODE];
+    for (size_t i = 0; i < N_OPTION && code != 0; i++)
+        if (option_table[i].letter == code) return &option_table[i];
     return NULL;
 }
 
@@ -175,22 +165,52 @@ static void apply(struct cli_args *a, int bit, const char *value)
     }
 }
 
-static status parse_option(int argc, char *const *argv, int *i, struct cli_args *a, int *given, struct error *err)
+/* Letters ("-": operands come in their place; ":": a missing value is told apart) and names for getopt_long. */
+static void list_options(char letters[2 * N_OPTION + 3], struct option named[N_OPTION + 1])
 {
-    const char *value;
-    const struct cli_option *o = find_option(argv[*i], &value);
-    if (o == NULL) return error_set(err, STATUS_INVALID, "unknown option '%s'; try --help", argv[*i]);
-    if (o->value == NULL && value != NULL)
-        return error_set(err, STATUS_INVALID, "option '--%s' takes no value", o->name);
-    if (o->value != NULL && value == NULL) {
-        if (*i + 1 >= argc)
-            return error_set(err, STATUS_INVALID, "option '--%s' needs a value: --%s %s", o->name, o->name, o->value);
-        value = argv[++*i];
+    size_t n = (size_t)snprintf(letters, 3, "-:");
+    for (int i = 0; i < N_OPTION; i++) {
+        const struct cli_option *o = &option_table[i];
+        named[i] = (struct option){o->name, o->value != NULL ? required_argument : no_argument, NULL, OPTION_CODE + i};
+        if (o->letter == 0) continue;
+        letters[n++] = o->letter;
+        if (o->value != NULL) letters[n++] = ':';
+        letters[n] = '\0';
     }
-    if (o->value != NULL && value[0] == '\0')
+    named[N_OPTION] = (struct option){0};
+}
+
+/* What getopt_long reported as code, ':' and '?' included. word is the last one that it has read. */
+static status take_option(struct cli_args *a, int code, const char *word, int *given, struct error *err)
+{
+    bool wrong = code == ':' || code == '?';
+    const struct cli_option *o = option_of(wrong ? optopt : code);
+    if (o == NULL && optopt != 0) return error_set(err, STATUS_INVALID, "unknown option '-%c'; try --help", optopt);
+    if (o == NULL) return error_set(err, STATUS_INVALID, "unknown option '%s'; try --help", word);
+    if (code == '?') return error_set(err, STATUS_INVALID, "option '--%s' takes no value", o->name);
+    if (code == ':')
+        return error_set(err, STATUS_INVALID, "option '--%s' needs a value: --%s %s", o->name, o->name, o->value);
+    if (o->value != NULL && optarg[0] == '\0')
         return error_set(err, STATUS_INVALID, "option '--%s' has an empty value", o->name);
     *given |= o->bit;
-    apply(a, o->bit, value);
+    apply(a, o->bit, optarg);
+    return STATUS_OK;
+}
+
+/* The first word is the command, the second its operand. */
+static status take_word(struct cli_args *a, const char *word, struct error *err)
+{
+    if (!a->has_command) {
+        status s = find_command(word, &a->command, err);
+        a->has_command = s == STATUS_OK;
+        return s;
+    }
+    if (a->operand != NULL) {
+        const char *operand = command_table[a->command].operand;
+        return error_set(err, STATUS_INVALID, "'selvedge %s' takes one %s, but '%s' follows '%s'",
+                         command_table[a->command].name, operand == NULL ? "command" : operand, word, a->operand);
+    }
+    a->operand = word;
     return STATUS_OK;
 }
 
@@ -219,29 +239,16 @@ status cli_args_parse(int argc, char *const *argv, const char *server_env, const
 {
     *args = (struct cli_args){.server = server_env != NULL && server_env[0] != '\0' ? server_env : CLI_DEFAULT_SERVER,
                               .token = token_env != NULL && token_env[0] != '\0' ? token_env : NULL};
+    char letters[2 * N_OPTION + 3];
+    struct option named[N_OPTION + 1];
     int given = 0;
-    bool only_operands = false;
-    for (int i = 1; i < argc; i++) {
-        const char *word = argv[i];
-        status s = STATUS_OK;
-        if (!only_operands && strcmp(word, "--") == 0) {
-            only_operands = true;
-        } else if (!only_operands && word[0] == '-' && word[1] != '\0') {
-            s = parse_option(argc, argv, &i, args, &given, err);
-        } else if (!args->has_command) {
-            s = find_command(word, &args->command, err);
-            args->has_command = s == STATUS_OK;
-        } else if (args->operand == NULL) {
-            args->operand = word;
-        } else {
-            s = error_set(err, STATUS_INVALID, "'selvedge %s' takes one %s, but '%s' follows '%s'",
-                          command_table[args->command].name,
-                          command_table[args->command].operand == NULL ? "command"
-                                                                       : command_table[args->command].operand,
-                          word, args->operand);
-        }
-        if (s != STATUS_OK) return s;
-    }
+    status s = STATUS_OK;
+    list_options(letters, named);
+    optind = 0; /* start anew */
+    for (int code; s == STATUS_OK && (code = getopt_long(argc, argv, letters, named, NULL)) != -1;)
+        s = code == 1 ? take_word(args, optarg, err) : take_option(args, code, argv[optind - 1], &given, err);
+    while (s == STATUS_OK && optind < argc) s = take_word(args, argv[optind++], err); /* after "--" */
+    if (s != STATUS_OK) return s;
     if (args->help || args->version) return STATUS_OK;
     if (!args->has_command) return error_set(err, STATUS_INVALID, "no command given; `selvedge --help` lists them");
     return check(args, given, err);

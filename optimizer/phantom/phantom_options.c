@@ -1,9 +1,12 @@
 #include "optimizer/phantom/phantom_commands.h"
 
 #include <errno.h>
+#include <getopt.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { MAX_OPTION = 48, OPTION_CODE = 256 }; /* code of the first option in getopt_long */
 
 /* Up to n comma-separated numbers; the last one given fills the rest. */
 static bool parse_list(const char *text, double *to, size_t n)
@@ -74,28 +77,29 @@ static status set_option(const struct command_option *o, const char *value, stru
     return error_set_field(err, STATUS_INVALID, o->name, "option --%s does not take '%s'", o->name, value);
 }
 
+/* What is wrong with the option that getopt_long stopped at: code is ':' or '?', word the last one that it has read. */
+static status option_fault(int code, const char *word, const struct command_option *option, struct error *err)
+{
+    if (optopt < OPTION_CODE) return error_set(err, STATUS_INVALID, "unknown option '%s'", word);
+    return error_set(err, STATUS_INVALID, "option --%s %s", option[optopt - OPTION_CODE].name,
+                     code == ':' ? "wants a value" : "takes no value");
+}
+
 status command_options_parse(int argc, char **argv, const struct command_option *option, size_t n_option,
                              struct error *err)
 {
-    for (int i = 1; i < argc; i++) {
-        const struct command_option *found = NULL;
-        const char *value = NULL;
-        if (strncmp(argv[i], "--", 2) == 0) {
-            size_t n_name = strcspn(argv[i] + 2, "=");
-            for (size_t k = 0; k < n_option && found == NULL; k++)
-                if (strlen(option[k].name) == n_name && strncmp(option[k].name, argv[i] + 2, n_name) == 0)
-                    found = &option[k];
-            if (argv[i][2 + n_name] == '=') value = argv[i] + 3 + n_name;
-        }
-        if (found == NULL) return error_set(err, STATUS_INVALID, "unknown option '%s'", argv[i]);
-        bool flag = found->kind == OPTION_FLAG || found->kind == OPTION_FALSE;
-        if (flag && value != NULL) return error_set(err, STATUS_INVALID, "option --%s takes no value", found->name);
-        if (!flag && value == NULL) {
-            if (i + 1 >= argc) return error_set(err, STATUS_INVALID, "option --%s wants a value", found->name);
-            value = argv[++i];
-        }
-        status st = set_option(found, value, err);
-        if (st != STATUS_OK) return st;
+    struct option named[MAX_OPTION + 1] = {{0}};
+    if (n_option > MAX_OPTION) return error_set(err, STATUS_INTERNAL, "a command has too many options");
+    for (size_t i = 0; i < n_option; i++) {
+        bool flag = option[i].kind == OPTION_FLAG || option[i].kind == OPTION_FALSE;
+        named[i] = (struct option){option[i].name, flag ? no_argument : required_argument, NULL, OPTION_CODE + (int)i};
     }
+    optind = 0; /* start anew */
+    for (int code; (code = getopt_long(argc, argv, "+:", named, NULL)) != -1;) {
+        status s = code >= OPTION_CODE ? set_option(&option[code - OPTION_CODE], optarg, err)
+                                       : option_fault(code, argv[optind - 1], option, err);
+        if (s != STATUS_OK) return s;
+    }
+    if (optind < argc) return error_set(err, STATUS_INVALID, "unknown option '%s'", argv[optind]);
     return STATUS_OK;
 }
