@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The main job end to end on a made sample: `make demo`, or clients/demo.sh [--fresh] after a build.
+# Runs the main job end to end on a synthetic sample: `make demo`, or clients/demo.sh [--fresh] after a build.
 # Environment: DEMO_PORT (a fixed port), DEMO_DIR (folder, default ./demo), SELVEDGE_BUILD (default ./build).
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -8,7 +8,7 @@ fresh=no
 case "${1:-}" in
 --fresh) fresh=yes ;;
 "") ;;
-*) echo "usage: $0 [--fresh]    --fresh: make the sample anew and run the fit again" >&2; exit 2 ;;
+*) echo "usage: $0 [--fresh]    --fresh: make a new sample and run the fit again" >&2; exit 2 ;;
 esac
 
 here=$PWD
@@ -21,7 +21,7 @@ mkdir -p "$demo"
 demo=$(cd "$demo" && pwd)
 started=$(date +%s.%N)
 
-# What the sample is made with; the fit does not see it.
+# Parameters that the sample is made with. The fit does not see them.
 truth=(--param C_R=0.06,0.05,0.08 --param C_TT=0.72,0.55,0.35 --param beta_R=4 --param beta_TT=20 --param gamma_TT=18)
 title="twill phantom"
 
@@ -33,7 +33,7 @@ for program in selvedged selvedge selvedge-worker selvedge-phantom; do
 done
 command -v python3 >/dev/null || fail "python3 is missing: run make deps"
 
-# ---- the daemon: the one that an earlier demo left running, or one of our own ----
+# ---- the daemon: one that an earlier demo left running, or a new one ----
 daemon_pid=
 keep_daemon=no
 stop_daemon() {
@@ -44,7 +44,7 @@ stop_daemon() {
     fi
 }
 trap stop_daemon EXIT
-trap 'echo; echo "Stopped. What is done is kept: run the demo again to go on."; exit 130' INT TERM
+trap 'echo; echo "Stopped. Finished work is kept; run the demo again to continue."; exit 130' INT TERM
 
 port_is_free() { ! (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null; }
 
@@ -74,7 +74,7 @@ start_daemon() {
     local port
     port=$(find_port) || exit 1
     export SELVEDGE_SERVER=http://127.0.0.1:$port
-    # its own session: Ctrl-C here must not cut it off in the middle of an answer
+    # its own session, so that Ctrl-C here does not end it in the middle of a reply
     setsid "$bin/selvedged" --data "$demo/daemon" --port "$port" >>"$demo/daemon.log" 2>&1 </dev/null &
     daemon_pid=$!
     for _ in $(seq 100); do
@@ -88,7 +88,7 @@ start_daemon() {
         sleep 0.1
     done
     tail -n 20 "$demo/daemon.log" >&2
-    fail "selvedged did not start; its last words are above"
+    fail "selvedged did not start; the end of its log is above"
 }
 
 # ---- the sample ----
@@ -102,7 +102,7 @@ make_sample() {
     mkdir -p "$sample"
     echo "cloth: a twill of 152 fibers, scanned at 2 um with noise"
     "$bin/selvedge-phantom" cloth --weave twill --seed 7 --out "$sample" >/dev/null
-    echo "photographs: 16 to fit and 24 held out, rendered with known parameters (half a minute)"
+    echo "photographs: 16 to fit and 24 held out, rendered with known parameters (takes half a minute)"
     "$bin/selvedge-phantom" photograph --fibers "$sample/truth.hair" --out "$sample" --seed 11 --noise 0.005 --paths 131072 --px 64 \
         "${truth[@]}" >/dev/null
     python3 clients/demo_report.py document "$sample" "$title"
@@ -116,12 +116,12 @@ run_job() {
         state=$("$bin/selvedge" status "$id" --json 2>/dev/null | python3 -c 'import json,sys; print(json.load(sys.stdin)["state"])' 2>/dev/null) || state=
     fi
     case "$state" in
-    succeeded) echo "the job of an earlier run, $id, has succeeded: showing its result (--fresh runs it again)" ;;
-    queued | running | paused) echo "the job of an earlier run, $id, goes on"; "$bin/selvedge" watch "$id" ;;
-    failed | cancelled) echo "the job of an earlier run, $id, has ended as $state: trying again"; "$bin/selvedge" retry "$id"; "$bin/selvedge" watch "$id" ;;
+    succeeded) echo "job $id of an earlier run has succeeded; this is its result (--fresh runs it again)" ;;
+    queued | running | paused) echo "job $id of an earlier run continues"; "$bin/selvedge" watch "$id" ;;
+    failed | cancelled) echo "job $id of an earlier run has $state; trying again"; "$bin/selvedge" retry "$id"; "$bin/selvedge" watch "$id" ;;
     draft) "$bin/selvedge" submit --resume "$id" "$sample/job.json" --watch ;;
     *)
-        # the id is noted before the upload, so that an interrupted demo finds its job again
+        # the id is stored before the upload, so that after an interruption the demo finds its job again
         "$bin/selvedge" submit "$sample/job.json" --id-file "$demo/job-id" --watch
         id=$(cat "$demo/job-id")
         ;;
@@ -150,12 +150,12 @@ summary    $demo/summary.json
 dashboard  $SELVEDGE_SERVER/#$job
 END
     if [ -z "$daemon_pid" ]; then
-        echo "selvedged goes on running; stop it with: kill $(cat "$demo/daemon.pid")"
+        echo "selvedged keeps running; stop it with: kill $(cat "$demo/daemon.pid")"
     elif [ -t 0 ]; then
         keep_daemon=yes
-        echo "selvedged goes on running for the dashboard; stop it with: kill $daemon_pid"
+        echo "selvedged keeps running for the dashboard; stop it with: kill $daemon_pid"
     else
-        echo "selvedged is stopped now; start it again with: $bin/selvedged --data $demo/daemon --port ${SELVEDGE_SERVER##*:}"
+        echo "selvedged has been stopped; start it again with: $bin/selvedged --data $demo/daemon --port ${SELVEDGE_SERVER##*:}"
     fi
 }
 

@@ -1,4 +1,5 @@
-"""What the demo needs of JSON: its job document, and fitted against true parameters. Standard library only."""
+"""JSON work of the demo: writes its job document, and compares fitted with true parameters. Uses only the standard
+library."""
 import json
 import os
 import sys
@@ -30,7 +31,7 @@ def remark(p):
 
 
 def summary(truth_path, result_path, out_path, wall_s):
-    """Print the table; write (or, without wall_s, keep) the machine-readable summary."""
+    """Print the table, and write the machine-readable summary (without wall_s: keep the existing one)."""
     with open(truth_path, encoding="utf-8") as f:
         truth = json.load(f)["parameter"]
     with open(result_path, encoding="utf-8") as f:
@@ -53,7 +54,7 @@ def summary(truth_path, result_path, out_path, wall_s):
         json.dump(data, f, indent=1)
     print(f"\nrelative RMS error: {100 * data['fit_rel_rms']:.2f} % over the fitted photographs, "
           f"{100 * data['heldout_rel_rms']:.2f} % over the held-out ones")
-    print("The fit used the fibers found in the noisy scan, not the true ones; the standard errors do not contain that difference.")
+    print("The fit used the fibers found in the noisy scan, not the true ones; the standard errors do not include that difference.")
     print(f"largest error of C_TT: {data['c_tt_error']:.3f};  wall time: {data['wall_s']:.0f} s")
 
 

@@ -21,7 +21,7 @@ PYTEST_TIMEOUT_S = 1500
 
 
 def count_junit(path):
-    """(passed, failed, skipped, [names of the failed], [skip messages]) of one JUnit file."""
+    """Returns (passed, failed, skipped, [names of the failed], [skip messages]) of one JUnit file."""
     passed = failed = skipped = 0
     bad, why = [], []
     for case in ElementTree.parse(path).getroot().iter("testcase"):
@@ -38,7 +38,7 @@ def count_junit(path):
 
 def run(command, timeout_s, environment):
     start = time.monotonic()
-    # a file, not a pipe: a process that outlives its test must not keep us waiting
+    # a file instead of a pipe, because a process that outlives its test would keep a pipe open
     with tempfile.TemporaryFile() as log:
         try:
             code = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=log,
@@ -124,7 +124,7 @@ def main():
                 if arguments.quick:
                     command += ["-m", "not slow"]
                 code, output, seconds = run(command, PYTEST_TIMEOUT_S, environment)
-                if code == 5 and arguments.quick:  # every test of the file is a slow one
+                if code == 5 and arguments.quick:  # all tests of the file are slow ones
                     continue
                 totals.add(f"{kind}/{name[:-3]}", junit, code, output, seconds)
 

@@ -1,5 +1,6 @@
-/* What every command gets, and the commands. A command prints results to `out` and progress to `note`; errors go up to main.
- * *exit_code is 0 when it starts; a command that follows a job sets it to tell how the job ended. */
+/* The commands of the command line client, and what each receives. A command prints results to `out` and progress to
+ * `note`, and returns errors to main. *exit_code is 0 at the start; a command that follows a job sets it by the
+ * outcome of the job. */
 #ifndef SELVEDGE_CLIENTS_CLI_H
 #define SELVEDGE_CLIENTS_CLI_H
 
@@ -34,19 +35,19 @@ status cli_log(struct cli *cli, int *exit_code, struct error *err);
 status cli_series(struct cli *cli, int *exit_code, struct error *err);
 status cli_delete(struct cli *cli, int *exit_code, struct error *err);
 
-/* Follow job `id` until it ends; prints the fitted parameters. */
+/* Follows job `id` until it ends, and prints the fitted parameters. */
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
-/* "/v1/jobs/ID" + tail into path; STATUS_INVALID when the id has characters that no id has. */
+/* Writes "/v1/jobs/ID" + tail to path. STATUS_INVALID when the id has characters that no id has. */
 status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err);
-/* Width of the terminal behind `note`, 80 when it cannot be told. */
+/* Width of the terminal behind `note`; 80 if it is unknown. */
 size_t cli_columns(const struct cli *cli);
 
-/* tus: send file->path to upload_url from wherever it stands, in pieces of piece_bytes; retries. changed is called with
- * the offset reached. */
+/* Sends file->path to upload_url by tus, from the server's present offset on, in pieces of piece_bytes; retries
+ * after a broken connection. `changed` is called with each offset that is reached. */
 struct cli_file;
 status cli_upload_file(struct cli *cli, const struct cli_file *file, const char *upload_url, uint64_t piece_bytes,
                        void (*changed)(void *context, uint64_t offset), void *context, struct error *err);
-/* What one piece may have: our own measure, or the server's limit where that is less. */
+/* Size of one piece: our default, or the server's limit if that is smaller. */
 uint64_t cli_piece_bytes(struct cli *cli);
 
 #endif

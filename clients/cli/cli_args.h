@@ -1,5 +1,5 @@
-/* The command line of `selvedge`: one table of commands, one of options; parsing and help texts come from the tables.
- * Pure: prints nothing and reads only the environment that it is given. */
+/* The command line of `selvedge`. Parsing and help texts come from a table of commands and a table of options. The
+ * functions print nothing, and read only the environment that they are given. */
 #ifndef SELVEDGE_CLIENTS_CLI_ARGS_H
 #define SELVEDGE_CLIENTS_CLI_ARGS_H
 
@@ -24,28 +24,29 @@ enum cli_command_id {
     CLI_N_COMMAND
 };
 
-/* Everything the command line says. Strings point into argv or the environment; NULL: not given. */
+/* All that the command line says. The strings point into argv or the environment; NULL if not given. */
 struct cli_args {
     enum cli_command_id command;
     const char *server, *token;
-    const char *operand;   /* job document for submit, job id for the rest */
-    const char *input_dir; /* --input-dir: where the files are that the document names */
+    const char *operand;   /* a job document for submit, a job id for the other commands */
+    const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */
     const char *id_file;   /* --id-file */
     bool watch, json, follow, draft;
-    bool help; /* --help was given; has_command says whether for one command */
+    bool help; /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;
 };
 
-/* server_env and token_env: values of SELVEDGE_SERVER and SELVEDGE_TOKEN, NULL when unset; options win.
- * STATUS_INVALID: unknown command or option (with the nearest known one), missing or extra operand. */
+/* server_env and token_env are the values of SELVEDGE_SERVER and SELVEDGE_TOKEN, NULL if unset; options override
+ * them. STATUS_INVALID for an unknown command or option (the text names the nearest known one) and for a missing or
+ * extra operand. */
 status cli_args_parse(int argc, char *const *argv, const char *server_env, const char *token_env, struct cli_args *args,
                       struct error *err);
 
 const char *cli_command_name(enum cli_command_id id);
-/* Help text: of one command, or of the program when has_command is false. Writes at most n_bytes, NUL-terminated. */
+/* Writes the help text of one command, or of the program if has_command is false: at most n_bytes, NUL-terminated. */
 void cli_help(const struct cli_args *args, char *text, size_t n_bytes);
 
 #endif

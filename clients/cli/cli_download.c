@@ -10,7 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Range requests of a bounded size: a file of any size needs little memory, and a broken connection costs one piece at most. */
+/* Files are requested in pieces of limited size, so a file of any size needs little memory and a broken connection
+ * costs at most one piece. */
 enum { PIECE_BYTES = 8 << 20, MAX_BREAK = 8 };
 
 struct download {
@@ -60,7 +61,8 @@ static status restart(struct download *d, struct error *err)
     return STATUS_OK;
 }
 
-/* Total from "Content-Range: bytes a-b/total" is not needed: a piece shorter than asked for is the last one. */
+/* Requests the next piece. A piece shorter than requested is the last one, so the total in Content-Range is not
+ * needed. */
 static status take_piece(struct http *http, const char *url_path, struct download *d, bool *done, bool *broke,
                          struct error *err)
 {
@@ -77,12 +79,13 @@ static status take_piece(struct http *http, const char *url_path, struct downloa
     }
     status s = http_call(http, "GET", url_path, header, NULL, 0, &reply, err);
     if (s != STATUS_OK && reply.code == 200 && d->n_done > 0) {
-        s = restart(d, err); /* the file has changed, and is too large for one answer: its first piece comes next */
+        /* the file has changed and is too large for one reply, so start again with its first piece */
+        s = restart(d, err);
     } else if (s != STATUS_OK) {
         *broke = reply.cut_off;
-    } else if (reply.code == 416) { /* the piece begins behind the end: we have it all, be it nothing */
+    } else if (reply.code == 416) { /* the piece begins after the end: the file is complete, or empty */
         *done = true;
-    } else if (reply.code == 200) { /* no range support, or the file has changed: this is all of it */
+    } else if (reply.code == 200) { /* no support for ranges, or the file has changed: the reply is the whole file */
         if ((s = restart(d, err)) == STATUS_OK) s = write_all(d->fd, reply.body, reply.n_body, err, d->part);
         d->n_done = reply.n_body;
         *done = true;
@@ -93,7 +96,7 @@ static status take_piece(struct http *http, const char *url_path, struct downloa
         if (reply.etag[0] != '\0' && strcmp(reply.etag, d->etag) != 0) {
             snprintf(d->etag, sizeof d->etag, "%s", reply.etag);
             (void)durable_replace_volatile(d->etag_path, d->etag, strlen(d->etag),
-                                           NULL); /* only makes continuing possible */
+                                           NULL); /* needed only to continue later */
         }
     } else {
         s = http_problem(&reply, err);

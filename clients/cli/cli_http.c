@@ -86,7 +86,7 @@ static size_t take_body(char *data, size_t size, size_t n, void *context)
     return n_new;
 }
 
-/* value of "name: value\r\n" into out; false when it is another header */
+/* Copies the value of a header line "name: value\r\n" to out. Returns false if it is another header. */
 static bool header_value(const char *line, size_t n, const char *name, char *out, size_t n_out)
 {
     size_t n_name = strlen(name);
@@ -111,7 +111,7 @@ static size_t take_header(char *data, size_t size, size_t n, void *context)
     return n_line;
 }
 
-static int look_at_stop(void *context, curl_off_t a, curl_off_t b, curl_off_t c, curl_off_t d)
+static int check_stop(void *context, curl_off_t a, curl_off_t b, curl_off_t c, curl_off_t d)
 {
     (void)a, (void)b, (void)c, (void)d;
     return http_stopped(context) ? 1 : 0;
@@ -149,7 +149,7 @@ static status prepare(struct http *http, const char *path, struct http_reply *re
     curl_easy_setopt(c, CURLOPT_HEADERFUNCTION, take_header);
     curl_easy_setopt(c, CURLOPT_HEADERDATA, reply);
     curl_easy_setopt(c, CURLOPT_NOPROGRESS, 0L);
-    curl_easy_setopt(c, CURLOPT_XFERINFOFUNCTION, look_at_stop);
+    curl_easy_setopt(c, CURLOPT_XFERINFOFUNCTION, check_stop);
     curl_easy_setopt(c, CURLOPT_XFERINFODATA, http);
     return STATUS_OK;
 }
@@ -167,13 +167,13 @@ static status perform(struct http *http, const char *const *header, struct http_
     if (code == CURLE_COULDNT_CONNECT || code == CURLE_COULDNT_RESOLVE_HOST) {
         reply->cut_off = reply->refused = true;
         return error_set(err, STATUS_IO,
-                         "cannot reach the server '%s': %s. Start it with `selvedged`, or say where it is with "
+                         "cannot reach the server '%s': %s. Start it with `selvedged`, or give its address with "
                          "--server URL or SELVEDGE_SERVER",
                          http->server, http->why[0] != '\0' ? http->why : curl_easy_strerror(code));
     }
     reply->cut_off = code != CURLE_UNSUPPORTED_PROTOCOL && code != CURLE_URL_MALFORMAT && code != CURLE_WRITE_ERROR &&
                      code != CURLE_PEER_FAILED_VERIFICATION;
-    /* an answer may have come before the connection broke, e.g. 413 while the body was still being sent */
+    /* A reply may have arrived before the connection broke, for example 413 while the body was still being sent. */
     if (reply->code >= 400) return STATUS_OK;
     return error_set(err, STATUS_IO, "the connection to '%s' broke: %s", http->server,
                      http->why[0] != '\0' ? http->why : curl_easy_strerror(code));
@@ -195,7 +195,7 @@ status http_call(struct http *http, const char *method, const char *path, const 
     return perform(http, header, reply, err);
 }
 
-static size_t give_file(char *out, size_t size, size_t n, void *context)
+static size_t read_source(char *out, size_t size, size_t n, void *context)
 {
     struct http_source *source = context;
     size_t want = size * n;
@@ -214,7 +214,7 @@ status http_patch(struct http *http, const char *path, const char *const *header
     if (s != STATUS_OK) return s;
     curl_easy_setopt(http->curl, CURLOPT_UPLOAD, 1L);
     curl_easy_setopt(http->curl, CURLOPT_CUSTOMREQUEST, "PATCH");
-    curl_easy_setopt(http->curl, CURLOPT_READFUNCTION, give_file);
+    curl_easy_setopt(http->curl, CURLOPT_READFUNCTION, read_source);
     curl_easy_setopt(http->curl, CURLOPT_READDATA, source);
     curl_easy_setopt(http->curl, CURLOPT_INFILESIZE_LARGE, (curl_off_t)source->n_bytes);
     curl_easy_setopt(http->curl, CURLOPT_UPLOAD_BUFFERSIZE, 512L * 1024L);
@@ -259,11 +259,11 @@ status http_problem(const struct http_reply *reply, struct error *err)
     const char *name = json_string_value(json_object_get(problem, "code"));
     if (name != NULL && strcmp(name, status_name(STATUS_CHECKSUM)) == 0) code = STATUS_CHECKSUM;
     const char *text = detail != NULL ? detail : title;
-    if (reply->code == 401 && text == NULL) text = "the server wants an access token: set SELVEDGE_TOKEN";
+    if (reply->code == 401 && text == NULL) text = "the server requires an access token; set SELVEDGE_TOKEN";
     if (text != NULL)
         error_set_field(err, code, field == NULL ? "" : field, "%s", text);
     else
-        error_set(err, code, "the server answered with HTTP status %ld and no explanation", reply->code);
+        error_set(err, code, "the server replied with HTTP status %ld and no explanation", reply->code);
     json_decref(problem);
     return code;
 }
@@ -285,7 +285,8 @@ status http_json(struct http *http, const char *method, const char *path, const 
         header[n_header++] = key_line;
     }
     char *text = body == NULL ? NULL : json_dumps(body, JSON_COMPACT);
-    bool repeatable = key != NULL || strcmp(path, "/v1/jobs") != 0; /* everything but making a job may be said twice */
+    /* every call except creating a job without a key has the same effect if repeated */
+    bool repeatable = key != NULL || strcmp(path, "/v1/jobs") != 0;
     struct http_reply reply = {0};
     status s = STATUS_OK;
     if (out != NULL) *out = NULL;
@@ -305,7 +306,7 @@ status http_json(struct http *http, const char *method, const char *path, const 
     } else if (out != NULL && reply.n_body > 0) {
         *out = json_loadb(reply.body, reply.n_body, 0, NULL);
         if (*out == NULL)
-            s = error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON", http->server);
+            s = error_set(err, STATUS_FORMAT, "'%s' is not a selvedge server: its reply is not JSON", http->server);
     }
 out:
     http_reply_release(&reply);

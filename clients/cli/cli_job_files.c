@@ -17,7 +17,7 @@ static status add(struct cli_file_list *list, const char *folder, const json_t *
         return error_set_field(err, STATUS_INVALID, field, "'%s' must be a file name", field);
     if (strchr(name, '/') != NULL)
         return error_set_field(err, STATUS_INVALID, field,
-                               "'%s' holds a '/': name the file alone, its folder is given with --input-dir", name);
+                               "'%s' contains a '/'; give the file name alone, and its folder with --input-dir", name);
     for (size_t i = 0; i < list->n_file; i++)
         if (strcmp(list->file[i].name, name) == 0) return STATUS_OK;
     struct cli_file *grown = realloc(list->file, (list->n_file + 1) * sizeof *grown);
@@ -91,7 +91,7 @@ status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint6
         goto out;
     }
     if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
-        s = error_set(err, STATUS_INVALID, "input '%s' is not a plain file", file->path);
+        s = error_set(err, STATUS_INVALID, "input '%s' is not a regular file", file->path);
         goto out;
     }
     if (buffer == NULL) {

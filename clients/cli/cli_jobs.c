@@ -1,4 +1,4 @@
-/* The short commands: one or two calls and some printing. */
+/* The short commands, which make one or two calls and print the reply. */
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_report.h"
 #include "clients/cli/cli_text.h"
@@ -27,7 +27,7 @@ static status job_call(struct cli *cli, const char *method, const char *tail, js
 
 static void print_json(const json_t *value, FILE *out)
 {
-    /* for programs: what the server said, to the last digit */
+    /* for programs: the server's numbers to the last digit */
     json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
     fputc('\n', out);
 }
@@ -50,7 +50,7 @@ status cli_list(struct cli *cli, int *exit_code, struct error *err)
     size_t n_job = 0;
     json_t *all = json_array();
     status s;
-    for (;;) { /* page by page */
+    for (;;) { /* one page of the list at a time */
         json_t *page = NULL, *job;
         size_t i;
         if ((s = http_json(cli->http, "GET", path, NULL, NULL, &page, err)) != STATUS_OK) break;
@@ -88,13 +88,13 @@ static status act(struct cli *cli, const char *tail, const char *done, struct er
 status cli_cancel(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
-    return act(cli, "/cancel", "asked to stop", err);
+    return act(cli, "/cancel", "cancellation requested", err);
 }
 
 status cli_retry(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
-    return act(cli, "/retry", "goes on from its last checkpoint", err);
+    return act(cli, "/retry", "continues from its last checkpoint", err);
 }
 
 status cli_delete(struct cli *cli, int *exit_code, struct error *err)
@@ -105,7 +105,7 @@ status cli_delete(struct cli *cli, int *exit_code, struct error *err)
     return s;
 }
 
-/* Log lines from `offset` on; *n_new tells how much came. */
+/* Prints the log from *offset on and advances *offset; *n_new is the number of bytes printed. */
 static status log_piece(struct cli *cli, int64_t *offset, size_t *n_new, struct error *err)
 {
     char path[256], tail[96];
@@ -117,8 +117,7 @@ static status log_piece(struct cli *cli, int64_t *offset, size_t *n_new, struct 
     if (s == STATUS_OK && reply.code != 200 && reply.code != 204) s = http_problem(&reply, err);
     *n_new = 0;
     if (s == STATUS_OK && reply.n_body > 0) {
-        for (size_t i = 0; i < reply.n_body;
-             i++) { /* a log may quote names of files: keep their escapes from the terminal */
+        for (size_t i = 0; i < reply.n_body; i++) { /* the log may quote file names: remove their terminal escapes */
             unsigned char c = (unsigned char)reply.body[i];
             fputc(c < 0x20 && c != '\n' && c != '\t' ? '?' : c, cli->out);
         }
@@ -130,13 +129,13 @@ static status log_piece(struct cli *cli, int64_t *offset, size_t *n_new, struct 
     return s;
 }
 
-static status job_lives(struct cli *cli, bool *lives, struct error *err)
+static status job_is_active(struct cli *cli, bool *active, struct error *err)
 {
     json_t *job = NULL;
     struct job_view view;
     status s = job_call(cli, "GET", "", &job, err);
     report_view(job, &view);
-    *lives =
+    *active =
         strcmp(view.state, "running") == 0 || strcmp(view.state, "queued") == 0 || strcmp(view.state, "paused") == 0;
     json_decref(job);
     return s;
@@ -149,13 +148,13 @@ status cli_log(struct cli *cli, int *exit_code, struct error *err)
     status s = STATUS_OK;
     for (;;) {
         size_t n_new;
-        bool lives = false;
-        if (cli->args->follow && (s = job_lives(cli, &lives, err)) != STATUS_OK)
-            break; /* asked first: what ends a job is in the log */
+        bool active = false;
+        if (cli->args->follow && (s = job_is_active(cli, &active, err)) != STATUS_OK)
+            break; /* the state is read first, because the last lines of a job are in the log when it has ended */
         do {
             if ((s = log_piece(cli, &offset, &n_new, err)) != STATUS_OK) return s;
         } while (n_new > 0);
-        if (!lives || http_stopped(cli->http)) break;
+        if (!active || http_stopped(cli->http)) break;
         http_sleep(cli->http, 1.0);
     }
     return s;
@@ -210,7 +209,7 @@ status cli_series(struct cli *cli, int *exit_code, struct error *err)
         if (!more) break;
     }
     if (s == STATUS_OK && cli->args->json) print_json(all, cli->out);
-    if (s == STATUS_OK && !cli->args->json && first) fprintf(cli->note, "the fit has not begun\n");
+    if (s == STATUS_OK && !cli->args->json && first) fprintf(cli->note, "the fit has not started\n");
     json_decref(all);
     return s;
 }

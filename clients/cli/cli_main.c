@@ -1,4 +1,4 @@
-/* selvedge: the command line client. Sees the daemon through HTTP only. */
+/* selvedge, the command line client. It communicates with the daemon only through HTTP. */
 #include "base/version.h"
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_text.h"
@@ -11,11 +11,11 @@
 #include <string.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t interrupted; /* written by the signal handler alone */
+static volatile sig_atomic_t interrupted; /* written only by the signal handler */
 
 static void on_signal(int number)
 {
-    if (interrupted) _exit(128 + number); /* asked twice: do not be polite */
+    if (interrupted) _exit(128 + number); /* a second signal ends the program at once */
     interrupted = 1;
 }
 
@@ -30,7 +30,7 @@ static void print_error(const struct error *err)
     char field[sizeof err->field], text[sizeof err->text];
     text_clean(err->field, field, sizeof field);
     text_clean(err->text, text, sizeof text);
-    /* the server's sentences often begin with the field themselves */
+    /* print the field only if the server's sentence does not contain it */
     if (field[0] != '\0' && strstr(text, field) == NULL)
         fprintf(stderr, "error: %s: %s\n", field, text);
     else

@@ -101,7 +101,7 @@ void report_job(const json_t *job, FILE *out)
     report_result(job, out);
 }
 
-/* What a reader must know beside the number. */
+/* Prints remarks that qualify the number. */
 static void print_flags(const json_t *parameter, FILE *out)
 {
     const json_t *at_bound = json_object_get(parameter, "at_bound");
@@ -129,7 +129,7 @@ static void print_parameter(const json_t *parameter, FILE *out)
     fputc('\n', out);
 }
 
-/* "2.41 +- 0.05 %", "2.41 %" where a result of before states no error, "-" where there is none. */
+/* Writes "2.41 +- 0.05 %", "2.41 %" for an older result without an error, or "-" if there is no value. */
 static void percent(const json_t *of, const char *key, char *text, size_t n)
 {
     char key_se[64];
@@ -143,7 +143,7 @@ static void percent(const json_t *of, const char *key, char *text, size_t n)
         snprintf(text, n, "%.2f +- %.2f %%", 100.0 * x, 100.0 * se);
 }
 
-/* One line a model, when there are several. */
+/* Prints one line for each model if there are several. */
 static void print_models(const json_t *models, FILE *out)
 {
     size_t i;
@@ -170,7 +170,7 @@ static void print_radius(const json_t *radius, FILE *out)
     char value[CLI_SHORT_TEXT];
     if (!json_is_object(radius)) return;
     text_with_error(member_number(radius, "radius_um"), member_number(radius, "standard_error_um"), value);
-    fprintf(out, "fiber radius: %s um (it was %.4g um)%s%s\n", value, member_number(radius, "start_um"),
+    fprintf(out, "fiber radius: %s um (start %.4g um)%s%s\n", value, member_number(radius, "start_um"),
             json_is_false(json_object_get(radius, "determined")) ? "  not determined" : "",
             json_is_true(json_object_get(radius, "at_bound")) ? "  at the edge of its range" : "");
 }

@@ -29,8 +29,8 @@ static void got(void *context, uint64_t n, uint64_t n_total)
     fflush(t->cli->note);
 }
 
-/* The server's paths become file names here: no absolute path, no "..", no control characters. */
-static bool path_is_tame(const char *path)
+/* Paths from the server become file names here, so absolute paths, ".." and control characters are refused. */
+static bool path_is_safe(const char *path)
 {
     if (path[0] == '\0' || path[0] == '/' || strlen(path) > 1000) return false;
     for (const char *p = path; *p != '\0'; p++)
@@ -49,7 +49,7 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
     uint64_t n_bytes = (uint64_t)json_integer_value(json_object_get(file, "size"));
     char target[4096], parent[4096];
     struct stat info;
-    if (path == NULL || url == NULL || url[0] != '/' || !path_is_tame(path))
+    if (path == NULL || url == NULL || url[0] != '/' || !path_is_safe(path))
         return error_set(err, STATUS_FORMAT, "the server lists a result with an unusable name");
     if (snprintf(target, sizeof target, "%s/%s", folder, path) >= (int)sizeof target)
         return error_set(err, STATUS_INVALID, "the path '%.80s...' is too long", target);
@@ -64,7 +64,7 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
     if (!whole) {
         s = http_download(t->cli->http, url, target, got, t, err);
         if (s != STATUS_OK) return error_prefix(err, s, "cannot download '%s'", path);
-        /* the server's time of change, so that the next download knows the file whatever the clocks say */
+        /* set the server's time of change, by which the next download recognises the file */
         struct timespec times[2] = {
             {.tv_nsec = UTIME_OMIT},
             {.tv_sec = (time_t)modified, .tv_nsec = (long)(1e9 * (modified - floor(modified)))}};
@@ -87,7 +87,7 @@ status cli_results(struct cli *cli, int *exit_code, struct error *err)
     if (s != STATUS_OK) return s;
     const json_t *files = json_object_get(list, "files");
     if (json_array_size(files) == 0) {
-        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` tells when",
+        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` waits for them",
                       cli->args->operand, cli->args->operand);
         goto out;
     }

@@ -103,7 +103,8 @@ static status hash_files(struct submit *u, struct error *err)
     u->verb = "checking ";
     u->started_s = clock_monotonic_s();
     u->n_before = u->n_now = u->n_total = 0;
-    for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) { /* sizes first, so that the bar knows the whole */
+    /* all sizes first, for the total of the progress bar */
+    for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) {
         FILE *f = fopen(u->list.file[i].path, "rb");
         if (f != NULL && fseeko(f, 0, SEEK_END) == 0) u->n_total += (uint64_t)ftello(f);
         if (f != NULL) fclose(f);
@@ -130,7 +131,7 @@ static status create_job(struct submit *u, struct error *err)
     status s = http_json(u->cli->http, "POST", "/v1/jobs", key, u->document, &u->job, err);
     if (s != STATUS_OK) return error_prefix(err, s, "the job document was refused");
     const char *id = json_string_value(json_object_get(u->job, "id"));
-    if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's answer has no job id");
+    if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's reply has no job id");
     snprintf(u->id, sizeof u->id, "%s", id);
     fprintf(u->cli->note, "job %s created\n", u->id);
     if (u->cli->args->id_file == NULL) return STATUS_OK;
@@ -139,7 +140,7 @@ static status create_job(struct submit *u, struct error *err)
     return durable_replace_volatile(u->cli->args->id_file, line, (size_t)n, err);
 }
 
-/* --resume: the job is there; a document given again replaces the server's when it differs. */
+/* --resume: the job exists. A document given again replaces the server's if it differs. */
 static status open_job(struct submit *u, struct error *err)
 {
     char path[256];
@@ -150,7 +151,7 @@ static status open_job(struct submit *u, struct error *err)
     const json_t *theirs = json_object_get(u->job, "document");
     if (u->document == NULL) {
         u->document = json_deep_copy(theirs);
-        if (u->document == NULL) return error_set(err, STATUS_FORMAT, "the server's answer has no job document");
+        if (u->document == NULL) return error_set(err, STATUS_FORMAT, "the server's reply has no job document");
         return STATUS_OK;
     }
     if (json_equal(theirs, u->document)) return STATUS_OK;
@@ -168,8 +169,7 @@ static status declare(struct submit *u, const struct cli_file *file, json_t **an
                              (json_int_t)file->n_bytes, "sha256", file->sha256);
     if (body == NULL) return error_set(err, STATUS_INVALID, "file name '%s' is not UTF-8", file->name);
     s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
-    if (s == STATUS_CONFLICT &&
-        u->cli->args->resume_id != NULL) { /* the file has changed since: the new one replaces it */
+    if (s == STATUS_CONFLICT && u->cli->args->resume_id != NULL) { /* the file has changed: replace the earlier one */
         char *escaped = path + strlen(path);
         snprintf(escaped, sizeof path - strlen(path), "/%s", file->name);
         s = http_json(u->cli->http, "DELETE", path, NULL, NULL, NULL, err);
@@ -201,7 +201,7 @@ static status send_files(struct submit *u, struct error *err)
             s = error_set(err, STATUS_FORMAT, "the server gives no address to upload '%s' to", file->name);
         if (s == STATUS_OK && !complete) {
             s = cli_upload_file(u->cli, file, url, piece_bytes, uploaded, u, err);
-            if (s == STATUS_CHECKSUM) /* damaged on its way: once more from the start */
+            if (s == STATUS_CHECKSUM) /* damaged in transfer: send it once more from the start */
                 s = cli_upload_file(u->cli, file, url, piece_bytes, uploaded, u, err);
             n_sent += s == STATUS_OK;
         }
@@ -232,7 +232,8 @@ status cli_submit(struct cli *cli, int *exit_code, struct error *err)
     if (cli->args->operand != NULL && (s = read_document(&u, cli->args->operand, err)) != STATUS_OK) goto out;
     if (cli->args->resume_id != NULL && (s = open_job(&u, err)) != STATUS_OK) goto out;
     if ((s = list_files(&u, err)) != STATUS_OK) goto out;
-    if ((s = hash_files(&u, err)) != STATUS_OK) goto out; /* before the job is made: a missing file costs nothing */
+    /* before the job is created, so that a missing file leaves no job behind */
+    if ((s = hash_files(&u, err)) != STATUS_OK) goto out;
     if (cli->args->resume_id == NULL && (s = create_job(&u, err)) != STATUS_OK) goto out;
     if ((s = send_files(&u, err)) != STATUS_OK) goto out;
     if (!cli->args->draft && (s = start_job(&u, err)) != STATUS_OK) goto out;

@@ -67,7 +67,7 @@ void text_with_error(double value, double standard_error, char out[CLI_SHORT_TEX
     }
 }
 
-/* Bytes of the UTF-8 sequence at p, 0 when it is broken or a control character (C0, DEL, C1). */
+/* Returns the length of the UTF-8 sequence at p, or 0 if it is invalid or a control character (C0, DEL, C1). */
 static size_t printable_bytes(const char *p)
 {
     const unsigned char a = (unsigned char)p[0], b = (unsigned char)(a != 0 ? p[1] : 0);

@@ -1,4 +1,4 @@
-/* The client's side of tus 1.0: ask for the offset, send pieces, go on after a broken connection. */
+/* The client's side of tus 1.0: asks for the offset, sends pieces, and continues after a broken connection. */
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_job_files.h"
 
@@ -55,7 +55,8 @@ static status send_piece(struct upload *u, struct http_reply *reply, struct erro
     return http_patch(u->cli->http, u->url, header, &source, reply, err);
 }
 
-/* One piece, or one question for the offset. *known says whether the offset is the server's; *again asks for a pause. */
+/* Sends one piece, or asks for the offset. *known: the offset agrees with the server's. *again: the caller should
+ * pause and call again. */
 static status step(struct upload *u, bool *known, bool *again, struct error *err)
 {
     struct http_reply reply = {0};
@@ -69,7 +70,7 @@ static status step(struct upload *u, bool *known, bool *again, struct error *err
     } else if (reply.code == 204 || reply.code == 200) {
         u->offset = reply.upload_offset >= 0 ? (uint64_t)reply.upload_offset : u->sending;
     } else if (reply.code == 409 || reply.code == 423 || reply.code == 408) {
-        *known = false; /* our idea of the offset is old, or we were too slow */
+        *known = false; /* our offset is out of date, or we were too slow */
         *again = true;
         http_problem(&reply, err);
         s = err == NULL ? STATUS_CONFLICT : err->code;
@@ -87,7 +88,7 @@ static status step(struct upload *u, bool *known, bool *again, struct error *err
 uint64_t cli_piece_bytes(struct cli *cli)
 {
     json_t *about = NULL;
-    /* a server that does not say takes what it always took, and one that does not answer will be noticed soon enough */
+    /* a server that reports no limit accepts the default; one that does not reply fails at the next request */
     json_int_t limit = http_json(cli->http, "GET", "/v1/about", NULL, NULL, &about, NULL) != STATUS_OK
                            ? 0
                            : json_integer_value(json_object_get(json_object_get(about, "limits"), "max_patch_bytes"));

@@ -1,4 +1,4 @@
-/* Following a job: poll with the ETag, draw what changed, tell the outcome. */
+/* Follows a job: polls with the ETag, prints what has changed, and reports the outcome. */
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_report.h"
 #include "clients/cli/cli_text.h"
@@ -16,10 +16,10 @@ enum { PLAIN_INTERVAL_S = 10, GONE_S = 120 };
 struct watch {
     struct cli *cli;
     char path[256], id[80], etag[160];
-    json_t *job;                 /* the last whole answer */
-    struct job_view view, shown; /* now, and what the last plain line said */
-    double shown_s, lost_s;      /* lost_s: since when there has been no answer, 0 when there is one */
-    size_t n_warning;            /* already printed */
+    json_t *job;                 /* the last complete reply */
+    struct job_view view, shown; /* the present state, and the state in the last plain line */
+    double shown_s, lost_s;      /* lost_s: time of the first of the failed requests, 0 if the last one succeeded */
+    size_t n_warning;            /* number already printed */
     bool drawn;
 };
 
@@ -76,14 +76,14 @@ static void draw(struct watch *w)
         draw_plain(w);
 }
 
-static status take_answer(struct watch *w, const struct http_reply *reply, struct error *err)
+static status read_reply(struct watch *w, const struct http_reply *reply, struct error *err)
 {
     if (reply->code == 304) return STATUS_OK;
     if (reply->code != 200) return http_problem(reply, err);
     json_t *job = json_loadb(reply->body, reply->n_body, 0, NULL);
     if (!json_is_object(job)) {
         json_decref(job);
-        return error_set(err, STATUS_FORMAT, "'%s' does not answer like a selvedge server: not JSON",
+        return error_set(err, STATUS_FORMAT, "'%s' is not a selvedge server: its reply is not JSON",
                          http_server(w->cli->http));
     }
     json_decref(w->job);
@@ -93,7 +93,7 @@ static status take_answer(struct watch *w, const struct http_reply *reply, struc
     return STATUS_OK;
 }
 
-/* The server may be restarted while we watch: wait for it, but not for ever. */
+/* The server may be restarted while a job is watched, so the client waits for it, but not for ever. */
 static bool may_wait(struct watch *w, const struct error *err)
 {
     double now = clock_monotonic_s();
@@ -101,12 +101,12 @@ static bool may_wait(struct watch *w, const struct error *err)
     if (w->lost_s <= 0.0) {
         w->lost_s = now;
         wipe(w);
-        fprintf(w->cli->note, "%s; waiting for it\n", err->text);
+        fprintf(w->cli->note, "%s; trying again\n", err->text);
     }
     return now - w->lost_s < GONE_S;
 }
 
-/* answers of a server that is on its way up or down, or of a proxy in front of one that is away */
+/* Replies of a server that is starting or stopping, or of a proxy whose server does not run. */
 static bool unavailable(long code) { return code == 429 || code == 502 || code == 503 || code == 504; }
 
 static status poll_once(struct watch *w, struct error *err)
@@ -123,7 +123,7 @@ static status poll_once(struct watch *w, struct error *err)
     if (s == STATUS_OK) {
         bool away = unavailable(reply.code);
         if (!away) w->lost_s = 0.0;
-        s = take_answer(w, &reply, &local);
+        s = read_reply(w, &reply, &local);
         if (away && may_wait(w, &local)) s = STATUS_OK;
     } else if (reply.cut_off && may_wait(w, &local)) {
         s = STATUS_OK;
@@ -139,7 +139,7 @@ static bool ended(const struct job_view *v)
            strcmp(v->state, "cancelled") == 0 || strcmp(v->state, "draft") == 0;
 }
 
-static status tell_end(struct watch *w, int *exit_code, struct error *err)
+static status report_outcome(struct watch *w, int *exit_code, struct error *err)
 {
     const char *state = w->view.state;
     const json_t *problem = json_object_get(w->job, "error");
@@ -151,10 +151,10 @@ static status tell_end(struct watch *w, int *exit_code, struct error *err)
         return STATUS_OK;
     }
     if (strcmp(state, "draft") == 0)
-        return error_set(err, STATUS_CONFLICT, "job %s has not been started: selvedge submit --resume %s", w->id,
-                         w->id);
+        return error_set(err, STATUS_CONFLICT,
+                         "job %s has not been started; start it with: selvedge submit --resume %s", w->id, w->id);
     if (strcmp(state, "cancelled") == 0) {
-        fprintf(w->cli->note, "job %s was cancelled; `selvedge retry %s` goes on from its last checkpoint\n", w->id,
+        fprintf(w->cli->note, "job %s was cancelled; `selvedge retry %s` continues from its last checkpoint\n", w->id,
                 w->id);
         *exit_code = CLI_EXIT_CANCELLED;
         return STATUS_OK;
@@ -172,14 +172,14 @@ status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct err
     while (s == STATUS_OK) {
         s = poll_once(&w, err);
         if (http_stopped(cli->http))
-            s = error_set(err, STATUS_CANCELLED, "interrupted; the job goes on (selvedge cancel %s stops it)", id);
+            s = error_set(err, STATUS_CANCELLED, "interrupted; the job continues (selvedge cancel %s stops it)", id);
         if (s != STATUS_OK) break;
         if (w.job != NULL && w.lost_s <= 0.0) draw(&w);
         if (w.job != NULL && ended(&w.view)) break;
         http_sleep(cli->http, cli->note_is_terminal ? 0.5 : 1.0);
     }
     wipe(&w);
-    if (s == STATUS_OK) s = tell_end(&w, exit_code, err);
+    if (s == STATUS_OK) s = report_outcome(&w, exit_code, err);
     json_decref(w.job);
     return s;
 }

@@ -1,4 +1,4 @@
-// Measured against rendered: pictures side by side, and a scatter plot of the means.
+// Comparison of measured and rendered photographs: pictures side by side, and a scatter plot of the means.
 import { colour, el, percent, svg } from "./page_parts.js";
 
 const RGB = ["var(--red)", "var(--green)", "var(--blue)"];
@@ -11,7 +11,7 @@ function picture(url, rgb, exposure, what) {
   return swatch;
 }
 
-// One exposure for all swatches, so that they can be compared: the brightest tenth of the means may clip.
+// Returns one exposure for all swatches, so that they can be compared. The brightest tenth of the means may clip.
 export function commonExposure(list) {
   const peak = list.filter((c) => c.measured).map((c) => Math.max(...c.measured)).sort((a, b) => a - b);
   return peak.length ? 0.8 / Math.max(peak[Math.floor(0.9 * (peak.length - 1))], 1e-6) : 1;
@@ -23,12 +23,12 @@ export function gallery(list, pngExposure) {
     el("div", { class: "pictures" }, picture(c.measuredPicture, c.measured, exposure, "measured"), picture(c.renderedPicture, c.rendered, exposure, "rendered")),
     el("div", { class: "label" },
       el("div", { class: "row" }, el("b", {}, c.name), c.held ? el("span", { class: "tag" }, "held out") : null),
-      el("div", { class: "row" }, el("span", {}, "lamp"), el("span", {}, `θ ${degrees(c.angles.light_theta_deg)}  φ ${degrees(c.angles.light_phi_deg)}`)),
+      el("div", { class: "row" }, el("span", {}, "light"), el("span", {}, `θ ${degrees(c.angles.light_theta_deg)}  φ ${degrees(c.angles.light_phi_deg)}`)),
       el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(c.angles.camera_theta_deg)}  φ ${degrees(c.angles.camera_phi_deg)}`)),
       el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, c.angles.all_rotations ? "mean over all" : degrees(c.angles.cloth_rotation_deg))),
       el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percent(c.error))))));
   return [
-    el("p", { class: "hint" }, "Left measured, right rendered with the fitted parameters; dashed frames were held out of the fit. Plain squares show mean colours; everything is at one exposure."),
+    el("p", { class: "hint" }, "Left: measured; right: rendered with the fitted parameters. Photographs in dashed frames were held out of the fit. Plain squares show mean colours. All pictures have the same exposure."),
     el("div", { class: "gallery" }, cards),
   ];
 }
@@ -75,7 +75,7 @@ export function scatterPlot(list) {
   ];
 }
 
-// Objective over the fiber radius with two standard errors either way; the line marks what came out.
+// Plots the objective over the fiber radius with two standard errors either way. The line marks the fitted radius.
 export function radiusPlot(search) {
   const W = 460, H = 220, L = 56, R = 12, T = 12, B = 34, list = search.curve;
   const low = Math.min(...list.map((p) => p.f - 2 * p.se)), high = Math.max(...list.map((p) => p.f + 2 * p.se));
@@ -91,5 +91,5 @@ export function radiusPlot(search) {
   for (const r of [list[0].radius, Math.exp((from + to) / 2), list[list.length - 1].radius]) label(Number(r.toPrecision(3)), { x: x(r), y: H - B + 15, "text-anchor": "middle" });
   for (const f of [low, high]) label(Number(f.toPrecision(2)), { x: L - 6, y: y(f) + (f === low ? 0 : 10), "text-anchor": "end" });
   label("fiber radius, µm", { x: (L + W - R) / 2, y: H - 4, "text-anchor": "middle" });
-  return el("div", {}, el("p", { class: "hint" }, "Objective of the fit at each radius ± 2 s.e.; the band is the radius that came out and its standard error."), svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "radius" }, ...parts));
+  return el("div", {}, el("p", { class: "hint" }, "Objective of the fit at each radius ± 2 s.e. The band is the fitted radius with its standard error."), svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "radius" }, ...parts));
 }

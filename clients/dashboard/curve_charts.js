@@ -1,11 +1,12 @@
-// Curves over the fit's steps with bands of two standard errors (dygraphs).
+// Draws curves over the fit's steps with bands of two standard errors (dygraphs).
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-// Its legend plugin sets an inline style, which the page's content security policy forbids; the legends here are our own.
+// The legend plugin of dygraphs sets an inline style, which the page's content security policy forbids, so the charts
+// draw their own legends.
 Dygraph.PLUGINS = Dygraph.PLUGINS.filter((plugin) => plugin !== Dygraph.Plugins.Legend);
 
-// A chart of one or more curves; data: rows [x, [low, mid, high] | null, ...] (dygraphs' custom bars).
+// A chart of one or more curves. data: rows [x, [low, mid, high] | null, ...], the custom bars of dygraphs.
 export class CurveChart {
   constructor(node, legend, labels, colours, { log = false, digits = 4 } = {}) {
     this.node = node;

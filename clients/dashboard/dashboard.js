@@ -1,4 +1,4 @@
-// Entry: "#" is the list of jobs, "#ID" is one job.
+// Entry point of the dashboard: "#" shows the list of jobs, "#ID" shows one job.
 import { el } from "./page_parts.js";
 import { listPage } from "./list_page.js";
 import { jobPage } from "./job_page.js";

@@ -1,10 +1,12 @@
-// The reconstructed fibers in 3D (three.js), read from the job's .hair file (docs/file-formats.md). Loaded only when asked for.
+// Shows the reconstructed fibers in 3D (three.js) from the job's .hair file (docs/file-formats.md), when the user asks
+// for it.
 import { el, size } from "./page_parts.js";
 import { raw } from "./server_link.js";
 
 const MAX_SEGMENT = 400000, MAX_BYTES = 200 << 20;
 
-// -> {position: Float32Array (xyz of both ends of every segment), n} in millimetres, thinned to MAX_SEGMENT by leaving fibers out.
+// Returns {position, n, ...}: position is a Float32Array with x, y, z of both ends of every segment in millimetres.
+// Beyond MAX_SEGMENT segments some fibers are left out.
 export function readHair(buffer) {
   const view = new DataView(buffer);
   const magic = String.fromCharCode(...new Uint8Array(buffer, 0, 4));
@@ -14,7 +16,7 @@ export function readHair(buffer) {
   const segments = new Uint32Array(nStrand);
   for (let i = 0; i < nStrand; i++) segments[i] = flags & 1 ? view.getUint16(at + 2 * i, true) : nDefault;
   if (flags & 1) at += 2 * nStrand;
-  if (!(flags & 2) || at + 12 * nPoint > buffer.byteLength) throw new Error("the .hair file is cut short");
+  if (!(flags & 2) || at + 12 * nPoint > buffer.byteLength) throw new Error("the .hair file is incomplete");
   const xyz = new Float32Array(buffer.slice(at, at + 12 * nPoint));
   const nSegment = segments.reduce((a, b) => a + b, 0);
   const keep = Math.min(1, MAX_SEGMENT / Math.max(1, nSegment));
@@ -31,7 +33,7 @@ export function readHair(buffer) {
   return { position: new Float32Array(position), n: position.length / 6, nStrand, nSegment, thinned: keep < 1 };
 }
 
-// Colour by direction (x warm, y cool, z green) with depth shading from the height.
+// Colours segments by direction (x warm, y cool, z green), shaded by height.
 function colours(position) {
   const out = new Float32Array(position.length);
   let low = Infinity, high = -Infinity;
@@ -49,7 +51,7 @@ function colours(position) {
   return out;
 }
 
-// Drag turns, wheel or pinch zooms, shift-drag moves.
+// Handles the mouse and touch: drag turns, wheel or pinch zooms, shift-drag moves.
 function orbit(node, state, draw) {
   let last = null;
   node.addEventListener("pointerdown", (e) => { last = [e.clientX, e.clientY]; node.setPointerCapture(e.pointerId); });
@@ -113,7 +115,7 @@ export function fiberView(file) {
       const [THREE, answer] = await Promise.all([import("/vendor/three.module.js"), raw("GET", file.url)]);
       const hair = readHair(await answer.arrayBuffer());
       close = show(THREE, node, hair);
-      caption.textContent = `${hair.nStrand} fibers, ${hair.nSegment} segments${hair.thinned ? " (a part of them shown)" : ""}; drag turns, wheel zooms, shift-drag moves`;
+      caption.textContent = `${hair.nStrand} fibers, ${hair.nSegment} segments${hair.thinned ? " (some of them are shown)" : ""}; drag turns, wheel zooms, shift-drag moves`;
     } catch (error) {
       hint.replaceChildren(`The 3D view is not available: ${error.message}. The slices above show the same fibers.`);
       if (!hint.isConnected) node.replaceChildren(hint);

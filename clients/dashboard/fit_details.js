@@ -1,4 +1,5 @@
-// What the options of a fit gave beyond the parameters: certificate, nuisance terms, gains of photographs, textures, several starts.
+// Shows results of a fit beyond its parameters: gradient certificate, nuisance terms, gains of photographs, textures,
+// several starts and the next photograph.
 import { el, isNumber, percent, withError } from "./page_parts.js";
 
 function table(id, heads, rows) {
@@ -20,13 +21,14 @@ function gains(result) {
   const rows = (result.rows ?? []).filter((r) => isNumber(r.gain));
   if (!rows.length) return null;
   return el("div", {}, el("h3", {}, "Gain of each photograph"),
-    el("p", { class: "hint" }, `With them the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}` +
+    el("p", { class: "hint" }, `With these gains the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}` +
       (result.heldout_rel_rms_with_gains == null ? "." : `, over the held-out rows ${percent(result.heldout_rel_rms_with_gains, 2)}.`)),
     table("gains", ["Photograph", "#Gain ± standard error", ""], rows.map((r) => el("tr", {}, el("td", { class: "mono" }, r.name), number(withError(r.gain, r.gain_se)),
       el("td", {}, Math.abs(r.gain - 1) > 3 * r.gain_se && Math.abs(r.gain - 1) > 0.05 ? tag("differs from the others") : "")))));
 }
 
-// Contrasts are squared: the scatter of the blocks' means, in per cent of their mean, is the root of the mean over channels.
+// Texture contrasts are squared values. The scatter of the block means, in per cent of their mean, is the square root
+// of the contrast averaged over channels.
 function textures(result) {
   const rows = (result.rows ?? []).filter((r) => r.texture);
   if (!rows.length) return null;
@@ -56,7 +58,7 @@ function certificate(result) {
   if (!c) return null;
   const passed = c.worst_rel_error - 3 * c.worst_rel_error_se <= 0.01;
   return el("div", { id: "certificate" }, el("h3", {}, "Gradient certificate ", tag(passed ? "passed" : "failed", passed ? "good" : "warn")),
-    el("p", { class: "hint" }, `Derivatives of ${c.n_path} paths through this cloth against differences of the same paths: worst relative error ${c.worst_rel_error.toExponential(1)} ± ${c.worst_rel_error_se.toExponential(0)} (${c.worst_parameter}).`));
+    el("p", { class: "hint" }, `Derivatives of ${c.n_path} paths through this cloth, compared with finite differences over the same paths: the worst relative error is ${c.worst_rel_error.toExponential(1)} ± ${c.worst_rel_error_se.toExponential(0)} (${c.worst_parameter}).`));
 }
 
 const SHOWN_CANDIDATES = 8;
@@ -66,13 +68,13 @@ function nextPhotograph(result) {
   if (!list.length) return null;
   const angle = (x) => number(`${Number(x.toPrecision(4))}°`);
   return el("div", {}, el("h3", {}, "Next photograph"),
-    el("p", { class: "hint" }, `Of ${list.length} candidates, those that would narrow the parameters most.`),
-    table("next-photograph", ["#Lamp", "#phi", "#Camera", "#phi", "#Cloth turned", "#Information, nats", ""], list.slice(0, SHOWN_CANDIDATES).map((c) => el("tr", {},
+    el("p", { class: "hint" }, `The best of ${list.length} candidates: those that would reduce the parameters' uncertainty most.`),
+    table("next-photograph", ["#Light", "#phi", "#Camera", "#phi", "#Cloth turned", "#Information, nats", ""], list.slice(0, SHOWN_CANDIDATES).map((c) => el("tr", {},
       angle(c.light_theta_deg), angle(c.light_phi_deg), angle(c.camera_theta_deg), angle(c.camera_phi_deg), angle(c.cloth_rotation_deg), number(c.information_nats.toFixed(2)),
       el("td", {}, c.determines.length ? tag(`determines ${c.determines.join(", ")}`, "good") : "")))));
 }
 
-// The content of the card, or null when there is nothing to say.
+// Returns the content of the card, or null if there is nothing to show.
 export function fitDetails(job) {
   if (!job.result) return null;
   const parts = [certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);

@@ -1,4 +1,5 @@
-// The curves of one fit: objective (log axis), relative RMS, and one chart a parameter, fed by the incremental series.
+// Draws the curves of one fit from the incremental series: objective (log axis), relative RMS error, and one chart for
+// each parameter.
 import { CurveChart } from "./curve_charts.js";
 import { el } from "./page_parts.js";
 import { describedParameters, finite, parameterGroups } from "./result_view.js";
@@ -11,7 +12,8 @@ const RGB = ["--red", "--green", "--blue"];
 function band(value, se, { positive = false, lower = 0, upper = Infinity } = {}) {
   if (finite(value) === null || (positive && value <= 0)) return null;
   const half = finite(se) === null ? 0 : BAND * se;
-  return [Math.max(value - half, positive ? value * 0.05 : lower), value, Math.min(value + half, upper)]; // bands end where parameters must
+  // bands end at the bounds of the parameter
+  return [Math.max(value - half, positive ? value * 0.05 : lower), value, Math.min(value + half, upper)];
 }
 
 function block(title, tall) {
@@ -34,9 +36,9 @@ export class JobCharts {
     this.charts = [];
     this.parameterCharts = null;
     this.models = [];
-    this.chosen = null; // model shown; null: the one that is being fitted
-    this.fitCard.replaceChildren(el("p", { class: "hint" }, "The curve begins with the fit."));
-    this.parameterCard.replaceChildren(el("p", { class: "hint" }, "The curves begin with the fit."));
+    this.chosen = null; // the model that is shown; null: the one that is being fitted
+    this.fitCard.replaceChildren(el("p", { class: "hint" }, "The curve appears when the fit has started."));
+    this.parameterCard.replaceChildren(el("p", { class: "hint" }, "The curves appear when the fit has started."));
   }
 
   async update(job) {
@@ -48,12 +50,13 @@ export class JobCharts {
       this.models = series.models ?? [];
       this.points.push(...series.points);
       this.after = series.next_after_step ?? this.points[this.points.length - 1].step;
-      if (this.points.length > 2 * MAX_POINT) { this.points = []; this.after = -1; continue; } // let the server thin it out
+      // read the series again, merged to fewer points by the server
+      if (this.points.length > 2 * MAX_POINT) { this.points = []; this.after = -1; continue; }
       this.draw(job);
     }
   }
 
-  // Curves of one model at a time: their parameters have nothing in common.
+  // Draws the curves of one model at a time, because different models have different parameters.
   draw(job) {
     const model = this.chosen ?? this.points[this.points.length - 1].i_model ?? 0;
     if (this.charts.length === 0 || this.shown !== model) this.build(job, model);

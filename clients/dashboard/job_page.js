@@ -1,4 +1,4 @@
-// One job: state and stages, live curves, and at the end parameters, comparison, fibers, downloads.
+// The page of one job: state, stages and live curves; after the end also parameters, comparison, fibers and downloads.
 import { gallery, radiusPlot, scatterPlot } from "./comparison.js";
 import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
@@ -36,7 +36,7 @@ function factsOf(job) {
   if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", duration(job.eta_s)));
   if (job.state === "running" && /^(fitting|fiber radius)/.test(job.message)) facts.push(fact("now", job.message));
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
-  const of = job.result ?? job; // at the end: of the best model, at fresh paths
+  const of = job.result ?? job; // after the end: of the best model, computed with fresh paths
   if (isNumber(of.objective)) facts.push(fact("objective", withError(of.objective, of.objective_se)));
   const { fit, fitSe, held, heldSe } = residuals(job);
   if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percentWithError(fit, fitSe)));
@@ -63,12 +63,12 @@ function notesOf(job) {
   return notes;
 }
 
-// The comparison that several models are fitted for.
+// Compares the models of a job that fits several.
 function modelTable(list) {
   const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.fit, m.fitSe)), el("td", { class: "number" }, percentWithError(m.held, m.heldSe)),
     el("td", { class: "number" }, isNumber(m.paths) ? `${(m.paths / 1e6).toPrecision(3)} M` : "–"), el("td", { class: "number" }, duration(m.seconds)),
     el("td", {}, m.best ? el("span", { class: "tag" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
-  return [el("p", { class: "hint" }, "Relative RMS errors of mean radiances; the best model has the lowest error over the held-out rows. Everything else on this page is of the best one."),
+  return [el("p", { class: "hint" }, "Relative RMS errors of mean radiances; the best model has the lowest error over the held-out rows. The rest of this page shows the best model."),
     el("table", { id: "models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Fitted"), el("th", { class: "number" }, "Held out"),
       el("th", { class: "number" }, "Paths"), el("th", { class: "number" }, "Time"), el("th", {}, "Remarks"))), el("tbody", {}, rows)),
     ...list.filter((m) => !m.best).map((m) => el("details", {}, el("summary", {}, `Parameters of ${m.id}`), parameterTable(m.parameters)))];
@@ -94,7 +94,7 @@ export function jobPage(page, id) {
   const logLink = el("a", { href: `/v1/jobs/${id}/log`, target: "_blank" }, "whole log");
   page.append(el("section", { class: "card", id: "state" }, head, stages, facts, notes),
     el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard)), results,
-    el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "the last lines; ", logLink)), logNode));
+    el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines; ", logLink)), logNode));
   let about = null, generation = null, closeFibers = null, gone = false;
 
   const act = (verb) => async (event) => {
@@ -128,10 +128,10 @@ export function jobPage(page, id) {
     const compete = models(job), radius = radiusSearch(job);
     results.append(
       compete.length > 1 ? card("Models compared", modelTable(compete)) : "",
-      el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured against rendered", scatterPlot(compared))),
-      details ? card("More about the fit", details) : "",
+      el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
+      details ? card("More results of the fit", details) : "",
       radius ? card("Fiber radius", radiusPlot(radius)) : "",
-      compared.length ? card("Measured beside rendered", gallery(compared, job.result?.png_exposure)) : "",
+      compared.length ? card("Measured and rendered pictures", gallery(compared, job.result?.png_exposure)) : "",
       quality ? card("Quality of the geometry", quality) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",

@@ -1,4 +1,4 @@
-// All jobs, newest first, and a place to drop a new one.
+// The list of all jobs, newest first, with a drop area for new ones.
 import { duration, el, refill, stateTag, when } from "./page_parts.js";
 import { getJson, poll } from "./server_link.js";
 import { submitPanel } from "./submit_panel.js";

@@ -1,4 +1,5 @@
-// The end of a job's log: begins 64 KiB before its end, keeps at most MAX_LINE lines, and follows while the reader is at the bottom.
+// Shows the end of a job's log: starts 64 KiB before its end, keeps at most MAX_LINE lines, and follows it while the
+// reader is at the bottom.
 import { raw } from "./server_link.js";
 
 const MAX_LINE = 1000, START_BYTES = 65536, PIECE = 262144, MAX_PIECE_A_ROUND = 4;
@@ -21,7 +22,7 @@ export class LogTail {
       const answer = await raw("GET", `/v1/jobs/${id}/log?offset=${this.offset ?? -START_BYTES}&max_bytes=${PIECE}`);
       const text = answer.status === 204 ? "" : await answer.text();
       const next = Number(answer.headers.get("Selvedge-Next-Offset")), all = Number(answer.headers.get("Selvedge-Log-Size"));
-      if (this.offset !== null && next < this.offset) this.reset(); // the log was started afresh
+      if (this.offset !== null && next < this.offset) this.reset(); // the log was started again
       const first = this.offset === null;
       this.offset = next;
       if (text === "") break;

@@ -1,4 +1,4 @@
-// Small parts of pages: elements without innerHTML (names come from users), numbers as text.
+// Small parts of pages: elements made without innerHTML, because names come from users, and numbers as text.
 
 export function el(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
@@ -20,7 +20,7 @@ export function svg(tag, attributes = {}, ...children) {
   return node;
 }
 
-// Replace the children only when they differ in what `key` says, so that a poll does not disturb a selection or a scroll position.
+// Replaces the children only if `key` has changed, so that polling does not disturb a selection or a scroll position.
 export function refill(node, key, make) {
   const text = JSON.stringify(key);
   if (node.dataset.key === text) return;
@@ -44,7 +44,7 @@ export function size(n) {
   return `${n.toFixed(i === 0 || n >= 99.95 ? 0 : n >= 9.995 ? 1 : 2)} ${unit[i]}`;
 }
 
-// As many digits as the standard error warrants.
+// Formats a value with as many digits as its standard error justifies.
 export function withError(value, se) {
   if (!isNumber(value)) return "–";
   if (!isNumber(se) || se <= 0) return Number(value.toPrecision(4)).toString();
@@ -57,7 +57,7 @@ export const percentWithError = (x, se, digits = 2) => (isNumber(x) && isNumber(
 export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
 export const stateTag = (state) => el("span", { class: `state ${state}` }, state);
 
-// Linear radiance to an sRGB byte colour.
+// Converts linear radiance to an sRGB byte colour.
 export function colour(rgb, exposure) {
   const byte = (x) => {
     const v = Math.min(1, Math.max(0, x * exposure));

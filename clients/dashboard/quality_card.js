@@ -1,4 +1,4 @@
-// What the job's geometry is worth: the key figures, the length distribution, and the way to the whole report.
+// Shows the quality of the job's geometry: the key figures, the length distribution, and a link to the full report.
 import { el, isNumber, percent, withError } from "./page_parts.js";
 
 const number = (x, digits = 3) => (isNumber(x) ? String(Number(x.toPrecision(digits))) : "–");
@@ -6,14 +6,14 @@ const pair = (v, show) => (v ? v.map((x) => (isNumber(x) ? show(x) : "–")).joi
 
 const radius = (g) => (g.radius_per_axis ? g.radius_um.map((r, i) => withError(r, g.radius_se_um?.[i])).join(" / ") : withError(g.mean_radius_um, g.radius_se_um?.[0])) + " µm";
 
-// [[name, value, what it means]] from result.json's geometry
+// Returns rows [name, value, meaning] from the geometry of result.json.
 export function qualityRows(g) {
   const rows = [["fibers", `${g.n_fiber}, ${number(g.total_length_mm)} mm`, ""], ["radius", radius(g), g.radius_per_axis ? "weft / warp / pile" : ""]];
   if (g.input === "volume") rows.push(
-    ["material explained (Dice)", number(g.dice), "overlap of fibers and material, 1 is all"],
+    ["material explained (Dice)", number(g.dice), "overlap of fibers and material; 1 is complete"],
     ["gaps bridged, pieces joined", `${g.n_gap_bridged}, ${g.n_joined}`, ""],
-    ["fiber diameter", `${number(g.fiber_diameter_voxel)} voxels`, "4 and more tell fibers apart"],
-    ["direction noise", pair(g.direction_noise_deg, (x) => `${number(x)}°`), "voxel to voxel, before / after the fibers' directions were taken"],
+    ["fiber diameter", `${number(g.fiber_diameter_voxel)} voxels`, "fibers are distinguished from 4 on"],
+    ["direction noise", pair(g.direction_noise_deg, (x) => `${number(x)}°`), "between neighbouring voxels, before / after fiber directions replaced those of voxels"],
     ["density step at the seams", pair(g.seam_density?.ratio, (x) => number(x)), "across x / y; 1 is no seam"]);
   rows.push(["fiber ends that continue", pair(g.seam_fibers?.continued, (x) => percent(x, 0)), "across the seams in x / y"]);
   const a = g.alignment;
@@ -31,5 +31,5 @@ export function qualityCard(job, files) {
     el("div", { class: "columns" },
       el("table", {}, el("tbody", {}, qualityRows(g).map(([name, value, hint]) => el("tr", {}, el("td", {}, name), el("td", { class: "number" }, value), el("td", { class: "hint" }, hint))))),
       plot ? el("img", { src: plot.url, alt: "length distribution of the fibers", class: "plot", loading: "lazy" }) : null),
-    page ? el("p", {}, el("a", { href: page.url, target: "_blank" }, "Whole quality report")) : null);
+    page ? el("p", {}, el("a", { href: page.url, target: "_blank" }, "Full quality report")) : null);
 }

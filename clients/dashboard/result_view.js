@@ -1,9 +1,10 @@
-// One place that knows the shapes of result.json and of series records (docs/file-formats.md); the rest of the page sees only this.
+// The only file that knows the structure of result.json and of series records (docs/file-formats.md). Other files use
+// its functions.
 import { isNumber } from "./page_parts.js";
 
 const CHANNEL = { r: 0, g: 1, b: 2 };
 
-// [{symbol, unit, flat: [{i, name, channel}]}] from parameter names such as "C_R.r", "beta_TT".
+// Returns [{symbol, unit, flat: [{i, name, channel}]}] from parameter names such as "C_R.r", "beta_TT".
 export function parameterGroups(parameters) {
   const groups = [];
   parameters.forEach((p, i) => {
@@ -15,27 +16,29 @@ export function parameterGroups(parameters) {
   return groups;
 }
 
-// What the n numbers of a model's points are: [{name, unit, lower, upper, fixed}]. The series describes its models; a series without that is of a job with one.
+// Describes the n numbers of a model's points: [{name, unit, lower, upper, fixed}]. A series describes its models; one
+// without descriptions belongs to a job with a single model.
 export function describedParameters(model, job, n) {
   if (model?.parameters?.length === n) return model.parameters;
   if (job.parameters?.length === n) return job.parameters;
   return Array.from({ length: n }, (_, i) => ({ name: `parameter ${i + 1}`, unit: "" }));
 }
 
-// What models are compared by: where each photograph has a gain of its own, the errors with these.
+// Errors by which models are compared: if each photograph has a gain of its own, the errors with these gains.
 function comparedErrors(m) {
   if (!isNumber(m.fit_rel_rms_with_gains)) return { fit: m.fit_rel_rms, fitSe: m.fit_rel_rms_se, held: m.heldout_rel_rms, heldSe: m.heldout_rel_rms_se, withGains: false };
   return { fit: m.fit_rel_rms_with_gains, fitSe: m.fit_rel_rms_with_gains_se, held: m.heldout_rel_rms_with_gains, heldSe: m.heldout_rel_rms_with_gains_se, withGains: true };
 }
 
-// Every model of the job: [{id, title, best, converged, fit, held, withGains, paths, seconds, parameters}]
+// Returns all models of the job: [{id, title, best, converged, fit, held, withGains, paths, seconds, parameters}]
 export function models(job) {
   return (job.result?.models ?? []).map((m) => ({
     id: m.id, title: m.title, best: m.best, converged: m.converged, paths: m.n_path_fit, seconds: m.fit_wall_s, parameters: fitted(m), ...comparedErrors(m),
   }));
 }
 
-// The fitted parameters of a job or of one of its models: [{name, unit, value, se, flags: [text], lower, upper}]
+// Returns the fitted parameters of a job or of one of its models: [{name, unit, value, se, flags: [text], lower,
+// upper}]
 export function fitted(of) {
   return (of.parameters ?? []).map((p) => {
     const flags = [];
@@ -51,7 +54,8 @@ export function fitted(of) {
   });
 }
 
-// The search for the fiber radius: {value, se, start, flags, curve: [{radius, f, se}]} by rising radius, or null.
+// Returns the search for the fiber radius, {value, se, start, flags, curve: [{radius, f, se}]} by rising radius, or
+// null.
 export function radiusSearch(job) {
   const r = job.result?.radius;
   if (!r) return null;
@@ -60,7 +64,7 @@ export function radiusSearch(job) {
   return { value: r.radius_um, se: r.standard_error_um, start: r.start_um, flags, curve };
 }
 
-// Every configuration: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error}]
+// Returns all configurations: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error}]
 export function configurations(job, urls) {
   return (job.result?.rows ?? []).map((c) => {
     const measured = c.measured, rendered = c.rendered;
@@ -73,7 +77,7 @@ export function configurations(job, urls) {
   });
 }
 
-// Pictures of slices and the fiber file among the results.
+// The pictures of slices and the fiber file among the results.
 export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
 export const fiberFile = (files) => files.find((f) => f.path.endsWith(".hair")) ?? null;
 export const residuals = (job) => ({

@@ -1,4 +1,5 @@
-// Talking to the daemon: JSON with ETags, problem documents as errors, polling that slows down when nobody looks.
+// Communication with the daemon: JSON with ETags, problem documents as errors, and polling that slows down on hidden
+// pages.
 
 export class Problem extends Error {
   constructor(status, body) {
@@ -10,7 +11,7 @@ export class Problem extends Error {
   }
 }
 
-const cached = new Map(); // url -> {etag, value}; a page looks at a handful of addresses
+const cached = new Map(); // url -> {etag, value}; a page requests only a few addresses
 const KEEP = 40;
 
 let token = sessionStorage.getItem("selvedge-token");
@@ -60,8 +61,8 @@ function showConnection(error) {
   connection.classList.toggle("lost", Boolean(error));
 }
 
-// Calls `work` again and again until stop() is called. work returns the seconds to wait; a hidden page waits ten times as long and
-// looks at once when it is shown again; after an error the pause grows.
+// Calls `work` repeatedly until stop() is called. `work` returns the seconds to wait. A hidden page waits ten times as
+// long, and polls at once when it is shown again. After errors the wait grows.
 export function poll(work) {
   let stopped = false, timer = null, failures = 0, busy = false;
   const round = async () => {
@@ -75,7 +76,7 @@ export function poll(work) {
     } catch (error) {
       failures++;
       wait = Math.min(30, 2 ** failures);
-      if (!stopped) showConnection(error instanceof Problem ? error.message : "The server does not answer; trying again.");
+      if (!stopped) showConnection(error instanceof Problem ? error.message : "The server does not reply; trying again.");
       if (!(error instanceof Problem) && !(error instanceof TypeError)) console.error(error);
     }
     busy = false;

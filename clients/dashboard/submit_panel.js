@@ -1,4 +1,5 @@
-// Drag and drop: a job document (*.json) and the files that it names. Uploads go through tus and continue after a broken connection.
+// Drag and drop of a job document (*.json) and the files that it names. Files are uploaded by tus; uploads continue
+// after a broken connection.
 import { el, size } from "./page_parts.js";
 import { getJson, raw, sendJson } from "./server_link.js";
 
@@ -14,7 +15,7 @@ function filesOf(doc) {
   return list;
 }
 
-// The browser's digest wants the whole file in memory; larger ones are sent without a checksum of ours.
+// The browser's digest needs the whole file in memory, so larger files are sent without a checksum.
 async function sha256(file) {
   if (!globalThis.crypto?.subtle || file.size > MAX_HASHED) return null;
   const digest = await crypto.subtle.digest("SHA-256", await file.arrayBuffer());
@@ -59,14 +60,15 @@ function removeFile(job, name) {
 async function declare(job, f, file) {
   const url = `/v1/jobs/${job}/files`, ask = { name: f.name, role: f.role, size: file.size, sha256: await sha256(file) };
   try { return await sendJson("POST", url, ask); } catch (error) { if (error.body?.code !== "exists") throw error; }
-  await removeFile(job, f.name); // the file was changed since an earlier try
+  await removeFile(job, f.name); // the file has changed since an earlier try
   return sendJson("POST", url, ask);
 }
 
 export function submitPanel() {
   const dropped = new Map();
   let doc = null, source = null, busy = false;
-  let key = null, sent = new Map(); // as long as the document is the same: what a broken submit has made, the next one goes on with
+  // kept while the document is the same, so that another try continues an interrupted submit
+  let key = null, sent = new Map();
   const list = el("ul"), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
   const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
   const wanted = () => (doc ? filesOf(doc) : []);
@@ -77,7 +79,7 @@ export function submitPanel() {
       el("span", {}, dropped.has(f.name) ? size(dropped.get(f.name).size) : el("span", { class: "tag warn" }, "still missing")))));
     allow();
     if (busy) return;
-    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files still missing: drop them here.`);
+    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
     else if (doc) say("Ready.");
   };
   const take = async (files) => {
@@ -102,21 +104,21 @@ export function submitPanel() {
     allow();
     const files = wanted(), known = sent;
     try {
-      // as it was written: a number above 2^53 does not survive JSON.parse
+      // sent as it was written, because JSON.parse does not keep numbers above 2^53
       const job = await (await raw("POST", "/v1/jobs", { body: source, header: { "Content-Type": "application/json", "Idempotency-Key": key } })).json();
       const piece = await pieceBytes();
       for (const [i, f] of files.entries()) {
         const file = dropped.get(f.name), mark = `${job.id} ${file.size} ${file.lastModified}`;
         const label = (n) => say(`${i + 1} of ${files.length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
         label(0);
-        // another file of the same name: the bytes of the first must not be continued with its own
+        // a different file of the same name: its bytes must not continue those of the first
         if (known.has(f.name) && known.get(f.name) !== mark) await removeFile(job.id, f.name);
         known.set(f.name, mark);
         const state = await declare(job.id, f, file);
         if (state.state !== "complete") await upload(file, state.upload_url, piece, label);
       }
       await sendJson("POST", `/v1/jobs/${job.id}/start`);
-      key = newKey(); // the same document once more is another job
+      key = newKey(); // submitting the same document again makes another job
       sent = new Map();
       location.hash = job.id;
     } catch (error) {

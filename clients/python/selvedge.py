@@ -24,7 +24,7 @@ ENDED = ("succeeded", "failed", "cancelled")
 
 
 class Problem(Exception):
-    """A problem document (RFC 9457). `code` is stable; `field` names what is at fault, "" when nothing in particular."""
+    """A problem document (RFC 9457). `code` is stable; `field` names what is at fault, or is ""."""
 
     def __init__(self, status, body):
         self.status, self.body = status, body
@@ -43,7 +43,7 @@ class JobFailed(Exception):
 
 
 def files_of(document):
-    """The input files that a job document names: [(name, role), ...], each once."""
+    """Return the input files that a job document names, each once: [(name, role), ...]."""
     names = [(n, "volume") for n in document.get("volume", {}).get("files", [])]
     for key, role in (("fibers", "fibers"), ("measurements", "measurements")):
         if key in document:
@@ -53,7 +53,7 @@ def files_of(document):
 
 
 class Server:
-    """One daemon. `token`: access token, default from SELVEDGE_TOKEN. Not to be shared between threads."""
+    """One daemon. `token`: access token, by default from SELVEDGE_TOKEN. Not to be shared between threads."""
 
     def __init__(self, url=None, token=None, timeout_s=60):
         self.url = (url or os.environ.get("SELVEDGE_SERVER") or "http://127.0.0.1:7878").rstrip("/")
@@ -66,7 +66,7 @@ class Server:
             self.session.headers["Authorization"] = f"Bearer {token}"
 
     def request(self, method, path, **arguments):
-        """A request that must succeed; returns requests.Response. Raises Problem, or requests.ConnectionError."""
+        """Send a request that must succeed, and return requests.Response. Raises Problem or requests.ConnectionError."""
         answer = self.session.request(method, self.url + path, timeout=self.timeout_s, **arguments)
         if answer.status_code >= 400:
             try:
@@ -77,14 +77,14 @@ class Server:
         return answer
 
     def piece_bytes(self):
-        """What one request of an upload carries: 16 MiB, or the server's limit where that is less. Asked once."""
+        """Size of one piece of an upload: 16 MiB, or the server's limit if that is smaller. The server is asked once."""
         if self._piece is None:
             limits = self.request("GET", "/v1/about").json().get("limits", {})
             self._piece = min(PIECE, limits.get("max_patch_bytes", PIECE))
         return self._piece
 
     def jobs(self):
-        """Summaries of all jobs, newest first."""
+        """Return summaries of all jobs, newest first."""
         cursor = ""
         while True:
             page = self.request("GET", f"/v1/jobs?limit=100&cursor={cursor}" if cursor else "/v1/jobs?limit=100").json()
@@ -94,16 +94,17 @@ class Server:
                 return
 
     def job(self, job_id):
-        """An existing job."""
+        """Return an existing job."""
         return Job(self, job_id)
 
     def create(self, document):
-        """A draft from a job document (a dict). Safe to repeat within one call: an idempotency key goes with it."""
+        """Create a draft from a job document (a dict). Retries within one call are safe: they carry an idempotency key."""
         answer = self.request("POST", "/v1/jobs", json=document, headers={"Idempotency-Key": uuid.uuid4().hex})
         return Job(self, answer.json()["id"])
 
     def submit(self, document, folder=None):
-        """Create, upload, start. document: a dict, or the path of a JSON file (whose folder is then the default of `folder`)."""
+        """Create a job, upload its files and start it. document: a dict, or the path of a JSON file, whose folder is
+        then the default of `folder`."""
         if not isinstance(document, dict):
             folder = folder or os.path.dirname(os.path.abspath(document))
             with open(document, encoding="utf-8") as f:
@@ -116,18 +117,18 @@ class Server:
 
 
 class Job:
-    """One job of a server. Methods ask the server every time; nothing is kept but the id."""
+    """One job of a server. Methods ask the server every time; only the id is kept."""
 
     def __init__(self, server, job_id):
         self.server, self.id = server, job_id
         self.path = f"/v1/jobs/{job_id}"
 
     def state(self):
-        """The whole job object of docs/api.md."""
+        """Return the whole job object of docs/api.md."""
         return self.server.request("GET", self.path).json()
 
     def upload(self, path, role, name=None):
-        """Declare one file and send it (tus): continues where an earlier upload stopped, checks the SHA-256 at the end."""
+        """Declare a file and send it by tus; continues an earlier upload. The server checks the SHA-256 at the end."""
         digest = hashlib.sha256()
         with open(path, "rb") as f:
             while chunk := f.read(1 << 20):
@@ -160,15 +161,15 @@ class Job:
                 time.sleep(0.25 * 2 ** failures)
 
     def start(self):
-        """Queue the job. Problem "files_missing" when inputs are not complete."""
+        """Queue the job. Raises Problem "files_missing" if inputs are incomplete."""
         return self.server.request("POST", self.path + "/start").json()
 
     def cancel(self):
-        """Ask the worker to stop; what it has computed is kept."""
+        """Ask the worker to stop; its results so far are kept."""
         return self.server.request("POST", self.path + "/cancel").json()
 
     def retry(self):
-        """Failed or cancelled: go on from the last checkpoint."""
+        """Start a failed or cancelled job again from its last checkpoint."""
         return self.server.request("POST", self.path + "/retry").json()
 
     def delete(self):
@@ -176,7 +177,8 @@ class Job:
         self.server.request("DELETE", self.path)
 
     def wait(self, report=None, interval_s=1.0):
-        """Until the job has ended; returns its state, raises JobFailed unless it succeeded. report(text) gets a line whenever something changed."""
+        """Wait until the job has ended; return its state, or raise JobFailed unless it succeeded. report(text) is
+        called whenever something changed."""
         shown = None
         while True:
             job = self.state()
@@ -193,16 +195,18 @@ class Job:
             time.sleep(interval_s)
 
     def parameters(self):
-        """Fitted parameters: dicts with name, unit, value, standard_error, lower, upper, determined ... None before the end."""
+        """Return the fitted parameters: dicts with name, unit, value, standard_error, lower, upper, determined ... None
+        before the end."""
         return self.state()["parameters"]
 
     def models(self):
-        """Every model of the job, in its order: dicts with id, best, fit_rel_rms, heldout_rel_rms, parameters ... None before the end."""
+        """Return all models of the job in order: dicts with id, best, fit_rel_rms, heldout_rel_rms, parameters ... None
+        before the end."""
         result = self.state()["result"]
         return result and result.get("models")
 
     def series(self):
-        """All points of the fit's curve, oldest first (more than 5000 are thinned by the server)."""
+        """Return all points of the fit's curve, oldest first (the server merges more than 5000)."""
         points, after = [], -1
         while True:
             page = self.server.request("GET", f"{self.path}/series?after_step={after}&max_points=5000").json()
@@ -212,16 +216,16 @@ class Job:
             after = page["next_after_step"]
 
     def log(self, offset=0):
-        """The log as text from a byte offset on (negative: from the end)."""
+        """Return the log as text from a byte offset on (negative: from the end)."""
         return self.server.request("GET", f"{self.path}/log?offset={offset}&max_bytes=1048576").text
 
     def download(self, folder):
-        """All results into a folder; returns their paths."""
+        """Download all results to a folder and return their paths."""
         paths = []
         for entry in self.server.request("GET", self.path + "/results").json()["files"]:
             parts = entry["path"].split("/")
             if any(p in ("", ".", "..") for p in parts):
-                raise ValueError(f"the server lists an unusable name: {entry['path']!r}")
+                raise ValueError(f"the server lists a result with an unusable name: {entry['path']!r}")
             path = os.path.join(folder, *parts)
             os.makedirs(os.path.dirname(path), exist_ok=True)
             self._fetch(entry["url"], path + ".part")
@@ -230,11 +234,11 @@ class Job:
         return paths
 
     def _fetch(self, url, path):
-        """One file, whole: goes on by range after a broken connection, from the start when the file has changed since."""
+        """Download one file: continue by range after a broken connection, or from the start if the file has changed."""
         failures, n, tag = 0, 0, None
         with open(path, "wb") as f:
             while True:
-                header = {"Accept-Encoding": "identity"}  # bytes as they are stored, so that they can be counted
+                header = {"Accept-Encoding": "identity"}  # uncompressed, so that the bytes can be counted
                 if n and tag:
                     header.update({"Range": f"bytes={n}-", "If-Range": tag})
                 try:
@@ -244,7 +248,7 @@ class Job:
                             n, tag = 0, answer.headers.get("ETag")
                             f.seek(0)
                             f.truncate()
-                        # for `requests` a reply that is cut off has just ended: only its length tells
+                        # `requests` treats an incomplete reply as ended, so its length is checked
                         length = answer.headers.get("Content-Length")
                         end = None if length is None else n + int(length)
                         for chunk in answer.iter_content(1 << 20):
@@ -253,7 +257,7 @@ class Job:
                             failures = 0 if continued else failures
                     if end is None or n == end:
                         return
-                    raise requests.ConnectionError(f"'{url}' was cut off after {n} of {end} bytes")
+                    raise requests.ConnectionError(f"'{url}' ended early, after {n} of {end} bytes")
                 except (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError):
                     failures += 1
                     if failures > 6:

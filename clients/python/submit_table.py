@@ -1,4 +1,4 @@
-"""Example: fit one scan to every table of a folder, and print held-out errors.
+"""Example: fit one scan to each of several tables of measurements, and print the errors.
 
     python3 clients/python/submit_table.py scan.tif 2.0 measured/*.csv
 """

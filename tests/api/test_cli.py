@@ -1,4 +1,4 @@
-"""The command line client and the Python client against a real daemon; the worker is a stub that computes nothing."""
+"""The command line client and the Python client with a real daemon. The worker is a stub that computes nothing."""
 import json
 import os
 import pty
@@ -38,7 +38,8 @@ class Daemon:
 
 
 class CuttingProxy:
-    """Forwards to a port; the connections whose number is in `cuts` are broken after that many bytes from the client, or to it."""
+    """Forwards connections to a port. Those whose number is in `cuts` are broken after that many bytes from the client,
+    or with `replies` to it."""
 
     def __init__(self, port, cuts, replies=False):
         self.port, self.cuts, self.replies, self.n = port, list(cuts), replies, 0
@@ -118,7 +119,7 @@ def test_from_submit_to_results(daemon, sample, tmp_path):
     assert "2 files in place" in done.stderr and "fit (6/8)" in done.stderr and "objective" in done.stderr
     assert "C_TT.r" in done.stdout and "+- 0.010" in done.stdout and "not determined" in done.stdout
     assert "held out: 3.00 %" in done.stdout
-    assert "\x1b" not in done.stderr  # no escapes where there is no terminal
+    assert "\x1b" not in done.stderr  # no escape sequences outside a terminal
     out = tmp_path / "results"
     run(daemon.url, "results", job_id, "--out", out)
     assert (out / "renderings" / "fit-00.bin").read_bytes() == bytes(range(256)) * 400
@@ -143,7 +144,7 @@ def test_failed_job_names_its_field(daemon, sample):
     assert "error: volume.files: job" in done.stderr and "page 2 is 8-bit" in done.stderr
     job_id = done.stdout.splitlines()[0]
     assert "page 2 is 8-bit" in run(daemon.url, "status", job_id).stdout
-    # replace the scan and go on with the same job: only the changed file is sent again
+    # replace the scan and continue with the same job: only the changed file is sent again
     (sample / "scan.tif").write_bytes(b"another scan")
     write_document(sample, "repaired twill")
     again = run(daemon.url, "submit", "--resume", job_id, sample / "job.json", "--watch")
@@ -203,7 +204,7 @@ def test_not_a_selvedge_server(tmp_path):
 
 
 def test_upload_goes_on_after_broken_connections(daemon, sample):
-    """The first connections break in the middle of the scan; the client asks for the offset and goes on."""
+    """The first connections break in the middle of the scan. The client asks for the offset and continues."""
     proxy = CuttingProxy(daemon.port, [500_000, 700_000, 400, 900_000])
     try:
         done = run(proxy.url, "submit", sample / "job.json", "--watch")
@@ -223,7 +224,8 @@ def test_pieces_are_no_larger_than_the_server_takes(sample, tmp_path):
 
 
 def test_interrupted_submit_is_continued(daemon, sample):
-    """Killed in the middle of the upload; --resume needs the id only when the files are at hand."""
+    """A submit is killed in the middle of the upload. --resume needs only the id if the files are in the current
+    folder."""
     (sample / "scan.tif").write_bytes(os.urandom(40_000_000))
     client = subprocess.Popen([CLI, "--server", daemon.url, "submit", str(sample / "job.json")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     job_id = client.stderr.readline().split()[1]
@@ -253,7 +255,7 @@ def test_interrupt_says_how_to_continue(daemon, sample):
 
 
 def test_live_line_in_a_terminal(daemon, sample):
-    """In a terminal one line is redrawn in place and wiped at the end."""
+    """In a terminal one line is redrawn in place and cleared at the end."""
     parent, child = pty.openpty()
     client = subprocess.Popen([CLI, "--server", daemon.url, "submit", "--watch", str(sample / "job.json")], stdout=subprocess.PIPE, stderr=child, text=True)
     os.close(child)
@@ -275,7 +277,7 @@ def test_live_line_in_a_terminal(daemon, sample):
 
 
 def test_a_large_result_that_changed_since_its_download_broke_off(daemon, sample, tmp_path):
-    """Its first piece is of the old file: all of it comes anew, in pieces."""
+    """The downloaded first piece is of the old file, so the whole new file is downloaded, in pieces."""
     job_id = run(daemon.url, "submit", sample / "job.json", "--watch").stdout.split()[0]
     large = os.path.join(daemon.folder, "jobs", job_id, "results", "large.bin")
     with open(large, "wb") as f:

@@ -1,7 +1,8 @@
-"""What a reply promises is on the disk before the reply is sent: bytes of uploads, files at their final names, the database.
+"""What a reply confirms is on disk before the reply is sent: bytes of uploads, files at their final names, the
+database.
 
-A preloaded library records the daemon's writes and syncs in their order. A power cut cannot be made here; a missing sync can be seen.
-"""
+A preloaded library records the order of the daemon's writes and syncs. The test cannot cut the power, but a missing
+sync shows in the record."""
 import pytest
 from daemon_under_test import Daemon, document
 from system_calls import Trace
@@ -9,14 +10,14 @@ from system_calls import Trace
 
 @pytest.fixture
 def traced(shim, tmp_path):
-    """A daemon and the trace of its system calls."""
+    """A daemon, and the trace of its system calls."""
     trace = Trace(shim, tmp_path / "trace")
     with Daemon(tmp_path / "data", environment=trace.environment) as d:
         yield d, trace
 
 
 def last(calls, call, part):
-    """Index of the last such call on a file with `part` in its path; -1: none."""
+    """Returns the index of the last such call on a file with `part` in its path, or -1."""
     return max((i for i, (c, path) in enumerate(calls) if c == call and part in path), default=-1)
 
 
@@ -53,7 +54,8 @@ def test_received_bytes_are_durable_before_their_offset_is(traced):
 
 
 def test_a_complete_file_is_durable_at_its_final_name(traced):
-    """The last bytes, then the folder that the file is moved to and the folder that it leaves, then the row that says so."""
+    """The last bytes are synced first, then the folder that the file is moved to and the folder that it leaves, then
+    its row in the database."""
     d, trace = traced
     job = d.create(document("succeed"))
     data = b"x" * 1000

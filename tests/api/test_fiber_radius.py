@@ -1,4 +1,5 @@
-"""A cloth whose file states fibers 1.3 times too thick: the search for the radius brings them back, within its standard error."""
+"""The file of a cloth states fibers 1.3 times too thick. The search for the radius finds the true radius within its
+standard error."""
 import json
 import os
 import shutil
@@ -9,13 +10,13 @@ import pytest
 from daemon_under_test import program
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
-TRUTH_UM, FACTOR = 7.0, 1.3  # of the phantom at 7 voxels of 2 um a diameter
+TRUTH_UM, FACTOR = 7.0, 1.3  # radius of the phantom's fibers: 7 voxels of 2 um in diameter
 VIEWS = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg\n" + "".join(
     f"fit,{light},0,{camera},180,{turn}\n" for light, camera, turn in [(20, 20, 0), (45, 45, 0), (60, 0, 0), (60, 60, 90), (30, 0, 90), (70, 30, 90)])
 
 
 def thicker(hair):
-    """The same .hair file with every thickness multiplied."""
+    """Returns the .hair file with every thickness multiplied."""
     data = bytearray(hair)
     strands, points, flags = struct.unpack_from("<III", data, 4)
     assert flags & 7 == 7

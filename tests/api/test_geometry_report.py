@@ -1,4 +1,5 @@
-"""What a job says about its geometry, through daemon and real worker: quality report, warnings, alignment that can be repeated by hand."""
+"""What a job reports about its geometry, through the daemon and the real worker: the quality report, warnings, and an
+alignment that can be repeated by hand."""
 import os
 import subprocess
 
@@ -37,7 +38,7 @@ def result(d, job):
 
 
 def test_fibers_as_text_and_their_report(real, phantom):
-    """A fiber file in the wrong unit: the job runs, and says so wherever a user looks."""
+    """The unit of a fiber file is wrong. The job runs, and every view of it shows a warning."""
     text = "\n".join(" ".join(f"{float(v) / 1000:.9g}" for v in line.split()) for line in (phantom / "truth.txt").read_text().splitlines())
     job = run(real, {"fibers": {"file": "cloth.txt", "tile_mm": [0.01, 0.01]}}, [("cloth.txt", "fibers", text.encode())])
     state = result(real, job)

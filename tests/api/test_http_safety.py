@@ -1,4 +1,4 @@
-"""Hostile and careless clients: framing, slow drip, other hosts' pages, many idle connections."""
+"""Hostile and careless clients: ambiguous framing, slow requests, pages of other sites, many idle connections."""
 import os
 import re
 import socket
@@ -10,7 +10,7 @@ from daemon_under_test import DOCUMENT, Daemon, ROOT, problem, program, wait_unt
 
 
 def raw(daemon, text, wait_s=10):
-    """Send bytes, read until the server closes or is silent for a while after an answer."""
+    """Sends bytes, and reads until the server closes the connection or is silent for a while after a reply."""
     with socket.create_connection(("127.0.0.1", daemon.port)) as s:
         s.sendall(text if isinstance(text, bytes) else text.encode())
         s.settimeout(wait_s)

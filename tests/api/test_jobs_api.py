@@ -1,4 +1,4 @@
-"""Jobs: creating, editing, listing, starting, cancelling, deleting."""
+"""Creating, editing, listing, starting, cancelling and deleting jobs."""
 import contextlib
 import json
 import os
@@ -90,7 +90,7 @@ def test_replace_document(daemon):
 
 
 def test_one_of_two_editors_with_the_same_tag_wins(daemon):
-    """What If-Match is for: nobody's edit is lost unseen, however close the two come."""
+    """If-Match prevents that one editor's change silently replaces another's, however close in time the two are."""
     job, n = daemon.create(), 8
     host = daemon.url.split("//")[1]
     address = (host.split(":")[0], int(host.split(":")[1]))
@@ -102,7 +102,7 @@ def test_one_of_two_editors_with_the_same_tag_wins(daemon):
             s.sendall((f"PUT /v1/jobs/{job}/document HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nIf-Match: {tag}\r\n"
                        f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n{body[:-1]}").encode())
             sockets.append(s)
-        for s in sockets:  # the last byte of all at once
+        for s in sockets:  # the last bytes of both requests at the same moment
             s.sendall(b"}")
         codes = [s.recv(4096).split()[1] for s in sockets]
         for s in sockets:
@@ -173,7 +173,7 @@ def test_failed_job_is_edited_and_started_again(daemon):
     assert daemon.post(f"/v1/jobs/{job}/retry").status_code == 202
     failed = daemon.wait_state(job, "failed")
     assert failed["attempt"] == 2 and failed["generation"] == 1
-    # the user replaces one file: the others stay, and the next start begins afresh
+    # the user replaces one file: the others stay, and the next start discards earlier progress
     problem(daemon.post(f"/v1/jobs/{job}/files", json={"name": "scan.tif", "role": "volume", "size": 3}), 409, "exists", "name")
     assert daemon.delete(f"/v1/jobs/{job}/files/scan.tif").status_code == 204
     assert daemon.job(job)["state"] == "draft" and daemon.job(job)["missing_files"] == ["scan.tif"]
@@ -269,7 +269,7 @@ def test_a_stored_document_that_is_refused_today_can_still_be_read(daemon_maker)
     assert seen["state"] == "draft" and d.job(done)["result"]["run"] == 1
     problem(d.post(f"/v1/jobs/{draft}/start"), 422, "invalid", "fit.fixed.beta_Q")
     problem(d.put(f"/v1/jobs/{draft}/document", json=old), 422, "invalid", "fit.fixed.beta_Q")
-    # the tag of such a job is good for the edit that mends it
+    # the tag of such a job can be used for the edit that corrects it
     tag = d.get(f"/v1/jobs/{draft}").headers["ETag"]
     assert d.put(f"/v1/jobs/{draft}/document", json=DOCUMENT, headers={"If-Match": tag}).status_code == 200
     assert d.job(draft)["missing_files"] == ["scan.tif", "rows.csv"]
@@ -286,7 +286,8 @@ def test_a_daemon_that_cannot_announce_itself_runs(daemon_maker):
 
 @pytest.mark.skipif("asan" in BUILD, reason="the sanitizer keeps what was freed")
 def test_lists_and_the_start_do_without_documents(daemon_maker):
-    """Documents may have a megabyte each: what shows many jobs does not read them, and what writes such rows back keeps them."""
+    """Documents may have a megabyte each. Lists of jobs do not read them, and updates of such rows leave them
+    unchanged."""
     d = daemon_maker()
     running, jobs = d.start_job("work_once"), [d.create() for _ in range(60)]
     d.wait_state(running, "running")

@@ -1,4 +1,5 @@
-"""config/openapi.json is valid, is what the daemon serves, and tells the truth. (conftest.py holds every reply of every API test against it.)"""
+"""config/openapi.json is valid and is what the daemon serves. conftest.py compares every reply of every API test with
+it."""
 import json
 import os
 import re
@@ -57,7 +58,7 @@ def test_problem_codes_are_documented():
 
 
 def key_lists():
-    """The lists of keys that the parser of job documents allows, as sets."""
+    """Returns the lists of keys that the parser of job documents allows, as sets."""
     source = ""
     for name in sorted(os.listdir(os.path.join(ROOT, "optimizer"))):
         if re.fullmatch(r"job_document\w*\.c", name):
@@ -97,7 +98,7 @@ def test_examples_fit_the_description():
 
 
 def test_iterations_of_several_starts(daemon):
-    """Description and daemon draw the same limit, which the guide names."""
+    """Description, daemon and guide state the same limit."""
     validator = OpenApiCheck().validator({"$ref": "#/components/schemas/JobDocument"})
     for starts, iterations, good in ((1, 501, True), (2, 500, True), (2, 501, False)):
         document = {"sample": "s", "volume": {"files": ["a.tif"]}, "measurements": {"file": "a.csv"},
@@ -135,13 +136,13 @@ def test_unknown_fields_are_refused_wherever_they_stand(daemon):
         dict(objects_within(document))[path]["colour"] = 1
         r = daemon.post("/v1/jobs", json=document)
         assert r.status_code == 422 and r.json()["code"] == "invalid", (path, r.text)
-        # a name in a list of parameters that are tied stands for the list
+        # a name in a list of tied parameters stands for the list
         assert r.json()["field"] in ((path + "." if path else "") + "colour", path), (path, r.json())
         assert "colour" in r.json()["detail"], (path, r.json())
 
 
 def test_every_operation_answers_as_documented(daemon):
-    """The happy path through all of them; the check in the fixture does the comparing."""
+    """Calls each operation successfully once; the fixture compares every reply with the description."""
     job = daemon.start_job("series 20")
     daemon.wait_state(job, "succeeded")
     draft = daemon.create()
@@ -198,7 +199,7 @@ WORD = st.text(st.characters(min_codepoint=33, max_codepoint=126, blacklist_char
 @hypothesis.settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(hypothesis.HealthCheck))
 @hypothesis.given(data=st.data())
 def test_random_requests_get_documented_answers(daemon, data):
-    """Near-valid and random requests: always a documented status, never a 5xx but for a full disk."""
+    """Near-valid and random requests always get a documented status, and never a 5xx except for a full disk."""
     path, method, operation = data.draw(st.sampled_from(OPERATIONS))
     if not hasattr(daemon, "fuzz_job"):
         daemon.fuzz_job = daemon.create()

@@ -1,4 +1,5 @@
-"""The real worker under the daemon: a small job from scan to results, kills in mid-fit, and input that is not what it should be."""
+"""The real worker under the daemon: a small job from scan to results, kills in the middle of the fit, and invalid
+input."""
 import io
 import json
 import math
@@ -20,7 +21,7 @@ TABLE = (HEAD + "\n".join(ROWS) + "\n").encode()
 
 
 def tiff(pages, width=24, height=24, value=lambda page, x, y: 0):
-    """A multi-page 8-bit TIFF; pages: list of (width, height) or a count."""
+    """Returns a multi-page 8-bit TIFF. pages: a list of (width, height), or a count."""
     sizes = [(width, height)] * pages if isinstance(pages, int) else pages
     out, offsets = bytearray(b"II*\0\0\0\0\0"), []
     for k, (w, h) in enumerate(sizes):
@@ -86,7 +87,7 @@ def test_from_scan_to_results(real, finished):
     assert all(b >= a - 1e-9 for a, b in zip(fractions, fractions[1:])) and fractions[-1] == 1
     stages = [s["name"] for s in real.get("/v1/about").json()["stages"]]
     passed = [stages.index(s) for _, s, _ in seen if s]
-    assert passed == sorted(passed) and len(set(passed)) >= 2  # a short stage may pass between two looks
+    assert passed == sorted(passed) and len(set(passed)) >= 2  # a short stage may pass between two polls
     j = real.job(job)
     assert j["parameters"] and all({"name", "value", "standard_error"} <= set(p) for p in j["parameters"])
     assert j["attempt"] == 1 and j["objective"] is not None
@@ -108,7 +109,7 @@ def steps(d, job):
 
 
 def strip(result):
-    """What has to be the same in two runs: parameters and their errors, not times."""
+    """Keeps what must be equal in two runs: parameters and their errors, not times."""
     return [(p["name"], p["value"], p["standard_error"]) for p in result["parameters"]]
 
 

@@ -1,4 +1,4 @@
-"""Series, log, results, archive, input files: what comes back."""
+"""Reading a job's series, log, results, archive and input files."""
 import io
 import json
 import os
@@ -69,7 +69,8 @@ N_ROW, SEARCH, STEPS = 300, 8, [500, 400]
 
 
 def write_long_series(path):
-    """A search for the radius with the second model, then the fits of two models, 300 rows a record: 12 MB."""
+    """Writes a search for the radius with the second model and then the fits of two models, with 300 rows in each
+    record: 12 MB."""
     rows = ",".join(["[0.123456789,0.234567891,0.345678912]"] * N_ROW)
     with open(path, "w") as f:
         for step in range(SEARCH + sum(STEPS)):
@@ -110,7 +111,8 @@ def test_long_series_costs_what_it_answers(daemon_maker):
     assert ["rendered" in p or "n_path_row" in p for p in whole["points"]] == [False] * (n - 1) + [True]
     few, _ = ask("max_points=11")
     assert len(few["points"]) == 11 and few["models"] == whole["models"]
-    assert process_number(pid, "status", "VmHWM") - peak < 8 << 10  # kB; the file alone has 12 MB, its records ten times as much
+    # kB; the file alone has 12 MB, and its parsed records ten times as much
+    assert process_number(pid, "status", "VmHWM") - peak < 8 << 10
     for after in [0, 7, 8, 450, 507, 508, 850]:
         some, _ = ask(f"after_step={after}&max_points=5000")
         assert some["points"] == whole["points"][after + 1:] and some["models"] == whole["models"], after
@@ -126,11 +128,11 @@ def test_long_series_costs_what_it_answers(daemon_maker):
     cut = ask("max_points=5000")[0]
     assert 0 < cut["n_step"] < n and cut["points"][:-1] == whole["points"][:cut["n_step"] - 1]
     os.truncate(path, 60_000)
-    assert [m["id"] for m in ask("")[0]["models"]] == []  # the search's second model does not stand in the first one's place
+    assert [m["id"] for m in ask("")[0]["models"]] == []  # the search's second model is not listed as the first
 
 
 def test_the_result_of_a_large_job_is_in_its_view(daemon):
-    """A table of thousands of rows in several models makes some 14 MB."""
+    """A table of thousands of rows in several models makes a result of about 14 MB."""
     job = daemon.start_job("succeed")
     daemon.wait_state(job, "succeeded")
     path = os.path.join(daemon.data, "jobs", job, "results", "result.json")
@@ -203,7 +205,7 @@ def test_big_archive_is_streamed_whole(daemon, done):
                                   "pictures", "pictures/", "link.txt", "linked/passwd", ".", "..", "result.json%00", "result.json%00.png", "x.tmp-AbCdEf",
                                   "result.json/x", "a" * 600, "a/" * 50 + "b"])
 def test_only_listed_paths_are_served(daemon, done, path):
-    # requests would tidy the path up: send it as it is
+    # http.client sends the path unchanged; requests would normalise it
     import http.client
     c = http.client.HTTPConnection("127.0.0.1", daemon.port)
     c.request("GET", f"/v1/jobs/{done}/results/{path}")

@@ -1,5 +1,5 @@
-"""Weights of rows, by the worker alone: only their ratios count, a row of weight 0 changes nothing, and a job without weights is refused.
-And what is told of parameters that the rows do not determine."""
+"""Weights of rows, with the worker alone: only their ratios matter, a row of weight 0 changes nothing, and a job in
+which all weights are 0 is refused. Also: warnings about parameters that the rows do not determine."""
 import csv
 import io
 import json
@@ -62,8 +62,9 @@ def test_only_ratios_count(plain, tmp_path, weight):
 def test_a_row_of_weight_0_changes_nothing(plain, tmp_path):
     result = run(tmp_path / "job", table(dead_weight=0))
     assert fitted(plain) == fitted(result) and result["n_path_fit"] == plain["n_path_fit"]
-    assert len(result["rows"]) == len(plain["rows"]) + 1  # it is rendered and shown all the same
-    assert result["fit_rel_rms"] == pytest.approx(plain["fit_rel_rms"], abs=0.05)  # other paths; 1 and more with the row
+    assert len(result["rows"]) == len(plain["rows"]) + 1  # the row is rendered and shown all the same
+    # the paths differ; with the row the error is 1 or more
+    assert result["fit_rel_rms"] == pytest.approx(plain["fit_rel_rms"], abs=0.05)
     assert not any("zero in all channels" in w for w in result["warnings"])
     bad = run(tmp_path / "counted", table(dead_weight=1))
     assert bad["fit_rel_rms"] > 0.3 and any("zero in all channels" in w for w in bad["warnings"])
@@ -92,4 +93,4 @@ def test_few_rows_for_the_free_parameters(tmp_path):
     said = [w for w in run(tmp_path / "nine", text)["warnings"] if "free parameters" in w]
     assert len(said) == 1 and "3 numbers for 9 free parameters" in said[0]
     said = [w for w in run(tmp_path / "three", text, tied=[["C_R"], ["C_TT"]], fixed={"beta_R": 5, "beta_TT": 15})["warnings"] if "free parameters" in w]
-    assert said == []  # C_R, C_TT, gamma_TT: three numbers for three
+    assert said == []  # C_R, C_TT and gamma_TT: three numbers for three parameters

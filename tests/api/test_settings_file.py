@@ -1,4 +1,4 @@
-"""config/selvedge.conf is the program's table of settings, printed; and it can be read back."""
+"""config/selvedge.conf is the printed table of settings, and the daemon can read it."""
 import os
 import subprocess
 

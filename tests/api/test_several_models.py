@@ -1,4 +1,5 @@
-"""Several models in one job, through daemon, real worker and command line: surface and volume models on one cloth of fibers."""
+"""Several models in one job, through the daemon, the real worker and the command line: surface and volume models on one
+cloth of fibers."""
 import os
 import subprocess
 import sys
@@ -47,7 +48,7 @@ def test_all_are_fitted_and_compared(finished):
     told = [w for w in result["warnings"] if "do not tell" in w]
     if min(m["heldout_rel_rms"] for m in result["models"]) > 0:
         assert bool(told) == (other["heldout_rel_rms"] ** 2 - best[0]["heldout_rel_rms"] ** 2 < 2 * apart), result["warnings"]
-    # the top of the result is the best model's: clients that know of one model read on as before
+    # the top level of the result describes the best model, so clients that expect one model still work
     assert result["model"] == best[0]["id"] and state["parameters"] == best[0]["parameters"]
     for key in ("fit_rel_rms", "heldout_rel_rms", "objective", "n_path_fit", "converged", "correlation"):
         assert result[key] == best[0][key], key
@@ -68,7 +69,7 @@ def test_series_says_what_its_numbers_are(real, finished):
     assert all(p["model"] == MODELS[p["i_model"]] for p in points) and {p["i_model"] for p in points} == {0, 1}
     assert all(len(p["parameter"]) == len(series["models"][p["i_model"]]["parameters"]) for p in points)
     assert all("parameters" not in p for p in points)
-    # thinned out: no point mixes two models, and the description stays although its records are merged away
+    # merged to few points: no point mixes two models, and the description stays although its record is merged
     few = real.get(f"/v1/jobs/{job}/series?max_points=3&after_step=0").json()
     assert few["models"] == series["models"] and len(few["points"]) == 3
     for p in few["points"]:
@@ -117,7 +118,7 @@ def test_bad_input(real, fit, field, says):
 
 
 def test_fiber_radius(real):
-    """The search goes before the fits, leaves its curve in the result, and all that follows uses what it found."""
+    """The search precedes the fits and leaves its curve in the result, and the fits use the radius found."""
     job = start_small_job(real, document(fit_radius={"lower_um": 5, "upper_um": 12}, path_budget=60000))
     result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
     radius = result["radius"]
@@ -145,7 +146,7 @@ def test_radius_range_without_the_cloths_own(real):
 
 
 def test_density_wants_light_from_behind(real):
-    """A table is read by the worker: the same error as for photographs, only later."""
+    """The worker reads the table, so the error is the same as for photographs but comes later."""
     job = start_small_job(real, {**document(fit_density=True), "black_sheet": False})
     error = real.wait_state(job, "failed", timeout_s=60)["error"]
     assert error["field"] == "fit.fit_density" and "behind the cloth" in error["text"], error

@@ -1,4 +1,4 @@
-"""Workers that crash, hang, refuse to stop; how many run; what a restart does to them."""
+"""Workers that crash, hang or refuse to stop, the number of workers, and the effect of a restart on them."""
 import contextlib
 import os
 import re
@@ -12,7 +12,7 @@ from daemon_under_test import document, problem, wait_until
 
 
 def worker_pid(daemon, job):
-    """The process that has this job's folder as its argument."""
+    """Returns the process that has this job's folder as its argument."""
     folder = os.path.join(daemon.data, "jobs", job)
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
@@ -183,12 +183,12 @@ def test_folders_that_resist_do_not_keep_the_daemon_from_starting(daemon_maker):
     d = daemon_maker()
     deleted, broken, good = d.create(), d.create(), d.ready_job()
     jobs = os.path.join(d.data, "jobs")
-    deep = os.path.join(jobs, deleted, *["x"] * 70)  # deeper than what is removed
+    deep = os.path.join(jobs, deleted, *["x"] * 70)  # deeper than the daemon removes
     os.makedirs(deep)
     assert d.delete(f"/v1/jobs/{deleted}").status_code == 204
     warned = f"job {deleted} is deleted, but not all of it is gone"
     wait_until(lambda: warned in d.log_text())
-    for _ in range(3):  # each makes the supervisor look again
+    for _ in range(3):  # each makes the supervisor check again
         d.delete(f"/v1/jobs/{d.create()}")
     wait_until(lambda: len(os.listdir(jobs)) == 3)
     assert d.log_text().count(warned) == 1, "the log is flooded"

@@ -1,4 +1,4 @@
-"""Declaring files and the tus protocol."""
+"""Declaring files, and the tus protocol."""
 import contextlib
 import os
 import socket
@@ -87,7 +87,8 @@ def test_sha256_is_computed_when_not_declared(daemon):
 
 
 def test_a_checksum_that_comes_later_is_checked(daemon):
-    """Half of one file, then a client that has another one and says so: no mixture of both is accepted."""
+    """A client sends half of one file, then another client declares a different checksum: a mixture of both is not
+    accepted."""
     job, first, second = daemon.create(), b"a" * 1000, b"b" * 1000
     url = daemon.declare(job, "scan.tif", first, checked=False)["upload_url"]
     assert daemon.patch(url, 0, first[:500]).status_code == 204
@@ -185,7 +186,7 @@ def test_a_verified_file_that_cannot_be_settled_at_the_start_is_not_given_up(dae
     d.upload(job, "scan.tif", data)
     d.stop()
     with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db, db:
-        db.execute("UPDATE file SET state = 1")  # verified, not yet called complete: as a crash leaves it
+        db.execute("UPDATE file SET state = 1")  # verified but not yet complete, as a crash leaves it
     with file_rows_locked(d.data):
         d.start()
         assert "lost its bytes" not in d.log_text() and "for a test" in d.log_text()
@@ -195,7 +196,7 @@ def test_a_verified_file_that_cannot_be_settled_at_the_start_is_not_given_up(dae
 
 
 def test_an_offset_that_cannot_be_committed_keeps_its_checksum(daemon_maker):
-    """The database holds the offset and the sum up to it: never one without the other."""
+    """The database always holds the offset together with the checksum state up to it."""
     d = daemon_maker()
     job, data = d.create(), os.urandom(100_000)
     url = d.declare(job, "scan.tif", data, checked=False)["upload_url"]
@@ -237,7 +238,7 @@ def test_space_is_reserved(daemon):
     st = os.stat(os.path.join(folder, os.listdir(folder)[0]))
     assert st.st_size == 50_000_000 and st.st_blocks * 512 >= 50_000_000
     r = daemon.post(f"/v1/jobs/{job}/files", json=declaration(name="huge.tif", size=1 << 39))
-    if r.status_code != 201:  # a machine with half a terabyte free takes it
+    if r.status_code != 201:  # a machine with half a terabyte free accepts it
         problem(r, 507, "disk_full")
         assert len(os.listdir(folder)) == 1
 
@@ -267,11 +268,11 @@ def test_a_second_writer_takes_over(daemon):
     first = raw_patch(daemon, url, 0, len(data))
     first.sendall(data[:500_000])
     wait_until(lambda: daemon.job(job)["files"][0]["offset"] == 500_000, what="arrival of the first part")
-    # the first connection is still open; the second one goes on where it was
+    # the first connection is still open; the second continues at its offset
     assert daemon.offset(url) == 500_000
     second = daemon.patch(url, 500_000, data[500_000:1_000_000])
     assert second.status_code == 204
-    try:  # the first writer's late bytes must go nowhere
+    try:  # late bytes of the first writer must be ignored
         first.sendall(b"x" * 100_000)
         first.settimeout(5)
         while first.recv(65536):

@@ -1,4 +1,4 @@
-"""The worker without a daemon, on job folders made by hand: what it says about tables, warnings and budgets."""
+"""The worker without a daemon, on job folders made by hand: its messages about tables, warnings and budgets."""
 import json
 import os
 import re
@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selved
 
 
 def run(folder, table=TABLE, expect=0, photographs=(), **fit):
-    """Runs a job of the small cloth, with a table or with photographs [(bytes of a PNG, keys)]; gives status.json."""
+    """Runs a job of the small cloth with a table, or with photographs [(bytes of a PNG, keys)]. Returns status.json."""
     document = {"sample": "alone", "fibers": {"file": "cloth.hair"},
                 "fit": {"path_budget": 100000, "render_px": 8, "render_samples": 1, **fit}}
     (folder / "input").mkdir()
@@ -42,7 +42,7 @@ def result(folder):
 
 
 def png(width, height, value):
-    """An 8-bit rgb PNG; value(x, y) gives a pixel."""
+    """Returns an 8-bit RGB PNG; value(x, y) is the value of a pixel."""
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     raw = b"".join(b"\0" + bytes(v for x in range(width) for v in value(x, y)) for y in range(height))
@@ -95,7 +95,7 @@ def test_texture_states_the_blocks_that_were_measured(tmp_path):
 
 
 def test_as_many_models_as_a_job_takes(tmp_path):
-    """And a run after one that got as far as their validation: that is loaded, not made again."""
+    """Also a run after an interruption in the validation: the finished part is loaded and not computed again."""
     models = ["two_lobe.v1", "two_lobe_balanced.v1", "kajiya_kay.v1", "marschner.v1", "isotropic.v1", "phase_two_lobe.v1", "microflake.v1", "phase_isotropic.v1"]
     run(tmp_path, models=models, path_budget=20000)
     first = result(tmp_path)
@@ -110,8 +110,8 @@ def test_as_many_models_as_a_job_takes(tmp_path):
 
 
 def test_a_gain_for_each_photograph(tmp_path):
-    """Rows that are the cloth's own radiances times known gains: the gains are found, errors are told with and without them, and a
-    bad row of weight 0 is in neither."""
+    """The rows are the cloth's own radiances times known gains. The fit finds the gains, reports errors with and
+    without them, and a bad row of weight 0 changes neither."""
     known = {"fixed": {"C_R": 0.1, "C_TT": 0.85, "beta_TT": 10, "gamma_TT": 10}, "bounds": {"beta_R": [4.99, 5.01]}, "path_budget": 400000}
     gains = [1.1, 0.92, 1.05, 0.9, 1.08, 0.93]
     for name in ("own", "told"):

@@ -1,7 +1,7 @@
-"""The dashboard in a real browser, against a real daemon: a small real job while it runs and at its end; the rest with a stub worker.
+"""The dashboard in a real browser with a real daemon: a small real job while it runs and at its end, and other cases
+with a stub worker.
 
-SELVEDGE_SCREENSHOTS=DIR keeps pictures of what was seen.
-"""
+SELVEDGE_SCREENSHOTS=DIR keeps screenshots."""
 import glob
 import json
 import os
@@ -83,7 +83,7 @@ def browser(tmp_path):
 
 
 def wait_for(browser, condition, seconds=30):
-    """Until the JavaScript expression is true."""
+    """Waits until the JavaScript expression is true."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if browser.execute_script(f"return Boolean({condition})"):
@@ -105,7 +105,7 @@ def keep(browser, name):
 
 
 def complaints(browser):
-    """Errors of the console: scripts, content security policy, missing files."""
+    """Returns the errors of the console: scripts, content security policy, missing files."""
     return [e["message"] for e in browser.get_log("browser") if e["level"] == "SEVERE"]
 
 
@@ -127,14 +127,14 @@ def test_real_job_live_and_finished(real, browser):
     keep(browser, "list")
     browser.find_element(By.CSS_SELECTOR, "#jobs tbody tr a").click()
     wait_for(browser, "document.querySelectorAll('.stage').length === 8")
-    # live: curves appear while the fit runs
+    # while the job runs: curves appear during the fit
     wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 8", 240)
     assert any(e.text.startswith("Objective") for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title"))
     keep(browser, "running")
     # finished
     wait_for(browser, "document.querySelector('.state.succeeded')", 400)
     wait_for(browser, "document.querySelector('#parameters')")
-    # both models' curves, under their own names; and the table that compares them
+    # the curves of both models under their own names, and the table that compares them
     titles = lambda: [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
     wait_for(browser, "document.querySelectorAll('#models-shown button').length === 2")
     assert any(t.startswith("alpha") for t in titles()) and not any(t.startswith("C_TT") for t in titles())
@@ -163,10 +163,10 @@ def test_real_job_live_and_finished(real, browser):
     listed = browser.find_element(By.ID, "files").text
     assert "result.json" in listed and "fibers.hair" in listed and "density.vol" in listed
     assert "stage" in browser.find_element(By.CSS_SELECTOR, "pre.log").text
-    # fibers in 3D, or a sentence that says why not (a machine without WebGL)
+    # fibers in 3D, or a sentence with the reason (a machine without WebGL)
     browser.execute_script("document.querySelector('.view3d button').click()")
     wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")
-    # the geometry's key figures, and the page with all of them
+    # the key figures of the geometry, and the page with all of them
     quality = browser.find_element(By.ID, "quality").text
     assert "material explained" in quality and "direction noise" in quality and "continue" in quality
     keep(browser, "finished")
@@ -206,7 +206,7 @@ def test_submit_by_choosing_files(stub, browser):
     chooser = browser.find_element(By.CSS_SELECTOR, ".drop input")
     browser.execute_script("arguments[0].style.display = 'block'", chooser)
     chooser.send_keys(str(sample / "job.json"))
-    wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files still missing')")
+    wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files are still missing')")
     assert not browser.find_element(By.CSS_SELECTOR, ".drop button").is_enabled()
     chooser.send_keys("\n".join(str(sample / n) for n in ("scan.tif", "cloth.csv")))
     wait_for(browser, "!document.querySelector('.drop button').disabled")
@@ -220,7 +220,7 @@ def test_submit_by_choosing_files(stub, browser):
 
 
 def drop_in(browser, *paths):
-    """Files into the submit panel; waits until it is ready."""
+    """Drops files into the submit panel, and waits until it is ready."""
     chooser = browser.find_element(By.CSS_SELECTOR, ".drop input")
     browser.execute_script("arguments[0].style.display = 'block'", chooser)
     chooser.send_keys("\n".join(map(str, paths)))
@@ -256,7 +256,7 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     button.click()
     wait_for(browser, "document.querySelector('.drop .note.bad') && !document.querySelector('.drop button').disabled")
     (job_id,) = set(jobs()) - set(before)
-    # the scan is mended and dropped again: it replaces the one that was declared
+    # the corrected scan is dropped again and replaces the declared one
     mended = tmp_path / "scan.tif"
     mended.write_bytes(b"mended scan")
     browser.execute_script("window.fetch = realFetch")
@@ -270,7 +270,7 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
 
 
 def test_the_document_is_sent_as_it_was_written(stub, browser):
-    """JavaScript's numbers end at 2^53, seeds do not."""
+    """JavaScript's integers are exact to 2^53, but seeds may be larger."""
     url, folder = stub
     _, sample = submit(url, folder, "seeded twill")
     document = json.loads((sample / "job.json").read_text())
@@ -299,7 +299,7 @@ def test_long_log_does_not_freeze(stub, browser):
         f.write("2026-01-01T00:00:00.000Z INFO the end\n")
     wait_for(browser, "document.querySelector('pre.log').textContent.endsWith('the end')", 30)
     assert browser.execute_script("return document.querySelector('pre.log').textContent.split('\\n').length") <= 1000
-    # the page answers at once
+    # the page replies at once
     longest = browser.execute_async_script("""
         const done = arguments[0], start = performance.now(); let last = start, longest = 0;
         const tick = () => { const now = performance.now(); longest = Math.max(longest, now - last); last = now;

@@ -10,14 +10,14 @@ from system_calls import build_shim  # noqa: E402
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory):
-    """One daemon for the tests of a file; its worker is tests/support/fake_worker.py."""
+    """One daemon for all tests of a file. Its worker is tests/support/fake_worker.py."""
     with Daemon(tmp_path_factory.mktemp("daemon") / "data") as d:
         yield d
 
 
 @pytest.fixture
 def daemon_maker(tmp_path):
-    """Daemons with their own settings; stopped at the end when they still run."""
+    """Makes daemons with settings of their own, and stops those that still run at the end of the test."""
     made = []
 
     def make(name="data", **more):

@@ -1,7 +1,8 @@
-/* LD_PRELOAD, for tests: makes one system call fail, or records the calls.
- * Environment of a fault: FAULT_CALL (write, sync, fallocate), FAULT_AT (1: the first call that fits), FAULT_ERRNO (0: a short
- * write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file made when it fired).
- * FAULT_TRACE: file to which every write and every sync that has succeeded appends a line "write PATH" or "sync PATH". */
+/* A library for LD_PRELOAD in tests. It makes one system call fail, or records calls.
+ * Environment of a fault: FAULT_CALL (write, sync, fallocate), FAULT_AT (number of the matching call that fails,
+ * from 1), FAULT_ERRNO (0: a short write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file
+ * made when the fault occurs).
+ * FAULT_TRACE: file to which every successful write and sync appends a line "write PATH" or "sync PATH". */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -14,10 +15,10 @@
 
 static atomic_int n_seen;
 
-/* the programs that this one starts work normally */
+/* programs that this one starts run without the library */
 __attribute__((constructor)) static void only_here(void) { unsetenv("LD_PRELOAD"); }
 
-/* Path of an open file; false: unknown. */
+/* Finds the path of an open file. Returns false if it is unknown. */
 static int find_path(int fd, char file[4096])
 {
     char link[64];
@@ -28,7 +29,7 @@ static int find_path(int fd, char file[4096])
     return 1;
 }
 
-/* true: this is the call that has to fail */
+/* Returns true if this call must fail. */
 static int fires(const char *call, int fd)
 {
     const char *wanted = getenv("FAULT_CALL"), *at = getenv("FAULT_AT"), *path = getenv("FAULT_PATH"),

@@ -1,4 +1,5 @@
-"""A full disk, write errors and short writes: clear answers, valid offsets, nothing lost, and work goes on when there is room again."""
+"""A full disk, write errors and short writes: error messages are clear, offsets stay valid, nothing is lost, and work
+continues when there is space again."""
 import ctypes
 import errno
 import os
@@ -34,7 +35,7 @@ def declare(d, job, name, size):
 def test_full_disk_is_refused_at_the_declaration(small_disk, tmp_path):
     with Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}) as d:
         job = d.ready_job("succeed")
-        # a first large file has its space for sure, whatever comes later
+        # the space of a first large file is reserved, whatever happens later
         first = declare(d, job, "first.tif", 6 << 20).json()["upload_url"]
         problem(declare(d, job, "second.tif", 12 << 20), 507, "disk_full")
         assert [f["name"] for f in d.job(job)["files"]] == [*FILES, "first.tif"]
@@ -45,7 +46,7 @@ def test_full_disk_is_refused_at_the_declaration(small_disk, tmp_path):
                 filler.flush()
         filler.close()
         problem(declare(d, job, "third.tif", 1 << 20), 507, "disk_full")
-        # the database cannot grow either: an answer that says so, or success; never a lie
+        # the database cannot grow either: the reply is success or that error, but never a false success
         r = d.patch(first, 0, b"y" * (3 << 20))
         assert r.status_code in (204, 507), r.text
         offset = d.request("HEAD", first, headers=TUS)
@@ -111,7 +112,7 @@ def test_a_paused_job_can_be_cancelled(small_disk):
 
 
 def insist(call):
-    """A client that repeats what failed on the server's side; returns the reply and how often it had to."""
+    """A client that repeats requests which failed in the server. Returns the reply and the number of repeats."""
     for n in range(5):
         r = call()
         if r.status_code not in (500, 503, 507):
@@ -121,7 +122,7 @@ def insist(call):
 
 
 def scenario(d):
-    """From a document to results, with a client that insists; the number of repeats."""
+    """Goes from a document to results with a client that repeats failed requests. Returns the number of repeats."""
     import requests
     repeats = 0
 
@@ -163,7 +164,7 @@ def scenario(d):
     ("fallocate", errno.ENOSPC, "/upload/", 1), ("write", errno.ENOSPC, "selvedge.db", 11), ("write", errno.EIO, "selvedge.db", 13),
     ("write", 0, "selvedge.db", 17), ("sync", errno.EIO, "selvedge.db", 7), ("write", errno.ENOSPC, "/jobs/", 9), ("sync", errno.EIO, "/jobs/", 9)])
 def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
-    """The 1st, then a later, then a later ... call fails, until a run passes untouched."""
+    """One call fails, at first the first one and then later ones, until a run ends without a fault."""
     fired = repeated = 0
     for n in range(1, 2000, step):
         mark = tmp_path / f"mark{n}"
@@ -171,7 +172,8 @@ def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
                                                        "FAULT_PATH": path, "FAULT_MARK": str(mark)})
         try:
             d.start()
-        except AssertionError:  # the fault came while the database was made: an error message, and the next start is fine
+        # the fault came while the database was made: there is an error message, and the next start succeeds
+        except AssertionError:
             assert mark.exists() and "error: " in d.log_text()
             d.environment = {}
             d.start()

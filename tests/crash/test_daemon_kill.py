@@ -1,4 +1,5 @@
-"""kill -9 of the daemon at any moment: nothing acknowledged is lost, no job is left running without a worker, files match their hashes."""
+"""kill -9 of the daemon at any moment: nothing acknowledged is lost, no job is left running without a worker, and files
+match their hashes."""
 import os
 import random
 import threading
@@ -10,7 +11,7 @@ from daemon_under_test import FILES, TUS, Daemon, document, sha256, wait_until
 
 
 def processes_of(daemon):
-    """Workers whose job lies in this daemon's data folder."""
+    """Returns the workers whose job is in this daemon's data folder."""
     found = []
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
@@ -64,7 +65,7 @@ def test_a_delete_that_was_acknowledged_holds(daemon_maker):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_kill_in_mid_upload(tmp_path, seed):
-    """Uploads go on through many kills; every acknowledged offset is still there, and the files are whole in the end."""
+    """Uploads continue through many kills: every acknowledged offset is kept, and the files are complete at the end."""
     rng = random.Random(seed)
     d = Daemon(tmp_path / "data", options={"upload.commit_bytes": 1 << 18}).start()
     job = d.create(document("succeed"))
@@ -113,10 +114,11 @@ def test_kill_in_mid_upload(tmp_path, seed):
 
 @pytest.mark.parametrize("seed", range(2))
 def test_kill_loop_over_everything(tmp_path, seed):
-    """Random requests and kills; what was acknowledged is checked after each restart, and at the end every job comes to rest."""
+    """Random requests and kills: what was acknowledged is checked after each restart, and at the end every job reaches
+    a final state."""
     rng = random.Random(100 + seed)
     d = Daemon(tmp_path / "data", options={"jobs.workers": 2, "jobs.cancel_grace_s": 0}).start()
-    known = {}  # job -> set of allowed states by what was acknowledged; None: deleted
+    known = {}  # job -> set of states allowed by what was acknowledged; None: deleted
     for round_ in range(15):
         stop_at = time.monotonic() + rng.uniform(0.02, 0.4)
         killer = threading.Thread(target=lambda: (time.sleep(max(0, stop_at - time.monotonic())), d.process.kill()))
@@ -130,7 +132,7 @@ def test_kill_loop_over_everything(tmp_path, seed):
                 else:
                     j = rng.choice(alive)
                     if act == "delete":
-                        known[j] = "unknown"  # until the answer is there
+                        known[j] = "unknown"  # until the reply has arrived
                         r = d.delete(f"/v1/jobs/{j}")
                         assert r.status_code in (204, 404)
                         known[j] = None
@@ -157,7 +159,7 @@ def test_kill_loop_over_everything(tmp_path, seed):
             elif r.status_code == 404:
                 known[j] = None
     jobs = d.get("/v1/jobs?limit=500").json()["jobs"]
-    # jobs that were being made when a kill came exist without being known: allowed, and drafts
+    # jobs that were being created when the daemon was killed may exist without being known; they are drafts
     for j in jobs:
         assert j["id"] in known or j["state"] == "draft"
     wait_until(lambda: all(j["state"] in ("draft", "succeeded", "failed", "cancelled") for j in d.get("/v1/jobs?limit=500").json()["jobs"]), 60, "rest")

@@ -1,4 +1,5 @@
-"""A scan worked on in files under a small memory setting gives the bytes that it gives in memory; no room for the files is an error."""
+"""A scan that is processed in files under a small memory setting gives the same bytes as one in memory. No space for
+the files is an error."""
 import json
 import os
 import resource

@@ -1,5 +1,5 @@
-"""A worker killed with SIGKILL in mid-fit, at several points, resumes and ends exactly as one that was never interrupted, with 1 and with 2
-threads; SIGTERM cancels; a stale attempt may not write."""
+"""A worker that is killed with SIGKILL at several points of the fit resumes and gives exactly the result of an
+uninterrupted one, with 1 and with 2 threads. SIGTERM cancels. A stale attempt must not write."""
 import json
 import os
 import shutil
@@ -50,7 +50,7 @@ def read_json(folder, name):
 
 
 def outcome(folder):
-    """What must be equal: everything but times."""
+    """Returns what must be equal: everything except times."""
     result = read_json(folder, "results/result.json")
     for key in ("fit_wall_s", "stages"):
         result.pop(key)
@@ -72,7 +72,7 @@ def journal_bytes(folder, stage, number="", name="estimates"):
 
 
 def kill_when(folder, threads, condition, timeout_s=60):
-    """SIGKILL as soon as the condition holds; False when the worker ended before."""
+    """Sends SIGKILL as soon as the condition holds. Returns False if the worker ended before."""
     worker = start(folder, threads)
     deadline = time.monotonic() + timeout_s
     while worker.poll() is None and not condition():
@@ -111,7 +111,8 @@ def test_killed_at_several_points(reference, tmp_path, threads):
     if "models" in fit:
         kills += kill_when(folder, threads, lambda: journal_bytes(folder, "fit", "-1") >= 3 * record)
     kills += kill_when(folder, threads, lambda: journal_bytes(folder, "validation") > 20)
-    kills += kill_when(folder, threads, lambda: os.path.exists(os.path.join(folder, "work", "validation.done")))  # the rest never traced
+    # the remaining row was never traced
+    kills += kill_when(folder, threads, lambda: os.path.exists(os.path.join(folder, "work", "validation.done")))
     assert kills >= 3, "the fit is too fast for this test"
     finish(folder, threads)
     assert outcome(folder) == want
@@ -131,7 +132,7 @@ def test_killed_while_looking_for_the_radius(tmp_path):
 
 
 def test_damaged_checkpoints(reference, tmp_path):
-    """A torn journal and a damaged stage file cost work, nothing else."""
+    """A journal with an incomplete record and a damaged stage file cost time but change no result."""
     fit, _, want = reference
     folder = make_job(str(tmp_path / "job"), **fit)
     kill_when(folder, 2, lambda: journal_bytes(folder, "fit") > 20000)
@@ -147,7 +148,7 @@ def test_damaged_checkpoints(reference, tmp_path):
 
 
 def test_edited_document_starts_anew(reference, tmp_path):
-    """A job folder that is edited by hand does not answer with what the old document gave."""
+    """A job folder whose document was edited by hand does not return the results of the old document."""
     fit, source, want = reference
     folder = str(tmp_path / "job")
     shutil.copytree(source, folder)
@@ -161,7 +162,7 @@ def test_edited_document_starts_anew(reference, tmp_path):
 
 
 def test_another_build_starts_anew(tmp_path):
-    """Estimates of another build of the program are not mixed with this one's."""
+    """Estimates of another build of the program are not mixed with those of this one."""
     folder = make_job(str(tmp_path / "job"))
     other = str(tmp_path / "other-build")
     shutil.copy(WORKER, other)
@@ -169,7 +170,7 @@ def test_another_build_starts_anew(tmp_path):
         f.write(b"another build")
     assert kill_when(folder, 1, lambda: journal_bytes(folder, "fit") > 20)
     journal = os.path.join(folder, "work", "fit", "estimates.journal")
-    with open(journal, "rb") as before:  # held open, so that its inode is not given to the new one
+    with open(journal, "rb") as before:  # kept open, so that the new file cannot get its inode
         worker = start(folder, program=other)
         worker.communicate(timeout=120)
         assert worker.returncode == 0
@@ -178,7 +179,8 @@ def test_another_build_starts_anew(tmp_path):
 
 
 def test_stage_that_runs_again_outdates_later_ones(reference, tmp_path):
-    """Fibers are read anew, then the fit cannot go on: what an earlier attempt made of the old fibers must not be taken by the next one."""
+    """Fibers are read again, then the fit fails. The next attempt must not use what an earlier attempt made from the
+    old fibers."""
     _, source, want = reference
     folder = str(tmp_path / "job")
     shutil.copytree(source, folder)
@@ -197,7 +199,7 @@ def test_stage_that_runs_again_outdates_later_ones(reference, tmp_path):
 
 
 def test_killed_while_removing_what_is_outdated(reference, tmp_path):
-    """The old fingerprint is gone, the marks of the old job's stages are not: they are not believed."""
+    """The old fingerprint is removed, but the marks of the old job's finished stages are not. They must be ignored."""
     fit, source, _ = reference
     folder = str(tmp_path / "job")
     shutil.copytree(source, folder)
@@ -227,14 +229,14 @@ def test_cancel_and_resume(reference, tmp_path):
 
 
 def test_stale_attempt(tmp_path):
-    """A worker whose attempt has been replaced ends with status 4 and leaves status.json alone."""
+    """A worker whose attempt has been replaced ends with status 4 and does not change status.json."""
     folder = make_job(str(tmp_path / "job"), path_budget=2000000, max_iterations=80)
     with open(os.path.join(folder, "attempt.json"), "w") as f:
         json.dump({"attempt": 1, "token": "old"}, f)
     worker = start(folder, 1)
     while journal_bytes(folder, "fit") <= 20 and worker.poll() is None:
         time.sleep(0.002)
-    second = start(folder, 1)  # the lock keeps another worker out
+    second = start(folder, 1)  # the lock excludes another worker
     assert second.wait(timeout=20) == 4
     second.stderr.close()
     assert read_json(folder, "status.json")["attempt"] == 1
@@ -252,7 +254,7 @@ def test_heartbeat(tmp_path):
     beats, end = set(), time.monotonic() + 4
     while time.monotonic() < end and worker.poll() is None:
         try:
-            status = read_json(folder, "status.json")  # always whole
+            status = read_json(folder, "status.json")  # always complete
             beats.add(status["heartbeat_unix_s"])
         except FileNotFoundError:
             pass

@@ -9,7 +9,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const struct job_photograph p = {.scale = 1.0, .crop_px = {1, 1, 6, 6}};
     struct photograph_mean mean;
     struct error err = {0};
-    if (size < 4 || memcmp(data, magic, 4) != 0) return 0; /* everything else is a PNG or nothing */
+    if (size < 4 || memcmp(data, magic, 4) != 0) return 0; /* all other input is a PNG or invalid */
     fuzz_check_error(photograph_measure(fuzz_file_as(".exr", data, size), &p, &mean, &err), &err);
     return 0;
 }

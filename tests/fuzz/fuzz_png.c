@@ -1,4 +1,4 @@
-/* Checksums of chunks are made right first, so that mutations get past them. */
+/* Corrects the checksums of chunks first, so that mutated input is not refused for them. */
 #include "optimizer/fit/photographs/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 

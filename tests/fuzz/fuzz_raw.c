@@ -1,4 +1,4 @@
-/* The first six bytes are the declaration, the rest is the file. */
+/* The first six bytes are the declaration, and the rest is the file. */
 #include "geometry/volume/raw_source.h"
 #include "tests/fuzz/fuzz_input.h"
 

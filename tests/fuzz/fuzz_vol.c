@@ -1,4 +1,4 @@
-/* Mitsuba grids as a scan and as directions. */
+/* Reads Mitsuba grids as a scan and as directions. */
 #include "geometry/volume/vol_file.h"
 #include "tests/fuzz/fuzz_input.h"
 

@@ -1,4 +1,5 @@
-/* make_fuzz_seeds DIR: small valid files for every harness, DIR/PARSER/NAME, by the library's own writers. */
+/* make_fuzz_seeds DIR: writes small valid files for every harness to DIR/PARSER/NAME, with the library's own
+ * writers. */
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/phantom/phantom.h"
 #include "geometry/volume/vol_file.h"

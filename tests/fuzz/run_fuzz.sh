@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# run_fuzz.sh BUILD SECONDS [PARSER...]: each harness for SECONDS from seeds made now. Ends with status 1 when there is a finding, whose
-# input stays in BUILD/fuzz/findings. A finding is a crash, a sanitizer's report, over 10 s, or over 512 MB in one piece.
+# run_fuzz.sh BUILD SECONDS [PARSER...]: runs each harness for SECONDS from newly made seeds. Ends with status 1 if
+# there is a finding, whose input stays in BUILD/fuzz/findings. A finding is a crash, a sanitizer report, a run over 10
+# s, or a single allocation over 512 MB.
 set -euo pipefail
 export ASAN_OPTIONS=quarantine_size_mb=16:malloc_context_size=8:allocator_release_to_os_interval_ms=500 # freed memory must not look like use
 build=$1 seconds=$2

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""Stands in for selvedge-worker where clients are tested: walks through the stages and writes made-up curves and results, computes nothing.
+"""A stub of selvedge-worker for tests of clients: it goes through the stages and writes invented curves and results,
+but computes nothing.
 
-The sample's name says how it behaves: "slow ..." takes seconds a stage, "failing ..." fails in the first stage with a field,
-anything else succeeds within a second or two.
-"""
+The sample's name selects its behaviour: "slow ..." takes seconds for each stage, "failing ..." fails in the first
+stage with a field, anything else succeeds within a second or two."""
 import json
 import math
 import os
@@ -78,7 +78,8 @@ def main():
             objective = series(k) if stage == "fit" else None
             status(stage=stage, i_stage=i, stage_fraction=k / 10, fraction=(10 * i + k) / 80, eta_s=(80 - 10 * i - k) * pause, objective=objective,
                    objective_se=None if objective is None else 0.02 * objective, step=None if objective is None else k)
-            time.sleep(15 * pause if stage == "fit" and pause < 0.1 else pause)  # the fit must be seen by a poll a second
+            # the fit must last until a client that polls once a second sees it
+            time.sleep(15 * pause if stage == "fit" and pause < 0.1 else pause)
     results()
     status(state="succeeded", stage="report", i_stage=len(STAGES) - 1, stage_fraction=1.0, fraction=1.0, eta_s=0.0)
     return 0

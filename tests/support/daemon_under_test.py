@@ -1,4 +1,4 @@
-"""A daemon for tests: on a free loopback port, with a data folder of its own, and small helpers around the API.
+"""A daemon for tests on a free loopback port with a data folder of its own, and helpers for the API.
 
 with Daemon(folder) as d: d.post("/v1/jobs", json=document)
 Programs come from SELVEDGE_BUILD (default: build/ of this tree)."""
@@ -20,7 +20,7 @@ TUS = {"Tus-Resumable": "1.0.0"}
 DOCUMENT = {"sample": "fake: succeed", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
             "measurements": {"file": "rows.csv"}}
 FILES = {"scan.tif": ("volume", b"II*\0 not really a scan" * 100), "rows.csv": ("measurements", b"set,r,g,b\n" * 20)}
-# what a sanitizer or valgrind would say must not be mistaken for an ordinary start
+# output of a sanitizer or valgrind must not be mistaken for a normal start
 TIMEOUT_S = float(os.environ.get("SELVEDGE_TEST_PATIENCE", "1"))
 
 
@@ -56,7 +56,7 @@ class Daemon:
         self.process = None
         self.log = None
         self.session = requests.Session()
-        self.check = OpenApiCheck()  # every reply is held against the API's description
+        self.check = OpenApiCheck()  # compares every reply with the description of the API
 
     def __enter__(self):
         return self.start()
@@ -135,7 +135,7 @@ class Daemon:
     def delete(self, path, **more):
         return self.request("DELETE", path, **more)
 
-    # the API in one call each; they assert success
+    # one call of the API each; they assert success
     def create(self, doc=None, **headers):
         r = self.post("/v1/jobs", json=doc if doc is not None else DOCUMENT, headers=headers)
         assert r.status_code == 201, r.text
@@ -185,7 +185,7 @@ class Daemon:
 
 
 def problem(reply, status, code, field=None):
-    """The reply is a problem document with this status, code and field."""
+    """Asserts that the reply is a problem document with this status, code and field."""
     assert reply.status_code == status, f"{reply.status_code}: {reply.text}"
     assert reply.headers["Content-Type"] == "application/problem+json"
     body = reply.json()

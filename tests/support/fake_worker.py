@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A worker for tests of the daemon: does what the job's sample name says ("fake: crash_once"), in the real layout.
-It keeps count of its runs in work/runs, so "once" and "always" can be told apart."""
+"""A worker for tests of the daemon: does what the job's sample name says ("fake: crash_once"), in the real folder
+layout. It counts its runs in work/runs to distinguish "once" from "always"."""
 import fcntl
 import json
 import os
@@ -89,21 +89,21 @@ elif behaviour == "series":
 elif behaviour == "fail":
     say("failed", 0.3, {"code": "format", "field": "volume.files", "text": "cannot read volume 'scan.tif': page 2 is cut off"})
     sys.exit(1)
-elif behaviour == "mute":  # fails and says so on stderr only
+elif behaviour == "mute":  # fails and reports it only on stderr
     os.remove(os.path.join(job, "status.json"))
     print("something terrible happened", file=sys.stderr)
     sys.exit(1)
 elif behaviour == "work":
     work(float(argument or 3600))
     finish()
-elif behaviour == "work_once":  # until it is ended; the next run succeeds
+elif behaviour == "work_once":  # until it is killed; the next run succeeds
     if run == 1:
         work(3600)
     finish()
-elif behaviour == "clock_set":  # the daemon's wall clock was set forward while this one works
+elif behaviour == "clock_set":  # the daemon's wall clock is set forward while this one works
     work(float(argument), clock_s=-1e6)
     finish()
-elif behaviour == "unreadable":  # works for so long, then its status cannot be read for a moment
+elif behaviour == "unreadable":  # works, then its status cannot be read for a moment
     work(float(argument))
     put("status.json", "{")
     time.sleep(0.3)

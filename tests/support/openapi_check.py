@@ -1,4 +1,5 @@
-"""Holds replies against config/openapi.json: the status has to be documented for the operation and the body has to fit the schema."""
+"""Compares replies with config/openapi.json: the status must be documented for the operation, and the body must match
+the schema."""
 import json
 import os
 import re
@@ -7,7 +8,7 @@ import jsonschema
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 METHODS = ("get", "put", "post", "delete", "head", "patch", "options")
-# what any request can get (docs/api.md, Errors): bad framing, Host, Origin; troubles of the machine
+# replies that any request can get (docs/api.md, Errors): bad framing, Host or Origin, and errors of the machine
 GENERAL = {"400", "403", "500", "503", "507"}
 
 

@@ -1,4 +1,4 @@
-"""A cloth of a few crossing fibers and a table of measurements of it: the smallest job that fits."""
+"""A cloth of a few crossing fibers and a table of measurements of it: the smallest job that can be fitted."""
 import random
 import struct
 
@@ -14,7 +14,7 @@ held-out,60,0,30,20,90,0.05,0.03,0.02
 
 
 def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
-    """Layers of crossing fibers as the bytes of a .hair file: positions and diameters in millimetres."""
+    """Returns layers of crossing fibers as the bytes of a .hair file: positions and diameters in millimetres."""
     rng = random.Random(5)
     xyz, thickness, strands = [], [], 0
     for layer in range(layers):
@@ -33,7 +33,7 @@ def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
 
 
 def start_small_job(daemon, document):
-    """A job of this document, which names cloth.hair and rows.csv, uploaded and started."""
+    """Uploads and starts a job of this document, which names cloth.hair and rows.csv."""
     job = daemon.create(document)
     daemon.upload(job, "cloth.hair", hair(), "fibers")
     daemon.upload(job, "rows.csv", TABLE.encode(), "measurements")

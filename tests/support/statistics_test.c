@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-/* Regularised upper incomplete gamma function, by its series below a + 1 and a continued fraction above (Numerical
- * Recipes 6.2). */
+/* Returns the regularised upper incomplete gamma function: by its series below a + 1, by a continued fraction above
+ * (Numerical Recipes 6.2). */
 static double gamma_q(double a, double x)
 {
     if (x <= 0) return 1;

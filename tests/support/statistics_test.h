@@ -1,16 +1,16 @@
-/* Tests of hypotheses for Monte-Carlo results. */
+/* Hypothesis tests for Monte-Carlo results. */
 #ifndef SELVEDGE_TESTS_STATISTICS_TEST_H
 #define SELVEDGE_TESTS_STATISTICS_TEST_H
 
 #include <stddef.h>
 
-/* P(chi^2 with n_degree degrees of freedom >= x). */
+/* Returns P(chi^2 with n_degree degrees of freedom >= x). */
 double chi_square_tail(double x, double n_degree);
-/* The chi-square statistic of counts against expectations; cells expecting fewer than five are pooled. Degrees of
- * freedom out. */
+/* Returns the chi-square statistic of counts against expectations and its degrees of freedom. Cells with an
+ * expectation below five are pooled. */
 double chi_square_statistic(const double *count, const double *expected, size_t n, double *n_degree);
 
-/* Running mean and variance of the mean. */
+/* Running mean, and variance of the mean. */
 struct sample_mean {
     double n, mean, m2;
 };

@@ -1,4 +1,5 @@
-"""System calls of a program under test: made to fail, or recorded, by the preloaded library tests/crash/fault_shim.c."""
+"""Makes system calls of a program under test fail, or records them, with the preloaded library
+tests/crash/fault_shim.c."""
 import os
 import shutil
 import subprocess
@@ -8,7 +9,7 @@ from daemon_under_test import BUILD, ROOT
 
 
 def build_shim(folder):
-    """Path of the library, or the test is skipped."""
+    """Returns the path of the library, or skips the test."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         pytest.skip("no C compiler for the fault injector")
@@ -21,7 +22,7 @@ def build_shim(folder):
 
 
 class Trace:
-    """Writes and syncs of a program started with `environment`, in their order."""
+    """Writes and syncs of a program started with `environment`, in order."""
 
     def __init__(self, shim, path):
         self.path = str(path)
@@ -32,6 +33,6 @@ class Trace:
             pass
 
     def calls(self):
-        """[("write" or "sync", path of the file)]"""
+        """Returns [("write" or "sync", path of the file)]."""
         with open(self.path, errors="replace") as f:
             return [tuple(line.rstrip("\n").split(" ", 1)) for line in f]

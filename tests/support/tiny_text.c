@@ -4,7 +4,7 @@
 
 enum { COLUMNS = 5, ROWS = 7 };
 
-/* Rows from the top, five dots each, the leftmost the highest bit. */
+/* Rows from the top, with five dots each; the highest bit is the leftmost dot. */
 static const struct {
     char character;
     uint8_t row[ROWS];
