@@ -182,7 +182,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
     r = supervisor_start(service, worker, &supervisor, err);
-    if (r == STATUS_OK) r = http_server_start(service, files, &server, &port, err);
+    if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, &port, err);
     if (r == STATUS_OK) {
         announce(s, port, log);
         wait_for_signal(signals, server, log);

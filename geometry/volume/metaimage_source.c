@@ -3,6 +3,7 @@
  * Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
 #include "base/durable.h"
 #include "base/option_id.h"
+#include "geometry/volume/volume_reader.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>

@@ -4,6 +4,7 @@
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
 #include "base/durable.h"
 #include "base/option_id.h"
+#include "geometry/volume/volume_reader.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>

@@ -2,6 +2,7 @@
  * Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our error text. */
 #include "base/durable.h"
 #include "base/option_id.h"
+#include "geometry/volume/sample_type.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>

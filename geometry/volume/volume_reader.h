@@ -25,21 +25,4 @@ extern const volume_reader tiff_reader, metaimage_reader, nrrd_reader, vol_reade
 size_t volume_reader_count(void);
 const volume_reader *volume_reader_at(size_t i);
 
-/* Little helpers that readers share. */
-enum sample_type {
-    SAMPLE_UINT8,
-    SAMPLE_INT8,
-    SAMPLE_UINT16,
-    SAMPLE_INT16,
-    SAMPLE_UINT32,
-    SAMPLE_INT32,
-    SAMPLE_FLOAT32,
-    SAMPLE_FLOAT64,
-    SAMPLE_COUNT
-};
-size_t sample_bytes(enum sample_type t);
-const char *sample_name(enum sample_type t);
-/* n samples of type t at data, byte order as the file's (swap: opposite to the machine's; data is changed), to floats. */
-void sample_to_float(enum sample_type t, bool swap, size_t n, void *data, float *value);
-
 #endif

@@ -5,7 +5,8 @@
 #ifndef SELVEDGE_GEOMETRY_VOXEL_STREAM_H
 #define SELVEDGE_GEOMETRY_VOXEL_STREAM_H
 
-#include "geometry/volume/volume_reader.h"
+#include "base/status.h"
+#include "geometry/volume/sample_type.h"
 
 struct voxel_layout {
     size_t n[3]; /* 1 .. VOXEL_STREAM_MAX_EDGE each */

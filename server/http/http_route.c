@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct http_route http_route_table[] = {
+static const struct http_route route[] = {
     {"GET", "/v1/jobs", HTTP_BODY_NONE, handle_list_jobs, NULL},
     {"POST", "/v1/jobs", HTTP_BODY_JSON, handle_create_job, NULL},
     {"GET", "/v1/jobs/{id}", HTTP_BODY_NONE, handle_get_job, NULL},
@@ -33,7 +33,6 @@ const struct http_route http_route_table[] = {
     {"GET", "/", HTTP_BODY_NONE, handle_static, NULL},
     {"GET", "/{path...}", HTTP_BODY_NONE, handle_static, NULL},
 };
-const size_t http_n_route = sizeof http_route_table / sizeof http_route_table[0];
 
 static bool match(const char *pattern, const char *url, char param[2][HTTP_PARAM_BYTES])
 {
@@ -61,8 +60,8 @@ const struct http_route *http_route_find(const char *method, const char *url, ch
     size_t n = 0;
     allow[0] = '\0';
     bool head = strcmp(method, "HEAD") == 0;
-    for (size_t i = 0; i < http_n_route; i++) {
-        const struct http_route *r = &http_route_table[i];
+    for (size_t i = 0; i < sizeof route / sizeof route[0]; i++) {
+        const struct http_route *r = &route[i];
         if (r->handle == handle_static && strncmp(url, "/v1/", 4) == 0) continue;
         if (!match(r->path, url, param)) continue;
         if (strcmp(r->method, method) == 0 || (head && strcmp(r->method, "GET") == 0)) return r;

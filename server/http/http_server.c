@@ -16,6 +16,7 @@ enum { CONNECTION_POOL_BYTES = 256 * 1024, DRAIN_LIMIT_BYTES = 64 << 20, LISTEN_
 
 struct http_server {
     struct job_service *service;
+    http_route_finder *find_route;
     const struct static_files *files;
     struct MHD_Daemon *daemon;
     struct connection_table *connection;
@@ -54,7 +55,7 @@ static bool examine(struct http_request *r, const char *method)
         return skip_body;
     }
     if (!guard_site(r, method)) return skip_body;
-    r->route = http_route_find(method, r->url, r->param, allow, sizeof allow);
+    r->route = r->server->find_route(method, r->url, r->param, allow, sizeof allow);
     if (r->route == NULL && allow[0] == '\0')
         reply_code(r, "not_found", "", "there is nothing at this address");
     else if (r->route == NULL) {
@@ -233,14 +234,15 @@ static status open_socket(const struct settings *settings, int *out, unsigned *p
     return STATUS_OK;
 }
 
-status http_server_start(struct job_service *service, const struct static_files *files, struct http_server **out,
-                         unsigned *port, struct error *err)
+status http_server_start(struct job_service *service, http_route_finder *find_route, const struct static_files *files,
+                         struct http_server **out, unsigned *port, struct error *err)
 {
     const struct settings *settings = service->settings;
     int fd = -1;
     struct http_server *s = calloc(1, sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the server: out of memory");
     s->service = service;
+    s->find_route = find_route;
     s->files = files;
     status result =
         connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s, &s->connection, err);
