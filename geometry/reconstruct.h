@@ -9,6 +9,7 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
+#include "base/warning.h"
 #include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/fibers/shape/radius.h"
@@ -94,14 +95,12 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err);
 
-/* Receives a warning: the option it is about (option_id.h; OPTION_NONE: the text begins with its subject) and its text. */
-typedef void (*reconstruct_warning)(void *context, const char *option, const char *text);
-/* What a user should know about the geometry though it stops nothing. Says the same again for a report that was read back.
- * f: the fibers in use. */
+/* Warn of what a user should know about the geometry although it stops nothing. They depend on the report alone, so a report
+ * that was read back gives the same warnings. f: the fibers in use. */
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
-                             reconstruct_warning warn, void *context);
-void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f, reconstruct_warning warn,
-                             void *context);
+                             const struct warning_sink *warn);
+void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
+                             const struct warning_sink *warn);
 
 /* Grey PNG-ready picture of slice i_slice perpendicular to axis (0 x, 1 y, 2 z) with the fibers crossing it marked as red
  * crosses; y or z points up, x or y to the right; rgb is 3 bytes a pixel, malloc'ed, width x height filled in. */

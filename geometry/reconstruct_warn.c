@@ -3,109 +3,98 @@
 #include "geometry/reconstruct.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 
-struct warner {
-    reconstruct_warning warn;
-    void *context;
-};
-
-__attribute__((format(printf, 3, 4))) static void say(const struct warner *w, const char *option, const char *format,
-                                                      ...)
-{
-    char text[400];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    w->warn(w->context, option, text);
-}
-
-static void warn_spacing(const struct warner *w, const struct reconstruct_option *o, const struct reconstruct_report *r)
+static void warn_spacing(const struct warning_sink *warn, const struct reconstruct_option *o,
+                         const struct reconstruct_report *r)
 {
     for (int a = 0; a < 3; a++) {
         double stated = r->file_voxel_size_m[a], given = o->voxel_size_m[a];
         if (!(stated > 0.0) || !(given > 0.0) || fabs(given / stated - 1.0) < 0.01) continue;
-        say(w, OPTION_VOXEL_SIZE, "the job says %.4g um along %c, the file says %.4g um; the job's value is used",
-            given * 1e6, "xyz"[a], stated * 1e6);
+        warning_send(warn, OPTION_VOXEL_SIZE,
+                     "the job says %.4g um along %c, the file says %.4g um; the job's value is used", given * 1e6,
+                     "xyz"[a], stated * 1e6);
         return;
     }
 }
 
-static void warn_alignment(const struct warner *w, const struct reconstruct_option *o,
+static void warn_alignment(const struct warning_sink *warn, const struct reconstruct_option *o,
                            const struct reconstruct_report *r)
 {
     const struct main_directions *m = &r->main;
     const double *u = m->n == 1 && m->direction[0][0] == 0.0 ? m->direction[1] : m->direction[0];
     if (o->align && r->align.outcome == ALIGN_NO_DIRECTION)
-        say(w, OPTION_ALIGN, "no main direction of the fibers stands out, the volume was left as it is");
+        warning_send(warn, OPTION_ALIGN, "no main direction of the fibers stands out, the volume was left as it is");
     if (o->align && r->align.outcome == ALIGN_OTHER_AXES && m->n == 0)
-        say(w, OPTION_ALIGN,
+        warning_send(
+            warn, OPTION_ALIGN,
             "%.0f %% of the fibers run along z and no weft or warp stands out: is 'axes' right? The volume was left as "
             "it is",
             100.0 * m->share_z);
     else if (o->align && r->align.outcome == ALIGN_OTHER_AXES)
-        say(w, OPTION_ALIGN,
+        warning_send(
+            warn, OPTION_ALIGN,
             "the fibers run along (%.2f, %.2f, %.2f)%s, too far from x and y to be turned there: correct 'axes' first; "
             "the volume was left as it is",
             u[0], u[1], u[2], m->n == 2 ? " and another direction" : "");
     if (r->aligned && r->align.se_deg > 1.0)
-        say(w, OPTION_ALIGN, "the directions of warp and weft are uncertain by %.1f degrees", r->align.se_deg);
+        warning_send(warn, OPTION_ALIGN, "the directions of warp and weft are uncertain by %.1f degrees",
+                     r->align.se_deg);
     const size_t *valid = r->tile.valid, *box = o->crop_voxel; /* valid is of what the box has left */
     double share = (double)(valid[2] - valid[0]) * (double)(valid[3] - valid[1]) / ((double)r->n[0] * (double)r->n[1]);
     if (!o->crop && valid[2] > 0 && share < 0.98)
-        say(w, OPTION_CROP_BOX,
+        warning_send(
+            warn, OPTION_CROP_BOX,
             "the matrix brings corners from outside of the scan into the tile, only %.0f %% of it is whole: crop "
             "to x %zu..%zu, y %zu..%zu, or give 'crop' as \"auto\"",
             100.0 * share, box[0] + valid[0], box[0] + valid[2], box[1] + valid[1], box[1] + valid[3]);
     for (int a = 0; a < 2; a++)
         if (o->crop && r->tile.mismatch[a] > TILE_MOST_MISMATCH)
-            say(w, OPTION_CROP,
-                "no two places of the scan match across %c (mismatch %.2f, 0 is a repeat and 1 is "
-                "chance): nothing was cut, the tile has a seam",
-                "xy"[a], r -> tile.mismatch[a]);
+            warning_send(warn, OPTION_CROP,
+                         "no two places of the scan match across %c (mismatch %.2f, 0 is a repeat and 1 is "
+                         "chance): nothing was cut, the tile has a seam",
+                         "xy"[a], r -> tile.mismatch[a]);
 }
 
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
-                             reconstruct_warning warn, void *context)
+                             const struct warning_sink *warn)
 {
-    const struct warner w = {warn, context};
-    warn_spacing(&w, o, r);
-    warn_alignment(&w, o, r);
+    warn_spacing(warn, o, r);
+    warn_alignment(warn, o, r);
     if (r->separability < 0.7)
-        say(&w, OPTION_SCAN_FILES,
-            "void and material cannot be told apart (separability %.2f; noise alone has 0.64, a clear "
-            "scan more than 0.8): "
-            "is this the right file, with the right type and byte order?",
-            r->separability);
+        warning_send(warn, OPTION_SCAN_FILES,
+                     "void and material cannot be told apart (separability %.2f; noise alone has 0.64, a clear "
+                     "scan more than 0.8): "
+                     "is this the right file, with the right type and byte order?",
+                     r->separability);
     else if (r->noise_sd > 0.5)
-        say(&w, OPTION_SCAN_FILES, "the scan is very noisy: standard deviation %.2f of the step from void to material",
-            r->noise_sd);
+        warning_send(warn, OPTION_SCAN_FILES,
+                     "the scan is very noisy: standard deviation %.2f of the step from void to material", r->noise_sd);
 }
 
-void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f, reconstruct_warning warn,
-                             void *context)
+void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
+                             const struct warning_sink *warn)
 {
-    const struct warner w = {warn, context};
     double radius = 0.0, longest = 0.0;
     for (size_t i = 0; i < f->n_fiber; i++) {
         radius += (double)f->radius_m[i] / (double)f->n_fiber;
         longest = fmax(longest, (double)f->radius_m[i]);
     }
     if (f->n_fiber < 5)
-        say(&w, OPTION_NONE, "fibers: the cloth has only %zu fiber%s", f->n_fiber, f->n_fiber == 1 ? "" : "s");
+        warning_send(warn, OPTION_NONE, "fibers: the cloth has only %zu fiber%s", f->n_fiber,
+                     f->n_fiber == 1 ? "" : "s");
     if (radius < 1e-6 || longest > 250e-6)
-        say(&w, OPTION_NONE,
-            "fibers: a mean radius of %.3g um is not that of a textile fiber (2 to 100 um): check "
-            "the voxel size of the scan, or the unit of the fiber file",
-            radius * 1e6);
+        warning_send(warn, OPTION_NONE,
+                     "fibers: a mean radius of %.3g um is not that of a textile fiber (2 to 100 um): check "
+                     "the voxel size of the scan, or the unit of the fiber file",
+                     radius * 1e6);
     if (r->fiber_diameter_voxel > 0.0 && r->fiber_diameter_voxel < 4.0)
-        say(&w, OPTION_NONE,
+        warning_send(
+            warn, OPTION_NONE,
             "fibers: they are only %.1f voxels thick; where they touch, fibers are told apart reliably from 7 voxels "
             "on, and hardly below 4",
             r->fiber_diameter_voxel);
     if (r->n[0] > 0 && r->dice > 0.0 && r->dice < 0.5)
-        say(&w, OPTION_NONE,
-            "fibers: they explain little of the material (Dice %.2f, 1 is all of it): look at the slices", r->dice);
+        warning_send(warn, OPTION_NONE,
+                     "fibers: they explain little of the material (Dice %.2f, 1 is all of it): look at the slices",
+                     r->dice);
 }

@@ -121,7 +121,7 @@ status stage_report(struct pipeline_context *c, struct error *err);
 
 /* Adds a warning to the job's status, with the key of the option that it is about (base/option_id.h). context: a struct
  * pipeline_context. */
-void pipeline_warn_option(void *context, const char *option, const char *text);
+void pipeline_warn(void *context, const char *option, const char *text);
 /* The mapped volume in memory, from its checkpoint when it was let go. */
 status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */

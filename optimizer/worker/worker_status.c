@@ -9,6 +9,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -234,8 +235,13 @@ static void add_warning(struct worker_status *st, const char *text)
     snprintf(st->warning[MAX_WARNING - 1], WARNING_BYTES, "%zu more warnings are in the job's log", ++st->n_more);
 }
 
-void worker_status_warn(struct worker_status *st, const char *text)
+void worker_status_warn(struct worker_status *st, const char *format, ...)
 {
+    char text[2 * WARNING_BYTES];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
     log_warning(st->log, "%s", text);
     pthread_mutex_lock(&st->mutex);
     bool known = false;

@@ -32,9 +32,9 @@ void worker_status_fraction(struct worker_status *st, double stage_fraction);
 void worker_status_restart_eta(struct worker_status *st);
 void worker_status_message(struct worker_status *st, const char *text);
 void worker_status_objective(struct worker_status *st, size_t step, double objective, double se);
-/* Kept in the list and written to the log. From the 50th on they are in the log only, and the list's last entry counts
- * them. */
-void worker_status_warn(struct worker_status *st, const char *text);
+/* Formats a warning as printf does, keeps it in the list and writes it to the log; a warning that the list has already is
+ * not added again. From the 50th on they are in the log only, and the list's last entry counts them. */
+void worker_status_warn(struct worker_status *st, const char *format, ...) __attribute__((format(printf, 2, 3)));
 size_t worker_status_n_warning(struct worker_status *st);
 /* Copies warning i; false when there is none. */
 bool worker_status_warning(struct worker_status *st, size_t i, char *text, size_t n_bytes);

@@ -1,17 +1,9 @@
 #include "optimizer/fit/photographs/observation.h"
 #include "base/angle.h"
-#include "base/durable.h"
-#include "base/option_id.h"
-#include "optimizer/fit/photographs/measurement_table.h"
-#include "optimizer/fit/photographs/photograph.h"
-#include "optimizer/fit/photographs/photograph_contrast.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { MAX_TABLE_BYTES = 16 << 20 };
 
 void observation_set_init(struct observation_set *o) { memset(o, 0, sizeof *o); }
 
@@ -69,7 +61,7 @@ void observation_set_weigh(struct observation_set *o)
 
 bool observation_is_contrast(const struct observation *o) { return o->configuration.contrast_cells > 0; }
 
-static bool contrast_is_known(const struct observation *o)
+bool observation_contrast_known(const struct observation *o)
 {
     return o->contrast_se_rgb[0] < 1.0 && o->contrast_se_rgb[1] < 1.0 && o->contrast_se_rgb[2] < 1.0;
 }
@@ -78,7 +70,7 @@ struct observation observation_of_contrast(const struct observation *o, double w
 {
     struct observation row = *o;
     row.configuration.contrast_cells = (uint32_t)o->n_cell;
-    row.weight = contrast_is_known(o) ? weight * o->weight : 0.0;
+    row.weight = observation_contrast_known(o) ? weight * o->weight : 0.0;
     memcpy(row.mean_rgb, o->contrast_rgb, sizeof row.mean_rgb);
     memcpy(row.se_rgb, o->contrast_se_rgb, sizeof row.se_rgb);
     return row;
@@ -112,70 +104,4 @@ struct configuration observation_configuration(const struct job_document *doc, d
         .crop_m = doc->crop_cm * cm,
     };
     return c;
-}
-
-static status load_table(const struct job_document *doc, const char *folder, struct observation_set *o,
-                         struct error *err)
-{
-    char path[4096];
-    char *text = NULL;
-    size_t n = 0;
-    snprintf(path, sizeof path, "%s/%s", folder, doc->measurement_file);
-    status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
-    if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
-        return s;
-    }
-    s = measurement_table_parse(text, n, doc->measurement_file, doc, o, err);
-    free(text);
-    return s;
-}
-
-static status load_photograph(const struct job_document *doc, size_t i, const char *folder, observation_warning warn,
-                              void *context, struct observation_set *o, struct error *err)
-{
-    const struct job_photograph *p = &doc->photograph[i];
-    struct photograph_mean mean;
-    struct observation item = {.set = p->set, .weight = p->weight};
-    char path[4096];
-    snprintf(path, sizeof path, "%s/%s", folder, p->file);
-    status s = photograph_measure(path, p, &mean, err);
-    if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
-        return s;
-    }
-    if (mean.warning[0] != '\0' && warn != NULL) warn(context, mean.warning);
-    snprintf(item.name, sizeof item.name, "%s", p->file);
-    if (doc->texture_block_mm > 0.0) {
-        item.n_cell = job_texture_cells(doc);
-        s = photograph_contrast(path, p, item.n_cell, item.contrast_rgb, item.contrast_se_rgb, err);
-        if (s != STATUS_OK) {
-            if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_TEXTURE_BLOCK);
-            return s;
-        }
-        if (!contrast_is_known(&item) && doc->texture_weight > 0.0 && warn != NULL) {
-            char text[400];
-            snprintf(text, sizeof text,
-                     "photograph '%s' is black in one of its channels, so its texture is not compared with the "
-                     "rendering's",
-                     p->file);
-            warn(context, text);
-        }
-    }
-    memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
-    memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
-    item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
-                                                   p->camera_phi_deg, p->cloth_rotation_deg);
-    return observation_set_append(o, &item, err);
-}
-
-status observation_set_load(const struct job_document *doc, const char *folder, observation_warning warn, void *context,
-                            struct observation_set *o, struct error *err)
-{
-    if (doc->measurement_file[0] != '\0') return load_table(doc, folder, o, err);
-    for (size_t i = 0; i < doc->n_photograph; i++) {
-        status s = load_photograph(doc, i, folder, warn, context, o, err);
-        if (s != STATUS_OK) return s;
-    }
-    return STATUS_OK;
 }

@@ -41,6 +41,8 @@ void observation_set_weigh(struct observation_set *o);
 /* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb are those of the
  * contrast, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
 bool observation_is_contrast(const struct observation *o);
+/* Whether the contrast of all channels is known: its standard errors are below 1, which a black channel has not. */
+bool observation_contrast_known(const struct observation *o);
 /* That observation from one with n_cell > 0. */
 struct observation observation_of_contrast(const struct observation *o, double weight);
 /* Appends the contrasts of all observations of `from` to `to`. */
@@ -51,11 +53,5 @@ status observation_set_append_contrasts(const struct observation_set *from, doub
 struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
                                                double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
                                                double cloth_rotation_deg);
-
-/* Reads what the document names, files being in `folder`. Warnings (see photograph.h) go to warn, NULL allowed.
- * err->field is the document's field. */
-typedef void (*observation_warning)(void *context, const char *text);
-status observation_set_load(const struct job_document *doc, const char *folder, observation_warning warn, void *context,
-                            struct observation_set *o, struct error *err);
 
 #endif

@@ -1,7 +1,7 @@
 #include "optimizer/fit/photographs/observation_check.h"
+#include "base/option_id.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 enum { NAMED = 3 };
@@ -48,7 +48,7 @@ static double median_reflected(const struct observation_set *o, bool behind)
     return median;
 }
 
-static void check_dark(const struct observation_set *o, observation_warning warn, void *context)
+static void check_dark(const struct observation_set *o, const struct warning_sink *warn)
 {
     const double median[2] = {median_reflected(o, false), median_reflected(o, true)};
     size_t n_dark = 0;
@@ -56,23 +56,17 @@ static void check_dark(const struct observation_set *o, observation_warning warn
         const struct observation *item = &o->item[i];
         bool behind = lit_from_behind(item);
         double a = reflected(item), share = behind ? dark_share_behind : dark_share_front;
-        char text[400];
         if ((a > 0.0 && a >= share * median[behind]) || !(item->weight > 0.0)) continue;
         if (++n_dark > NAMED) continue;
         if (a > 0.0)
-            snprintf(text, sizeof text,
-                     "row '%s' is dark: its brightness %.2g is %.2g %% of what the others lead to expect "
-                     "under its lamp",
-                     item->name, brightness(item), 100.0 * a / median[behind]);
+            warning_send(warn, OPTION_NONE,
+                         "row '%s' is dark: its brightness %.2g is %.2g %% of what the others lead to expect "
+                         "under its lamp",
+                         item->name, brightness(item), 100.0 * a / median[behind]);
         else
-            snprintf(text, sizeof text, "row '%s' is zero in all channels: was the lamp on?", item->name);
-        warn(context, text);
+            warning_send(warn, OPTION_NONE, "row '%s' is zero in all channels: was the lamp on?", item->name);
     }
-    if (n_dark > NAMED) {
-        char text[100];
-        snprintf(text, sizeof text, "%zu more rows are dark or zero", n_dark - NAMED);
-        warn(context, text);
-    }
+    if (n_dark > NAMED) warning_send(warn, OPTION_NONE, "%zu more rows are dark or zero", n_dark - NAMED);
 }
 
 /* Of a cloth; gaps show the lamp behind it. */
@@ -82,26 +76,22 @@ static double brightest_possible(const struct configuration *c)
     return c->light_theta_rad > M_PI_2 ? fmax(brightest, lamp) : brightest;
 }
 
-static void check_bright(const struct observation_set *o, observation_warning warn, void *context)
+static void check_bright(const struct observation_set *o, const struct warning_sink *warn)
 {
     size_t n_bright = 0;
     for (size_t i = 0; i < o->n; i++) {
         const struct observation *item = &o->item[i];
         double largest = fmax(fmax(item->mean_rgb[0], item->mean_rgb[1]), item->mean_rgb[2]);
-        char text[400];
         if (!(item->weight > 0.0) || largest <= brightest_possible(&item->configuration)) continue;
         if (++n_bright > NAMED) continue;
-        snprintf(text, sizeof text,
-                 "row '%s' is brighter than any cloth: its radiance is %.3g, that of a perfect white diffuser facing "
-                 "the lamp is 1; is its scale right?",
-                 item->name, largest);
-        warn(context, text);
+        warning_send(
+            warn, OPTION_NONE,
+            "row '%s' is brighter than any cloth: its radiance is %.3g, that of a perfect white diffuser facing "
+            "the lamp is 1; is its scale right?",
+            item->name, largest);
     }
-    if (n_bright > NAMED) {
-        char text[100];
-        snprintf(text, sizeof text, "%zu more rows are brighter than any cloth", n_bright - NAMED);
-        warn(context, text);
-    }
+    if (n_bright > NAMED)
+        warning_send(warn, OPTION_NONE, "%zu more rows are brighter than any cloth", n_bright - NAMED);
 }
 
 /* Unit vector towards theta, phi. */
@@ -147,33 +137,28 @@ static double contradiction(const struct observation *a, const struct observatio
     return scale > 0.0 && largest > allowed_difference * scale ? largest / scale : 0.0;
 }
 
-static void check_contradictions(const struct observation_set *o, observation_warning warn, void *context)
+static void check_contradictions(const struct observation_set *o, const struct warning_sink *warn)
 {
     size_t n = 0;
     for (size_t i = 0; i < o->n; i++) {
         for (size_t j = 0; j < i; j++) {
             const struct observation *a = &o->item[j], *b = &o->item[i];
-            char text[500];
             if (!(a->weight > 0.0 && b->weight > 0.0) || !same_configuration(&a->configuration, &b->configuration))
                 continue;
             double difference = contradiction(a, b);
             if (!(difference > 0.0) || ++n > NAMED) continue;
-            snprintf(text, sizeof text,
-                     "rows '%s' and '%s' have the same angles to the cloth and differ by %.0f %%: no model fits both",
-                     a->name, b->name, 100.0 * difference);
-            warn(context, text);
+            warning_send(
+                warn, OPTION_NONE,
+                "rows '%s' and '%s' have the same angles to the cloth and differ by %.0f %%: no model fits both",
+                a->name, b->name, 100.0 * difference);
         }
     }
-    if (n > NAMED) {
-        char text[100];
-        snprintf(text, sizeof text, "%zu more pairs of rows contradict each other", n - NAMED);
-        warn(context, text);
-    }
+    if (n > NAMED) warning_send(warn, OPTION_NONE, "%zu more pairs of rows contradict each other", n - NAMED);
 }
 
-void observation_set_check(const struct observation_set *o, observation_warning warn, void *context)
+void observation_set_check(const struct observation_set *o, const struct warning_sink *warn)
 {
-    check_dark(o, warn, context);
-    check_bright(o, warn, context);
-    check_contradictions(o, warn, context);
+    check_dark(o, warn);
+    check_bright(o, warn);
+    check_contradictions(o, warn);
 }

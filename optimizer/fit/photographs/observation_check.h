@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_OPTIMIZER_OBSERVATION_CHECK_H
 #define SELVEDGE_OPTIMIZER_OBSERVATION_CHECK_H
 
+#include "base/warning.h"
 #include "optimizer/fit/photographs/observation.h"
 
 /* Rows that are zero in all channels (a lamp that was off, an empty line); rows far darker than others lit from the
@@ -10,6 +11,6 @@
  * any cloth (radiance above 20; from behind, above the lamp's); rows of the same configuration, however its angles are
  * written, that contradict each other: a channel differs by more than 5 % of the brightness and five standard errors.
  * Rows of weight 0 are left out. At most a few of each kind are named, the rest counted. */
-void observation_set_check(const struct observation_set *o, observation_warning warn, void *context);
+void observation_set_check(const struct observation_set *o, const struct warning_sink *warn);
 
 #endif

@@ -127,17 +127,6 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
     return s;
 }
 
-struct picture_progress {
-    const struct progress *whole;
-    double base, share;
-};
-
-static void report_picture(void *context, double fraction)
-{
-    const struct picture_progress *p = context;
-    progress_report(p->whole, p->base + p->share * fraction);
-}
-
 static status write_rendering(struct pipeline_context *c, size_t i, const char *name, double exposure,
                               const struct progress *progress, struct error *err)
 {
@@ -173,9 +162,9 @@ status result_renderings_write(struct pipeline_context *c, double base, struct e
     for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++)
         s = write_photograph(c, i, name[i], exposure, err);
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
-        struct picture_progress part = {&c->progress, base + (1.0 - base) * (double)i / (double)n,
-                                        (1.0 - base) / (double)n};
-        struct progress progress = {report_picture, &part, c->progress.cancel};
+        struct progress_part part;
+        struct progress progress = progress_begin_part(&part, &c->progress, base + (1.0 - base) * (double)i / (double)n,
+                                                       (1.0 - base) / (double)n);
         s = write_rendering(c, i, name[i], exposure, &progress, err);
     }
     free(name);

@@ -31,17 +31,16 @@ status pipeline_warn_budget(struct pipeline_context *c, struct error *err)
 {
     for (size_t i = 0; i < c->n_model && c->doc->path_budget > 0; i++) {
         const struct pipeline_model *m = &c->model[i];
-        char warning[400];
         uint64_t least;
         status s = least_budget(c, m, &least, err);
         if (s != STATUS_OK) return s;
         if (least <= c->doc->path_budget) continue;
-        snprintf(warning, sizeof warning,
-                 "%s: %" PRIu64 " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
-                 " all the same: that is the least%s",
-                 job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method, c->fitted.n,
-                 least, m->option->n_start > 1 ? " for so many starts" : "");
-        worker_status_warn(c->status, warning);
+        worker_status_warn(c->status,
+                           "%s: %" PRIu64
+                           " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
+                           " all the same: that is the least%s",
+                           job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method,
+                           c->fitted.n, least, m->option->n_start > 1 ? " for so many starts" : "");
     }
     return STATUS_OK;
 }

@@ -15,13 +15,12 @@ static const double allowed_error = 0.01;
 static void warn_of(struct pipeline_context *c, const struct pipeline_model *m)
 {
     const struct derivative_check *k = &m->certificate;
-    char warning[400];
     if (k->error[k->worst] - 3.0 * k->error_se[k->worst] <= allowed_error) return;
-    snprintf(warning, sizeof warning,
-             "the derivatives by '%s' of model '%s' are off by %.2g +- %.1g of themselves on this cloth: do not trust "
-             "the fit's standard errors, and report this",
-             m->appearance.param[k->worst].name, m->appearance.id, k->error[k->worst], k->error_se[k->worst]);
-    worker_status_warn(c->status, warning);
+    worker_status_warn(
+        c->status,
+        "the derivatives by '%s' of model '%s' are off by %.2g +- %.1g of themselves on this cloth: do not trust "
+        "the fit's standard errors, and report this",
+        m->appearance.param[k->worst].name, m->appearance.id, k->error[k->worst], k->error_se[k->worst]);
 }
 
 static status certify(struct pipeline_context *c, struct pipeline_model *m, const struct configuration *configuration,

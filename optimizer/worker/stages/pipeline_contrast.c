@@ -11,13 +11,13 @@ status pipeline_validate_contrast(struct pipeline_context *c, size_t i_model, co
 {
     struct pipeline_model *m = &c->model[i_model];
     struct pipeline_trace trace;
-    struct pipeline_part part;
+    struct progress_part part;
     double wall_s;
     if (c->contrast.n == 0) return STATUS_OK;
     status s = pipeline_trace_open(&trace, c, "validation", "contrast.journal", i_model, &c->contrast, err);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
         struct estimator e = estimate_journal_estimator(trace.journal);
-        struct progress half = pipeline_sub_progress(&part, progress, 0.5 * q, 0.5);
+        struct progress half = progress_begin_part(&part, progress, 0.5 * q, 0.5);
         struct estimator_call call = {m->fit.param, n_path, ITERATION, q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B,
                                       false};
         s = e.run(e.context, &call, &half, m->validation.contrast[q], &wall_s, err);

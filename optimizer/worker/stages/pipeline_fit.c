@@ -61,35 +61,31 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
 static void warn_of_starts(struct pipeline_context *c, const struct pipeline_model *m)
 {
     for (size_t k = 0; k < m->fit.n_start; k++) {
-        char warning[400];
         if (!m->fit.start[k].elsewhere) continue;
-        snprintf(warning, sizeof warning,
-                 "start %zu of the fit of %s ended at other parameters with an objective (%.4g) that cannot be told "
-                 "from the one kept: the photographs allow more than one solution",
-                 k + 1, m->appearance.id, m->fit.start[k].objective);
-        worker_status_warn(c->status, warning);
+        worker_status_warn(
+            c->status,
+            "start %zu of the fit of %s ended at other parameters with an objective (%.4g) that cannot be told "
+            "from the one kept: the photographs allow more than one solution",
+            k + 1, m->appearance.id, m->fit.start[k].objective);
     }
 }
 
 static void warn_convergence(struct pipeline_context *c, const struct pipeline_model *m)
 {
-    char warning[400];
     if (m->fit.converged) return;
-    snprintf(warning, sizeof warning, "the fit%s%s has not converged: %s", c->n_model > 1 ? " of " : "",
-             c->n_model > 1 ? m->appearance.id : "", m->fit.reason);
-    worker_status_warn(c->status, warning);
+    worker_status_warn(c->status, "the fit%s%s has not converged: %s", c->n_model > 1 ? " of " : "",
+                       c->n_model > 1 ? m->appearance.id : "", m->fit.reason);
 }
 
 static void warn_density(struct pipeline_context *c, const struct pipeline_model *m)
 {
     int d = appearance_param_index(&m->appearance, APPEARANCE_DENSITY_MULTIPLIER);
     if (d < 0 || m->parameter[d].fixed || m->fit.uncertainty.determined[d]) return;
-    char warning[300];
-    snprintf(warning, sizeof warning,
-             "the density multiplier of %s is not determined by these photographs: too little light comes through "
-             "the cloth, or too much",
-             m->appearance.id);
-    worker_status_warn(c->status, warning);
+    worker_status_warn(
+        c->status,
+        "the density multiplier of %s is not determined by these photographs: too little light comes through "
+        "the cloth, or too much",
+        m->appearance.id);
 }
 
 /* "a, b, c" of the flagged parameters; false when there is none. */
@@ -107,21 +103,18 @@ static bool list_names(const struct pipeline_model *m, const bool *flag, size_t 
 static void warn_parameters(struct pipeline_context *c, const struct pipeline_model *m)
 {
     bool at_bound[SCATTERING_MAX_PARAM], unknown[SCATTERING_MAX_PARAM];
-    char names[300], warning[400];
+    char names[300];
     for (size_t p = 0; p < m->appearance.n_param; p++) {
         bool density = strcmp(m->appearance.param[p].name, APPEARANCE_DENSITY_MULTIPLIER) == 0; /* warn_density */
         at_bound[p] = !m->parameter[p].fixed && m->fit.uncertainty.at_bound[p];
         unknown[p] = !m->parameter[p].fixed && !m->fit.uncertainty.determined[p] && !density;
     }
     if (list_names(m, at_bound, sizeof names, names)) {
-        snprintf(warning, sizeof warning, "at the edge of the allowed range in the fit of %s: %s", m->appearance.id,
-                 names);
-        worker_status_warn(c->status, warning);
+        worker_status_warn(c->status, "at the edge of the allowed range in the fit of %s: %s", m->appearance.id, names);
     }
     if (list_names(m, unknown, sizeof names, names)) {
-        snprintf(warning, sizeof warning, "not determined by these measurements in the fit of %s: %s", m->appearance.id,
-                 names);
-        worker_status_warn(c->status, warning);
+        worker_status_warn(c->status, "not determined by these measurements in the fit of %s: %s", m->appearance.id,
+                           names);
     }
 }
 
@@ -142,9 +135,9 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     struct pipeline_context *c = listener->pipeline;
     struct pipeline_model *m = &c->model[listener->i_model];
     struct pipeline_trace trace;
-    struct pipeline_part rest, part;
+    struct progress_part rest, part;
     double before = c->doc->fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
-    struct progress whole = pipeline_sub_progress(&rest, &c->progress, before, 1.0 - before);
+    struct progress whole = progress_begin_part(&rest, &c->progress, before, 1.0 - before);
     struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_model);
     struct estimator estimator;
     char message[160];

@@ -77,7 +77,7 @@ status stage_volume(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;
-    reconstruct_warn_volume(&c->option, &c->geometry, pipeline_warn_option, c);
+    reconstruct_warn_volume(&c->option, &c->geometry, &(struct warning_sink){pipeline_warn, c});
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
                                      {c->volume.n, sizeof c->volume.n},
@@ -109,7 +109,7 @@ static status load_volume(struct pipeline_context *c, struct reconstruct_option 
 status stage_volume_load(struct pipeline_context *c, struct error *err)
 {
     status s = load_volume(c, &c->option, &c->geometry, err);
-    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, pipeline_warn_option, c);
+    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, &(struct warning_sink){pipeline_warn, c});
     return s;
 }
 

@@ -106,9 +106,9 @@ static status evaluate(void *context, double u, double *f, double *se, struct er
     struct search *q = context;
     struct pipeline_context *c = q->c;
     struct pipeline_trace trace = {0};
-    struct pipeline_part part;
+    struct progress_part part;
     double share = PIPELINE_RADIUS_SHARE / MOST_POINTS;
-    struct progress progress = pipeline_sub_progress(&part, &c->progress, share * (double)q->n_done, share);
+    struct progress progress = progress_begin_part(&part, &c->progress, share * (double)q->n_done, share);
     struct estimator estimator;
     struct fit_result r;
     char name[64], message[100];
@@ -149,21 +149,19 @@ static void conclude(struct pipeline_context *c)
     r->se_m = fmin(exp(r->curve.u) * sqrt(var), (r->upper_m - r->lower_m) / sqrt(12.0));
 }
 
-static void tell(struct pipeline_context *c)
+static void report_radius(struct pipeline_context *c)
 {
     const struct pipeline_radius *r = &c->radius;
-    char warning[300];
     log_info(c->log, "fiber radius %.4g +- %.2g um (%s), it was %.4g um", r->radius_m / um, r->se_m / um,
              r->curve.determined ? "determined" : "not determined", r->start_m / um);
     if (r->curve.determined) return;
     if (r->curve.at_bound)
-        snprintf(warning, sizeof warning,
-                 "the fiber radius ends at the edge of its range, %.4g um (%s: %.4g to %.4g um)", r->radius_m / um,
-                 job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um);
+        worker_status_warn(c->status, "the fiber radius ends at the edge of its range, %.4g um (%s: %.4g to %.4g um)",
+                           r->radius_m / um, job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um);
     else
-        snprintf(warning, sizeof warning,
-                 "the fiber radius is not determined by these photographs: %.4g um is kept as it was", r->start_m / um);
-    worker_status_warn(c->status, warning);
+        worker_status_warn(c->status,
+                           "the fiber radius is not determined by these photographs: %.4g um is kept as it was",
+                           r->start_m / um);
 }
 
 bool pipeline_radius_used(const struct pipeline_radius *r) { return r->curve.determined || r->curve.at_bound; }
@@ -196,14 +194,12 @@ static status check_range(struct pipeline_context *c, struct error *err)
 static void warn_of_range(struct pipeline_context *c)
 {
     const struct pipeline_radius *r = &c->radius;
-    char warning[300];
     if (r->start_m >= r->lower_m && r->start_m <= r->upper_m) return;
-    snprintf(
-        warning, sizeof warning,
+    worker_status_warn(
+        c->status,
         "'%s' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, which is not in this "
         "range",
         job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um, r->start_m / um);
-    worker_status_warn(c->status, warning);
 }
 
 status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err)
@@ -228,7 +224,7 @@ status pipeline_radius_search(struct pipeline_context *c, struct worker_series *
     c->radius.n_step = q.n_done;
     if (s == STATUS_OK) {
         conclude(c);
-        tell(c);
+        report_radius(c);
         s = use_radius(c, q.radius_m, err);
     }
     free(q.radius_m);
@@ -238,6 +234,6 @@ status pipeline_radius_search(struct pipeline_context *c, struct worker_series *
 status pipeline_radius_apply(struct pipeline_context *c, struct error *err)
 {
     warn_of_range(c);
-    tell(c);
+    report_radius(c);
     return use_radius(c, c->fiber.radius_m, err);
 }

@@ -24,7 +24,6 @@ static status voxelise(struct pipeline_context *c, struct error *err)
         .voxel_size_m = c->doc->voxel_um * um,
         .limit_bytes = c->memory_limit_bytes > 0 ? c->memory_limit_bytes / VOXELISE_MEMORY_SHARE : SIZE_MAX};
     double radius_m = 0.0, voxel_m;
-    char warning[300];
     status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
     if (s != STATUS_OK) {
         if (err != NULL && s != STATUS_CANCELLED) snprintf(err->field, sizeof err->field, OPTION_DENSITY_VOXEL);
@@ -32,11 +31,11 @@ static status voxelise(struct pipeline_context *c, struct error *err)
     }
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
     if (isnan(option.voxel_size_m) && voxel_m > 0.51 * radius_m) {
-        snprintf(warning, sizeof warning,
-                 "volume models see the fibers in voxels of %.3g um instead of %.3g um (half a radius): finer ones do "
-                 "not fit into the memory setting",
-                 voxel_m / um, 0.5 * radius_m / um);
-        worker_status_warn(c->status, warning);
+        worker_status_warn(
+            c->status,
+            "volume models see the fibers in voxels of %.3g um instead of %.3g um (half a radius): finer ones do "
+            "not fit into the memory setting",
+            voxel_m / um, 0.5 * radius_m / um);
     }
     return STATUS_OK;
 }
@@ -84,6 +83,7 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
 
 status stage_scene(struct pipeline_context *c, struct error *err)
 {
-    reconstruct_warn_fibers(&c->geometry, &c->fiber, pipeline_warn_option, c); /* this stage runs in every attempt */
+    reconstruct_warn_fibers(&c->geometry, &c->fiber,
+                            &(struct warning_sink){pipeline_warn, c}); /* this stage runs in every attempt */
     return pipeline_make_scene(c, err);
 }

@@ -54,22 +54,9 @@ void pipeline_trace_close(struct pipeline_trace *t)
     free(t->configuration);
 }
 
-static void report_part(void *context, double fraction)
-{
-    const struct pipeline_part *p = context;
-    progress_report(p->whole, p->base + p->share * fraction);
-}
-
-struct progress pipeline_sub_progress(struct pipeline_part *part, const struct progress *whole, double base,
-                                      double share)
-{
-    *part = (struct pipeline_part){whole, base, share};
-    return (struct progress){report_part, part, whole->cancel};
-}
-
-struct progress pipeline_model_progress(struct pipeline_part *part, const struct progress *whole,
+struct progress pipeline_model_progress(struct progress_part *part, const struct progress *whole,
                                         const struct pipeline_context *c, size_t i_model)
 {
     double share = 1.0 / (double)c->n_model;
-    return pipeline_sub_progress(part, whole, share * (double)i_model, share);
+    return progress_begin_part(part, whole, share * (double)i_model, share);
 }

@@ -20,15 +20,8 @@ status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c,
                            size_t i_model, const struct observation_set *o, struct error *err);
 void pipeline_trace_close(struct pipeline_trace *t);
 
-struct pipeline_part {
-    const struct progress *whole;
-    double base, share;
-};
-/* Fractions 0..1 become base .. base + share of `whole`. */
-struct progress pipeline_sub_progress(struct pipeline_part *part, const struct progress *whole, double base,
-                                      double share);
-/* Models take equal shares. */
-struct progress pipeline_model_progress(struct pipeline_part *part, const struct progress *whole,
+/* The progress of model i_model as a part of `whole`: all models take equal shares. */
+struct progress pipeline_model_progress(struct progress_part *part, const struct progress *whole,
                                         const struct pipeline_context *c, size_t i_model);
 
 #endif

@@ -116,8 +116,8 @@ static status allocate_validations(struct pipeline_context *c, struct error *err
 static status estimate_validation(struct pipeline_context *c, struct pipeline_model *m, const struct estimator *e,
                                   const struct progress *whole, size_t *n_path, struct error *err)
 {
-    struct pipeline_part part;
-    struct progress progress = pipeline_sub_progress(&part, whole, 0.0, 0.1);
+    struct progress_part part;
+    struct progress progress = progress_begin_part(&part, whole, 0.0, 0.1);
     struct estimator_call call = {m->fit.param, n_path, 0, REPLICA_FINAL_A, false};
     double wall_s;
     double pilot = 0.05 * (double)m->fit.n_path / (double)c->observation.n;
@@ -127,7 +127,7 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
     if (s != STATUS_OK) return s;
     plan_validation(c, m, m->validation.replica[0], n_path);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
-        progress = pipeline_sub_progress(&part, whole, 0.1 + 0.45 * q, 0.45);
+        progress = progress_begin_part(&part, whole, 0.1 + 0.45 * q, 0.45);
         call.iteration = 1;
         call.replica = q == 0 ? REPLICA_FINAL_A : REPLICA_FINAL_B;
         s = e->run(e->context, &call, &progress, m->validation.replica[q], &wall_s, err);
@@ -154,18 +154,18 @@ static void warn_of_equals(struct pipeline_context *c)
         used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.3g +- %.2g %%)", c->model[i].appearance.id,
                                  100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
     }
-    if (used > 0) worker_status_warn(c->status, text);
+    if (used > 0) worker_status_warn(c->status, "%s", text);
 }
 
 static status validate_model(struct pipeline_context *c, size_t i_model, size_t *n_path, struct error *err)
 {
     struct pipeline_model *m = &c->model[i_model];
     struct pipeline_trace trace;
-    struct pipeline_part part, means, contrasts;
+    struct progress_part part, means, contrasts;
     struct progress progress = pipeline_model_progress(&part, &c->progress, c, i_model);
     double share = c->contrast.n > 0 ? 0.5 : 1.0;
-    struct progress of_means = pipeline_sub_progress(&means, &progress, 0.0, share);
-    struct progress of_contrasts = pipeline_sub_progress(&contrasts, &progress, share, 1.0 - share);
+    struct progress of_means = progress_begin_part(&means, &progress, 0.0, share);
+    struct progress of_contrasts = progress_begin_part(&contrasts, &progress, share, 1.0 - share);
     struct estimator estimator;
     status s = pipeline_trace_open(&trace, c, "validation", "estimates.journal", i_model, &c->observation, err);
     if (s != STATUS_OK) goto out;

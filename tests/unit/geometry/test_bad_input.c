@@ -62,7 +62,7 @@ static void chain_release(struct chain *c)
 static status chain_read(struct chain *c, const char *const *path, size_t n_path)
 {
     status s = reconstruct_read(path, n_path, &c->o, NULL, NULL, NULL, &c->v, &c->r, &c->err);
-    if (s == STATUS_OK) reconstruct_warn_volume(&c->o, &c->r, keep, c);
+    if (s == STATUS_OK) reconstruct_warn_volume(&c->o, &c->r, &(struct warning_sink){keep, c});
     return s;
 }
 
@@ -72,7 +72,7 @@ static status chain_run(struct chain *c, const char *const *path, size_t n_path)
     if (s == STATUS_OK) s = reconstruct_orientation(&c->v, &c->o, NULL, NULL, &c->d, &c->r, &c->err);
     if (s == STATUS_OK) s = reconstruct_fibers(&c->v, &c->d, &c->o, NULL, NULL, &c->f, &c->r, &c->err);
     if (s == STATUS_OK) s = reconstruct_transfer(&c->f, &c->d, NULL, NULL, &c->r, &c->err);
-    if (s == STATUS_OK) reconstruct_warn_fibers(&c->r, &c->f, keep, c);
+    if (s == STATUS_OK) reconstruct_warn_fibers(&c->r, &c->f, &(struct warning_sink){keep, c});
     return s;
 }
 

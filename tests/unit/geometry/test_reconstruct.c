@@ -230,7 +230,7 @@ static void test_advice_to_crop_can_be_followed(void **state)
             memcpy(o.crop_voxel, (const size_t[6]){advice[0].x0, advice[0].y0, 0, advice[0].x1, advice[0].y1, NZ},
                    sizeof o.crop_voxel);
         if (reconstruct_read(&file, 1, &o, NULL, NULL, NULL, &v, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
-        reconstruct_warn_volume(&o, &r, take_advice, &advice[i]);
+        reconstruct_warn_volume(&o, &r, &(struct warning_sink){take_advice, &advice[i]});
         volume_release(&v);
     }
     assert_int_equal(advice[0].n_said, 1);

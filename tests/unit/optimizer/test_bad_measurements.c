@@ -1,6 +1,7 @@
 /* Measurements that no one should have: too few, contradictory, dark, all zero; and an estimator that fails. A fit ends,
  * says what it does not know, and never gives a number that is not finite. */
 #include "base/angle.h"
+#include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/job/method_names.h"
@@ -183,9 +184,10 @@ struct said {
     char text[8][500];
 };
 
-static void listen(void *context, const char *text)
+static void listen(void *context, const char *option, const char *text)
 {
     struct said *s = context;
+    assert_string_equal(option, OPTION_NONE);
     assert_true(s->n < 8);
     snprintf(s->text[s->n++], sizeof s->text[0], "%s", text);
 }
@@ -198,7 +200,7 @@ static void test_warnings(void **state)
     setup(&x, FAKE_N_FIT);
     struct observation *o = x.observation.item;
     o[7].configuration.camera_theta_rad = o[15].configuration.camera_theta_rad = 0.1; /* phi counts for the fake at 0 */
-    observation_set_check(&x.observation, listen, &s);
+    observation_set_check(&x.observation, &(struct warning_sink){listen, &s});
     assert_int_equal(s.n, 0);
     for (int c = 0; c < 3; c++) {
         o[3].mean_rgb[c] = 0.0;
@@ -210,7 +212,7 @@ static void test_warnings(void **state)
     o[8] = o[7];
     o[8].mean_rgb[2] *= 1.3;
     snprintf(o[8].name, sizeof o[8].name, "again");
-    observation_set_check(&x.observation, listen, &s);
+    observation_set_check(&x.observation, &(struct warning_sink){listen, &s});
     assert_int_equal(s.n, 3);
     assert_non_null(strstr(s.text[0], "'row-3' is zero"));
     assert_non_null(strstr(s.text[1], "'row-4' is dark"));
@@ -218,7 +220,7 @@ static void test_warnings(void **state)
     for (size_t i = 0; i < x.observation.n; i++)
         for (int c = 0; c < 3; c++) o[i].mean_rgb[c] = 0.0;
     s.n = 0;
-    observation_set_check(&x.observation, listen, &s);
+    observation_set_check(&x.observation, &(struct warning_sink){listen, &s});
     assert_int_equal(s.n, 4);
     assert_non_null(strstr(s.text[3], "13 more rows"));
     observation_set_release(&x.observation);
@@ -240,7 +242,7 @@ static void check_rows(const double light_theta_deg[3], const double value[5], c
         snprintf(item[i].name, sizeof item[i].name, "row-%zu", i);
     }
     s->n = 0;
-    observation_set_check(&o, listen, s);
+    observation_set_check(&o, &(struct warning_sink){listen, s});
 }
 
 static void test_too_dark_and_too_bright(void **state)
@@ -277,7 +279,7 @@ static size_t warnings_of(const struct configuration *a, const struct configurat
                                   {.name = "b", .configuration = *b, .mean_rgb = {0.3, 0.3, 0.3}, .weight = 1}};
     const struct observation_set o = {.n = 2, .capacity = 2, .item = item};
     struct said s = {0};
-    observation_set_check(&o, listen, &s);
+    observation_set_check(&o, &(struct warning_sink){listen, &s});
     return s.n;
 }
 

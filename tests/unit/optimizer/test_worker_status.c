@@ -60,7 +60,7 @@ static void test_warnings_beyond_the_list_are_counted(void **state)
     start(&d, state);
     for (int i = 0; i < 60; i++) {
         snprintf(text, sizeof text, "warning %d", i);
-        worker_status_warn(d.status, text);
+        worker_status_warn(d.status, "%s", text);
         worker_status_warn(d.status, "warning 0"); /* known: not counted again */
     }
     assert_int_equal(worker_status_n_warning(d.status), 50);
@@ -82,7 +82,7 @@ static void test_texts_that_are_no_utf8(void **state)
     longer[599] = '\0';
     struct error error = {.code = STATUS_FORMAT};
     snprintf(error.text, sizeof error.text, "x%s", longer);
-    worker_status_warn(d.status, error.text); /* the limits of warnings and of messages cut a character in two */
+    worker_status_warn(d.status, "%s", error.text); /* the limits of warnings and of messages cut a character in two */
     worker_status_warn(d.status, "gr\xf6\xdf"
                                  "e");
     json_t *json = finish(&d, &error);

@@ -1,0 +1,187 @@
+/* What a job is given, read and checked before its first stage: the document, the parameters of its models, the
+ * observations. */
+#include "base/durable.h"
+#include "base/option_id.h"
+#include "optimizer/fit/photographs/observation_check.h"
+#include "optimizer/fit/photographs/observation_load.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/job/option_key.h"
+#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/pipeline_budget.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <zlib.h>
+
+enum { NAMED_PHOTOGRAPHS = 3 };
+
+/* A series of photographs is often uneven alike: the first few are named in the job's status, all in its log. */
+struct uneven_photographs {
+    struct pipeline_context *pipeline;
+    size_t n;
+};
+
+static void warn_photograph(void *context, const char *option, const char *text)
+{
+    struct uneven_photographs *uneven = context;
+    if (++uneven->n <= NAMED_PHOTOGRAPHS)
+        pipeline_warn(uneven->pipeline, option, text);
+    else
+        log_warning(uneven->pipeline->log, "%s", text);
+}
+
+static status load_observations(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct uneven_photographs uneven = {.pipeline = c};
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
+    status s =
+        observation_set_load(c->doc, path, &(struct warning_sink){warn_photograph, &uneven}, &c->observation, err);
+    if (s != STATUS_OK) return s;
+    if (uneven.n > NAMED_PHOTOGRAPHS)
+        worker_status_warn(c->status, "%zu more photographs are not uniform: the job's log names them",
+                           uneven.n - NAMED_PHOTOGRAPHS);
+    observation_set_check(&c->observation, &(struct warning_sink){pipeline_warn, c});
+    return STATUS_OK;
+}
+
+static status set_parameters(const struct job_model *given, struct pipeline_model *m, struct error *err)
+{
+    struct job_fit_parameter k[JOB_MAX_PARAM];
+    status s = job_fit_resolve(m->appearance.param, m->appearance.n_param, given, k, err);
+    if (s != STATUS_OK) return s;
+    m->option = &given->option;
+    for (size_t p = 0; p < m->appearance.n_param; p++) {
+        const struct param_info *info = &m->appearance.param[p];
+        /* degrees to radians may step over a bound by one rounding */
+        double lower = fmin(fmax(param_from_file_unit(info, k[p].lower), info->lower), info->upper);
+        double upper = fmin(fmax(param_from_file_unit(info, k[p].upper), lower), info->upper);
+        m->parameter[p] = (struct fit_parameter){
+            .lower = lower, .upper = upper, .start = param_from_file_unit(info, k[p].start), .fixed = k[p].fixed};
+        m->parameter[p].start = fmin(fmax(m->parameter[p].start, lower), upper);
+    }
+    return STATUS_OK;
+}
+
+static status set_models(struct pipeline_context *c, struct error *err)
+{
+    c->model = calloc(c->doc->n_model, sizeof *c->model);
+    if (c->model == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
+    c->n_model = c->doc->n_model;
+    for (size_t i = 0; i < c->n_model; i++) {
+        if (!appearance_find(c->doc->model[i].id, &c->model[i].appearance))
+            return error_set_field(err, STATUS_INVALID, OPTION_MODEL, "unknown model '%s'", c->doc->model[i].id);
+        status s = set_parameters(&c->doc->model[i], &c->model[i], err);
+        if (s != STATUS_OK) return s;
+    }
+    return STATUS_OK;
+}
+
+static status check_density(const struct pipeline_context *c, struct error *err)
+{
+    bool from_behind = false;
+    for (size_t i = 0; i < c->fitted.n; i++)
+        if (c->fitted.item[i].configuration.light_theta_rad > M_PI_2) from_behind = true;
+    return c->doc->fit_density && !from_behind ? job_density_undetermined(c->doc->black_sheet, err) : STATUS_OK;
+}
+
+static void warn_few_rows(struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->n_model; i++) {
+        const size_t n_free = pipeline_n_free(&c->model[i]);
+        if (3 * c->fitted.n >= n_free) continue;
+        worker_status_warn(
+            c->status,
+            "%zu fitted rows give %zu numbers for %zu free parameters of model '%s': some will stay undetermined",
+            c->fitted.n, 3 * c->fitted.n, n_free, c->model[i].appearance.id);
+    }
+}
+
+struct input_sum {
+    const struct pipeline_context *pipeline;
+    uint32_t sum;
+};
+
+/* Name, size and time of change of an input file. */
+static void add_input(void *context, const char *name, const char *role)
+{
+    struct input_sum *input = context;
+    char path[WORKER_PATH_BYTES];
+    struct stat st = {0};
+    (void)role;
+    worker_folder_path(input->pipeline->folder, JOB_FOLDER_INPUT, name, path);
+    if (stat(path, &st) != 0) return; /* absence is noticed by the stage that reads it */
+    int64_t seen[3] = {(int64_t)st.st_size, (int64_t)st.st_mtim.tv_sec, (int64_t)st.st_mtim.tv_nsec};
+    input->sum = (uint32_t)crc32_z(input->sum, (const void *)name, strlen(name));
+    input->sum = (uint32_t)crc32_z(input->sum, (const void *)seen, sizeof seen);
+}
+
+static status claim_inputs(struct pipeline_context *c, struct error *err)
+{
+    struct input_sum input = {.pipeline = c};
+    bool changed;
+    job_document_visit_files(c->doc, add_input, &input);
+    status s = worker_folder_claim_inputs(c->folder, c->fingerprint << 32 | input.sum, &changed, err);
+    if (s == STATUS_OK && changed)
+        log_info(c->log, "the inputs, or the program, have changed since the last run: starting anew");
+    return s;
+}
+
+/* What the fit sees, and the contrasts. */
+static status select_rows(struct pipeline_context *c, struct error *err)
+{
+    const struct job_document *doc = c->doc;
+    status s = observation_set_select(&c->observation, JOB_SET_FIT, &c->fitted, err);
+    observation_set_weigh(&c->fitted);
+    if (s == STATUS_OK && c->fitted.n == 0)
+        s = error_set_field(err, STATUS_INVALID,
+                            doc->measurement_file[0] != '\0' ? OPTION_MEASUREMENT_FILE : OPTION_PHOTOGRAPHS,
+                            "all rows of the set 'fit' have the weight 0: give at least one a weight above it");
+    if (s == STATUS_OK) s = observation_set_select(&c->fitted, JOB_SET_FIT, &c->row, err);
+    if (s != STATUS_OK || !(doc->texture_block_mm > 0.0)) return s;
+    s = observation_set_append_contrasts(&c->observation, doc->texture_weight, &c->contrast, err);
+    return s == STATUS_OK && doc->texture_weight > 0.0
+               ? observation_set_append_contrasts(&c->fitted, doc->texture_weight, &c->row, err)
+               : s;
+}
+
+enum { PROGRAM_MAX_BYTES = 256 << 20 };
+
+/* Of the running program: another build may trace other numbers, which must not be mixed with those of the run before. 0
+ * where the system does not show it. */
+static uint32_t program_sum(void)
+{
+    char *text = NULL;
+    size_t n = 0;
+    if (file_read_all("/proc/self/exe", PROGRAM_MAX_BYTES, &text, &n, NULL) != STATUS_OK) return 0;
+    uint32_t sum = (uint32_t)crc32_z(0, (const void *)text, n);
+    free(text);
+    return sum;
+}
+
+static status read_inputs(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    worker_folder_path(c->folder, JOB_FILE_DOCUMENT, NULL, path);
+    status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
+    if (s != STATUS_OK) return s;
+    s = job_document_parse(text, n, &c->doc, err);
+    c->fingerprint = crc32_z(program_sum(), (const void *)text, n);
+    free(text);
+    if (s == STATUS_OK) s = set_models(c, err);
+    if (s == STATUS_OK) s = claim_inputs(c, err);
+    if (s == STATUS_OK) s = load_observations(c, err);
+    if (s == STATUS_OK) s = select_rows(c, err);
+    if (s == STATUS_OK) s = check_density(c, err);
+    if (s == STATUS_OK) warn_few_rows(c);
+    return s == STATUS_OK ? pipeline_warn_budget(c, err) : s;
+}
+
+status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
+{
+    return job_option_name_field(read_inputs(c, err), err);
+}
