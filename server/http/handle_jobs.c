@@ -74,7 +74,8 @@ void handle_create_job(struct http_request *r)
         return;
     }
     if (!body_is_json(r)) return;
-    if (job_create(r->service, r->body, r->n_body, key, id, &replayed, &refusal, &err) != STATUS_OK)
+    const struct job_request request = {r->body, r->n_body, key};
+    if (job_create(r->service, &request, id, &replayed, &refusal, &err) != STATUS_OK)
         reply_refusal(r, &refusal, &err);
     else
         reply_job(r, id, MHD_HTTP_CREATED, true, replayed);

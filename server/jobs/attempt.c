@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job/job_folder.h"
+#include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 
 #include <signal.h>

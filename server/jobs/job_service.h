@@ -37,9 +37,17 @@ status job_service_open(const struct settings *settings, struct log *log, struct
                         struct error *err);
 void job_service_close(struct job_service *service);
 
-/* idempotency_key may be NULL. *replayed: the job existed already. */
-status job_create(struct job_service *v, const char *document, size_t n_bytes, const char *idempotency_key,
-                  char id[STORE_ID_BYTES], bool *replayed, struct job_refusal *refusal, struct error *err);
+/* A job to be made: the text of its document, and the client's key for this request, or NULL. */
+struct job_request {
+    const char *document;
+    size_t n_bytes;
+    const char *idempotency_key;
+};
+
+/* Makes a job in the state "draft" and gives its id. *replayed: a request with the same key and document has made it before;
+ * that job's id is given. */
+status job_create(struct job_service *v, const struct job_request *request, char id[STORE_ID_BYTES], bool *replayed,
+                  struct job_refusal *refusal, struct error *err);
 /* may_edit (NULL: always) sees the job as it is and is not changed by anyone until the document is replaced; what it returns
  * ends the call. */
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
@@ -50,9 +58,6 @@ status job_start(struct job_service *v, const char *id, bool *changed, struct jo
 status job_retry(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);
 status job_cancel(struct job_service *v, const char *id, bool *changed, struct error *err);
 status job_delete(struct job_service *v, const char *id, struct error *err);
-
-/* store_job_update for changes that free space or end work: on a full disk the ballast is given up for them. */
-status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);
 
 /* A job that exists and is not a tombstone. Release the row. */
 status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err);

@@ -1,0 +1,61 @@
+#include "server/jobs/job_access.h"
+#include "server/jobs/ballast.h"
+#include "server/jobs/job_paths.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <uuid/uuid.h>
+
+void job_new_id(char out[STORE_ID_BYTES])
+{
+    uuid_t u;
+    uuid_generate_random(u);
+    uuid_unparse_lower(u, out);
+}
+
+status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err)
+{
+    long long free_bytes = 0;
+    status s = path_free_bytes(v->settings->data, &free_bytes, err);
+    if (s != STATUS_OK) return s;
+    if (free_bytes < n_bytes || free_bytes - n_bytes < v->settings->floor_bytes)
+        return error_set(
+            err, STATUS_DISK_FULL,
+            "cannot take new work: %lld bytes are free, %lld are kept in reserve; delete jobs or free space",
+            free_bytes, (long long)v->settings->floor_bytes);
+    return STATUS_OK;
+}
+
+status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
+{
+    status s = store_job_update(v->store, row, err);
+    return s == STATUS_DISK_FULL && ballast_release(v->settings->data) ? store_job_update(v->store, row, err) : s;
+}
+
+status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err)
+{
+    memset(row, 0, sizeof *row);
+    if (!id_valid(id)) return error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id);
+    status s = store_job_get(v->store, id, row, err);
+    if (s != STATUS_OK || !row->deleted) return s;
+    job_row_release(row);
+    return error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id);
+}
+
+bool job_active(const struct job_row *row)
+{
+    return row->state == JOB_QUEUED || row->state == JOB_RUNNING || row->state == JOB_PAUSED;
+}
+
+status job_check_editable(const struct job_row *row, struct error *err)
+{
+    if (!job_active(row)) return STATUS_OK;
+    return error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first",
+                     job_state_name(row->state));
+}
+
+void job_mark_edited(struct job_row *row)
+{
+    row->state = JOB_DRAFT;
+    row->dirty = row->dirty || row->attempt > 0;
+}

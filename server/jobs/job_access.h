@@ -1,0 +1,20 @@
+/* Inside jobs/: how the functions that change a job check its row and write it back. Who writes a row holds the service's lock
+ * `change` from reading it to writing it. */
+#ifndef SELVEDGE_SERVER_JOB_ACCESS_H
+#define SELVEDGE_SERVER_JOB_ACCESS_H
+
+#include "server/jobs/job_service.h"
+
+/* A random id for a job or an upload. */
+void job_new_id(char out[STORE_ID_BYTES]);
+/* Whether the job is queued, running or paused. */
+bool job_active(const struct job_row *row);
+/* STATUS_CONFLICT while the job is active: its document and files must not change then. */
+status job_check_editable(const struct job_row *row, struct error *err);
+/* Makes the row that of a job whose document or files were edited: back to draft, and its next start begins afresh. The
+ * caller writes the row together with the edit, so that a job whose edit fails is unchanged. */
+void job_mark_edited(struct job_row *row);
+/* store_job_update for changes that free space or end work: when the disk is full, the ballast is released for them. */
+status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);
+
+#endif

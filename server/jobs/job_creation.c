@@ -1,0 +1,130 @@
+/* New jobs, and new documents for jobs that exist. */
+#include "base/clock.h"
+#include "base/durable.h"
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_folder.h"
+#include "server/jobs/job_access.h"
+#include "server/jobs/job_paths.h"
+
+#include <sodium.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static status check_document(const char *document, size_t n_bytes, char sample[256], struct error *err)
+{
+    struct job_document *doc = NULL;
+    status s = job_document_parse(document, n_bytes, &doc, err);
+    if (s != STATUS_OK) return s;
+    snprintf(sample, 256, "%s", doc->sample);
+    job_document_free(doc);
+    return STATUS_OK;
+}
+
+static status make_folders(struct job_service *v, const char *id, struct error *err)
+{
+    static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
+    char path[PATH_BYTES];
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < 2; i++) {
+        path_join(path, v->settings->data, "jobs", id, part[i], NULL);
+        s = durable_make_folder(path, err);
+        if (s == STATUS_OK) s = durable_sync_folder_of(path, err);
+    }
+    path_join(path, v->settings->data, "jobs", id, NULL);
+    return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
+}
+
+static void text_hash(const char *text, size_t n_bytes, char out[STORE_HASH_TEXT_BYTES])
+{
+    unsigned char sum[crypto_hash_sha256_BYTES];
+    crypto_hash_sha256(sum, (const unsigned char *)text, n_bytes);
+    sodium_bin2hex(out, STORE_HASH_TEXT_BYTES, sum, sizeof sum);
+}
+
+static status find_replay(struct job_service *v, const char *key, const char *body_hash, char id[STORE_ID_BYTES],
+                          bool *replayed, struct job_refusal *refusal, struct error *err)
+{
+    char before[STORE_HASH_TEXT_BYTES];
+    status s = store_idempotency_find(v->store, key, id, before, err);
+    if (s == STATUS_NOT_FOUND) return STATUS_OK;
+    if (s != STATUS_OK) return s;
+    if (strcmp(before, body_hash) != 0) {
+        refusal->code = "idempotency_key_reused";
+        return error_set_field(err, STATUS_INVALID, "Idempotency-Key", "key '%.128s' was used before with another body",
+                               key);
+    }
+    *replayed = true;
+    return STATUS_OK;
+}
+
+static status create_locked(struct job_service *v, struct job_row *row, const char *key, const char *body_hash,
+                            bool *replayed, struct job_refusal *refusal, struct error *err)
+{
+    status s = key == NULL ? STATUS_OK : find_replay(v, key, body_hash, row->id, replayed, refusal, err);
+    if (s != STATUS_OK || *replayed) return s;
+    int64_t count[JOB_N_STATE], n = 0;
+    s = store_job_count(v->store, count, err);
+    if (s != STATUS_OK) return s;
+    for (int i = 0; i < JOB_N_STATE; i++) n += count[i];
+    if (n >= v->settings->max_jobs) {
+        refusal->code = "too_many";
+        return error_set(err, STATUS_TOO_LARGE, "cannot keep more than %lld jobs: delete some",
+                         (long long)v->settings->max_jobs);
+    }
+    job_new_id(row->id);
+    row->created_unix_s = clock_wall_s();
+    s = store_job_insert(v->store, row, key, body_hash, err);
+    if (s != STATUS_OK) return s;
+    s = make_folders(v, row->id, err);
+    if (s != STATUS_OK) store_job_erase(v->store, row->id, NULL);
+    return s;
+}
+
+status job_create(struct job_service *v, const struct job_request *request, char id[STORE_ID_BYTES], bool *replayed,
+                  struct job_refusal *refusal, struct error *err)
+{
+    struct job_row row = {.state = JOB_DRAFT};
+    char body_hash[STORE_HASH_TEXT_BYTES];
+    *replayed = false;
+    status s = check_document(request->document, request->n_bytes, row.sample, err);
+    if (s != STATUS_OK) return s;
+    s = job_disk_check(v, 0, err);
+    if (s != STATUS_OK) return s;
+    text_hash(request->document, request->n_bytes, body_hash);
+    row.document = strndup(request->document, request->n_bytes);
+    if (row.document == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot create job: out of memory");
+    pthread_mutex_lock(&v->change);
+    s = create_locked(v, &row, request->idempotency_key, body_hash, replayed, refusal, err);
+    pthread_mutex_unlock(&v->change);
+    if (s == STATUS_OK) snprintf(id, STORE_ID_BYTES, "%s", row.id);
+    if (s == STATUS_OK && !*replayed) log_info(v->log, "job %s created: '%s'", row.id, row.sample);
+    job_row_release(&row);
+    return s;
+}
+
+status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
+                            status (*may_edit)(void *context, const struct job_row *row, struct error *err),
+                            void *context, struct error *err)
+{
+    struct job_row row;
+    pthread_mutex_lock(&v->change);
+    status s = job_get(v, id, &row, err);
+    if (s == STATUS_OK && may_edit != NULL) s = may_edit(context, &row, err);
+    if (s == STATUS_OK) s = check_document(document, n_bytes, row.sample, err);
+    if (s == STATUS_OK) s = job_check_editable(&row, err);
+    if (s != STATUS_OK) goto out;
+    char *text = strndup(document, n_bytes);
+    if (text == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot replace the document: out of memory");
+        goto out;
+    }
+    free(row.document);
+    row.document = text;
+    job_mark_edited(&row);
+    s = job_update_surely(v, &row, err);
+out:
+    pthread_mutex_unlock(&v->change);
+    job_row_release(&row);
+    return s;
+}

@@ -1,0 +1,166 @@
+/* The input files of a job: which of them its document names and are missing, declarations, deletion. */
+#include "optimizer/job/job_document.h"
+#include "server/jobs/ballast.h"
+#include "server/jobs/job_access.h"
+#include "server/jobs/job_paths.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct missing {
+    const struct file_row *file;
+    size_t n_file;
+    json_t *name;
+};
+
+static void visit_file(void *context, const char *name, const char *role)
+{
+    struct missing *m = context;
+    (void)role;
+    for (size_t i = 0; i < m->n_file; i++)
+        if (m->file[i].state == FILE_COMPLETE && strcmp(m->file[i].name, name) == 0) return;
+    json_array_append_new(m->name, json_string(name));
+}
+
+status job_missing_files(struct job_service *v, const struct job_row *row, json_t **out, struct error *err)
+{
+    struct job_document *doc = NULL;
+    struct file_row *file = NULL;
+    struct missing m = {0};
+    status s = job_document_parse(row->document, strlen(row->document), &doc, err);
+    if (s != STATUS_OK) return s;
+    s = store_file_list(v->store, row->id, &file, &m.n_file, err);
+    if (s != STATUS_OK) goto out;
+    m.file = file;
+    m.name = json_array();
+    job_document_visit_files(doc, visit_file, &m);
+    *out = m.name;
+out:
+    free(file);
+    job_document_free(doc);
+    return s;
+}
+
+static bool role_valid(const char *role)
+{
+    static const char *const known[] = {"volume", "fibers", "measurements", "photograph", "chart", "dark_frame"};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (strcmp(role, known[i]) == 0) return true;
+    return false;
+}
+
+static status check_declaration(struct job_service *v, struct file_row *row, struct error *err)
+{
+    if (!job_file_name_valid(row->name))
+        return error_set_field(
+            err, STATUS_INVALID, "name",
+            "file name '%.127s' is not allowed: 1..127 of A-Z a-z 0-9 . _ -, not starting with a dot", row->name);
+    if (!role_valid(row->role))
+        return error_set_field(err, STATUS_INVALID, "role",
+                               "role '%.31s' is not one of volume, fibers, measurements, photograph, chart, dark_frame",
+                               row->role);
+    if (row->size_bytes < 1)
+        return error_set_field(err, STATUS_INVALID, "size",
+                               "file '%s' is declared with %lld bytes: empty files are of no use", row->name,
+                               (long long)row->size_bytes);
+    if (row->size_bytes > v->settings->max_file_bytes)
+        return error_set_field(err, STATUS_TOO_LARGE, "size",
+                               "file '%s' is declared with %lld bytes, the limit is %lld", row->name,
+                               (long long)row->size_bytes, (long long)v->settings->max_file_bytes);
+    size_t n = strlen(row->sha256);
+    for (size_t i = 0; i < n; i++) {
+        if (row->sha256[i] >= 'A' && row->sha256[i] <= 'F') row->sha256[i] = (char)(row->sha256[i] - 'A' + 'a');
+        char c = row->sha256[i];
+        if (!((c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'))) n = 1;
+    }
+    if (n != 0 && n != 64)
+        return error_set_field(err, STATUS_INVALID, "sha256", "sha256 of '%s' is not 64 hexadecimal digits", row->name);
+    return STATUS_OK;
+}
+
+static status declare_locked(struct job_service *v, const char *id, struct file_row *row, bool *existed,
+                             struct job_refusal *refusal, struct error *err)
+{
+    struct job_row job;
+    struct file_row before, *all = NULL;
+    size_t n = 0;
+    status s = job_get(v, id, &job, err);
+    if (s != STATUS_OK) goto out;
+    snprintf(row->job_id, sizeof row->job_id, "%s", id);
+    s = store_file_find(v->store, id, row->name, &before, NULL);
+    if (s == STATUS_OK) {
+        bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
+                    (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
+        if (!same)
+            s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first",
+                                row->name);
+        else if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
+            s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
+        else
+            *row = before;
+        *existed = true;
+        goto out;
+    }
+    s = store_file_list(v->store, id, &all, &n, err);
+    if (s != STATUS_OK) goto out;
+    if ((int64_t)n >= v->settings->max_files_per_job) {
+        refusal->code = "too_many";
+        s = error_set(err, STATUS_TOO_LARGE, "a job takes at most %lld files",
+                      (long long)v->settings->max_files_per_job);
+        goto out;
+    }
+    s = job_check_editable(&job, err);
+    if (s == STATUS_OK) s = job_disk_check(v, row->size_bytes, err);
+    if (s != STATUS_OK) goto out;
+    job_new_id(row->id);
+    s = upload_reserve(v->upload, row, err);
+    if (s != STATUS_OK) goto out;
+    job_mark_edited(&job);
+    s = store_file_insert(v->store, row, &job, err);
+    if (s != STATUS_OK) upload_discard(v->upload, row);
+out:
+    free(all);
+    job_row_release(&job);
+    return s;
+}
+
+status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed,
+                        struct job_refusal *refusal, struct error *err)
+{
+    *existed = false;
+    status s = check_declaration(v, row, err);
+    if (s != STATUS_OK) return s;
+    pthread_mutex_lock(&v->change);
+    s = declare_locked(v, id, row, existed, refusal, err);
+    pthread_mutex_unlock(&v->change);
+    return s;
+}
+
+status job_delete_file(struct job_service *v, const char *id, const char *name, struct error *err)
+{
+    struct job_row job;
+    struct file_row file;
+    pthread_mutex_lock(&v->change);
+    status s = job_get(v, id, &job, err);
+    if (s == STATUS_OK) s = store_file_find(v->store, id, name, &file, err);
+    if (s == STATUS_OK) s = job_check_editable(&job, err);
+    if (s != STATUS_OK) goto out;
+    job_mark_edited(&job);
+    /* the row first: bytes without a row are swept away, a row without bytes would be a lie */
+    s = store_file_erase(v->store, file.id, &job, err);
+    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, &job, err);
+    if (s == STATUS_OK) upload_discard(v->upload, &file);
+out:
+    pthread_mutex_unlock(&v->change);
+    job_row_release(&job);
+    return s;
+}
+
+status job_delete_upload(struct job_service *v, const char *upload_id, struct error *err)
+{
+    struct file_row file;
+    if (!id_valid(upload_id)) return error_set(err, STATUS_NOT_FOUND, "upload '%.40s' does not exist", upload_id);
+    status s = store_file_get(v->store, upload_id, &file, err);
+    return s == STATUS_OK ? job_delete_file(v, file.job_id, file.name, err) : s;
+}
