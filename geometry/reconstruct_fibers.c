@@ -1,4 +1,4 @@
-/* Step "fibers": subvolumes, centers, chains, joins, smoothing, radius. */
+/* Step "fibers": subvolumes, centers, chains, joining, smoothing and radius. */
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
@@ -19,15 +19,16 @@
 #include <string.h>
 
 enum {
-    MIN_PIECE = 4,  /* centers in a chain before joining */
-    N_MEND = 2,     /* rounds of growing and cutting */
+    MIN_PIECE = 4,  /* least number of centers in a chain before joining */
+    N_REPAIR = 2,   /* rounds of growing, joining and cutting */
     N_FIT = 4,      /* rounds of fitting axes to the scan */
-    MAX_GROWTH = 64 /* voxels that an end may grow */
+    MAX_GROWTH = 64 /* voxels by which an end may grow */
 };
 
-#define OVER_USUAL_TURN                                                                                                \
-    2.1 /* kinks; less cuts fibers of plain weaves to pieces, more leaves changes from fiber to fiber */
-#define END_DIAMETERS 1.0 /* as far as an end may be astray */
+/* Turn of a kink relative to the usual turn. Less cuts fibers of plain weaves into pieces; more keeps jumps between
+ * fibers. */
+#define OVER_USUAL_TURN 2.1
+#define END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
 #define MAX_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
 
 struct fiber_job {
@@ -37,7 +38,7 @@ struct fiber_job {
     struct thread_pool *pool;
     struct reconstruct_report *report;
     struct progress inner;
-    struct progress_part part; /* what inner reports to */
+    struct progress_part part; /* progress that inner reports to */
     double diameter;           /* voxels */
 };
 
@@ -47,7 +48,7 @@ static void enter_part(struct fiber_job *job, double from, double to)
     job->part.share = to - from;
 }
 
-/* Axis that a frame's centers are counted under: a diagonal between two axes counts under the first. */
+/* Axis class that a frame's centers are counted under. A diagonal between two axes counts under the first. */
 static int frame_axis(const struct slice_frame *f)
 {
     int axis = 0;
@@ -79,7 +80,7 @@ static status find_chains(struct fiber_job *job, struct polyline_set *chains, st
     return s;
 }
 
-/* The class of a fiber is the axis along which it moves most. */
+/* Sets the class of each fiber: the axis along which it extends most. */
 static void classify(struct polyline_set *p)
 {
     for (size_t l = 0; l < p->n_line; l++) {
@@ -90,7 +91,7 @@ static void classify(struct polyline_set *p)
     }
 }
 
-/* Smooth every line, and drop those under min_vertex. */
+/* Smooths every line, and drops those with fewer than min_vertex vertices. */
 static status smooth_and_drop(struct fiber_job *job, const struct polyline_set *in, struct polyline_set *out,
                               struct error *err)
 {
@@ -113,7 +114,7 @@ static status smooth_and_drop(struct fiber_job *job, const struct polyline_set *
     return s;
 }
 
-/* Mean density on the way from x along n_step times t. */
+/* Mean density on the way from x over n_step steps of t. */
 static double density_on_way(const struct volume *v, const float x[3], const float t[3], double n_step)
 {
     double sum = 0.0;
@@ -129,8 +130,8 @@ static double density_on_way(const struct volume *v, const float x[3], const flo
     return sum / n;
 }
 
-/* Fibers that end shortly before a face, with material on the rest of the way, reach it: the last segment is prolonged. Ends are first or last
- * vertices. */
+/* Extends a line that ends shortly before a face to that face, if there is material on the rest of the way. `last`:
+ * the last vertex instead of the first. */
 static void reach_face(const struct fiber_job *job, struct polyline_set *p, size_t line, bool last)
 {
     size_t m = polyline_length(p, line), back = m < 5 ? m - 1 : 4;
@@ -138,7 +139,7 @@ static void reach_face(const struct fiber_job *job, struct polyline_set *p, size
     const float *y = p->vertex[last ? p->first[line + 1] - 1 - back : p->first[line] + back];
     float t[3], nearest = INFINITY;
     for (int a = 0; a < 3; a++) t[a] = (x[a] - y[a]) / (float)back;
-    for (int a = 0; a < 3; a++) { /* steps of t until a face is met */
+    for (int a = 0; a < 3; a++) { /* number of steps of t until a face is reached */
         float room = t[a] > 0.0f ? (float)job->v->n[a] - x[a] : x[a], speed = fabsf(t[a]);
         if (speed > 0.2f && room / speed < nearest) nearest = room / speed;
     }
@@ -147,9 +148,9 @@ static void reach_face(const struct fiber_job *job, struct polyline_set *p, size
     for (int a = 0; a < 3; a++) x[a] += nearest * t[a];
 }
 
-/* One pass over the pieces: cut duplicates, let the ends grow, join what meets. in is emptied. */
-static status mend(struct fiber_job *job, struct polyline_set *in, bool grow, struct polyline_set *out,
-                   struct join_counts *counts, struct error *err)
+/* One pass over the pieces: cuts duplicates, lets the ends grow, and joins ends that meet. `in` is emptied. */
+static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool grow, struct polyline_set *out,
+                           struct join_counts *counts, struct error *err)
 {
     struct polyline_set agreeing, single, grown;
     const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, MAX_GROWTH};
@@ -183,7 +184,7 @@ static bool is_inside(const struct fiber_job *job, const float x[3])
     return true;
 }
 
-/* Lines without the vertices at their ends that lie outside of the volume. */
+/* Copies the lines without vertices at their ends that lie outside of the volume. */
 static status keep_inside(const struct fiber_job *job, const struct polyline_set *in, struct polyline_set *out,
                           struct error *err)
 {
@@ -201,7 +202,7 @@ static status keep_inside(const struct fiber_job *job, const struct polyline_set
     return s;
 }
 
-/* Lines are moved to where they explain the scan best. */
+/* Moves lines to where they explain the scan best. */
 static status fit_axes(struct fiber_job *job, struct polyline_set *lines, int n_round, struct error *err)
 {
     struct axis_profile profile = {0.5 * job->diameter, 0.8, 0.0, 1.0};
@@ -221,7 +222,7 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, int n_
     return s;
 }
 
-/* Lines without their kinks, where they change over to another fiber; the last time without ends that go astray, too. */
+/* Cuts lines at kinks, where they change to another fiber; in the last pass also removes ends that deviate. */
 static status straighten(struct fiber_job *job, struct polyline_set *lines, bool last, size_t min_vertex,
                          struct error *err)
 {
@@ -262,24 +263,24 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
     status s = find_chains(job, &part[0], err);
     enter_part(job, 0.6, 0.65);
-    if (s == STATUS_OK) s = mend(job, &part[0], false, &part[1], &counts, err);
-    for (int round = 0; round < N_MEND && s == STATUS_OK; round++) { /* grow and join, then cut what went astray */
+    if (s == STATUS_OK) s = repair_lines(job, &part[0], false, &part[1], &counts, err);
+    for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
         s = relax(job, &part[1], 2, err);
-        if (s == STATUS_OK) s = mend(job, &part[1], true, &part[2], &counts, err);
+        if (s == STATUS_OK) s = repair_lines(job, &part[1], true, &part[2], &counts, err);
         if (s == STATUS_OK) s = relax(job, &part[2], 2, err);
-        if (s == STATUS_OK) s = mend(job, &part[2], false, &part[1], &counts, err);
+        if (s == STATUS_OK) s = repair_lines(job, &part[2], false, &part[1], &counts, err);
     }
-    if (s == STATUS_OK) s = mend(job, &part[1], true, &part[0], &counts, err);
+    if (s == STATUS_OK) s = repair_lines(job, &part[1], true, &part[0], &counts, err);
     if (s == STATUS_OK) {
-        classify(&part[0]); /* from subvolumes to axes */
+        classify(&part[0]); /* from classes of subvolumes to axis classes */
         s = smooth_and_drop(job, &part[0], lines, err);
     }
     if (s == STATUS_OK) s = relax(job, lines, 2, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
     if (s == STATUS_OK)
-        s = mend(job, lines, true, &part[1], &counts,
-                 err); /* lines on their axes are easier to tell apart and to join */
+        s = repair_lines(job, lines, true, &part[1], &counts,
+                         err); /* lines on the fibers' axes are easier to distinguish and to join */
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
@@ -298,7 +299,8 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
 
 static status find_radius(struct fiber_job *job, const struct polyline_set *lines, struct error *err)
 {
-    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *all; /* the last is their sum */
+    /* the last one is the sum of the others */
+    struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *all;
     struct reconstruct_report *report = job->report;
     struct radius_measure m;
     double voxel_m = job->v->voxel_size_m[0];
@@ -356,7 +358,7 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
     fiber_set_init(f);
     for (int a = 0; a < 3; a++) report->n_short_dropped[a] = 0;
     if (!(job.diameter > 0.0))
-        return error_set(err, STATUS_INVALID, "cannot trace fibers: the report does not hold the fiber diameter");
+        return error_set(err, STATUS_INVALID, "cannot trace fibers: the report has no fiber diameter");
     status s = make_lines(&job, &lines, err);
     if (s == STATUS_OK) s = find_radius(&job, &lines, err);
     if (s == STATUS_OK) s = to_fiber_set(&job, &lines, f, err);

@@ -1,10 +1,11 @@
 /* Step "orientation": the direction of the fiber through every voxel of material.
  *
- * J(x, d) is sharp only on the axis of a fiber: off the axis a line that leans across the fiber stays inside for longer. So every voxel
- * first climbs to its ridge (the densest place of the blurred volume within about one radius), J is minimised there, and the
- * voxel takes the ridge's direction and J. The descent starts from the structure tensor, which in dense bundles is not misled by the
- * rows of touching fibers that J takes for fibers, and ends on the paraboloid through J at the best node of a fine set of directions and
- * its neighbours. Where the neighbourhood agrees on another direction that J likes almost as well, that one is taken. Nothing depends on how the work is divided. */
+ * J(x, d) is sharp only on the axis of a fiber: off the axis a line that leans across the fiber stays inside it for
+ * longer. So every voxel first climbs to its ridge, the densest place of the blurred volume within about one radius.
+ * J is minimised there, and the voxel gets the direction and J of its ridge. The descent starts from the structure
+ * tensor, which in dense bundles is not misled by rows of touching fibers as J is. It ends on the paraboloid through
+ * J at the best node of a fine set of directions and at the node's neighbours. Where the neighbourhood has another
+ * direction whose J is almost as low, that direction is used. The result does not depend on how the work is divided. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
@@ -21,9 +22,10 @@
 
 enum { N_FINE = 900, MAX_STEP = 24, N_CONSENSUS_BLUR = 3, MAX_CLIMB = 19 };
 
-#define J_TOLERANCE 0.07 /* minima of J that noise and touching fibers may exchange */
+/* difference of two minima of J up to which noise and touching fibers may decide between them */
+#define J_TOLERANCE 0.07
 #define AGREEMENT_COSINE 0.94f
-#define J_UNIT (1.0 / 40000.0) /* J at ridges is kept as a share of J in solid material in 16 bits */
+#define J_UNIT (1.0 / 40000.0) /* J at ridges is stored in 16 bits, as a share of J in solid material */
 
 struct orientation_job {
     const struct volume *v;
@@ -34,18 +36,18 @@ struct orientation_job {
     struct tensor_window window;
     float eps_d, eps_j;
     double j_full; /* J in solid material */
-    int n_climb;   /* steps to the ridge */
+    int n_climb;   /* most steps to the ridge */
     struct line_bound bound;
-    uint16_t *ridge;           /* per voxel of material: offset of its ridge voxel, packed */
-    _Atomic uint16_t *j_ridge; /* per voxel: 0 for no ridge; at ridges J in J_UNIT * j_full, at least 1 */
+    uint16_t *ridge;           /* per voxel of material: packed offset of its ridge voxel */
+    _Atomic uint16_t *j_ridge; /* 0: not a ridge; at ridges J in J_UNIT * j_full, at least 1 */
     struct consensus consensus;
     float *scratch; /* per thread */
     size_t scratch_per_thread;
-    size_t *n_material, *n_kept; /* per band, per slice */
-    ptrdiff_t neighbour[26];     /* offsets in the volume, in rising order */
+    size_t *n_material, *n_kept; /* per band; per slice */
+    ptrdiff_t neighbour[26];     /* offsets in the volume, in ascending order */
 };
 
-enum { BAND = 32 }; /* rows of a slice in a task: short enough to be cancelled */
+enum { BAND = 32 }; /* rows of a slice in one task; short, so that a cancellation is noticed soon */
 
 struct band {
     size_t j0, j1, k;
@@ -59,7 +61,7 @@ static struct band band_of(const struct orientation_job *o, size_t i_task)
     return (struct band){j0, j0 + BAND < o->v->n[1] ? j0 + BAND : o->v->n[1], i_task / n_band(o)};
 }
 
-/* The highest of the 26 neighbours of x in the blurred volume. False at a peak. */
+/* Moves x to the highest of its 26 neighbours in the blurred volume. Returns false at a peak. */
 static bool step_up_inside(const struct orientation_job *o, size_t x[3])
 {
     const float *p = o->blurred.density + volume_index(o->blurred.n, x[0], x[1], x[2]);
@@ -71,14 +73,14 @@ static bool step_up_inside(const struct orientation_job *o, size_t x[3])
         most = value > most ? value : most;
     }
     if (best < 0) return false;
-    size_t cell = best < 13 ? (size_t)best : (size_t)best + 1; /* of the 27 */
+    size_t cell = best < 13 ? (size_t)best : (size_t)best + 1; /* index among the 27 cells */
     x[0] += cell % 3 - 1;
     x[1] += cell / 3 % 3 - 1;
     x[2] += cell / 9 - 1;
     return true;
 }
 
-/* The same where neighbours may be missing. */
+/* The same for voxels at a face, where neighbours are missing. */
 static bool step_up(const struct volume *l, size_t x[3])
 {
     size_t best[3] = {x[0], x[1], x[2]}, at[3];
@@ -112,7 +114,7 @@ static void climb(const struct orientation_job *o, size_t x[3])
     }
 }
 
-/* An offset of at most n_climb along each axis in 16 bits. */
+/* Packs an offset of at most n_climb along each axis into 16 bits. */
 static uint16_t pack_offset(const struct orientation_job *o, const size_t from[3], const size_t to[3])
 {
     size_t code = 0, edge = 2 * (size_t)o->n_climb + 1;
@@ -161,14 +163,14 @@ static void climb_band(void *context, size_t i_task, size_t i_thread)
     o->n_material[i_task] = material;
 }
 
-/* Values of J already known at a voxel. */
-struct memory {
+/* Cache of the values of J at a voxel. */
+struct j_cache {
     size_t n;
     uint16_t node[MAX_STEP * DIRECTION_NEIGHBOURS + 1];
     float value[MAX_STEP * DIRECTION_NEIGHBOURS + 1];
 };
 
-static float recall_j(const struct orientation_job *o, const struct line_filter_site *site, struct memory *m,
+static float cached_j(const struct orientation_job *o, const struct line_filter_site *site, struct j_cache *m,
                       uint16_t node)
 {
     for (size_t i = m->n; i-- > 0;)
@@ -179,18 +181,18 @@ static float recall_j(const struct orientation_job *o, const struct line_filter_
     return j;
 }
 
-/* Downhill from seed; the direction in d, J at the best node returned. */
+/* Descends from node seed. Writes the direction to d, and returns J at the best node. */
 static float descend(const struct orientation_job *o, const struct line_filter_site *site, uint16_t seed, float d[3])
 {
-    struct memory m = {.n = 0};
+    struct j_cache m = {.n = 0};
     uint16_t here = seed;
-    float value = recall_j(o, site, &m, here), around[DIRECTION_NEIGHBOURS];
+    float value = cached_j(o, site, &m, here), around[DIRECTION_NEIGHBOURS];
     for (int step = 0; step < MAX_STEP; step++) {
         const struct direction_node *node = &o->fine.node[here];
         uint16_t best = here;
         float least = value;
         for (int k = 0; k < DIRECTION_NEIGHBOURS; k++) {
-            around[k] = recall_j(o, site, &m, node->neighbour[k]);
+            around[k] = cached_j(o, site, &m, node->neighbour[k]);
             if (around[k] < least) {
                 least = around[k];
                 best = node->neighbour[k];
@@ -204,7 +206,8 @@ static float descend(const struct orientation_job *o, const struct line_filter_s
     return value;
 }
 
-/* J, as a share of that in solid material, at ridge voxel x: downhill from the node nearest to `start`; the direction in d. */
+/* Descends at ridge voxel x from the node nearest to `start`. Writes the direction to d, and returns J as a share of
+ * J in solid material. */
 static double descend_at(const struct orientation_job *o, const size_t x[3], const float start[3], float *scratch,
                          float d[3])
 {
@@ -214,8 +217,8 @@ static double descend_at(const struct orientation_job *o, const size_t x[3], con
 
 typedef void (*ridge_visitor)(struct orientation_job *o, const size_t x[3], size_t at, float *scratch);
 
-/* All ridge voxels of a band; scratch is the thread's. */
-static void each_ridge(struct orientation_job *o, size_t i_task, size_t i_thread, ridge_visitor visit)
+/* Visits all ridge voxels of a band. scratch belongs to the thread. */
+static void visit_ridges(struct orientation_job *o, size_t i_task, size_t i_thread, ridge_visitor visit)
 {
     const struct band b = band_of(o, i_task);
     float *scratch = o->scratch + i_thread * o->scratch_per_thread;
@@ -237,10 +240,10 @@ static void find_direction(struct orientation_job *o, const size_t x[3], size_t 
 
 static void ridge_band(void *context, size_t i_task, size_t i_thread)
 {
-    each_ridge(context, i_task, i_thread, find_direction);
+    visit_ridges(context, i_task, i_thread, find_direction);
 }
 
-/* One layer of cells of the consensus. */
+/* Collects one layer of cells of the consensus. */
 static void collect_layer(void *context, size_t layer, size_t i_thread)
 {
     (void)i_thread;
@@ -259,8 +262,8 @@ static void collect_layer(void *context, size_t layer, size_t i_thread)
             }
 }
 
-/* The direction that the neighbourhood agrees on, where J has a minimum near it that is almost as deep. */
-static void agree(struct orientation_job *o, const size_t x[3], size_t at, float *scratch)
+/* Changes to the direction of the neighbourhood if J has a minimum near it that is almost as low. */
+static void take_consensus(struct orientation_job *o, const size_t x[3], size_t at, float *scratch)
 {
     float own[3], common[3], d[3];
     if (!consensus_direction(&o->consensus, x[0], x[1], x[2], common)) return;
@@ -272,14 +275,17 @@ static void agree(struct orientation_job *o, const size_t x[3], size_t at, float
     direction_volume_set(o->d, at, d);
 }
 
-static void agree_band(void *context, size_t i_task, size_t i_thread) { each_ridge(context, i_task, i_thread, agree); }
+static void consensus_band(void *context, size_t i_task, size_t i_thread)
+{
+    visit_ridges(context, i_task, i_thread, take_consensus);
+}
 
-static status seek_agreement(struct orientation_job *o, struct thread_pool *pool, const struct progress *progress,
-                             struct error *err)
+static status apply_consensus(struct orientation_job *o, struct thread_pool *pool, const struct progress *progress,
+                              struct error *err)
 {
     status s = thread_pool_run(pool, o->consensus.n[2], collect_layer, o, NULL);
     if (s == STATUS_OK) s = consensus_blur(&o->consensus, N_CONSENSUS_BLUR, pool, err);
-    if (s == STATUS_OK) s = thread_pool_run(pool, n_band(o) * o->v->n[2], agree_band, o, progress);
+    if (s == STATUS_OK) s = thread_pool_run(pool, n_band(o) * o->v->n[2], consensus_band, o, progress);
     return s;
 }
 
@@ -289,7 +295,7 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
     struct orientation_job *o = context;
     size_t n = o->v->n[0] * o->v->n[1], kept = 0;
     scratch_keep_within(o->v->space);
-    for (size_t at = k * n; at < (k + 1) * n; at++) { /* densities are 0 from the start */
+    for (size_t at = k * n; at < (k + 1) * n; at++) { /* densities are 0 at first */
         float density = o->v->density[at];
         if (density < o->eps_d || !line_bound_reaches(&o->bound, at % o->v->n[0], at % n / o->v->n[0], k)) continue;
         size_t top = ridge_index(o, at);
@@ -306,12 +312,13 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
 /* J in a block of density 1. */
 static double solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
 
-/* Axes of fibers have 0.9 of the J of solid material, those of thin and blurred ones 0.5; noise in void has below 0.2. */
+/* J as a share of that of solid material is 0.9 on axes of fibers, 0.5 on those of thin and blurred ones, and below
+ * 0.2 for noise in void. */
 static const double EPS_J_SHARE = 0.35;
 
-/* Filter parameters from the fiber diameter. Over the six fabrics of thesis Table 5.2 s times the squared radius in voxels is
- * between 0.7 and 11, about 4 in the (geometric) mean; t is twice s for most. A line must be
- * some diameters long, or it fits into one fiber in many directions: h is about 2.8 diameters. */
+/* Chooses filter parameters from the fiber diameter. Over the six fabrics of thesis Table 5.2 s times the squared
+ * radius in voxels is between 0.7 and 11, with a geometric mean of about 4; for most of them t is twice s. A line
+ * must be some diameters long, because a shorter one fits into a fiber in many directions: h is about 2.8 diameters. */
 static void choose_parameters(struct reconstruct_option *o, const struct volume *v, double diameter_voxel)
 {
     struct density_modes modes;
@@ -322,12 +329,13 @@ static void choose_parameters(struct reconstruct_option *o, const struct volume 
         size_t h = 2 * (size_t)lrint(1.4 * diameter_voxel) + 1;
         o->h = h < 9 ? 9 : h > 41 ? 41 : h;
     }
-    if (isnan(o->eps_d)) /* half way between the modes of void and material */
+    if (isnan(o->eps_d)) /* half way between the modes of void and of material */
         o->eps_d = density_modes_find(v, &modes, NULL) == STATUS_OK ? fmin(0.6, fmax(0.25, modes.half)) : 0.5;
     if (isnan(o->eps_j)) o->eps_j = EPS_J_SHARE * solid_j(o->s, o->t, o->h);
 }
 
-/* J of solid material is only below that of void, 0, for t > s / 2. A job may give one of the two, the other is chosen here. */
+/* J of solid material is below that of void, 0, only for t > s / 2. A job may give one of the two; the other is then
+ * chosen here. */
 static status check_parameters(const struct reconstruct_option *o, struct error *err)
 {
     if (o->t > 0.5 * o->s) return STATUS_OK;
@@ -384,7 +392,7 @@ static void release(struct orientation_job *o)
     free(o->n_kept);
 }
 
-/* All passes over the volume; their progress goes on from that of the blur. */
+/* Runs all passes over the volume. Their progress continues that of the blur. */
 static status search(struct orientation_job *o, struct thread_pool *pool, const struct progress *inner,
                      struct progress_part *part, struct error *err)
 {
@@ -394,7 +402,7 @@ static status search(struct orientation_job *o, struct thread_pool *pool, const 
     *part = (struct progress_part){part->outer, 0.5, 0.4};
     if (s == STATUS_OK) s = thread_pool_run(pool, n_band(o) * n_slice, ridge_band, o, inner);
     *part = (struct progress_part){part->outer, 0.9, 0.1};
-    if (s == STATUS_OK) s = seek_agreement(o, pool, inner, err);
+    if (s == STATUS_OK) s = apply_consensus(o, pool, inner, err);
     if (s == STATUS_OK) s = thread_pool_run(pool, n_slice, assign_slice, o, NULL);
     return s == STATUS_CANCELLED ? error_set(err, s, "finding fiber directions was cancelled") : s;
 }

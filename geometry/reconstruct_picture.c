@@ -1,4 +1,4 @@
-/* Slices of the density volume with the recovered fibers drawn where they cross. */
+/* Draws slices of the density volume with the reconstructed fibers that cross them. */
 #include "geometry/reconstruct.h"
 
 #include "geometry/fibers/slices/slice_frame.h"

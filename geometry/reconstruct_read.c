@@ -1,4 +1,4 @@
-/* Step "volume": from files to a density volume in the cloth frame. */
+/* Step "volume": reads files to a density volume in the cloth frame. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
@@ -33,14 +33,15 @@ void reconstruct_option_default(struct reconstruct_option *o)
     };
 }
 
-/* What has to be done to the file's grid. "stored": after the axis permutation, before matrix and cubic resampling. */
+/* What must be done to the grid of the file. "stored": after the permutation of axes, before matrix and cubic
+ * resampling. */
 struct plan {
     struct axis_map map;
     size_t n_file[3], n_stored[3], n_all[3]; /* n_all: after resampling, before cropping */
-    double spacing_m[3];                     /* stored axes */
-    double voxel_m;                          /* cubic, of the result */
+    double spacing_m[3];                     /* of the stored axes */
+    double voxel_m;                          /* of the cubic voxels of the result */
     bool resample;
-    size_t box[6];        /* of the result */
+    size_t box[6];        /* in the result */
     size_t box_stored[6]; /* part of the stored grid that is kept in memory */
 };
 
@@ -65,7 +66,7 @@ static status plan_voxel_size(const struct volume_source_info *info, struct reco
                 "cannot use the volume: its voxel size is not given, and the file does not state it");
         if (!(w >= 1e-9) || !(w <= 1e-2))
             return error_set_field(err, STATUS_INVALID, OPTION_VOXEL_SIZE,
-                                   "cannot use the volume: a voxel size of %g um makes no sense", w * 1e6);
+                                   "cannot use the volume: a voxel size of %g um is not possible", w * 1e6);
         p->spacing_m[a] = o->voxel_size_m[p->map.source[a]];
         least = fmin(least, w);
         most = fmax(most, w);
@@ -110,10 +111,11 @@ static status plan_read(const struct volume_source_info *info, struct reconstruc
     return plan_crop(o, p, err);
 }
 
-/* Puts n_slice slices of the file from i_slice on where they belong in the stored grid; block is n_slice x n_file[1] x n_file[0]. */
+/* Copies n_slice slices of the file from i_slice on to their places in the stored grid. block is n_slice x n_file[1]
+ * x n_file[0]. */
 static void scatter_slices(const struct plan *p, const float *block, size_t i_slice, size_t n_slice, struct volume *v)
 {
-    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, from[3], to[3]; /* file indices that are kept */
+    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, from[3], to[3]; /* from, to: file indices that are kept */
     ptrdiff_t step[3], first = 0;
     for (int a = 0; a < 3; a++) {
         int f = p->map.source[a];
@@ -126,7 +128,8 @@ static void scatter_slices(const struct plan *p, const float *block, size_t i_sl
     size_t k0 = i_slice > from[2] ? i_slice : from[2], k1 = i_slice + n_slice < to[2] ? i_slice + n_slice : to[2];
     size_t n_row = p->n_file[0], n_page = n_row * p->n_file[1];
     bool inwards = p->map.source[0] ==
-                   2; /* the file's slices lie across rows: a row at a time of all of them keeps the writes together */
+                   /* the file's slices lie across rows; taking one row of all slices at a time keeps writes together */
+                   2;
     for (size_t outer = inwards ? from[1] : k0; outer < (inwards ? to[1] : k1); outer++) {
         scratch_keep_within(v->space);
         for (size_t i = from[0]; inwards && i < to[0]; i++) {
@@ -160,7 +163,7 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
                 s = volume_source_read(source, k + i, 1, block + i * n_page, err);
         }
         for (size_t i = 0; i < n * n_page && s == STATUS_OK;
-             i++) /* a value of the file's own is not VOLUME_OUTSIDE: refused later as any infinite one */
+             i++) /* VOLUME_OUTSIDE in a file is an infinite value, which is refused later */
             if (block[i] == VOLUME_OUTSIDE) block[i] = INFINITY;
         if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
         progress_report(progress, 0.8 * (double)(k + n) / (double)p->n_file[2]);
@@ -171,7 +174,8 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
 
 static const double LEAST_SEPARABILITY = 0.7;
 
-/* The matrix from the directions of the fibers. Turns smaller than their own error, or than a tenth of a degree, are left alone. */
+/* Estimates the matrix from the directions of the fibers. A rotation smaller than its own standard error, or than a
+ * tenth of a degree, is not applied. */
 static status estimate_alignment(const struct volume *stored, struct reconstruct_option *o, struct thread_pool *pool,
                                  const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
@@ -191,7 +195,8 @@ static status estimate_alignment(const struct volume *stored, struct reconstruct
     return STATUS_OK;
 }
 
-/* With option "crop" the box that tiles best; after any matrix, how much of the tile lies in the scan. */
+/* With option "crop" chooses the box that tiles best. After any matrix measures how much of the tile lies in the
+ * scan. */
 static status choose_crop(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {

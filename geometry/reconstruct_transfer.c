@@ -1,4 +1,5 @@
-/* Step "directions": voxels near a fiber take its direction (fabric thesis, 5.6.7), and the share of material explained. */
+/* Step "directions": gives voxels near a fiber its direction (fabric thesis, 5.6.7), and measures the share of
+ * material explained. */
 #include "base/angle.h"
 #include "geometry/reconstruct.h"
 
@@ -14,12 +15,12 @@ struct transfer_job {
     const struct segment_bricks *bricks;
     const struct fiber_set *fibers;
     struct direction_volume *d;
-    float *distance2; /* per thread: BRICK^3 */
+    float *distance2; /* BRICK^3 per thread */
     uint32_t *nearest;
     struct brick_sum {
         double angle_deg;
         size_t n_changed, n_both, n_fiber, n_kept;
-    } * sum; /* per brick */
+    } * sum; /* one per brick */
 };
 
 static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size_t at, float distance2,

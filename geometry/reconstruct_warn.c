@@ -1,4 +1,4 @@
-/* Warnings about a scan and its fibers, from what was measured: no one of them stops a job. */
+/* Warnings about a scan and its fibers from measured figures. None of them stops a job. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
@@ -23,28 +23,27 @@ static void warn_alignment(const struct warning_sink *warn, const struct reconst
     const struct main_directions *m = &r->main;
     const double *u = m->n == 1 && m->direction[0][0] == 0.0 ? m->direction[1] : m->direction[0];
     if (o->align && r->align.outcome == ALIGN_NO_DIRECTION)
-        warning_send(warn, OPTION_ALIGN, "no main direction of the fibers stands out, the volume was left as it is");
+        warning_send(warn, OPTION_ALIGN, "the fibers have no clear main direction, so the volume was not aligned");
     if (o->align && r->align.outcome == ALIGN_OTHER_AXES && m->n == 0)
         warning_send(
             warn, OPTION_ALIGN,
-            "%.0f %% of the fibers run along z and no weft or warp stands out: is 'axes' right? The volume was left as "
-            "it is",
+            "%.0f %% of the fibers run along z and there is no clear weft or warp, so the volume was not aligned; "
+            "check 'axes'",
             100.0 * m->share_z);
     else if (o->align && r->align.outcome == ALIGN_OTHER_AXES)
-        warning_send(
-            warn, OPTION_ALIGN,
-            "the fibers run along (%.2f, %.2f, %.2f)%s, too far from x and y to be turned there: correct 'axes' first; "
-            "the volume was left as it is",
-            u[0], u[1], u[2], m->n == 2 ? " and another direction" : "");
+        warning_send(warn, OPTION_ALIGN,
+                     "the fibers run along (%.2f, %.2f, %.2f)%s, which is too far from x and y, so the volume was not "
+                     "aligned; correct 'axes' first",
+                     u[0], u[1], u[2], m->n == 2 ? " and another direction" : "");
     if (r->aligned && r->align.se_deg > 1.0)
-        warning_send(warn, OPTION_ALIGN, "the directions of warp and weft are uncertain by %.1f degrees",
+        warning_send(warn, OPTION_ALIGN, "the standard error of the directions of warp and weft is %.1f degrees",
                      r->align.se_deg);
     const size_t *valid = r->tile.valid, *box = o->crop_voxel; /* valid is of what the box has left */
     double share = (double)(valid[2] - valid[0]) * (double)(valid[3] - valid[1]) / ((double)r->n[0] * (double)r->n[1]);
     if (!o->crop && valid[2] > 0 && share < 0.98)
         warning_send(
             warn, OPTION_CROP_BOX,
-            "the matrix brings corners from outside of the scan into the tile, only %.0f %% of it is whole: crop "
+            "the matrix brings corners from outside of the scan into the tile, so only %.0f %% of it is complete: crop "
             "to x %zu..%zu, y %zu..%zu, or give 'crop' as \"auto\"",
             100.0 * share, box[0] + valid[0], box[0] + valid[2], box[1] + valid[1], box[1] + valid[3]);
     for (int a = 0; a < 2; a++)
@@ -61,14 +60,15 @@ void reconstruct_warn_volume(const struct reconstruct_option *o, const struct re
     warn_spacing(warn, o, r);
     warn_alignment(warn, o, r);
     if (r->separability < 0.7)
-        warning_send(warn, OPTION_SCAN_FILES,
-                     "void and material cannot be told apart (separability %.2f; noise alone has 0.64, a clear "
-                     "scan more than 0.8): "
-                     "is this the right file, with the right type and byte order?",
-                     r->separability);
+        warning_send(
+            warn, OPTION_SCAN_FILES,
+            "void and material cannot be distinguished (separability %.2f; noise alone has 0.64, a clear scan more "
+            "than 0.8); check that this is the right file, and its type and byte order",
+            r->separability);
     else if (r->noise_sd > 0.5)
         warning_send(warn, OPTION_SCAN_FILES,
-                     "the scan is very noisy: standard deviation %.2f of the step from void to material", r->noise_sd);
+                     "the scan is very noisy: its standard deviation is %.2f of the step from void to material",
+                     r->noise_sd);
 }
 
 void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
@@ -84,17 +84,17 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
                      f->n_fiber == 1 ? "" : "s");
     if (radius < 1e-6 || longest > 250e-6)
         warning_send(warn, OPTION_NONE,
-                     "fibers: a mean radius of %.3g um is not that of a textile fiber (2 to 100 um): check "
+                     "fibers: a mean radius of %.3g um is not that of a textile fiber (2 to 100 um); check "
                      "the voxel size of the scan, or the unit of the fiber file",
                      radius * 1e6);
     if (r->fiber_diameter_voxel > 0.0 && r->fiber_diameter_voxel < 4.0)
         warning_send(
             warn, OPTION_NONE,
-            "fibers: they are only %.1f voxels thick; where they touch, fibers are told apart reliably from 7 voxels "
+            "fibers: they are only %.1f voxels thick; touching fibers are distinguished reliably from 7 voxels "
             "on, and hardly below 4",
             r->fiber_diameter_voxel);
     if (r->n[0] > 0 && r->dice > 0.0 && r->dice < 0.5)
         warning_send(warn, OPTION_NONE,
-                     "fibers: they explain little of the material (Dice %.2f, 1 is all of it): look at the slices",
+                     "fibers: they explain little of the material (Dice %.2f, where 1 is all of it); check the slices",
                      r->dice);
 }

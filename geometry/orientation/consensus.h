@@ -1,5 +1,6 @@
-/* What the fibers around agree on: mean direction tensors on a coarse grid, blurred over about a fiber diameter. Fibers of a yarn run side
- * by side, so where J cannot tell two directions apart the one that the neighbourhood takes is the right one. */
+/* Mean fiber directions of neighbourhoods: direction tensors averaged on a coarse grid and blurred over about a
+ * fiber diameter. The fibers of a yarn run side by side, so where J does not distinguish two directions, that of the
+ * neighbourhood is the right one. */
 #ifndef SELVEDGE_GEOMETRY_CONSENSUS_H
 #define SELVEDGE_GEOMETRY_CONSENSUS_H
 
@@ -10,21 +11,22 @@
 #include <stddef.h>
 
 struct consensus {
-    size_t cell;                 /* voxels */
-    size_t n[3];                 /* cells */
+    size_t cell;                 /* edge of a cell in voxels */
+    size_t n[3];                 /* number of cells */
     float (*tensor)[6];          /* sum of weight d d^T: xx yy zz xy xz yz */
-    struct scratch_space *space; /* not owned; NULL: memory */
+    struct scratch_space *space; /* not owned; NULL: ordinary memory */
 };
 
-/* Cells of zeros over a volume of n_voxel. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+/* Makes cells of zeros over a volume of n_voxel. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
 status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space,
                       struct error *err);
 void consensus_release(struct consensus *c);
-/* Adds to the cell of a voxel; threads keep to different layers of cells (k / cell). */
+/* Adds direction d to the cell of voxel (i, j, k). Several threads may add at the same time to different layers of
+ * cells (k / cell). */
 void consensus_add(struct consensus *c, size_t i, size_t j, size_t k, const float d[3], float weight);
-/* n_pass times the binomial filter 1 2 1 along each axis. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+/* Applies the binomial filter 1 2 1 n_pass times along each axis. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
 status consensus_blur(struct consensus *c, int n_pass, struct thread_pool *pool, struct error *err);
-/* Main direction around a voxel; false where nothing was added. */
+/* Writes the main direction around a voxel to d. Returns false where nothing was added. */
 bool consensus_direction(const struct consensus *c, size_t i, size_t j, size_t k, float d[3]);
 
 #endif

@@ -6,7 +6,7 @@
 
 struct noise_job {
     const struct direction_volume *d;
-    double *sum; /* two per slice: angles, pairs */
+    double *sum; /* two numbers per slice: sum of angles, number of pairs */
 };
 
 static void noise_slice(void *context, size_t k, size_t i_thread)

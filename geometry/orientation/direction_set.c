@@ -9,7 +9,7 @@ static float dot3(const float a[3], const float b[3]) { return a[0] * b[0] + a[1
 
 static void tangent_frame(const float d[3], float e1[3], float e2[3])
 {
-    int a = fabsf(d[0]) < 0.6f ? 0 : 1; /* an axis well away from d */
+    int a = fabsf(d[0]) < 0.6f ? 0 : 1; /* an axis that is not nearly parallel to d */
     float c = d[a], norm = 1.0f / sqrtf(1.0f - c * c);
     for (int b = 0; b < 3; b++) e1[b] = ((b == a ? 1.0f : 0.0f) - c * d[b]) * norm;
     e2[0] = d[1] * e1[2] - d[2] * e1[1];
@@ -17,7 +17,8 @@ static void tangent_frame(const float d[3], float e1[3], float e2[3])
     e2[2] = d[0] * e1[1] - d[1] * e1[0];
 }
 
-/* Coordinates of direction b in the tangent plane at a (azimuthal equidistant), b taken on a's side. */
+/* Coordinates of direction b in the tangent plane at a (azimuthal equidistant projection), with the sign of b nearer
+ * to a. */
 static void tangent_coordinates(const struct direction_node *a, const float b[3], double u[2])
 {
     float c = dot3(a->d, b), sign = c < 0.0f ? -1.0f : 1.0f;
@@ -49,7 +50,7 @@ static void find_neighbours(struct direction_set *s, size_t i)
 static void prepare_fit(struct direction_set *s, size_t i)
 {
     double basis[DIRECTION_NEIGHBOURS][5], normal[5][5] = {{0.0}}, right[5][DIRECTION_NEIGHBOURS];
-    double scale = 1.0 / s->node[i].reach; /* conditioning */
+    double scale = 1.0 / s->node[i].reach; /* for the conditioning of the system */
     for (int k = 0; k < DIRECTION_NEIGHBOURS; k++) {
         double u[2];
         tangent_coordinates(&s->node[i], s->node[s->node[i].neighbour[k]].d, u);
@@ -62,7 +63,7 @@ static void prepare_fit(struct direction_set *s, size_t i)
         }
     }
     for (int r = 0; r < 5; r++) normal[r][r] += 1e-6;
-    (void)small_factor(&normal[0][0], 5, 0.0); /* definite by the 1e-6 above */
+    (void)small_factor(&normal[0][0], 5, 0.0); /* positive definite because of the 1e-6 above */
     for (int k = 0; k < DIRECTION_NEIGHBOURS; k++) small_solve(&normal[0][0], 5, &right[0][k], DIRECTION_NEIGHBOURS);
     for (int r = 0; r < 5; r++)
         for (int k = 0; k < DIRECTION_NEIGHBOURS; k++)
@@ -122,7 +123,7 @@ void direction_set_refine(const struct direction_set *s, size_t i, float value_0
     for (int k = 0; k < DIRECTION_NEIGHBOURS; k++)
         for (int r = 0; r < 5; r++) c[r] += node->fit[r][k] * (value[k] - value_0);
     float det = c[2] * c[4] - c[3] * c[3], u = 0.0f, v = 0.0f;
-    if (c[2] > 0.0f && det > 0.0f) { /* a minimum exists */
+    if (c[2] > 0.0f && det > 0.0f) { /* the paraboloid has a minimum */
         u = (c[3] * c[1] - c[4] * c[0]) / det;
         v = (c[3] * c[0] - c[2] * c[1]) / det;
     }

@@ -1,4 +1,4 @@
-/* Directions spread evenly over the half sphere (d and -d are one), with what a descent over them needs:
+/* Directions spread evenly over the half sphere, where d and -d are the same, with what a descent over them needs:
  * the nearest neighbours of each, and the least-squares fit of a paraboloid to values at them. */
 #ifndef SELVEDGE_GEOMETRY_DIRECTION_SET_H
 #define SELVEDGE_GEOMETRY_DIRECTION_SET_H
@@ -21,11 +21,12 @@ struct direction_set {
     struct direction_node *node;
 };
 
-/* n directions on a Fibonacci spiral, 32 <= n <= 65535. STATUS_NO_MEMORY, STATUS_INVALID. */
+/* Makes n directions on a Fibonacci spiral, 32 <= n <= 65535. STATUS_NO_MEMORY, STATUS_INVALID. */
 status direction_set_init(struct direction_set *s, size_t n, struct error *err);
 void direction_set_release(struct direction_set *s);
 size_t direction_set_nearest(const struct direction_set *s, const float d[3]);
-/* Minimum of the paraboloid through value_0 at node i and value[] at its neighbours, kept within reach / 2 of the node. */
+/* Writes the direction of the minimum of the paraboloid through value_0 at node i and value[] at its neighbours; it
+ * stays within reach / 2 of the node. */
 void direction_set_refine(const struct direction_set *s, size_t i, float value_0,
                           const float value[DIRECTION_NEIGHBOURS], float d[3]);
 

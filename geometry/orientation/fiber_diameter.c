@@ -8,7 +8,8 @@ enum { N_SCALE = 20, MAX_BRICK = 12, EDGE = 64, MAX_REACH = 40 };
 
 static double scale_sigma(int i) { return 0.7 * pow(1.14, i); } /* 0.7 .. 8.4 voxels */
 
-/* 2 sqrt 2 = 2.83 for a lone cylinder; bundled ones answer at finer scales. Between the two, found on phantoms. */
+/* The ratio is 2 sqrt 2 = 2.83 for an isolated cylinder. Fibers in bundles respond at finer scales. This value lies
+ * between the two and was found on phantoms. */
 static const double DIAMETER_OVER_SIGMA = 3.25;
 static const float MIN_BLURRED = 0.35f;
 
@@ -20,12 +21,12 @@ struct brick {
 struct job {
     const struct volume *v;
     struct brick brick[MAX_BRICK];
-    double noise_var[N_SCALE]; /* of the answer to white noise of variance 1 */
-    float *scratch;            /* per thread: 2 bricks */
+    double noise_var[N_SCALE]; /* of the response to white noise of variance 1 */
+    float *scratch;            /* two bricks per thread */
     size_t scratch_per_thread;
 };
 
-/* Convolution along one axis, edge values repeated. stride: of that axis; the other two are walked by lines. */
+/* Convolves along one axis with edge values repeated. */
 static void blur_axis(const float *in, float *out, const size_t n[3], int axis, const float *kernel, int reach)
 {
     size_t stride = axis == 0 ? 1 : axis == 1 ? n[0] : n[0] * n[1];
@@ -58,15 +59,17 @@ static void blur(float *a, float *b, const size_t n[3], double sigma)
     memcpy(a, b, n[0] * n[1] * n[2] * sizeof *a);
 }
 
-/* -lap at p, in a volume with rows of sy and slices of sz voxels. */
-static float bright_at(const float *p, ptrdiff_t sy, ptrdiff_t sz)
+/* Returns -lap at p, in a volume with rows of sy and slices of sz voxels. */
+static float minus_laplacian(const float *p, ptrdiff_t sy, ptrdiff_t sz)
 {
     return 6.0f * p[0] - p[-1] - p[1] - p[-sy] - p[sy] - p[-sz] - p[sz];
 }
 
-/* Mean over inner voxels of the third power of the answer r = -sigma^2 lap where it is positive and there is material at this scale (noise in
- * void must not count: a volume may be void for the most part). On the axis of a lone cylinder at its scale the blurred density is 0.63.
- * Noise of variance q in the answer s of the scan adds to its third power: the mean of (s + noise)^3 - 3 q (s + noise) is s^3. */
+/* Mean over the inner voxels of the third power of the response r = -sigma^2 lap, where it is positive and there is
+ * material at this scale. Noise in void must not count, because most of a volume may be void. On the axis of an
+ * isolated cylinder at its scale the blurred density is 0.63.
+ * Noise of variance q adds to the third power of the response s of the scan. It is removed by the identity that the
+ * mean of (s + noise)^3 - 3 q (s + noise) is s^3. */
 static double bright_energy(const float *a, const size_t n[3], double sigma, double noise_var)
 {
     ptrdiff_t sy = (ptrdiff_t)n[0], sz = (ptrdiff_t)(n[0] * n[1]);
@@ -78,14 +81,15 @@ static double bright_energy(const float *a, const size_t n[3], double sigma, dou
             for (size_t i = 1; i + 1 < n[0]; i++, count++) {
                 const float *p = a + (ptrdiff_t)k * sz + (ptrdiff_t)j * sy + (ptrdiff_t)i;
                 if (p[0] < MIN_BLURRED) continue;
-                float bright = s2 * bright_at(p, sy, sz);
+                float bright = s2 * minus_laplacian(p, sy, sz);
                 if (bright > 0.0f && bright * bright > q3) sum += (double)(bright * (bright * bright - q3));
             }
     return count > 0 ? sum / (double)count : 0.0;
 }
 
-/* Noise of a brick: second differences along all three axes at once leave next to nothing of fibers (nothing at all of straight ones
- * square to an axis), and of white noise 6^3 times its variance (after Immerkaer 1996). Scans with noise that is smooth give less. */
+/* Noise variance of a brick. Second differences along all three axes at once remove nearly all of the fibers
+ * (straight fibers perpendicular to an axis completely), and give 6^3 times the variance of white noise (after
+ * Immerkaer 1996). For scans with smooth noise the result is too small. */
 static double noise_variance(const float *a, const size_t n[3])
 {
     static const float d2[3] = {1.0f, -2.0f, 1.0f};
@@ -94,18 +98,19 @@ static double noise_variance(const float *a, const size_t n[3])
     for (size_t k = 1; k + 1 < n[2]; k++)
         for (size_t j = 1; j + 1 < n[1]; j++)
             for (size_t i = 1; i + 1 < n[0]; i++) {
-                float answer = 0.0f;
+                float response = 0.0f;
                 for (size_t m = 0; m < 27; m++)
-                    answer += d2[m % 3] * d2[m / 3 % 3] * d2[m / 9] *
-                              a[((k + m / 9 - 1) * n[1] + j + m / 3 % 3 - 1) * n[0] + i + m % 3 - 1];
-                sum += (double)(answer * answer);
+                    response += d2[m % 3] * d2[m / 3 % 3] * d2[m / 9] *
+                                a[((k + m / 9 - 1) * n[1] + j + m / 3 % 3 - 1) * n[0] + i + m % 3 - 1];
+                sum += (double)(response * response);
                 count++;
             }
     return count > 0 ? sum / (216.0 * (double)count) : 0.0;
 }
 
-/* Variance of the answer to white noise of variance 1 at each scale: the sum of squares of the answer to one voxel. */
-static void answer_to_noise(float *a, float *tmp, double var[N_SCALE])
+/* Variance of the response to white noise of variance 1 at each scale: the sum of squares of the response to one
+ * voxel. */
+static void response_to_noise(float *a, float *tmp, double var[N_SCALE])
 {
     const size_t n[3] = {EDGE, EDGE, EDGE};
     const ptrdiff_t sy = EDGE, sz = EDGE * EDGE;
@@ -117,7 +122,7 @@ static void answer_to_noise(float *a, float *tmp, double var[N_SCALE])
         blur(a, tmp, n, sqrt(sigma * sigma - done));
         done = sigma * sigma;
         for (ptrdiff_t at = sz + sy + 1; at < EDGE * sz - sz - sy - 1; at++) {
-            double r = done * (double)bright_at(a + at, sy, sz);
+            double r = done * (double)minus_laplacian(a + at, sy, sz);
             sum += r * r;
         }
         var[s] = sum;
@@ -136,7 +141,7 @@ static void measure_brick(void *context, size_t i_brick, size_t i_thread)
                    job->v->density + volume_index(job->v->n, b->from[0], b->from[1] + j, b->from[2] + k),
                    b->n[0] * sizeof *a);
     double done = 0.0, noise_var = noise_variance(a, b->n);
-    for (int s = 0; s < N_SCALE; s++) { /* cascade: variances add */
+    for (int s = 0; s < N_SCALE; s++) { /* applied one after the other, because the variances of Gaussians add */
         double sigma = scale_sigma(s);
         blur(a, tmp, b->n, sqrt(sigma * sigma - done));
         done = sigma * sigma;
@@ -144,7 +149,7 @@ static void measure_brick(void *context, size_t i_brick, size_t i_thread)
     }
 }
 
-/* Bricks with the most material out of a lattice over the volume. */
+/* Chooses the bricks with the most material from a lattice over the volume. */
 static size_t choose_bricks(const struct volume *v, struct brick *chosen)
 {
     double share[MAX_BRICK];
@@ -176,7 +181,8 @@ static size_t choose_bricks(const struct volume *v, struct brick *chosen)
     return count;
 }
 
-/* The finest scale that answers more strongly than its neighbours: coarser peaks are yarns. The largest if there is none. */
+/* Returns the finest scale whose response is stronger than that of its neighbours, because peaks at coarser scales
+ * are yarns; the scale of the largest response if there is no peak. */
 static int first_peak(const double energy[N_SCALE])
 {
     int best = 0;
@@ -195,7 +201,7 @@ status fiber_diameter_measure(const struct volume *v, struct thread_pool *pool, 
     job.scratch = malloc(thread_pool_n_thread(pool) * job.scratch_per_thread * sizeof *job.scratch);
     if (job.scratch == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber diameter: out of memory");
-    answer_to_noise(job.scratch, job.scratch + EDGE * EDGE * EDGE, job.noise_var);
+    response_to_noise(job.scratch, job.scratch + EDGE * EDGE * EDGE, job.noise_var);
     status s = thread_pool_run(pool, n_brick, measure_brick, &job, progress);
     free(job.scratch);
     if (s != STATUS_OK) return error_set(err, s, "measuring the fiber diameter was cancelled");

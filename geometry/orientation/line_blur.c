@@ -1,4 +1,4 @@
-/* The ball-shaped part of the line filter: difference of two Gaussians, separable. */
+/* The isotropic part of the line filter: a difference of two Gaussians, computed along the three axes in turn. */
 #include "geometry/orientation/line_filter.h"
 
 #include <math.h>
@@ -14,16 +14,16 @@ struct kernel {
 
 struct blur_job {
     const struct volume *v;
-    float *half_done, *out; /* blurred in x and y, slice k at k % n_ring; sum of both Gaussians */
+    float *half_done, *out; /* half_done: blurred in x and y, slice k at k % n_ring; out: sum of both Gaussians */
     size_t n_ring, first;   /* first: slice of task 0 */
     struct kernel kernel;
-    float factor; /* of this Gaussian in the sum */
+    float factor; /* factor of this Gaussian in the sum */
     bool add;
-    float *scratch; /* a slice per thread */
+    float *scratch; /* one slice per thread */
     size_t scratch_per_thread;
 };
 
-/* exp(-a x^2), sampled and scaled to the sum of the integral. */
+/* Samples exp(-a x^2), scaled so that the sum equals the integral. Returns false when memory is out. */
 static bool make_kernel(double a, struct kernel *k)
 {
     double sigma = 1.0 / sqrt(2.0 * a), sum = 0.0;
@@ -42,7 +42,7 @@ static void add_scaled(float *restrict to, const float *restrict from, float w, 
     for (size_t i = 0; i < n; i++) to[i] += w * from[i];
 }
 
-/* Rows along x with edge values repeated, then rows added along y. */
+/* Blurs rows along x with edge values repeated, then adds rows along y. */
 static void blur_slice(void *context, size_t i_task, size_t i_thread)
 {
     const struct blur_job *job = context;
@@ -80,7 +80,7 @@ static void blur_along_z(void *context, size_t i_task, size_t i_thread)
     size_t n_slice = job->v->n[0] * job->v->n[1];
     float *out = job->out + k * n_slice;
     if (!job->add) memset(out, 0, n_slice * sizeof *out);
-    enum { PART = 4096 }; /* stays in the cache while all taps pass over it */
+    enum { PART = 4096 }; /* this part stays in the cache for all taps */
     for (size_t from = 0; from < n_slice; from += PART) {
         size_t n = from + PART <= n_slice ? PART : n_slice - from;
         for (int t = -q->reach; t <= q->reach; t++) {
@@ -91,7 +91,7 @@ static void blur_along_z(void *context, size_t i_task, size_t i_thread)
     }
 }
 
-/* One Gaussian: slabs of as many slices as the buffer holds besides those that the kernel reaches. */
+/* Applies one Gaussian in slabs. A slab has as many slices as the buffer holds beside those that the kernel reaches. */
 static status blur_slabs(struct blur_job *job, size_t n_slab, struct thread_pool *pool, const struct progress *progress)
 {
     size_t n = job->v->n[2], reach = (size_t)job->kernel.reach, ready = 0;

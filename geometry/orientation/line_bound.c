@@ -14,7 +14,7 @@ static bool any_above(const struct bound_job *job, const size_t from[3], const s
     for (size_t k = from[2]; k < to[2]; k++)
         for (size_t j = from[1]; j < to[1]; j++) {
             const float *row = job->blurred->density + volume_index(job->blurred->n, 0, j, k);
-            int above = 0; /* whole rows at once, in vectors */
+            int above = 0; /* no early exit, so that the loop over a row is vectorised */
             for (size_t i = from[0]; i < to[0]; i++) above |= row[i] >= job->least;
             if (above) return true;
         }
@@ -39,7 +39,7 @@ static void mark_layer(void *context, size_t layer, size_t i_thread)
         }
 }
 
-/* A cell is set when one within `cells` of it along one axis is: three times gives a box. */
+/* Sets a cell if one within `cells` of it along one axis is set. Applied along all three axes this dilates by a box. */
 static void dilate(const struct line_bound *b, int axis, size_t cells, const bool *in, bool *out)
 {
     size_t stride = axis == 0 ? 1 : axis == 1 ? b->n[0] : b->n[0] * b->n[1], n = b->n[0] * b->n[1] * b->n[2];
@@ -65,7 +65,7 @@ status line_bound_init(struct line_bound *b, const struct volume *blurred, size_
         line_bound_release(b);
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     }
-    struct bound_job job = {blurred, b, (float)(0.999 * least)}; /* rounding must not exclude anything */
+    struct bound_job job = {blurred, b, (float)(0.999 * least)}; /* the factor keeps rounding from excluding a voxel */
     status s = thread_pool_run(pool, b->n[2], mark_layer, &job, NULL);
     for (int a = 0; a < 3; a++) {
         dilate(b, a, cells, b->reaches, other);

@@ -1,6 +1,6 @@
-/* Where J cannot be low enough, known without looking at directions: J sums h values of the blurred volume (line_filter.h), so
- * J >= -h max L over everything that a line may touch. Block maxima of L tell this for void, whose noise would otherwise be searched for
- * fibers voxel by voxel. */
+/* A bound that excludes void without evaluating any direction. J is minus the sum of h values of the blurred volume
+ * L (line_filter.h), so J >= -h max L over all voxels that a line may touch. Block maxima of L show where J cannot
+ * be low enough; without this bound the noise in void would be searched for fibers voxel by voxel. */
 #ifndef SELVEDGE_GEOMETRY_LINE_BOUND_H
 #define SELVEDGE_GEOMETRY_LINE_BOUND_H
 
@@ -16,7 +16,8 @@ struct line_bound {
     bool *reaches;
 };
 
-/* A cell reaches when L is at least `least` somewhere within `reach` voxels of it. STATUS_NO_MEMORY, STATUS_CANCELLED. */
+/* Sets a cell of `reaches` if L is at least `least` somewhere within `reach` voxels of it. STATUS_NO_MEMORY,
+ * STATUS_CANCELLED. */
 status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least,
                        struct thread_pool *pool, struct error *err);
 void line_bound_release(struct line_bound *b);

@@ -9,14 +9,14 @@ typedef float lanes __attribute__((vector_size(LANES * sizeof(float)), aligned(s
 
 struct line_filter {
     size_t half; /* offsets -half .. half */
-    size_t edge; /* of the copied surroundings: 2 half + 1, in x padded to edge_x */
+    size_t edge; /* of the copied neighbourhood: 2 half + 1, in x padded to edge_x */
     size_t edge_x;
     size_t n[3];
     size_t n_direction;
-    size_t *first_run;     /* n_direction + 1 */
+    size_t *first_run;     /* n_direction + 1 entries */
     int32_t *offset;       /* of a run's first tap from the voxel, in the volume */
-    int32_t *offset_local; /* the same in the copy */
-    float *weight;         /* LANES a run */
+    int32_t *offset_local; /* the same in the copied neighbourhood */
+    float *weight;         /* LANES weights per run */
 };
 
 void line_filter_free(struct line_filter *f)
@@ -29,7 +29,7 @@ void line_filter_free(struct line_filter *f)
     free(f);
 }
 
-/* Adds the eight taps of the interpolated sample at x (voxels from the centre of the cube). */
+/* Adds the eight taps of the interpolated sample at x, in voxels from the centre of the cube. */
 static void splat(const struct line_filter *f, const double x[3], double weight, float *cube)
 {
     int i[3];
@@ -50,7 +50,7 @@ static void splat(const struct line_filter *f, const double x[3], double weight,
     }
 }
 
-/* Taps of one direction in a cube of edge^3: whole steps, and what is left of h / 2 at either end. */
+/* Adds the taps of one direction to a cube of edge^3: whole steps, and the remainder of h / 2 at either end. */
 static void make_taps(const struct line_filter *f, const float d[3], double half_length, float *cube)
 {
     memset(cube, 0, f->edge * f->edge * f->edge * sizeof *cube);
@@ -62,7 +62,7 @@ static void make_taps(const struct line_filter *f, const float d[3], double half
     }
 }
 
-/* Runs of one direction: written if the tables exist, counted in any case. */
+/* Makes the runs of one direction: writes them if the tables exist, and always returns their number. */
 static size_t make_runs(struct line_filter *f, const float *cube, size_t at)
 {
     size_t count = 0;
@@ -139,7 +139,7 @@ struct line_filter_site line_filter_at(const struct line_filter *f, const struct
     for (size_t z = 0; z < f->edge; z++)
         for (size_t y = 0; y < f->edge; y++, out += f->edge_x - f->edge)
             for (size_t x = 0; x < f->edge; x++, out++) {
-                /* index + half so that nothing is negative; the mirror image of c is 2 * centre - c */
+                /* index + half, so that no index is negative; the mirror image of c is 2 * centre - c */
                 size_t at[3] = {i + x, j + y, k + z}, centre[3] = {i, j, k}, mirrored[3];
                 bool inside = true, inside_mirrored = true;
                 for (int a = 0; a < 3; a++) {

@@ -11,23 +11,24 @@ enum {
     BLUR = 2,   /* reach of the blur of standard deviation 1 voxel */
     WINDOW = 5, /* reach of the tensor's window */
     INNER = 16,
-    STEP = 4, /* places: every 4th voxel of 16 a side */
+    STEP = 4, /* samples are taken at every 4th of the 16 voxels along each axis */
     BUFFER = INNER + 2 * (WINDOW + 1 + BLUR),
     PER_BRICK = (INNER / STEP) * (INNER / STEP) * (INNER / STEP),
     MAX_BRICK = 1600,
     N_BIN = 180,
-    APART_BIN = 30, /* of the histogram: one degree each */
+    APART_BIN = 30, /* least distance of two peaks in bins of the histogram, which are one degree each */
     N_ROUND = 30,
     LEAST_SAMPLE = 200
 };
 
-static const double LEAST_IN_PLANE = 0.5; /* length of a direction's part in the plane: up to 60 degrees out of it */
+/* length of the part of a unit direction in the plane: at most 60 degrees out of it */
+static const double LEAST_IN_PLANE = 0.5;
 static const double WITHIN_RAD = 0.8727;  /* 50 degrees */
 static const double KERNEL_RAD = 0.1396;  /* 8 degrees */
-static const double LEAST_CONTRAST = 2.5; /* of a peak over the valley beside it */
-static const double LEAST_SECOND = 0.12;  /* a lower second peak is no system of its own */
-static const double LEAST_SHARE = 0.12;   /* of what runs in the plane */
-static const double LEAST_Z = 0.35;       /* fibers along z where warp or weft is missing: the axes are wrong */
+static const double LEAST_CONTRAST = 2.5; /* ratio of a peak to the valley beside it */
+static const double LEAST_SECOND = 0.12;  /* a second peak below this share of the first is not a system of its own */
+static const double LEAST_SHARE = 0.12;   /* of the directions in the plane */
+static const double LEAST_Z = 0.35; /* share of fibers along z at which the axes are wrong if warp or weft is missing */
 
 struct sample {
     float d[3], weight;
@@ -36,10 +37,10 @@ struct sample {
 struct finder {
     const struct volume *v;
     float material;
-    size_t n_brick, *first; /* corner voxels of bricks; x runs fastest, then y */
-    size_t n_column;        /* bricks side by side in x and y */
-    struct sample *sample;  /* PER_BRICK a brick; weight 0: none */
-    float *scratch;         /* per thread: two buffers */
+    size_t n_brick, *first; /* corner voxels of bricks, in the order x, y, z */
+    size_t n_column;        /* number of columns of bricks in x and y */
+    struct sample *sample;  /* PER_BRICK per brick; weight 0: no sample */
+    float *scratch;         /* two buffers per thread */
 };
 
 static const size_t EDGE = BUFFER, CUBE = (size_t)BUFFER * BUFFER * BUFFER;
@@ -69,7 +70,7 @@ static void copy_brick(const struct finder *f, const size_t corner[3], float *ou
         if (!isfinite(out[i])) out[i] = least;
 }
 
-/* Gaussian of one voxel along all three axes; the border of BLUR voxels stays as it was. */
+/* Blurs by a Gaussian of one voxel along all three axes. A border of BLUR voxels keeps its values. */
 static void blur_brick(float *a, float *b)
 {
     static const float weight[2 * BLUR + 1] = {0.0545f, 0.2442f, 0.4026f, 0.2442f, 0.0545f};
@@ -84,8 +85,8 @@ static void blur_brick(float *a, float *b)
     }
 }
 
-/* Direction of least change around a place of the buffer; its weight is how clearly it is one line. The window is cut at the faces of the
- * volume: repeated voxels beyond them do not change along one axis. */
+/* Direction of least change around a place of the buffer; its weight states how clearly it is a single line. The
+ * window is cut at the faces of the volume, because repeated voxels beyond them would not change along one axis. */
 static void tensor_sample(const struct finder *f, const size_t corner[3], const float *a, const size_t at[3],
                           struct sample *s)
 {
@@ -137,7 +138,7 @@ static void sample_brick(void *context, size_t i_brick, size_t i_thread)
                     tensor_sample(f, f->first + 3 * i_brick, a, at, &out[n++]);
 }
 
-/* Bricks side by side, or spread evenly where there are more than MAX_BRICK of them. */
+/* Places bricks side by side, or spread evenly if there are more than MAX_BRICK of them. */
 static status place_bricks(struct finder *f, struct error *err)
 {
     size_t n[3], gap[3];
@@ -169,7 +170,7 @@ static status place_bricks(struct finder *f, struct error *err)
 
 static double angle_of(const struct sample *s) { return atan2((double)s->d[1], (double)s->d[0]); }
 
-/* Difference of two angles of lines, -90..90 degrees, in radians. */
+/* Difference of the angles of two lines in radians, within -pi/2..pi/2. */
 static double line_difference(double a, double b)
 {
     double d = a - b;
@@ -198,8 +199,8 @@ static void make_histogram(const struct finder *f, double height[N_BIN])
     }
 }
 
-/* Bins of the highest peak and of the highest place at least APART_BIN from it; contrast: the lower one over the lowest place on that
- * side of the two where the valley between them is higher. */
+/* Finds the bins of the two highest peaks that lie at least APART_BIN apart. Two valleys separate the peaks;
+ * contrast is the height of the lower peak over the lowest place of the higher valley. */
 static void find_peaks(const double height[N_BIN], int peak[2], double *contrast)
 {
     double valley[2] = {INFINITY, INFINITY};
@@ -215,10 +216,11 @@ static void find_peaks(const double height[N_BIN], int peak[2], double *contrast
 }
 
 struct vector_sum {
-    double v[3], weight, square; /* square: sum of weight x squared cosine to the present direction */
+    double v[3], weight, square; /* square: sum of weight times squared cosine to the present direction */
 };
 
-/* Adds what belongs to direction p of brick b: nearer in the plane to it than to the other, and within 50 degrees there. */
+/* Adds the samples of brick b that belong to direction p: those nearer to it in the plane than to the other
+ * direction, and within 50 degrees of it there. */
 static void add_brick(const struct finder *f, size_t b, double u[2][3], size_t n, size_t p, struct vector_sum *t)
 {
     double own = atan2(u[p][1], u[p][0]), other = atan2(u[1 - p][1], u[1 - p][0]);
@@ -240,7 +242,7 @@ static void unit(const double v[3], double u[3])
     for (int a = 0; a < 3; a++) u[a] = norm > 0.0 ? v[a] / norm : 0.0;
 }
 
-static void settle(const struct finder *f, double u[2][3], size_t n, struct vector_sum total[2])
+static void iterate_means(const struct finder *f, double u[2][3], size_t n, struct vector_sum total[2])
 {
     for (int round = 0; round < N_ROUND; round++) {
         double next[2][3];
@@ -256,8 +258,8 @@ static void settle(const struct finder *f, double u[2][3], size_t n, struct vect
     }
 }
 
-/* Delete-a-block jackknife of the mean vector; a block is a column of bricks over the height of the cloth. se_deg: within the plane of x
- * and y, and out of it. */
+/* Standard error of the mean vector by a delete-a-block jackknife, whose blocks are columns of bricks over the
+ * height of the cloth. se_deg: within the plane of x and y, and out of it. */
 static void standard_error(const struct finder *f, double u[2][3], size_t n, size_t p, const struct vector_sum *total,
                            double se_deg[2])
 {
@@ -282,7 +284,7 @@ static void standard_error(const struct finder *f, double u[2][3], size_t n, siz
                         : angle_to_deg(sqrt(fmax(0.0, (used - 1.0) * (square[a] / used - pow(sum[a] / used, 2.0)))));
 }
 
-/* [0] shall be the one nearer to x; signs so that weft points along +x, warp along +y. */
+/* Puts the direction nearer to x first, and chooses signs so that weft points along +x and warp along +y. */
 static void order(struct main_directions *m)
 {
     double(*u)[3] = m->direction;
@@ -303,7 +305,7 @@ static void order(struct main_directions *m)
             for (int a = 0; a < 3; a++) u[p][a] = -u[p][a];
 }
 
-/* All directions, and those along z. */
+/* Counts all directions and those along z. */
 static void count_samples(const struct finder *f, struct main_directions *m, double *all)
 {
     double along_z = 0.0;
@@ -332,7 +334,7 @@ static void conclude(const struct finder *f, struct main_directions *m)
         u[p][1] = sin((peak[p] + 0.5) * M_PI / N_BIN);
     }
     size_t n = height[peak[1]] < LEAST_SECOND * height[peak[0]] ? 1 : 2;
-    settle(f, u, n, total);
+    iterate_means(f, u, n, total);
     for (size_t p = 0; p < n; p++) {
         memcpy(m->direction[p], u[p], sizeof u[p]);
         m->share[p] = total[p].weight / all;
@@ -377,7 +379,7 @@ static void cross(const double a[3], const double b[3], double out[3])
 
 static double length(const double a[3]) { return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
 
-/* Rows of the inverse of the matrix with columns u, v, w. */
+/* Writes the rows of the inverse of the matrix with columns u, v, w. */
 static void inverse_of_columns(const double u[3], const double v[3], const double w[3], double out[9])
 {
     double vw[3], wu[3], uv[3];
@@ -392,14 +394,14 @@ static void inverse_of_columns(const double u[3], const double v[3], const doubl
     }
 }
 
-/* The other axes of a frame turned, by the shortest way, so that `axis` lies along u. */
+/* Writes the columns of the identity rotated by the shortest way that brings `axis` to u. */
 static void turned_frame(const double u[3], int axis, double column[3][3])
 {
     double e[3] = {0.0}, k[3];
     e[axis] = 1.0;
     cross(e, u, k);
     double c = u[axis];
-    for (int b = 0; b < 3; b++) { /* Rodrigues */
+    for (int b = 0; b < 3; b++) { /* rotation formula of Rodrigues */
         double x[3] = {0.0}, kx[3], along = 0.0;
         x[b] = 1.0;
         cross(k, x, kx);
@@ -408,7 +410,8 @@ static void turned_frame(const double u[3], int axis, double column[3][3])
     }
 }
 
-/* Less than a repeat of crimped yarns leans somewhere: then the part out of the plane says nothing. */
+/* Puts a direction without a repeat into the plane of x and y: less than a repeat of crimped yarns may lean, so the
+ * part out of the plane is not a tilt of the cloth. */
 static void flattened(const struct main_directions *m, int p, double u[3])
 {
     const double flat[3] = {m->direction[p][0], m->direction[p][1], m->repeat_m[p] > 0.0 ? m->direction[p][2] : 0.0};

@@ -7,7 +7,7 @@
 enum { N_CELL = 128, N_HEIGHT = 8, N_FINE_HEIGHT = 128 };
 
 static const double CONE_RAD = 0.1047;               /* 6 degrees */
-static const double SHORTEST = 0.25, LONGEST = 0.75; /* of the volume's extent along the direction */
+static const double SHORTEST = 0.25, LONGEST = 0.75; /* of the extent of the volume along the direction */
 static const double LEAST_CORRELATION = 0.4;
 static const double MOST_RISE = 0.2; /* 11 degrees out of the plane */
 static const double SYSTEMATIC_DEG = 1.0;
@@ -16,7 +16,7 @@ struct cells {
     const struct volume *v;
     size_t n[2], block[3], n_z;
     double size_m[3];
-    float void_value; /* of what lies outside of the scan */
+    float void_value; /* value of cells outside of the scan */
     float *value;     /* [(z * n[1] + y) * n[0] + x] */
 };
 
@@ -41,7 +41,7 @@ static void fill_height(void *context, size_t z, size_t i_thread)
     for (size_t i = 0; i < c->n[0] * c->n[1]; i++) out[i] *= scale;
 }
 
-/* Normalised correlation of the cells with themselves, shifted; over what overlaps. */
+/* Normalised correlation of the cells with themselves shifted by (dx, dy, dz), over the overlap. */
 static double correlation(const struct cells *c, long dx, long dy, long dz)
 {
     size_t width = c->n[0] - (size_t)labs(dx), count = 0;
@@ -64,13 +64,13 @@ static double correlation(const struct cells *c, long dx, long dy, long dz)
 
 struct search {
     const struct cells *c;
-    int axis; /* the shift's larger component */
+    int axis; /* axis of the shift's larger component */
     double angle;
     long from;
     struct shift {
         double correlation;
         long d[2];
-    } * best; /* per length */
+    } * best; /* one per length */
 };
 
 static double angle_between(double a, double b)
@@ -84,7 +84,7 @@ static double shift_angle(const struct cells *c, double dx, double dy)
     return atan2(dy * c->size_m[1], dx * c->size_m[0]);
 }
 
-/* All shifts with one length along the main axis that lie in the cone. */
+/* Tries all shifts of one length along the main axis that lie within the cone. */
 static void try_length(void *context, size_t i, size_t i_thread)
 {
     (void)i_thread;
@@ -100,7 +100,7 @@ static void try_length(void *context, size_t i, size_t i_thread)
     }
 }
 
-/* Place of the peak of the parabola through three values around the middle one; 0 where there is none. */
+/* Position of the peak of the parabola through three values, relative to the middle one; 0 if there is no peak. */
 static double peak_offset(double before, double at, double after)
 {
     double bend = before - 2.0 * at + after;
@@ -123,7 +123,8 @@ static status best_shift(struct search *s, struct thread_pool *pool, struct shif
     return st == STATUS_OK ? st : error_set(err, st, "finding the repeat was cancelled");
 }
 
-/* How much higher the cloth lies one repeat on, metres; NAN when the best height is not an inner one. */
+/* Rise of the cloth over one repeat in metres: the height of the best correlation. NAN if that is the first or last
+ * height tried. */
 static double rise_m(const struct cells *fine, const long d[2], double length_m)
 {
     long most = (long)fmin(MOST_RISE * length_m / fine->size_m[2], 0.5 * (double)fine->n_z), best = 0;
@@ -153,7 +154,8 @@ static status refine(const struct cells *c, const struct cells *fine, struct thr
     long across[2] = {s.axis == 1, s.axis == 0};
     double before = correlation(c, best.d[0] - across[0], best.d[1] - across[1], 0),
            after = correlation(c, best.d[0] + across[0], best.d[1] + across[1], 0);
-    if (before >= best.correlation || after >= best.correlation) return STATUS_OK; /* the cone's edge */
+    /* the best shift lies at the edge of the cone, so it is not a peak */
+    if (before >= best.correlation || after >= best.correlation) return STATUS_OK;
     double off = peak_offset(before, best.correlation, after);
     double d[3] = {((double)best.d[0] + off * (double)across[0]) * c->size_m[0],
                    ((double)best.d[1] + off * (double)across[1]) * c->size_m[1]};

@@ -28,7 +28,8 @@ static void add_scalar(const struct volume *v, size_t at, float weight, double s
     sum[5] += (double)(weight * gy * gz);
 }
 
-/* n voxels of a row, weights in w (padded with zeros to whole lanes); reads up to LANES - 1 voxels beyond. */
+/* Adds n voxels of a row with weights w, which are padded with zeros to whole lanes. Reads up to LANES - 1 voxels
+ * beyond. */
 static void add_row(const struct volume *v, size_t at, const float *w, int n, float row_weight, lanes sum[6])
 {
     size_t sy = v->n[0], sz = v->n[0] * v->n[1];

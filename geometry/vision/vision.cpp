@@ -8,7 +8,8 @@
 namespace
 {
 
-/* Gaussian and its second derivative (times sigma^2, then scaled to second moment 2), sampled; sums are 1 and 0. */
+/* Samples the Gaussian and its second derivative times sigma^2, the latter scaled to second moment 2. Their sums are
+ * 1 and 0. */
 void gaussian_kernels(double sigma, std::vector<float> &smooth, std::vector<float> &second)
 {
     int reach = std::max(2, static_cast<int>(std::ceil(4.0 * sigma)));

@@ -170,7 +170,7 @@ static void test_wrong_spacing(void **state)
     write_metaimage("spacing", "MET_USHORT", 50.0, samples, N_VOXEL * 2);
     chain_init(&c);
     for (int a = 0; a < 3; a++) c.o.voxel_size_m[a] = NAN;
-    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "makes no sense");
+    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "is not possible");
     chain_release(&c);
     chain_init(&c);
     c.o.voxel_size_m[2] = 100e-6;
@@ -217,7 +217,7 @@ static void test_noise_only(void **state)
     c.o.align = c.o.crop = true;
     status s = chain_run(&c, &path, 1);
     print_outcome(&c, s);
-    assert_warned(&c, "void and material cannot be told apart");
+    assert_warned(&c, "void and material cannot be distinguished");
     assert_true(s == STATUS_OK || s == STATUS_INVALID);
     chain_release(&c);
 }
