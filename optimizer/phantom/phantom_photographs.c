@@ -5,7 +5,6 @@
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/fit/photographs/observation.h"
 #include "optimizer/phantom/phantom_view_table.h"
-#include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 
 #include <jansson.h>
@@ -150,8 +149,7 @@ static struct configuration view_configuration(const struct phantom_photograph_o
 static status check_view(const struct phantom_photograph_option *o, const struct job_photograph *v, struct error *err)
 {
     const struct configuration c = view_configuration(o, v);
-    if (estimate_check_configurations(&c, 1, 0, 0, NULL) != STATUS_OK ||
-        !(v->light_theta_deg >= 0.0 && v->light_theta_deg <= 180.0))
+    if (configuration_check(&c, 1, NULL) != STATUS_OK || !(v->light_theta_deg >= 0.0 && v->light_theta_deg <= 180.0))
         return error_set(
             err, STATUS_INVALID,
             "photograph '%s' makes no sense: camera_theta_deg must be 0 to below 90, light_theta_deg 0 to 180, and "
@@ -174,9 +172,9 @@ static status make_photograph(const struct phantom_photograph_option *o, const s
     struct image im = {0};
     const struct configuration c = view_configuration(o, v);
     const size_t n_pixel = o->px * o->px, n_sample = (size_t)((o->n_path + n_pixel - 1) / n_pixel);
-    const struct render_request q = {.scene = scene,
-                                     .model = o->model,
-                                     .param = o->param,
+    struct appearance model;
+    appearance_from_surface(o->model, &model);
+    const struct render_request q = {.input = {.scene = {.fibers = scene}, .model = &model, .param = o->param},
                                      .configuration = &c,
                                      .width = o->px,
                                      .height = o->px,

@@ -21,7 +21,6 @@
 #include "optimizer/worker/worker_status.h"
 #include "renderer/scattering/appearance.h"
 #include "renderer/scene/scene.h"
-#include "renderer/transport/appearance_estimate.h"
 #include "renderer/transport/derivative_check.h"
 
 /* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */

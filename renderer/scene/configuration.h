@@ -11,6 +11,8 @@
 #ifndef SELVEDGE_RENDERER_CONFIGURATION_H
 #define SELVEDGE_RENDERER_CONFIGURATION_H
 
+#include "base/status.h"
+
 #include <stdint.h>
 
 struct environment; /* renderer/transport/light/environment.h */
@@ -54,11 +56,15 @@ struct configuration {
     uint32_t contrast_cells; /* 0: estimates are of the crop's mean radiance; 2 or more: of the contrast between so many
                                 equal parts of the crop a side (transport/contrast_blocks.h) */
     uint32_t n_rotation; /* 0 or 1: the cloth lies at cloth_rotation_rad; more: estimates are of the mean over so many
-                                rotations, equally spaced from there on (appearance_estimate.h; pictures show the first) */
+                                rotations, equally spaced from there on (rotation_mean.h; pictures show the first) */
 };
 
 /* For messages, in degrees: "lamp 45/0, camera 45/180, cloth turned by 90". */
 enum { CONFIGURATION_TEXT = 128 };
 void configuration_describe(const struct configuration *c, char text[CONFIGURATION_TEXT]);
+
+/* STATUS_INVALID for more than CONFIGURATION_MAX_COUNT configurations (field "n_configuration"), and for one whose angles,
+ * distances or lights make no sense (field "configuration"). */
+status configuration_check(const struct configuration *c, size_t n, struct error *err);
 
 #endif

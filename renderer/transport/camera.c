@@ -20,10 +20,9 @@ void camera_init(struct camera *m, const struct configuration *c)
     }
 }
 
-void camera_direction(const struct camera *m, double x, double y, double d[3])
+void camera_direction(const struct camera *m, const double xy[2], double d[3])
 {
-    double length2 = 0;
-    if (m->far_field) x = y = 0.5;
+    double length2 = 0, x = m->far_field ? 0.5 : xy[0], y = m->far_field ? 0.5 : xy[1];
     for (int a = 0; a < 3; a++) {
         d[a] = (x - 0.5) * m->right_mm[a] + (0.5 - y) * m->up_mm[a] - m->eye_mm[a];
         length2 += d[a] * d[a];
@@ -32,16 +31,16 @@ void camera_direction(const struct camera *m, double x, double y, double d[3])
     for (int a = 0; a < 3; a++) d[a] *= inv;
 }
 
-void camera_origin(const struct camera *m, double x, double y, double origin_mm[3])
+void camera_origin(const struct camera *m, const double xy[2], double origin_mm[3])
 {
     for (int a = 0; a < 3; a++)
-        origin_mm[a] = m->eye_mm[a] + (m->far_field ? (x - 0.5) * m->right_mm[a] + (0.5 - y) * m->up_mm[a] : 0);
+        origin_mm[a] = m->eye_mm[a] + (m->far_field ? (xy[0] - 0.5) * m->right_mm[a] + (0.5 - xy[1]) * m->up_mm[a] : 0);
 }
 
-bool camera_ray(const struct camera *m, const struct scene *scene, double x, double y, struct scene_ray *ray)
+bool camera_ray(const struct camera *m, const struct scene *scene, const double xy[2], struct scene_ray *ray)
 {
     double d[3], origin[3];
-    camera_direction(m, x, y, d);
-    camera_origin(m, x, y, origin);
+    camera_direction(m, xy, d);
+    camera_origin(m, xy, origin);
     return scene_ray_enter(scene, origin, d, ray);
 }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK_PATHS = ESTIMATE_BLOCK_PATHS, TASK_PATHS = 4096, N_JAC = 3 * SCATTERING_MAX_FLAT };
+enum { BLOCK_PATHS = RADIANCE_BLOCK_PATHS, TASK_PATHS = 4096, N_JAC = 3 * SCATTERING_MAX_FLAT };
 
 /* ---- sums: for each cell and set the values, their squares, and the products of derivatives with their channel ---- */
 
@@ -46,31 +46,34 @@ static void add_path(const struct contrast_plan *c, const float *value, double *
     }
 }
 
-uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contrast_plan *c, size_t i_configuration,
-                             size_t i_task, const struct progress *progress, float *value)
+/* Places the paths of a block at random in their cells. */
+static void start_paths(const struct contrast_plan *c, const struct rng_key *key, uint32_t i_block, size_t n,
+                        const size_t *i_cell, struct rng *rng, double (*xy)[2])
 {
-    const struct rng_key key = {b->seed, b->iteration, b->replica, (uint32_t)i_configuration};
+    for (uint32_t i = 0; i < n; i++) {
+        rng_start(&rng[i], key, i_block, i);
+        xy[i][0] = ((double)(i_cell[i] % c->n_side) + rng_double(&rng[i])) / (double)c->n_side;
+        xy[i][1] = ((double)(i_cell[i] / c->n_side) + rng_double(&rng[i])) / (double)c->n_side;
+    }
+}
+
+uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contrast_plan *c, size_t i_group,
+                             size_t i_task, float *value)
+{
+    struct rng_key key = b->key;
     size_t n_value = 3 + c->n_jac, first = i_task * c->cells_per_task, per_cell = 2 * c->n_half;
     size_t n_cell = c->n_cell - first < c->cells_per_task ? c->n_cell - first : c->cells_per_task;
-    size_t n_path = n_cell * per_cell;
+    size_t n_path = n_cell * per_cell, i_cell[BLOCK_PATHS];
     uint64_t n_vertex = 0;
     struct rng rng[BLOCK_PATHS];
     double xy[BLOCK_PATHS][2];
-    for (size_t done = 0; done < n_path; done += BLOCK_PATHS) {
-        uint32_t i_block = (uint32_t)(i_task * c->blocks_per_task + done / BLOCK_PATHS);
-        memset(value, 0, BLOCK_PATHS * n_value * sizeof *value);
-        for (uint32_t i = 0; i < BLOCK_PATHS; i++) {
-            if (progress_cancelled(progress)) return n_vertex;
-            size_t i_cell = first + (done + i < n_path ? (done + i) / per_cell : 0); /* those behind the end: unused */
-            rng_start(&rng[i], &key, i_block, i);
-            xy[i][0] = ((double)(i_cell % c->n_side) + rng_double(&rng[i])) / (double)c->n_side;
-            xy[i][1] = ((double)(i_cell / c->n_side) + rng_double(&rng[i])) / (double)c->n_side;
-            if (b->trace_block == NULL && done + i < n_path)
-                n_vertex += b->trace(b->context, i_configuration, xy[i][0], xy[i][1], &rng[i], value + i * n_value);
-        }
-        if (b->trace_block != NULL) n_vertex += b->trace_block(b->context, i_configuration, xy, rng, value);
-        for (size_t i = 0; i < BLOCK_PATHS && done + i < n_path; i++)
-            add_path(c, value + i * n_value, sums_of(c, first + (done + i) / per_cell, (done + i) % 2));
+    key.configuration = (uint32_t)i_group;
+    for (size_t done = 0; done < n_path && !progress_cancelled(b->progress); done += BLOCK_PATHS) {
+        size_t n = n_path - done < BLOCK_PATHS ? n_path - done : BLOCK_PATHS;
+        for (size_t i = 0; i < n; i++) i_cell[i] = first + (done + i) / per_cell;
+        start_paths(c, &key, (uint32_t)(i_task * c->blocks_per_task + done / BLOCK_PATHS), n, i_cell, rng, xy);
+        n_vertex += estimate_trace(b, i_group, n, xy, rng, value);
+        for (size_t i = 0; i < n; i++) add_path(c, value + i * n_value, sums_of(c, i_cell[i], (done + i) % 2));
     }
     return n_vertex;
 }

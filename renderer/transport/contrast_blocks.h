@@ -28,9 +28,9 @@ struct contrast_plan {
 /* n_path: rounded up to 4 a cell. STATUS_NO_MEMORY. */
 status contrast_plan_init(struct contrast_plan *c, size_t n_side, size_t n_path, size_t n_jac, struct error *err);
 void contrast_plan_release(struct contrast_plan *c);
-/* All paths of task i_task; value: room for ESTIMATE_BLOCK_PATHS x (3 + n_jac). Result: number of vertices. */
-uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contrast_plan *c, size_t i_configuration,
-                             size_t i_task, const struct progress *progress, float *value);
+/* All paths of task i_task; value: room for RADIANCE_BLOCK_PATHS x (3 + n_jac). Result: the number of bounces. */
+uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contrast_plan *c, size_t i_group,
+                             size_t i_task, float *value);
 /* Mean, variance and derivatives of the contrast, n_path; false when *bad_value is not finite. */
 bool contrast_reduce(const struct contrast_plan *c, struct estimate *e, size_t *bad_value);
 

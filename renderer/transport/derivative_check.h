@@ -14,14 +14,11 @@
 #ifndef SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
 #define SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
 
-#include "base/progress.h"
-#include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/radiance_source.h"
 
 struct derivative_check_request {
-    struct appearance_scene scene;
-    const struct appearance *model;
-    const double *param; /* internal units, inside the model's bounds */
-    const bool *skip;    /* parameters that are not looked at; NULL: none */
+    struct radiance_input input; /* parameters inside the model's bounds; one set; want_derivative is taken as true */
+    const bool *skip;            /* parameters that are not looked at; NULL: none */
     const struct configuration *configuration;
     const double *weight; /* of each configuration, > 0; NULL: all 1 */
     size_t n_configuration;
@@ -34,8 +31,8 @@ struct derivative_check {
     size_t n_param;
     double error[SCATTERING_MAX_PARAM], error_se[SCATTERING_MAX_PARAM]; /* 0 for skipped ones */
     bool checked[SCATTERING_MAX_PARAM];
-    size_t worst; /* parameter with the largest error */
-    uint64_t n_path, n_step;
+    size_t worst;            /* parameter with the largest error */
+    uint64_t n_path, n_step; /* paths, and their scattering events */
 };
 
 /* STATUS_INVALID as for an estimate; STATUS_CANCELLED; STATUS_NUMERIC (naming model and parameter) for a value that is

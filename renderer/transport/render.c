@@ -1,70 +1,151 @@
 #include "renderer/transport/render.h"
 
-#include "renderer/transport/camera.h"
-#include "renderer/transport/estimate_blocks.h"
-#include "renderer/transport/render_pixels.h"
-#include "renderer/transport/surface/path_tracer.h"
-
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+enum {
+    CHUNK_SAMPLES = 64,
+    TASK_SAMPLES = 512,
+    NAME_BYTES = RADIANCE_NAME_BYTES + 8,
+    N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT
+};
+/* apart from estimate.h, which counts iterations upwards from 0 */
+enum { RENDER_ITERATION = 65535, RENDER_REPLICA = 15 };
 
 struct run {
     const struct render_request *q;
-    struct path_setting setting;
-    struct camera camera;
-    size_t n_jac;
+    const struct radiance_source *source;
+    const struct progress *progress;
+    struct image *im;
+    size_t pixels_per_task, n_pixel;
 };
 
-static void trace(void *context, size_t n, double (*xy)[2], struct rng *rng, float *value)
+/* Adds n samples of a pixel, from number `first`. */
+static void add_samples(const struct run *r, size_t i_pixel, size_t first, size_t n, double *x, double *x2)
 {
-    const struct run *r = context;
+    const struct render_request *q = r->q;
+    const struct rng_key key = {q->seed, RENDER_ITERATION, RENDER_REPLICA, q->stream};
+    const size_t configuration = 0;
+    size_t n_value = 3 + 3 * r->source->n_flat;
+    struct rng rng[CHUNK_SAMPLES];
+    double xy[CHUNK_SAMPLES][2];
+    float value[CHUNK_SAMPLES * N_VALUE];
+    const struct radiance_block block = {
+        .member = &configuration, .n_member = 1, .n_path = n, .xy = xy, .rng = rng, .progress = r->progress};
+    memset(value, 0, n * n_value * sizeof *value);
     for (size_t i = 0; i < n; i++) {
-        struct scene_ray ray;
-        struct path_result path;
-        float *out = value + i * (3 + r->n_jac);
-        if (!camera_ray(&r->camera, r->q->scene, xy[i][0], xy[i][1], &ray)) continue;
-        path_trace(&r->setting, &ray, &rng[i], &path, NULL);
-        memcpy(out, path.radiance, sizeof path.radiance);
-        memcpy(out + 3, path.jac, r->n_jac * sizeof *out);
+        rng_start(&rng[i], &key, (uint32_t)i_pixel, (uint32_t)(first + i));
+        xy[i][0] = ((double)(i_pixel % q->width) + rng_double(&rng[i])) / (double)q->width;
+        xy[i][1] = ((double)(i_pixel / q->width) + rng_double(&rng[i])) / (double)q->height;
     }
+    r->source->tracer->trace(r->source->state, &block, value);
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < n_value; k++) {
+            double v = (double)value[i * n_value + k];
+            x[k] += v;
+            if (k < 3) x2[k] += v * v;
+        }
 }
 
-static void name(void *context, size_t i_flat, char text[RENDER_NAME_BYTES])
+static void render_pixel(struct run *r, size_t i_pixel)
 {
-    const struct run *r = context;
-    const struct scattering_model *m = r->q->model;
-    if (r->setting.n_set == 1)
-        snprintf(text, RENDER_NAME_BYTES, "d_%s", m->param[i_flat].name);
-    else
-        snprintf(text, RENDER_NAME_BYTES, "d_set%zu.%s", i_flat / m->n_param, m->param[i_flat % m->n_param].name);
+    size_t n_sample = r->q->n_sample, n_flat = r->source->n_flat;
+    double x[N_VALUE] = {0}, x2[3] = {0}, n = (double)n_sample;
+    for (size_t i = 0; i < n_sample; i += CHUNK_SAMPLES) {
+        if (progress_cancelled(r->progress)) return;
+        add_samples(r, i_pixel, i, n_sample - i < CHUNK_SAMPLES ? n_sample - i : CHUNK_SAMPLES, x, x2);
+    }
+    float *out = r->im->pixel + i_pixel * r->im->n_channel;
+    for (size_t k = 0; k < 3; k++) {
+        double mean = x[k] / n;
+        out[k] = (float)mean;
+        out[3 + k] = n_sample > 1 ? (float)(fmax(0, x2[k] - x[k] * mean) / (n * (n - 1))) : INFINITY;
+    }
+    for (size_t k = 0; k < 3 * n_flat; k++) out[6 + 3 * (k % n_flat) + k / n_flat] = (float)(x[3 + k] / n);
+}
+
+static void run_task(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    struct run *r = context;
+    size_t first = i_task * r->pixels_per_task, last = first + r->pixels_per_task;
+    for (size_t i = first; i < last && i < r->n_pixel && !progress_cancelled(r->progress); i++) render_pixel(r, i);
+}
+
+/* One block: the array of pointers, then the texts. */
+static status name_channels(const struct radiance_source *source, struct image *im, struct error *err)
+{
+    static const char channel[] = "RGB";
+    size_t n = im->n_channel;
+    char *block = calloc(n, sizeof(char *) + NAME_BYTES), flat[RADIANCE_NAME_BYTES];
+    if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot render: out of memory");
+    const char **name = (const char **)(void *)block;
+    for (size_t i = 0; i < n; i++) {
+        char *text = block + n * sizeof(char *) + i * NAME_BYTES;
+        if (i < 3)
+            snprintf(text, NAME_BYTES, "%c", channel[i]);
+        else if (i < 6)
+            snprintf(text, NAME_BYTES, "var.%c", channel[i - 3]);
+        else {
+            radiance_derivative_name(source, (i - 6) / 3, flat);
+            snprintf(text, NAME_BYTES, "d_%s.%c", flat, channel[i % 3]);
+        }
+        name[i] = text;
+    }
+    im->channel_name = name;
+    im->name_storage = block;
+    return STATUS_OK;
+}
+
+static status check_finite(const struct image *im, const char *id, struct error *err)
+{
+    for (size_t i = 0; i < im->width * im->height; i++)
+        for (size_t k = 0; k < im->n_channel; k++)
+            if ((k < 3 || k >= 6) && !isfinite(im->pixel[i * im->n_channel + k]))
+                return error_set(err, STATUS_NUMERIC,
+                                 "model '%s' gave a value that is not finite in pixel %zu, %zu (%s)", id, i % im->width,
+                                 i / im->width, im->channel_name[k]);
+    return STATUS_OK;
+}
+
+static status check_request(const struct render_request *q, struct error *err)
+{
+    if (q->n_sample == 0 || q->n_sample > UINT32_MAX || q->width == 0 || q->height == 0 || q->width > 65536 ||
+        q->height > 65536 || q->stream > 4095)
+        return error_set(err, STATUS_INVALID, "cannot render %zu x %zu pixels with %zu samples in stream %u", q->width,
+                         q->height, q->n_sample, q->stream);
+    return configuration_check(q->configuration, 1, err);
+}
+
+static status render_pixels(struct run *r, struct thread_pool *pool, struct error *err)
+{
+    const struct render_request *q = r->q;
+    size_t n_task = (r->n_pixel + r->pixels_per_task - 1) / r->pixels_per_task;
+    status st = image_init(r->im, q->width, q->height, 6 + 3 * r->source->n_flat, err);
+    if (st == STATUS_OK) st = name_channels(r->source, r->im, err);
+    if (st == STATUS_OK) {
+        st = thread_pool_run(pool, n_task, run_task, r, r->progress);
+        if (st == STATUS_OK && progress_cancelled(r->progress)) st = STATUS_CANCELLED;
+        if (st != STATUS_OK) error_set(err, st, "rendering was cancelled");
+    }
+    if (st == STATUS_OK) st = check_finite(r->im, q->input.model->id, err);
+    if (st != STATUS_OK) image_release(r->im);
+    return st;
 }
 
 status render_run(const struct render_request *q, struct thread_pool *pool, const struct progress *progress,
                   struct image *im, struct error *err)
 {
-    struct parameter_sets sets;
-    struct run r = {.q = q};
-    struct render_pixels p = {.width = q->width,
-                              .height = q->height,
-                              .n_sample = q->n_sample,
-                              .seed = q->seed,
-                              .stream = q->stream,
-                              .id = q->model->id,
-                              .trace = trace,
-                              .name = name,
-                              .context = &r};
+    struct radiance_source source;
+    struct run r = {.q = q, .source = &source, .progress = progress, .im = im, .n_pixel = q->width * q->height};
     memset(im, 0, sizeof *im);
-    status st = render_pixels_check(&p, err);
-    if (st == STATUS_OK) st = estimate_check_configurations(q->configuration, 1, 0, 0, err);
+    status st = check_request(q, err);
+    if (st == STATUS_OK) st = radiance_source_init(&source, &q->input, q->configuration, 1, err);
     if (st != STATUS_OK) return st;
-    st = parameter_sets_init(&sets, q->scene, q->model, q->param, q->n_set, err);
-    if (st == STATUS_OK) {
-        p.n_flat = q->want_derivative ? sets.n * q->model->n_param : 0;
-        r.n_jac = 3 * p.n_flat;
-        path_setting_init_sets(&r.setting, q->scene, &sets, q->configuration, q->want_derivative);
-        camera_init(&r.camera, q->configuration);
-        st = render_pixels_run(&p, pool, progress, im, err);
-    }
-    parameter_sets_release(&sets);
+    r.pixels_per_task = q->n_sample < TASK_SAMPLES ? TASK_SAMPLES / q->n_sample : 1;
+    st = render_pixels(&r, pool, err);
+    radiance_source_release(&source);
     return st;
 }

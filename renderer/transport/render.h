@@ -1,24 +1,28 @@
-/* A picture of one configuration: the crop that a photograph shows, pixel by pixel, with the same tracer as estimate.h.
- * Channels: R G B, var.R var.G var.B, and with derivatives d_<param>.R .G .B per flat parameter; with several parameter
- * sets d_set<i>.<param>.R .G .B. A crop that is not square wants crop_aspect = width / height for square pixels. */
+/* A picture of one configuration: the crop that a photograph shows, pixel by pixel, with the same tracers as estimate.h.
+ *
+ * Channels: R G B, var.R var.G var.B (of the mean; infinite for one sample), and with derivatives d_<name>.R .G .B for
+ * every flat parameter (radiance_derivative_name). The bits do not depend on the number of threads. Random numbers are
+ * apart from those of estimates. A crop that is not square wants crop_aspect = width / height for square pixels. Of a
+ * configuration with n_rotation it shows the first rotation.
+ */
 #ifndef SELVEDGE_RENDERER_RENDER_H
 #define SELVEDGE_RENDERER_RENDER_H
 
+#include "base/thread_pool.h"
 #include "renderer/image/image.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/radiance_source.h"
 
 struct render_request {
-    const struct scene *scene;
-    const struct scattering_model *model;
-    const double *param; /* model->n_param for each set */
+    struct radiance_input input;
     const struct configuration *configuration;
     size_t width, height, n_sample; /* samples a pixel */
     uint64_t seed;
-    uint32_t stream; /* takes the place of the configuration number in the random key */
-    bool want_derivative;
-    size_t n_set; /* as in estimate.h */
+    uint32_t stream; /* takes the place of the configuration number in the random key; at most 4095 */
 };
 
+/* im: initialised here, released on failure. STATUS_INVALID (no pixels or samples, too many, a stream above 4095, and
+ * as for an estimate), STATUS_NO_MEMORY, STATUS_CANCELLED (looked for every 64 samples or more often), STATUS_NUMERIC
+ * naming model, pixel and channel. */
 status render_run(const struct render_request *q, struct thread_pool *pool, const struct progress *progress,
                   struct image *im, struct error *err);
 

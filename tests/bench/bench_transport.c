@@ -18,6 +18,7 @@
 #include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -138,14 +139,13 @@ static int trace_fleece(void)
     for (int i = 0; i < 16; i++) n[i] = 256;
     for (int p = 0; p < 9; p++) param[p] = m->param[p].start;
     status st = scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, &err);
-    struct estimate_request q = {.scene = scene,
-                                 .model = m,
-                                 .param = param,
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, m, param, &model),
                                  .configuration = c,
                                  .n_configuration = 16,
                                  .n_path = n,
-                                 .seed = 1,
-                                 .want_jacobian = true};
+                                 .seed = 1};
+    q.input.want_derivative = true;
     if (st == STATUS_OK) st = estimate_run(&q, NULL, NULL, e, &err);
     if (st == STATUS_OK)
         fprintf(stderr, "fleece: %zu segments, %zu fibers\n", scene_n_segment(scene), f.n_fiber);
@@ -183,17 +183,16 @@ static double trace(const struct bench *b, const double param[9], size_t n_path,
     struct error err = {0};
     size_t n[N_CONFIGURATION];
     for (int i = 0; i < N_CONFIGURATION; i++) n[i] = n_path;
-    const struct estimate_request q = {.scene = b->scene,
-                                       .model = scattering_find("two_lobe.v1"),
-                                       .param = param,
-                                       .configuration = b->configuration,
-                                       .n_configuration = N_CONFIGURATION,
-                                       .n_path = n,
-                                       .seed = 1,
-                                       .replica = replica,
-                                       .want_jacobian = true,
-                                       .share_camera_paths = share,
-                                       .no_probes = plain};
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(b->scene, scattering_find("two_lobe.v1"), param, &model),
+                                 .configuration = b->configuration,
+                                 .n_configuration = N_CONFIGURATION,
+                                 .n_path = n,
+                                 .seed = 1,
+                                 .replica = replica,
+                                 .share_camera_paths = share};
+    q.input.want_derivative = true;
+    q.input.plain_paths = plain;
     double t0 = processor_s();
     if (estimate_run(&q, b->pool, NULL, e, &err) != STATUS_OK) {
         fprintf(stderr, "%s\n", err.text);

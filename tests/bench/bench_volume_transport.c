@@ -5,9 +5,10 @@
  *   transport.volume.memory_over_stored                bytes of the scene over the stored bytes of its volume
  * Arguments: paths a configuration (4096), voxels along an edge (500).
  */
-#include "renderer/transport/volume_estimate.h"
+#include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -70,11 +71,17 @@ int main(int argc, char **argv)
         snprintf(set, sizeof set, "mfp%.0fum", mean_free_path_um[k]);
         /* directions are everywhere: the mean sine of the angle to the fiber is pi / 4 */
         double multiplier_per_m = 1 / (1e-6 * mean_free_path_um[k] * density * M_PI_4);
-        struct volume_estimate_request q = {&scene, m, param, multiplier_per_m, c, 16, warm, 1, 0, 0, true};
+        struct trace_volume volume_model;
+        struct estimate_request q = {.input = trace_input_volume(&scene, m, param, multiplier_per_m, &volume_model),
+                                     .configuration = c,
+                                     .n_configuration = 16,
+                                     .n_path = warm,
+                                     .seed = 1};
+        q.input.want_derivative = true;
         double t0 = 0;
         for (int pass = 0; pass < 2; pass++) {
             t0 = processor_s();
-            if (volume_estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
+            if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
                 fprintf(stderr, "%s\n", err.text);
                 return 1;
             }

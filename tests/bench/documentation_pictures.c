@@ -11,6 +11,7 @@
 #include "geometry/phantom/phantom.h"
 #include "renderer/transport/render.h"
 #include "tests/support/tiny_text.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -60,15 +61,14 @@ static status make_twill(struct thread_pool *pool, const struct scene *scene, si
                                     .crop_m = 0.0034,
                                     .crop_aspect = 1.5,
                                     .environment_rgb = {0.12, 0.14, 0.17}};
-    const struct render_request q = {.scene = scene,
-                                     .model = scattering_find("two_lobe.v1"),
-                                     .param = param[0],
-                                     .configuration = &c,
-                                     .width = width,
-                                     .height = width * 2 / 3,
-                                     .n_sample = n_sample,
-                                     .seed = 7,
-                                     .n_set = 3};
+    struct appearance model;
+    struct render_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param[0], &model),
+                               .configuration = &c,
+                               .width = width,
+                               .height = width * 2 / 3,
+                               .n_sample = n_sample,
+                               .seed = 7};
+    q.input.n_set = 3;
     struct image im;
     status st = render_run(&q, pool, NULL, &im, err);
     if (st == STATUS_OK) st = image_write_png(&im, 1.9, path, err);
@@ -195,16 +195,15 @@ static status make_derivatives(struct thread_pool *pool, const struct scene *sce
     status st = STATUS_OK;
     memset(rgb, 255, sizeof rgb);
     for (size_t r = 0; r < N_ROW && st == STATUS_OK; r++) {
-        const struct render_request q = {.scene = scene,
-                                         .model = scattering_find("two_lobe.v1"),
-                                         .param = param,
-                                         .configuration = &c[r],
-                                         .width = PANEL,
-                                         .height = PANEL,
-                                         .n_sample = n_sample,
-                                         .seed = 8,
-                                         .stream = (uint32_t)r,
-                                         .want_derivative = true};
+        struct appearance model;
+        struct render_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
+                                   .configuration = &c[r],
+                                   .width = PANEL,
+                                   .height = PANEL,
+                                   .n_sample = n_sample,
+                                   .seed = 8,
+                                   .stream = (uint32_t)r};
+        q.input.want_derivative = true;
         st = render_run(&q, pool, NULL, &im[r], err);
     }
     for (size_t column = 0; column < N_COLUMN && st == STATUS_OK; column++) draw_column(rgb, im, column);

@@ -50,12 +50,13 @@ void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t see
     struct estimate_journal *journal = NULL;
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
     struct configuration *configuration = trace_configurations(&f->fitted);
-    struct trace_estimator trace = {.model = &f->model,
-                                    .scene = {f->cloth.scene, f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
-                                    .pool = f->pool,
-                                    .seed = seed,
-                                    .configuration = configuration,
-                                    .n_configuration = f->fitted.n};
+    struct trace_estimator trace = {
+        .request = {.input = {.scene = {f->cloth.scene, f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
+                              .model = &f->model},
+                    .configuration = configuration,
+                    .n_configuration = f->fitted.n,
+                    .seed = seed},
+        .pool = f->pool};
     const struct estimator live = trace_estimator(&trace);
     struct estimator estimator = live;
     if (journal_file != NULL) {

@@ -5,6 +5,7 @@
 #include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/reference_two_lobe.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -74,7 +75,12 @@ static void check(const struct configuration *c, const double param[9], struct t
     const size_t n_path = 200000;
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = {scene, scattering_find("two_lobe.v1"), param, c, 1, &n_path, 3, 0, 0, false};
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
+                                 .configuration = c,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .seed = 3};
     if (estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     double coverage = 2 * radius_m / tile_m;
     for (int k = 0; k < 3; k++) {

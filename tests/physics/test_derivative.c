@@ -8,6 +8,7 @@
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -100,8 +101,8 @@ static void check_recorded(const struct scene *scene, const struct scattering_mo
         struct path_result path;
         struct path_record rec = {0, (size_t)(end - next), next};
         rng_start(&r, &(struct rng_key){21, 0, 0, 0}, i, 0);
-        double x = rng_double(&r), y = rng_double(&r);
-        assert_true(camera_ray(&camera, scene, x, y, &ray));
+        const double x = rng_double(&r), xy[2] = {x, rng_double(&r)};
+        assert_true(camera_ray(&camera, scene, xy, &ray));
         path_trace(&setting, &ray, &r, &path, &rec);
         if (rec.n_step > rec.capacity) break;
         for (int k = 0; k < 3; k++) value[k] += (double)path.radiance[k];
@@ -148,7 +149,14 @@ static void run(const struct scene *scene, const struct scattering_model *m, con
 {
     const size_t n_path[3] = {BATCH_PATHS, BATCH_PATHS, BATCH_PATHS};
     struct error err = {0};
-    struct estimate_request q = {scene, m, param, view, 3, n_path, 31, batch, 0, true};
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, m, param, &model),
+                                 .configuration = view,
+                                 .n_configuration = 3,
+                                 .n_path = n_path,
+                                 .seed = 31,
+                                 .iteration = batch};
+    q.input.want_derivative = true;
     if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
 

@@ -49,9 +49,8 @@ static int teardown(void **state)
 
 static struct derivative_check_request request(const struct fixture *x, const struct appearance *m, const double *param)
 {
-    return (struct derivative_check_request){.scene = {.fibers = x->scene, .volume = &x->volume},
-                                             .model = m,
-                                             .param = param,
+    const struct appearance_scene scene = {.fibers = x->scene, .volume = &x->volume};
+    return (struct derivative_check_request){.input = {.scene = scene, .model = m, .param = param},
                                              .configuration = x->c,
                                              .n_configuration = 16,
                                              .n_path = 2048,
@@ -146,7 +145,7 @@ static void bad_requests(void **state)
     assert_true(appearance_at(0, &m));
     for (size_t p = 0; p < m.n_param; p++) param[p] = m.param[p].start;
     struct derivative_check_request q = request(x, &m, param);
-    q.scene.fibers = NULL;
+    q.input.scene.fibers = NULL;
     assert_int_equal(derivative_check_run(&q, NULL, &check, &err), STATUS_INVALID);
     q = request(x, &m, param);
     assert_int_equal(derivative_check_run(&q, &(struct progress){.cancel = (void *)(uintptr_t)&cancel}, &check, &err),

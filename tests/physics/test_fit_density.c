@@ -52,12 +52,12 @@ static void observe(struct trace_estimator *t, const double *truth, struct obser
     const struct rng_key key = {.seed = 11};
     struct rng rng;
     struct estimator estimator = trace_estimator(t);
-    for (size_t i = 0; i < t->n_configuration; i++) n_path[i] = TRUTH_PATHS;
+    for (size_t i = 0; i < t->request.n_configuration; i++) n_path[i] = TRUTH_PATHS;
     const struct estimator_call call = {truth, n_path, 0, REPLICA_FINAL_A, false};
     assert_int_equal(estimator.run(estimator.context, &call, NULL, e, &wall_s, NULL), STATUS_OK);
     rng_start(&rng, &key, 0, 0);
-    for (size_t i = 0; i < t->n_configuration; i++) {
-        struct observation item = {.set = JOB_SET_FIT, .configuration = t->configuration[i], .weight = 1.0};
+    for (size_t i = 0; i < t->request.n_configuration; i++) {
+        struct observation item = {.set = JOB_SET_FIT, .configuration = t->request.configuration[i], .weight = 1.0};
         for (int k = 0; k < 3; k++) {
             double normal[2];
             rng_normal_pair(&rng, normal);
@@ -82,16 +82,15 @@ static void fit(const struct volume_scene *scene, size_t n, uint64_t budget, str
     const struct param_info *d = &model.param[model.n_param - 1];
     truth[model.n_param - 1] = param_from_file_unit(d, TRUE_PER_CM);
     assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
-    struct trace_estimator t = {.model = &model,
-                                .scene = {.volume = scene},
-                                .pool = pool,
-                                .seed = 77,
-                                .configuration = c,
-                                .n_configuration = n};
+    struct trace_estimator t = {.request = {.input = {.scene = {.volume = scene}, .model = &model},
+                                            .configuration = c,
+                                            .n_configuration = n,
+                                            .seed = 77},
+                                .pool = pool};
     observe(&t, truth, &o);
     for (size_t p = 0; p < model.n_param; p++)
         parameter[p] = (struct fit_parameter){model.param[p].lower, model.param[p].upper, model.param[p].start, false};
-    t.seed = 1;
+    t.request.seed = 1;
     struct estimator e = trace_estimator(&t);
     const struct fit_problem problem = {.n_param = model.n_param,
                                         .info = model.param,

@@ -195,17 +195,17 @@ static void cloth_furnace(const struct scene *scene, const struct scattering_mod
     struct camera camera;
     path_setting_init(&setting, scene, m, s, c, want_jacobian);
     camera_init(&camera, c);
-    setting.has_lamp = false;
-    setting.has_environment = true;
+    setting.lights.has_lamp = false;
+    setting.lights.has_constant = true;
     *worst = 0;
-    for (int k = 0; k < 3; k++) setting.environment[k] = 1;
+    for (int k = 0; k < 3; k++) setting.lights.constant[k] = 1;
     for (uint32_t i = 0; i < n; i++) {
         struct rng r;
         struct scene_ray ray;
         struct path_result path;
         rng_start(&r, &(struct rng_key){6, 0, 0, 0}, i, 0);
-        double x = rng_double(&r), y = rng_double(&r);
-        assert_true(camera_ray(&camera, scene, x, y, &ray));
+        const double x = rng_double(&r), xy[2] = {x, rng_double(&r)};
+        assert_true(camera_ray(&camera, scene, xy, &ray));
         path_trace(&setting, &ray, &r, &path, NULL);
         for (int k = 0; k < 3; k++) {
             sample_mean_add(&mean[k], (double)path.radiance[k]);

@@ -19,6 +19,7 @@
 
 #include "base/angle.h"
 #include "base/rng.h"
+#include "tests/support/tracer/trace_input.h"
 
 static struct thread_pool *pool;
 static struct scene *weave[2]; /* without and with the black sheet */
@@ -49,9 +50,8 @@ static struct estimate run(const struct scene *scene, const char *model, const d
 {
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = {.scene = scene,
-                                 .model = scattering_find(model),
-                                 .param = param,
+    struct appearance appearance;
+    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find(model), param, &appearance),
                                  .configuration = c,
                                  .n_configuration = 1,
                                  .n_path = &n_path,
@@ -331,9 +331,8 @@ static void bad_lights_are_refused(void **state)
     assert_int_equal(environment_new(&im, 1, &e, &err), STATUS_OK);
     assert_int_not_equal(environment_read_exr("/nowhere/sky.exr", 1, &e, &err), STATUS_OK);
     orbit_configurations_16(c);
-    struct estimate_request q = {.scene = weave[0],
-                                 .model = scattering_find("isotropic.v1"),
-                                 .param = white,
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(weave[0], scattering_find("isotropic.v1"), white, &model),
                                  .configuration = c,
                                  .n_configuration = 1,
                                  .n_path = &n_path};

@@ -7,6 +7,7 @@
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -49,15 +50,14 @@ static struct estimate run(const struct scene *scene, const double *param, size_
 {
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = {.scene = scene,
-                                 .model = scattering_find("two_lobe.v1"),
-                                 .param = param,
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
                                  .configuration = &configuration[i_configuration],
                                  .n_configuration = 1,
                                  .n_path = &n_path,
-                                 .seed = 31,
-                                 .want_jacobian = true,
-                                 .n_set = n_set};
+                                 .seed = 31};
+    q.input.want_derivative = true;
+    q.input.n_set = n_set;
     if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     return e;
 }
@@ -134,21 +134,20 @@ static void bad_sets_are_refused(void **state)
     hand_weave_small(&f);
     f.axis_class[3] = 2; /* a third group */
     assert_int_equal(scene_new(&f, &(struct scene_option){.group_by_axis_class = true}, &scene, &err), STATUS_OK);
-    struct estimate_request q = {.scene = scene,
-                                 .model = scattering_find("two_lobe.v1"),
-                                 .param = param,
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
                                  .configuration = configuration,
                                  .n_configuration = 1,
-                                 .n_path = &n_path,
-                                 .n_set = 2};
+                                 .n_path = &n_path};
+    q.input.n_set = 2;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
     assert_string_equal(err.field, "n_set");
-    q.n_set = 8; /* 72 parameters */
+    q.input.n_set = 8; /* 72 parameters */
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
-    q.n_set = 7;
-    q.want_jacobian = true;
+    q.input.n_set = 7;
+    q.input.want_derivative = true;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_OK);
-    q.n_set = 3;
+    q.input.n_set = 3;
     param[2 * N_PARAM + 4] = 7;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
     scene_free(scene);
@@ -231,8 +230,8 @@ static void recorded_paths_of_two_sets(void **state)
             struct path_result path;
             struct path_record rec = {0, (size_t)(end - next), next};
             rng_start(&r, &(struct rng_key){22, 0, 0, 0}, i, 0);
-            double x = rng_double(&r), y = rng_double(&r);
-            assert_true(camera_ray(&camera, two, x, y, &ray));
+            const double x = rng_double(&r), xy[2] = {x, rng_double(&r)};
+            assert_true(camera_ray(&camera, two, xy, &ray));
             path_trace(&setting, &ray, &r, &path, &rec);
             if (rec.n_step > rec.capacity) break;
             for (int k = 0; k < 3; k++) value[k] += (double)path.radiance[k];
@@ -269,16 +268,15 @@ static void pictures_name_their_layers(void **state)
     (void)state;
     struct image im;
     struct error err = {0};
-    struct render_request q = {.scene = two,
-                               .model = scattering_find("two_lobe.v1"),
-                               .param = set[0],
+    struct appearance model;
+    struct render_request q = {.input = trace_input_surface(two, scattering_find("two_lobe.v1"), set[0], &model),
                                .configuration = configuration,
                                .width = 4,
                                .height = 4,
                                .n_sample = 4,
-                               .seed = 1,
-                               .want_derivative = true,
-                               .n_set = 2};
+                               .seed = 1};
+    q.input.want_derivative = true;
+    q.input.n_set = 2;
     if (render_run(&q, NULL, NULL, &im, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_int_equal(im.n_channel, 6 + 3 * 2 * N_PARAM);
     assert_string_equal(im.channel_name[6], "d_set0.C_R.r.R");

@@ -6,6 +6,7 @@
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/naive_tracer.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -51,7 +52,12 @@ static void agree(const struct configuration *c, const double *param, struct thr
     for (int i = 0; i < N_TASK; i++) sample_mean_add(&batch, j.mean[i].mean);
 
     if (scene_new(&j.f, &(struct scene_option){true}, &scene, &err) != STATUS_OK) fail_msg("%s", err.text);
-    struct estimate_request q = {scene, scattering_find("two_lobe.v1"), param, c, 1, &n_path, 5, 0, 0, false};
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
+                                 .configuration = c,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .seed = 5};
     if (estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     double se = sqrt(sample_mean_se(&batch) * sample_mean_se(&batch) + e.var[0]), z = (batch.mean - e.mean[0]) / se;
     print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se,

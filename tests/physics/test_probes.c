@@ -8,6 +8,7 @@
 #include "renderer/transport/light/lamp_guide.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -119,16 +120,15 @@ static void test_same_means(void **state)
         assert_non_null(m);
         for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
         for (int plain = 0; plain < 2; plain++) {
-            struct estimate_request q = {.scene = weave[v->black_sheet],
-                                         .model = m,
-                                         .param = param,
+            struct appearance model;
+            struct estimate_request q = {.input = trace_input_surface(weave[v->black_sheet], m, param, &model),
                                          .configuration = &c,
                                          .n_configuration = 1,
                                          .n_path = &n_path,
                                          .seed = 11,
-                                         .iteration = (uint32_t)plain,
-                                         .want_jacobian = true,
-                                         .no_probes = plain == 1};
+                                         .iteration = (uint32_t)plain};
+            q.input.want_derivative = true;
+            q.input.plain_paths = plain == 1;
             if (estimate_run(&q, pool, NULL, &e[plain], &err) != STATUS_OK) fail_msg("%s", err.text);
         }
         struct comparison here = {0};

@@ -6,11 +6,11 @@
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
-#include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/reference_two_lobe.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -87,9 +87,10 @@ static void transmittance(void **state)
         int alpha = (int)(m->n_param == 12 ? 9 : 0);
         for (int c = 0; c < 3; c++) param[alpha + c] = 0.001;
         prepare(m, param, &s);
-        volume_setting_init(&setting, &scene, m, s, d_per_m, NULL, true);
-        setting.has_environment = true;
-        for (int c = 0; c < 3; c++) setting.environment[c] = 1;
+        const struct volume_parameters parameters = {m, s, d_per_m};
+        volume_setting_init(&setting, &scene, &parameters, NULL, true);
+        setting.lights.has_constant = true;
+        for (int c = 0; c < 3; c++) setting.lights.constant[c] = 1;
         setting.roulette_below = 0.001f;
         trace(&setting, direction, 100000, (uint32_t)k, value);
         float d_s, s_w = phase_extinction_at(setting.extinction, (float)sine, &d_s);
@@ -133,7 +134,8 @@ static void single_scattering(void **state)
                                         .crop_m = 0.01};
         struct volume_setting setting;
         struct sample_mean value[N_VALUE];
-        volume_setting_init(&setting, &scene, m, s, d_per_m, &c, true);
+        const struct volume_parameters parameters = {m, s, d_per_m};
+        volume_setting_init(&setting, &scene, &parameters, &c, true);
         setting.roulette_below = 0.001f;
         setting.shadow_below = 0;
         const double direction[3] = {-sin(theta_o), 0, -cos(theta_o)};
@@ -172,9 +174,10 @@ static void white_furnace(void **state)
         size_t alpha = m->n_param == 12 ? 9 : 0;
         for (size_t c = 0; c < 3; c++) param[alpha + c] = m->param[alpha].upper;
         prepare(m, param, &s);
-        volume_setting_init(&setting, &scene, m, s, 8e4, NULL, true);
-        setting.has_environment = true;
-        for (int c = 0; c < 3; c++) setting.environment[c] = 1;
+        const struct volume_parameters parameters = {m, s, 8e4};
+        volume_setting_init(&setting, &scene, &parameters, NULL, true);
+        setting.lights.has_constant = true;
+        for (int c = 0; c < 3; c++) setting.lights.constant[c] = 1;
         trace(&setting, direction, 30000, 20 + (uint32_t)k, value);
         for (size_t c = 0; c < 3; c++) {
             double missing = 1 - param[alpha + c];
@@ -212,7 +215,8 @@ static void along_the_fiber(void **state)
         double param[SCATTERING_MAX_PARAM];
         start_param(m, param);
         prepare(m, param, &s);
-        volume_setting_init(&setting, &scene, m, s, 4e4, &c, true);
+        const struct volume_parameters parameters = {m, s, 4e4};
+        volume_setting_init(&setting, &scene, &parameters, &c, true);
         for (uint32_t i = 0; i < 200; i++) {
             struct rng rng;
             struct volume_result path;
@@ -253,23 +257,23 @@ static void estimate_cloud(uint32_t i_cloud, const double *param, const struct c
     hand_volume_rasterise(&v, n, cloud_tile_m / (double)n[0], &f, cloud_scale);
     scene_of(&coarse, &v, true);
     assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, NULL), STATUS_OK);
-    const struct estimate_request q = {.scene = scene,
-                                       .model = scattering_find("two_lobe.v1"),
-                                       .param = param,
+    struct appearance model;
+    const struct estimate_request q = {.input =
+                                           trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
                                        .configuration = c,
                                        .n_configuration = 2,
                                        .n_path = count,
                                        .seed = i_cloud};
-    const struct volume_estimate_request qv = {.scene = &coarse,
-                                               .model = phase_find("phase_two_lobe.v1"),
-                                               .param = param,
-                                               .multiplier_per_m = 2 / (M_PI * cloud_radius_m) / cloud_scale,
-                                               .configuration = c,
-                                               .n_configuration = 2,
-                                               .n_path = count,
-                                               .seed = i_cloud};
+    struct trace_volume volume_qv;
+    const struct estimate_request qv = {.input =
+                                            trace_input_volume(&coarse, phase_find("phase_two_lobe.v1"), param,
+                                                               2 / (M_PI * cloud_radius_m) / cloud_scale, &volume_qv),
+                                        .configuration = c,
+                                        .n_configuration = 2,
+                                        .n_path = count,
+                                        .seed = i_cloud};
     if (estimate_run(&q, pool, NULL, surface, &err) != STATUS_OK) fail_msg("%s", err.text);
-    if (volume_estimate_run(&qv, pool, NULL, volume, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (estimate_run(&qv, pool, NULL, volume, &err) != STATUS_OK) fail_msg("%s", err.text);
     scene_free(scene);
     fiber_set_release(&f);
     volume_scene_release(&coarse);

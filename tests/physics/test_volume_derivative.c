@@ -1,9 +1,10 @@
 /* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
  * bits for any number of threads. */
 #include "base/angle.h"
+#include "renderer/transport/estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
-#include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -53,9 +54,15 @@ static void run(const struct cloth *k, const struct phase_model *m, const double
 {
     const size_t n[N_CONFIGURATION] = {n_path, n_path};
     struct error err = {0};
-    const struct volume_estimate_request q = {&k->scene, m,  param,     d, k->c,         N_CONFIGURATION,
-                                              n,         61, iteration, 0, want_jacobian};
-    if (volume_estimate_run(&q, k->pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    struct trace_volume volume_model;
+    struct estimate_request q = {.input = trace_input_volume(&k->scene, m, param, d, &volume_model),
+                                 .configuration = k->c,
+                                 .n_configuration = N_CONFIGURATION,
+                                 .n_path = n,
+                                 .seed = 61,
+                                 .iteration = iteration};
+    q.input.want_derivative = want_jacobian;
+    if (estimate_run(&q, k->pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
 
 /* The derivative against a difference, channels together: the sum over channels, whose standard error is at most the
@@ -149,12 +156,18 @@ static void nonsense_is_refused(void **state)
     const size_t n[N_CONFIGURATION] = {256, 256};
     const struct phase_model *m = phase_find("microflake.v1");
     const double param[4] = {0.5, 0.5, 0.5, 0.3}, bad[4] = {0.5, 0.5, 0.5, NAN};
-    struct volume_estimate_request q = {&k.scene, m, param, NAN, k.c, N_CONFIGURATION, n, 1, 0, 0, true};
-    assert_int_equal(volume_estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "d");
-    q.multiplier_per_m = 1e4;
-    q.param = bad;
-    assert_int_equal(volume_estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
+    struct trace_volume volume_model;
+    struct estimate_request q = {.input = trace_input_volume(&k.scene, m, param, NAN, &volume_model),
+                                 .configuration = k.c,
+                                 .n_configuration = N_CONFIGURATION,
+                                 .n_path = n,
+                                 .seed = 1};
+    q.input.want_derivative = true;
+    assert_int_equal(estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
+    assert_string_equal(err.field, APPEARANCE_DENSITY_MULTIPLIER);
+    q.input = trace_input_volume(&k.scene, m, bad, 1e4, &volume_model);
+    q.input.want_derivative = true;
+    assert_int_equal(estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
     assert_string_equal(err.field, "gamma");
     volume_scene_release(&k.scene);
     memset(k.v.density, 0, volume_n_voxel(k.v.n));
@@ -253,7 +266,8 @@ static void interleaved_paths_are_the_same(void **state)
     double param[SCATTERING_MAX_PARAM];
     for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
     assert_int_equal(m->prepare(param, &ps, NULL), STATUS_OK);
-    volume_setting_init(&setting, &k.scene, m, ps, 4e4, &k.c[0], true);
+    const struct volume_parameters parameters = {m, ps, 4e4};
+    volume_setting_init(&setting, &k.scene, &parameters, &k.c[0], true);
     for (uint32_t i = 0; i < N; i++) {
         rng_start(&rng[i], &(struct rng_key){62, 0, 0, 0}, 0, i);
         const double from[3] = {rng_double(&rng[i]), rng_double(&rng[i]), 1}, down[3] = {0.6, 0, -0.8};

@@ -3,11 +3,12 @@
  * and cameras; pictures against constants; lights that add up. Tolerances are standard errors, with what a closed form
  * leaves out beside them. */
 #include "base/angle.h"
+#include "renderer/transport/estimate.h"
 #include "renderer/transport/light/environment.h"
-#include "renderer/transport/volume_estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/painted_environment.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -53,16 +54,15 @@ static struct estimate run(const struct volume_scene *scene, const char *model, 
 {
     struct estimate e;
     struct error err = {0};
-    const struct volume_estimate_request q = {.scene = scene,
-                                              .model = phase_find(model),
-                                              .param = param,
-                                              .multiplier_per_m = scene->n[2] == 5 ? d_per_m : 3e4,
-                                              .configuration = c,
-                                              .n_configuration = 1,
-                                              .n_path = &n_path,
-                                              .seed = seed,
-                                              .want_jacobian = true};
-    if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    struct trace_volume volume_model;
+    struct estimate_request q = {
+        .input = trace_input_volume(scene, phase_find(model), param, scene->n[2] == 5 ? d_per_m : 3e4, &volume_model),
+        .configuration = c,
+        .n_configuration = 1,
+        .n_path = &n_path,
+        .seed = seed};
+    q.input.want_derivative = true;
+    if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     return e;
 }
 
@@ -273,15 +273,14 @@ static void no_ray_leaves_where_it_enters(void **state)
     hand_volume_uniform(&thick, n, 5e-6, 255, along);
     if (volume_scene_init(&scene, &thick, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK)
         fail_msg("%s", err.text);
-    const struct volume_estimate_request q = {.scene = &scene,
-                                              .model = phase_find("phase_isotropic.v1"),
-                                              .param = dark,
-                                              .configuration = &c,
-                                              .multiplier_per_m = 1e7,
-                                              .n_configuration = 1,
-                                              .n_path = &n_path,
-                                              .seed = 7};
-    if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    struct trace_volume volume_model;
+    const struct estimate_request q = {
+        .input = trace_input_volume(&scene, phase_find("phase_isotropic.v1"), dark, 1e7, &volume_model),
+        .configuration = &c,
+        .n_configuration = 1,
+        .n_path = &n_path,
+        .seed = 7};
+    if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (!(e.mean[0] <= 1.01 * dark[0] + 4 * sqrt(e.var[0])) || !(sqrt(e.var[0]) < 0.1 * dark[0]))
         fail_msg("mean radiance %g +- %g of a slab with albedo %g", e.mean[0], sqrt(e.var[0]), dark[0]);
     volume_scene_release(&scene);
@@ -308,15 +307,14 @@ static void a_lost_path_brings_nothing(void **state)
     if (volume_scene_init(&scene, &one, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK)
         fail_msg("%s", err.text);
     for (int k = 0; k < 2; k++) { /* mean step 8e-6 m: all get across; 8e-10 m: none of the 0.8 mm */
-        const struct volume_estimate_request q = {.scene = &scene,
-                                                  .model = phase_find("phase_isotropic.v1"),
-                                                  .param = grey,
-                                                  .configuration = &c,
-                                                  .multiplier_per_m = k == 0 ? 1e5 : 1e9,
-                                                  .n_configuration = 1,
-                                                  .n_path = &n_path,
-                                                  .seed = 1};
-        if (volume_estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+        struct trace_volume volume_model;
+        const struct estimate_request q = {.input = trace_input_volume(&scene, phase_find("phase_isotropic.v1"), grey,
+                                                                       k == 0 ? 1e5 : 1e9, &volume_model),
+                                           .configuration = &c,
+                                           .n_configuration = 1,
+                                           .n_path = &n_path,
+                                           .seed = 1};
+        if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
         if (k == 0 ? !(e.mean[0] > 0.9) : !(e.mean[0] < 0.1)) fail_msg("mean radiance %g in front of 1", e.mean[0]);
     }
     volume_scene_release(&scene);

@@ -2,10 +2,11 @@
  * large, so that the naive one finds it, and the lobes are wide, so that its directions serve. */
 #include "base/angle.h"
 #include "base/thread_pool.h"
-#include "renderer/transport/volume_estimate.h"
+#include "renderer/transport/estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/naive_volume.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -77,15 +78,14 @@ static void agree(struct configuration c, double sky, bool black_sheet, double d
     for (int i = 0; i < N_TASK; i++) sample_mean_add(&batch, j.mean[i].mean);
     for (int k = 0; k < 3; k++) c.environment_rgb[k] = sky;
     assert_int_equal(volume_scene_init(&scene, &volume, &(struct volume_scene_option){black_sheet}, &err), STATUS_OK);
-    const struct volume_estimate_request q = {.scene = &scene,
-                                              .model = phase_find("phase_two_lobe.v1"),
-                                              .param = param,
-                                              .multiplier_per_m = d_per_m,
-                                              .configuration = &c,
-                                              .n_configuration = 1,
-                                              .n_path = &n_path,
-                                              .seed = 5};
-    if (volume_estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    struct trace_volume volume_model;
+    const struct estimate_request q = {
+        .input = trace_input_volume(&scene, phase_find("phase_two_lobe.v1"), param, d_per_m, &volume_model),
+        .configuration = &c,
+        .n_configuration = 1,
+        .n_path = &n_path,
+        .seed = 5};
+    if (estimate_run(&q, pool, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     double se = sqrt(sample_mean_se(&batch) * sample_mean_se(&batch) + e.var[0]), z = (batch.mean - e.mean[0]) / se;
     print_message("naive %.5f, renderer %.5f, joint standard error %.5f (%.1f %%)\n", batch.mean, e.mean[0], se,
                   100 * se / e.mean[0]);

@@ -123,7 +123,8 @@ static void differences_of(const struct phase_model *m, const struct configurati
     struct volume_setting s;
     struct now now[5];
     assert_int_equal(m->prepare(param, &base, NULL), STATUS_OK);
-    volume_setting_init(&s, &scene, m, base, d_per_m, c, true);
+    const struct volume_parameters parameters = {m, base, d_per_m};
+    volume_setting_init(&s, &scene, &parameters, c, true);
     for (int j = 0; j < 5; j++) {
         double x[SCATTERING_MAX_PARAM];
         memcpy(x, param, m->n_param * sizeof *x);
@@ -197,7 +198,8 @@ static void white_without_roulette(void **state)
     assert_int_equal(m->prepare(param, &ps, NULL), STATUS_OK);
     for (int brute = 0; brute < 2; brute++) {
         struct volume_setting s;
-        volume_setting_init(&s, &scene, m, ps, 1e5, &c, true);
+        const struct volume_parameters parameters = {m, ps, 1e5};
+        volume_setting_init(&s, &scene, &parameters, &c, true);
         if (brute) s.roulette_below = s.shadow_below = 0;
         for (uint32_t i = 0; i < 400000; i++) {
             struct volume_result path;

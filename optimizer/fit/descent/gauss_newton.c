@@ -25,7 +25,7 @@
 #include "base/small_matrix.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/job/method_names.h"
-#include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/estimate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -430,7 +430,7 @@ static uint64_t least_budget(const struct fit_problem *problem)
     for (size_t i = 0; i < problem->observation->n; i++) {
         const struct configuration *c = &problem->observation->item[i].configuration;
         size_t cells = (size_t)c->contrast_cells * c->contrast_cells;
-        sum += 2 * appearance_n_path(c, PATH_PER_CELL * cells > MIN_PATH ? PATH_PER_CELL * cells : MIN_PATH);
+        sum += 2 * estimate_n_path(c, PATH_PER_CELL * cells > MIN_PATH ? PATH_PER_CELL * cells : MIN_PATH);
     }
     return sum;
 }

@@ -14,7 +14,7 @@
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/rescale.h"
 #include "optimizer/job/method_names.h"
-#include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/estimate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -222,7 +222,7 @@ static double n_rendering(const struct fit_problem *problem, const struct coordi
 static double least_rendering(const struct observation_set *o)
 {
     double sum = 0.0;
-    for (size_t i = 0; i < o->n; i++) sum += (double)appearance_n_path(&o->item[i].configuration, 1);
+    for (size_t i = 0; i < o->n; i++) sum += (double)estimate_n_path(&o->item[i].configuration, 1);
     return sum;
 }
 
@@ -233,7 +233,7 @@ static void plan_paths(struct descent_run *run)
     double n = n_rendering(run->problem, run->coordinate), sum = 0.0;
     double times = floor((double)run->problem->path_budget / (n * least_rendering(o)));
     for (size_t i = 0; i < o->n; i++) {
-        size_t least = appearance_n_path(&o->item[i].configuration, 1);
+        size_t least = estimate_n_path(&o->item[i].configuration, 1);
         run->n_path[i] = run->problem->path_budget > 0 ? (size_t)fmax(1.0, times) * least : published_path;
         sum += (double)run->n_path[i];
     }

@@ -8,27 +8,25 @@ static status trace(void *context, const struct estimator_call *call, const stru
                     struct estimate *out, double *wall_s, struct error *err)
 {
     const struct trace_estimator *t = context;
-    const struct appearance_request q = {.scene = t->scene,
-                                         .model = t->model,
-                                         .param = call->param,
-                                         .configuration = t->configuration,
-                                         .n_configuration = t->n_configuration,
-                                         .n_path = call->n_path,
-                                         .seed = t->seed,
-                                         .iteration = call->iteration,
-                                         .replica = call->replica,
-                                         .want_jacobian = call->want_jacobian,
-                                         .no_probes = call->plain_paths};
+    struct estimate_request q = t->request;
+    q.input.param = call->param;
+    q.input.want_derivative = call->want_jacobian;
+    q.input.plain_paths = call->plain_paths;
+    q.n_path = call->n_path;
+    q.iteration = call->iteration;
+    q.replica = call->replica;
     double start_s = clock_monotonic_s();
-    status s = appearance_estimate_run(&q, t->pool, progress, out, err);
+    status s = estimate_run(&q, t->pool, progress, out, err);
     *wall_s = clock_monotonic_s() - start_s;
     return s;
 }
 
 struct estimator trace_estimator(struct trace_estimator *t)
 {
-    return (struct estimator){
-        .context = t, .n_configuration = t->n_configuration, .n_param = t->model->n_param, .run = trace};
+    return (struct estimator){.context = t,
+                              .n_configuration = t->request.n_configuration,
+                              .n_param = t->request.input.model->n_param,
+                              .run = trace};
 }
 
 struct configuration *trace_configurations(const struct observation_set *o)

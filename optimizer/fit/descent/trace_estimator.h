@@ -5,16 +5,12 @@
 #include "base/thread_pool.h"
 #include "optimizer/fit/descent/estimator.h"
 #include "optimizer/fit/photographs/observation.h"
-#include "renderer/transport/appearance_estimate.h"
+#include "renderer/transport/estimate.h"
 
 /* Everything pointed to outlives the estimator. */
 struct trace_estimator {
-    const struct appearance *model;
-    struct appearance_scene scene;
+    struct estimate_request request; /* parameter values, counts, iteration and replica are those of each call */
     struct thread_pool *pool;
-    uint64_t seed;
-    const struct configuration *configuration;
-    size_t n_configuration;
 };
 
 struct estimator trace_estimator(struct trace_estimator *t);

@@ -4,7 +4,7 @@
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
-#include "renderer/transport/appearance_render.h"
+#include "renderer/transport/render.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -135,16 +135,15 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
     picture_paths(c, "renderings", name, ".png", path, temporary); /* written last of the two */
     if (exists(path)) return STATUS_OK;
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
-    struct appearance_render_request q = {.scene = pipeline_scene(c),
-                                          .model = &m->appearance,
-                                          .param = m->fit.param,
-                                          .configuration = &c->observation.item[i].configuration,
-                                          .width = c->doc->render_px,
-                                          .height = c->doc->render_px,
-                                          .n_sample = c->doc->render_sample,
-                                          .seed = c->doc->seed ^ 0x70696374757265u,
-                                          .stream = (uint32_t)i};
-    status s = appearance_render_run(&q, c->pool, progress, &im, err);
+    const struct render_request q = {
+        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param},
+        .configuration = &c->observation.item[i].configuration,
+        .width = c->doc->render_px,
+        .height = c->doc->render_px,
+        .n_sample = c->doc->render_sample,
+        .seed = c->doc->seed ^ 0x70696374757265u,
+        .stream = (uint32_t)i};
+    status s = render_run(&q, c->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
     s = write_image(c, &im, "renderings", name, exposure, true, err);
     image_release(&im);

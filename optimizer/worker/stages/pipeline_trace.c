@@ -35,12 +35,12 @@ status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c,
     *t = (struct pipeline_trace){.configuration = trace_configurations(o)};
     if (t->configuration == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
-    t->live = (struct trace_estimator){.model = &c->model[i_model].appearance,
-                                       .scene = pipeline_scene(c),
-                                       .pool = c->pool,
-                                       .seed = c->doc->seed,
-                                       .configuration = t->configuration,
-                                       .n_configuration = o->n};
+    t->live = (struct trace_estimator){
+        .request = {.input = {.scene = pipeline_scene(c), .model = &c->model[i_model].appearance},
+                    .configuration = t->configuration,
+                    .n_configuration = o->n,
+                    .seed = c->doc->seed},
+        .pool = c->pool};
     t->live_estimator = trace_estimator(&t->live);
     status s = pipeline_model_path(c, stage, name, i_model, path, err);
     return s == STATUS_OK ? estimate_journal_open(path, fingerprint(c, i_model), &t->live_estimator, may_write, c,

@@ -41,18 +41,4 @@ static inline void to_world(const struct fiber_frame *f, const float d[3], float
 
 static inline float cos_theta(const float local[3]) { return sqrtf(local[1] * local[1] + local[2] * local[2]); }
 
-/* About the cloth normal by an angle of cosine and sine by[2] (sign 1), or back (-1). */
-static inline void turn_about_normal(const float by[2], float sign, const float d[3], float out[3])
-{
-    out[0] = by[0] * d[0] - sign * by[1] * d[1];
-    out[1] = sign * by[1] * d[0] + by[0] * d[1];
-    out[2] = d[2];
-}
-
-static inline float power_heuristic(float a, float b)
-{
-    float r = b / a;
-    return 1 / (1 + r * r);
-}
-
 #endif

@@ -1,23 +1,12 @@
 #include "renderer/transport/surface/path_tracer.h"
 
-#include "renderer/transport/light/lamp_guide.h"
+#include "renderer/transport/path_value.h"
 #include "renderer/transport/surface/fiber_frame.h"
 
 #include <math.h>
 #include <string.h>
 
-#ifndef ROULETTE_BELOW
-#define ROULETTE_BELOW 0.6f
-#endif
-#ifndef SHADOW_BELOW
-#define SHADOW_BELOW 0.01f
-#endif
-#ifndef PROBE_SCALE
 #define PROBE_SCALE 1.5f
-#endif
-#ifndef PROBE_BELOW
-#define PROBE_BELOW 0.1f
-#endif
 
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
                        const struct scattering_state *state, const struct configuration *c, bool want_jacobian)
@@ -27,16 +16,9 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     s->model = model;
     s->state[0] = state;
     s->n_set = 1;
-    s->has_lamp = s->probes = c->light != LIGHT_NO_LAMP;
-    if (s->has_lamp) lamp_init(&s->lamp, c);
-    for (int k = 0; k < 3; k++) {
-        s->environment[k] = (float)c->environment_rgb[k];
-        if (s->environment[k] > 0) s->has_environment = true;
-    }
-    s->image = c->environment;
-    s->image_turn[0] = (float)cos(c->cloth_rotation_rad);
-    s->image_turn[1] = (float)sin(c->cloth_rotation_rad);
-    s->roulette_below = ROULETTE_BELOW;
+    lights_init(&s->lights, c);
+    s->probes = s->lights.has_lamp;
+    s->roulette_below = PATH_SURFACE_ROULETTE_BELOW;
     if (s->probes) lamp_guide_energy_of(model, state, &s->energy[0]);
     s->want_jacobian = want_jacobian;
 }
@@ -92,12 +74,6 @@ static inline void add_light(struct walk *w, const float value[3], const float *
         }
 }
 
-/* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
-static void keep_nan(struct walk *w, const float value[3])
-{
-    if (isnan(value[0] + value[1] + value[2])) w->out->radiance[0] = NAN;
-}
-
 static void add_light_to_all(struct walk *w, const float value[3], const float *score)
 {
     for (size_t i = 0; i < w->n_out; i++) {
@@ -119,19 +95,15 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float share, 
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return 0;
     to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float light = share * lamp->radiance * cos_theta(wi) / pdf_lamp * power_heuristic(pdf_lamp, pdf), value[3],
-          most = 0;
-    for (int c = 0; c < 3; c++) {
-        value[c] = w->throughput[c] * s_rgb[c] * light;
-        most = value[c] > most ? value[c] : most;
-    }
+    float light = share * lamp->radiance * cos_theta(wi) / pdf_lamp * lights_power_heuristic(pdf_lamp, pdf), value[3];
+    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
+    float most = path_value_largest(value), survival;
     if (!(most > 0)) {
-        keep_nan(w, value);
+        path_value_keep_nan(w->out->radiance, value);
         return 0;
     }
-    if (most < SHADOW_BELOW) { /* hardly any light: trace few of these shadow rays, for more each */
-        float survival = most / SHADOW_BELOW;
-        if (rng_float(w->rng) >= survival) return 0;
+    if (most < PATH_SURFACE_SHADOW_BELOW) { /* hardly any light: trace few of these shadow rays, for more each */
+        if (!path_value_survives(most, PATH_SURFACE_SHADOW_BELOW, w->rng, &survival)) return 0;
         light /= survival;
         for (int c = 0; c < 3; c++) value[c] /= survival;
     }
@@ -147,27 +119,25 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
                           const struct fiber_frame *f, const float wo[3])
 {
     const struct path_setting *s = w->s;
-    float u[2], world[3], direction[3], radiance[3], pdf_image, wi[3], s_rgb[3], value[3], most = 0;
+    float u[2], direction[3], radiance[3], pdf_image, wi[3], s_rgb[3], value[3], survival;
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
-    if (!environment_sample(s->image, u, world, radiance, &pdf_image)) return;
-    if (world[2] <= 0 && scene_has_black_sheet(s->scene)) return;
-    turn_about_normal(s->image_turn, -1, world, direction);
+    if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
+    if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
     to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float weight = cos_theta(wi) / pdf_image * power_heuristic(pdf_image, pdf);
+    float weight = cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
     for (int c = 0; c < 3; c++) {
         radiance[c] *= weight;
         value[c] = w->throughput[c] * s_rgb[c] * radiance[c];
-        most = value[c] > most ? value[c] : most;
     }
+    float most = path_value_largest(value);
     if (!(most > 0)) {
-        keep_nan(w, value);
+        path_value_keep_nan(w->out->radiance, value);
         return;
     }
-    if (most < SHADOW_BELOW) {
-        float survival = most / SHADOW_BELOW;
-        if (rng_float(w->rng) >= survival) return;
+    if (most < PATH_SURFACE_SHADOW_BELOW) {
+        if (!path_value_survives(most, PATH_SURFACE_SHADOW_BELOW, w->rng, &survival)) return;
         for (int c = 0; c < 3; c++) {
             radiance[c] /= survival;
             value[c] /= survival;
@@ -183,33 +153,17 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
     }
 }
 
-static void add_image(const struct path_setting *s, const float direction[3], float pdf, float beyond[3])
-{
-    float world[3], radiance[3];
-    turn_about_normal(s->image_turn, 1, direction, world);
-    float pdf_image = environment_at(s->image, world, radiance);
-    float share = pdf > 0 ? power_heuristic(pdf, pdf_image) : 1;
-    for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
-}
-
-static float lamp_beyond(const struct lamp *lamp, const struct scene_ray *ray, float pdf)
-{
-    float position[3];
-    unwrapped(ray->origin_mm, ray->offset_mm, position);
-    float pdf_lamp = lamp_pdf(lamp, position, ray->direction);
-    return pdf_lamp > 0 ? lamp->radiance * (pdf > 0 ? power_heuristic(pdf, pdf_lamp) : 1) : 0;
-}
-
 /* Radiance that a ray meets beyond the cloth. pdf: of the scattering sample that made it, 0 for a camera ray. */
 static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 {
     const struct path_setting *s = w->s;
     if (ray->direction[2] < 0 && scene_has_black_sheet(s->scene)) return;
-    float around[3] = {0, 0, 0};
-    for (int c = 0; c < 3 && s->has_environment; c++) around[c] += s->environment[c];
-    if (s->image != NULL) add_image(s, ray->direction, pdf, around);
+    float around[3] = {0, 0, 0}, position[3];
+    lights_add_environment(&s->lights, ray->direction, pdf, around);
+    unwrapped(ray->origin_mm, ray->offset_mm, position);
     for (size_t i = 0; i < w->n_out; i++) {
-        float beyond[3], value[3], lamp = i < w->n_lamp ? lamp_beyond(&w->lamp[i], ray, pdf) : 0;
+        float beyond[3], value[3];
+        float lamp = i < w->n_lamp ? lights_lamp_beyond(&w->lamp[i], position, ray->direction, pdf) : 0;
         for (int c = 0; c < 3; c++) {
             beyond[c] = lamp + around[c];
             value[c] = w->throughput[c] * beyond[c];
@@ -264,24 +218,21 @@ static void probe(struct walk *w, size_t i_lamp, const struct scene_ray *ray, co
                   const struct fiber_frame *f, const float wo[3])
 {
     const struct path_setting *s = w->s;
-    float u[2], direction[3], wi[3], s_rgb[3], next[3], most = 0;
+    float u[2], direction[3], wi[3], s_rgb[3], next[3], survival;
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     lamp_guide_sample(w->towards[i_lamp], u, direction);
     to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = cos_theta(wi) / (pdf + w->p_probe * lamp_guide_pdf(w->towards[i_lamp], direction));
-    for (int c = 0; c < 3; c++) {
-        next[c] = w->throughput[c] * s_rgb[c] * weight;
-        most = next[c] > most ? next[c] : most;
-    }
+    for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
+    float most = path_value_largest(next);
     if (!(most > 0)) {
-        keep_nan(w, next);
+        path_value_keep_nan(w->out->radiance, next);
         return;
     }
-    if (most < PROBE_BELOW) {
-        float survival = most / PROBE_BELOW;
-        if (rng_float(w->rng) >= survival) return;
+    if (most < PATH_SURFACE_PROBE_BELOW) {
+        if (!path_value_survives(most, PATH_SURFACE_PROBE_BELOW, w->rng, &survival)) return;
         weight /= survival;
         for (int c = 0; c < 3; c++) next[c] /= survival;
     }
@@ -344,19 +295,14 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
     s->model->sample(w->state, wo, w->throughput, u, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     if (pdf == 0) return false; /* rounded to a direction along the fiber, where nothing is scattered to */
-    float weight = cos_theta(wi) / pdf, most = 0, next[3];
-    for (int c = 0; c < 3; c++) {
-        next[c] = w->throughput[c] * s_rgb[c] * weight;
-        most = next[c] > most ? next[c] : most;
-    }
+    float weight = cos_theta(wi) / pdf, next[3];
+    for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
+    float most = path_value_largest(next);
     if (!(most > 0)) {
-        keep_nan(w, next);
+        path_value_keep_nan(w->out->radiance, next);
         return false;
     }
-    if (most < s->roulette_below) {
-        survival = most / s->roulette_below;
-        if (rng_float(w->rng) >= survival) return false;
-    }
+    if (most < s->roulette_below && !path_value_survives(most, s->roulette_below, w->rng, &survival)) return false;
     for (int c = 0; c < 3; c++) w->throughput[c] = next[c] / survival;
     if (s->want_jacobian) add_scores(w);
     if (w->step != NULL) {
@@ -423,7 +369,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
             w->step->i_group = scene_group_of(s->scene, hit.i_segment);
         }
         connect_lamps(w, ray, &hit, &f, wo);
-        if (s->image != NULL) connect_image(w, ray, &hit, &f, wo);
+        if (s->lights.image != NULL) connect_image(w, ray, &hit, &f, wo);
         if (!scatter(w, ray, &hit, &f, wo, &pdf)) return;
     }
 }
@@ -432,8 +378,8 @@ void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng 
                 struct path_record *record)
 {
     struct walk w; /* large: only what is used is set */
-    w.lamp = &s->lamp;
-    w.n_lamp = s->has_lamp;
+    w.lamp = &s->lights.lamp;
+    w.n_lamp = s->lights.has_lamp;
     walk_start(&w, s, rng, out);
     walk_on(&w, ray, record);
 }

@@ -9,8 +9,8 @@
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scene/scene_ray.h"
-#include "renderer/transport/light/environment.h"
 #include "renderer/transport/light/lamp_guide.h"
+#include "renderer/transport/light/lights.h"
 #include "renderer/transport/surface/parameter_sets.h"
 
 enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT, PATH_MAX_LAMP = 16 };
@@ -20,12 +20,7 @@ struct path_setting {
     const struct scattering_model *model;
     const struct scattering_state *state[SCATTERING_MAX_SET]; /* by material group */
     size_t n_set;                                             /* 1: the first serves all groups */
-    struct lamp lamp;
-    bool has_lamp;
-    bool has_environment;
-    float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
-    const struct environment *image; /* or NULL */
-    float image_turn[2];             /* cosine and sine of the angle from the cloth's frame to the world's */
+    struct lights lights;
     bool
         probes; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
     struct lamp_guide_energy
@@ -78,5 +73,8 @@ void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng 
  * alone (environments count in all), and costs its lamp connections only. The results' errors go together. */
 void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
                       struct rng *rng, struct path_result *out);
+
+/* Sum over channels of the radiance that a recorded path has with other parameters, by the formula at path_step. */
+double path_replay(const struct parameter_sets *sets, const struct path_record *record);
 
 #endif

@@ -1,40 +1,32 @@
 #include "renderer/transport/volume/volume_tracer.h"
 
-#include "renderer/transport/camera.h"
+#include "renderer/transport/path_value.h"
 #include "renderer/transport/volume/volume_flight.h"
 
-#define VOLUME_ROULETTE_BELOW 0.3f
-#define VOLUME_SHADOW_BELOW 0.02f
 #define VOLUME_HEADROOM 1.25f
 enum { VOLUME_MAX_LOOKUP = 200000, N_LANE = 16 };
 
-void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
-                         const struct phase_state *state, double multiplier_per_m, const struct configuration *c,
-                         bool want_jacobian)
+float volume_majorant_density(const struct volume_scene *scene, const struct volume_parameters *p)
+{
+    return VOLUME_HEADROOM * scene->largest_density * p->model->extinction(p->state)->largest;
+}
+
+void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct volume_parameters *p,
+                         const struct configuration *c, bool want_jacobian)
 {
     memset(s, 0, sizeof *s);
     s->scene = scene;
-    s->model = model;
-    s->state = state;
-    s->extinction = model->extinction(state);
-    s->multiplier_per_m = (float)multiplier_per_m;
-    s->majorant_density = VOLUME_HEADROOM * scene->largest_density * s->extinction->largest;
-    s->majorant_per_mm = (float)(1e-3 * multiplier_per_m) * s->majorant_density;
+    s->model = p->model;
+    s->state = p->state;
+    s->extinction = p->model->extinction(p->state);
+    s->multiplier_per_m = (float)p->multiplier_per_m;
+    s->majorant_density = volume_majorant_density(scene, p);
+    s->majorant_per_mm = (float)(1e-3 * p->multiplier_per_m) * s->majorant_density;
     s->inv_majorant_density = 1 / s->majorant_density;
     s->mean_step_mm = 1 / s->majorant_per_mm;
-    s->has_lamp = c != NULL && c->light != LIGHT_NO_LAMP;
-    if (s->has_lamp) lamp_init(&s->lamp, c);
-    for (int k = 0; k < 3 && c != NULL; k++) {
-        s->environment[k] = (float)c->environment_rgb[k];
-        if (s->environment[k] > 0) s->has_environment = true;
-    }
-    if (c != NULL) {
-        s->image = c->environment;
-        s->image_turn[0] = (float)cos(c->cloth_rotation_rad);
-        s->image_turn[1] = (float)sin(c->cloth_rotation_rad);
-    }
-    s->roulette_below = VOLUME_ROULETTE_BELOW;
-    s->shadow_below = VOLUME_SHADOW_BELOW;
+    if (c != NULL) lights_init(&s->lights, c);
+    s->roulette_below = PATH_VOLUME_ROULETTE_BELOW;
+    s->shadow_below = PATH_VOLUME_SHADOW_BELOW;
     s->want_jacobian = want_jacobian;
 }
 
@@ -119,39 +111,19 @@ static void add_light(const struct volume_setting *s, struct lane *l, const floa
     }
 }
 
-/* A model that gives no number must be found out (STATUS_NUMERIC), not taken for black. */
-static void keep_nan(struct lane *l, const float value[3])
-{
-    if (isnan(value[0] + value[1] + value[2])) l->out->radiance[0] = NAN;
-}
-
-static float largest(const float value[3])
-{
-    float most = value[0] > value[1] ? value[0] : value[1];
-    return value[2] > most ? value[2] : most;
-}
-
 /* Radiance that the path's ray meets beyond the cloth. */
 static void add_beyond(const struct volume_setting *s, struct lane *l)
 {
     const float *direction = l->ray.direction;
     if (direction[2] < 0 && s->scene->black_sheet) return;
     float beyond[3] = {0, 0, 0}, value[3];
-    if (s->has_lamp) {
-        float pdf_lamp = lamp_pdf(&s->lamp, l->origin_mm, direction);
-        float share = pdf_lamp > 0 ? s->lamp.radiance * (l->pdf > 0 ? power_heuristic(l->pdf, pdf_lamp) : 1) : 0;
-        for (int c = 0; c < 3; c++) beyond[c] = share;
+    if (s->lights.has_lamp) {
+        float lamp = lights_lamp_beyond(&s->lights.lamp, l->origin_mm, direction, l->pdf);
+        for (int c = 0; c < 3; c++) beyond[c] = lamp;
     }
-    for (int c = 0; c < 3 && s->has_environment; c++) beyond[c] += s->environment[c];
-    if (s->image != NULL) {
-        float world[3], radiance[3];
-        turn_about_normal(s->image_turn, 1, direction, world);
-        float pdf_image = environment_at(s->image, world, radiance);
-        float share = l->pdf > 0 ? power_heuristic(l->pdf, pdf_image) : 1;
-        for (int c = 0; c < 3; c++) beyond[c] += radiance[c] * share;
-    }
+    lights_add_environment(&s->lights, direction, l->pdf, beyond);
     for (int c = 0; c < 3; c++) value[c] = l->throughput[c] * beyond[c];
-    if (!(largest(value) > 0)) return;
+    if (!(path_value_largest(value) > 0)) return;
     add_light(s, l, value, NULL, NULL);
     note_light(l, VOLUME_BEYOND, NULL, beyond);
 }
@@ -208,15 +180,12 @@ static bool scatter(const struct volume_setting *s, struct lane *l)
     l->pdf = s->model->eval_pdf(s->state, wi, l->wo, l->throughput, f_rgb, s->want_jacobian ? score : NULL);
     if (l->pdf == 0) return false; /* rounded to a direction that has no density */
     for (int c = 0; c < 3; c++) next[c] = l->throughput[c] * f_rgb[c] / l->pdf;
-    float most = largest(next);
+    float most = path_value_largest(next);
     if (!(most > 0)) {
-        keep_nan(l, next);
+        path_value_keep_nan(l->out->radiance, next);
         return false;
     }
-    if (most < s->roulette_below) {
-        survival = most / s->roulette_below;
-        if (rng_float(&l->rng) >= survival) return false;
-    }
+    if (most < s->roulette_below && !path_value_survives(most, s->roulette_below, &l->rng, &survival)) return false;
     for (int c = 0; c < 3; c++) l->throughput[c] = next[c] / survival;
     for (size_t p = 0; s->want_jacobian && p < 3 * s->model->n_param; p++) l->h[p] += score[p];
     note_light(l, VOLUME_SCATTER, wi, (float[3]){1 / (l->pdf * survival), 0, 0});
@@ -229,16 +198,14 @@ static bool scatter(const struct volume_setting *s, struct lane *l)
 static bool sample_light(const struct volume_setting *s, struct lane *l, enum connection to, float direction[3],
                          float radiance[3], float *pdf)
 {
-    float u[2] = {rng_float(&l->rng), rng_float(&l->rng)}, position_mm[3], world[3];
+    float u[2] = {rng_float(&l->rng), rng_float(&l->rng)}, position_mm[3];
     if (to == LAMP) {
         volume_ray_position_mm(s->scene, &l->vertex, position_mm);
-        if (!lamp_sample(&s->lamp, position_mm, u, direction, pdf)) return false;
-        for (int c = 0; c < 3; c++) radiance[c] = s->lamp.radiance;
+        if (!lamp_sample(&s->lights.lamp, position_mm, u, direction, pdf)) return false;
+        for (int c = 0; c < 3; c++) radiance[c] = s->lights.lamp.radiance;
         return true;
     }
-    if (!environment_sample(s->image, u, world, radiance, pdf)) return false;
-    turn_about_normal(s->image_turn, -1, world, direction);
-    return true;
+    return lights_sample_image(&s->lights, u, direction, radiance, pdf);
 }
 
 /* Next-event estimation: a ray to the lamp, one to the image, then the path goes on. False: it ends here. */
@@ -246,19 +213,19 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
 {
     for (; to <= IMAGE; to++) {
         float direction[3], radiance[3], pdf_light, f_rgb[3];
-        if (!(to == LAMP ? s->has_lamp : s->image != NULL)) continue;
+        if (!(to == LAMP ? s->lights.has_lamp : s->lights.image != NULL)) continue;
         if (!sample_light(s, l, to, direction, radiance, &pdf_light)) continue;
         if (direction[2] <= 0 && s->scene->black_sheet) continue;
         to_local(&l->frame, direction, l->light_wi);
         float pdf = s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, NULL);
-        float heuristic = power_heuristic(pdf_light, pdf) / pdf_light;
+        float heuristic = lights_power_heuristic(pdf_light, pdf) / pdf_light;
         for (int c = 0; c < 3; c++) {
             radiance[c] *= heuristic;
             l->light[c] = l->throughput[c] * f_rgb[c] * radiance[c];
         }
-        l->worth = largest(l->light);
+        l->worth = path_value_largest(l->light);
         if (!(l->worth > 0)) {
-            keep_nan(l, l->light);
+            path_value_keep_nan(l->out->radiance, l->light);
             continue;
         }
         l->passed = l->ratios = 1;
@@ -379,29 +346,4 @@ void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_r
             }
         }
     } while (n_busy > 0);
-}
-
-uint64_t volume_trace_camera(const struct volume_setting *s, const struct camera *camera, size_t n, double (*xy)[2],
-                             struct rng *rng, float *value)
-{
-    struct volume_ray ray[VOLUME_CAMERA_PATHS];
-    struct volume_result path[VOLUME_CAMERA_PATHS];
-    size_t n_ray = 0, place[VOLUME_CAMERA_PATHS], n_jac = s->want_jacobian ? 3 * (s->model->n_param + 1) : 0;
-    uint64_t n_vertex = 0;
-    for (size_t i = 0; i < n; i++) {
-        double origin_mm[3], direction[3];
-        camera_origin(camera, xy[i][0], xy[i][1], origin_mm);
-        camera_direction(camera, xy[i][0], xy[i][1], direction);
-        if (!volume_ray_enter(s->scene, origin_mm, direction, &ray[n_ray])) continue; /* sees nothing: adds 0 */
-        rng[n_ray] = rng[i];
-        place[n_ray++] = i;
-    }
-    volume_trace_many(s, n_ray, ray, rng, path);
-    for (size_t i = 0; i < n_ray; i++) {
-        float *v = value + place[i] * (3 + n_jac);
-        memcpy(v, path[i].radiance, sizeof path[i].radiance);
-        memcpy(v + 3, path[i].jac, n_jac * sizeof *v);
-        n_vertex += path[i].n_vertex;
-    }
-    return n_vertex;
 }

@@ -22,11 +22,17 @@
 #include "base/rng.h"
 #include "renderer/scattering/phase_model.h"
 #include "renderer/scene/configuration.h"
-#include "renderer/transport/light/environment.h"
-#include "renderer/transport/light/lamp.h"
+#include "renderer/transport/light/lights.h"
 #include "renderer/transport/volume/volume_scene.h"
 
 enum { VOLUME_MAX_VERTEX = 10000, VOLUME_N_DERIVATIVE = 3 * SCATTERING_MAX_PARAM };
+
+/* The model at given parameter values. */
+struct volume_parameters {
+    const struct phase_model *model;
+    struct phase_state *state;
+    double multiplier_per_m; /* d > 0 */
+};
 
 struct volume_setting {
     const struct volume_scene *scene;
@@ -37,21 +43,17 @@ struct volume_setting {
     float majorant_per_mm;
     float majorant_density;                   /* density times s at which extinction would equal the majorant */
     float inv_majorant_density, mean_step_mm; /* their inverses */
-    struct lamp lamp;
-    bool has_lamp;
-    bool has_environment;
-    float environment[3]; /* the same radiance from every direction (from below only without the black sheet) */
-    const struct environment *image; /* or NULL */
-    float image_turn[2];             /* cosine and sine of the angle from the cloth's frame to the world's */
-    float roulette_below;            /* throughput under which paths are ended at random; 0: never */
-    float shadow_below;              /* light connections worth less are thinned out at random; 0: never */
+    struct lights lights;
+    float roulette_below; /* throughput under which paths are ended at random; 0: never */
+    float shadow_below;   /* light connections worth less are thinned out at random; 0: never */
     bool want_jacobian;
 };
 
 /* Roulette at the usual place, the configuration's lights (NULL: none). */
-void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct phase_model *model,
-                         const struct phase_state *state, double multiplier_per_m, const struct configuration *c,
-                         bool want_jacobian);
+void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct volume_parameters *p,
+                         const struct configuration *c, bool want_jacobian);
+/* Density times s at which the extinction would equal the majorant that paths are traced with. */
+float volume_majorant_density(const struct volume_scene *scene, const struct volume_parameters *p);
 
 struct volume_result {
     float radiance[3];
@@ -87,12 +89,9 @@ void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct
 void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
                        struct volume_result *out);
 
-struct camera;
-enum { VOLUME_CAMERA_PATHS = 256 };
-/* The paths of n <= VOLUME_CAMERA_PATHS camera rays through xy (camera.h), each with its generator (changed):
- * value[n][3 + 3 * (model->n_param + 1)] (value[n][3] without derivatives), preset to 0, radiance and derivatives.
- * Result: the number of vertices. */
-uint64_t volume_trace_camera(const struct volume_setting *s, const struct camera *camera, size_t n, double (*xy)[2],
-                             struct rng *rng, float *value);
+/* Sum over channels of the radiance that a recorded path has with parameters `now`, when it was traced with `then`, by
+ * the formulas at volume_event. */
+double volume_replay(const struct volume_scene *scene, const struct volume_parameters *now,
+                     const struct volume_parameters *then, const struct volume_record *record);
 
 #endif

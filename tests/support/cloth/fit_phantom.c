@@ -167,19 +167,19 @@ static void run_counts(const struct fit_phantom *f, const struct kept_call *c, u
                        struct estimate *out)
 {
     struct error err = {0};
-    const struct appearance_request q = {
-        .scene = {.fibers = f->cloth.scene, .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
-        .model = &f->model,
-        .param = c->param,
+    const struct estimate_request q = {
+        .input = {.scene = {.fibers = f->cloth.scene, .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
+                  .model = &f->model,
+                  .param = c->param,
+                  .want_derivative = c->want_jacobian,
+                  .plain_paths = c->plain_paths},
         .configuration = c->configuration,
         .n_configuration = c->n_configuration,
         .n_path = count,
         .seed = c->seed,
         .iteration = iteration,
-        .replica = c->replica,
-        .want_jacobian = c->want_jacobian,
-        .no_probes = c->plain_paths};
-    fit_check(appearance_estimate_run(&q, f->pool, NULL, out, &err), &err);
+        .replica = c->replica};
+    fit_check(estimate_run(&q, f->pool, NULL, out, &err), &err);
 }
 
 static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,

@@ -45,16 +45,16 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
     observation_set_init(&o);
     for (size_t i = 0; i < N_ROW; i++) {
         const struct observation item = {
-            .mean_rgb = {0.2, 0.2, 0.2}, .weight = 1.0, .configuration = t->configuration[i]};
+            .mean_rgb = {0.2, 0.2, 0.2}, .weight = 1.0, .configuration = t->request.configuration[i]};
         assert_int_equal(observation_set_append(&o, &item, NULL), STATUS_OK);
     }
-    for (size_t p = 0; p < t->model->n_param; p++) {
-        const struct param_info *info = &t->model->param[p];
+    for (size_t p = 0; p < t->request.input.model->n_param; p++) {
+        const struct param_info *info = &t->request.input.model->param[p];
         parameter[p] = (struct fit_parameter){info->lower, info->upper, info->start, false};
     }
     struct estimator e = trace_estimator(t);
-    const struct fit_problem problem = {.n_param = t->model->n_param,
-                                        .info = t->model->param,
+    const struct fit_problem problem = {.n_param = t->request.input.model->n_param,
+                                        .info = t->request.input.model->param,
                                         .param = parameter,
                                         .observation = &o,
                                         .estimator = &e,
@@ -69,7 +69,7 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
         bool named = false;
         for (size_t i = 0; i < N_ROW; i++) {
             char view[CONFIGURATION_TEXT];
-            configuration_describe(&t->configuration[i], view);
+            configuration_describe(&t->request.configuration[i], view);
             named = named || strstr(err.text, view) != NULL;
         }
         if (!named) fail_msg("%s names no configuration: %s", (*m)->id, err.text);
@@ -104,8 +104,10 @@ static void test_surface(void **state)
     hand_weave_small(&f);
     assert_int_equal(scene_new(&f, &(struct scene_option){true}, &scene, NULL), STATUS_OK);
     fiber_set_release(&f);
-    struct trace_estimator t = {
-        .model = &a, .scene = {.fibers = scene}, .seed = 3, .configuration = c, .n_configuration = N_ROW};
+    struct trace_estimator t = {.request = {.input = {.scene = {.fibers = scene}, .model = &a},
+                                            .configuration = c,
+                                            .n_configuration = N_ROW,
+                                            .seed = 3}};
     fit(&t, 0, "broken.v1", "beta_R");
     fit(&t, 60000, "broken.v1", "beta_R"); /* in the midst of it */
     scene_free(scene);
@@ -125,8 +127,10 @@ static void test_volume(void **state)
     hand_volume_weave(&v, (const size_t[3]){16, 16, 8}, 10e-6, 0.4);
     assert_int_equal(volume_scene_init(&scene, &v, &(struct volume_scene_option){.black_sheet = true}, NULL),
                      STATUS_OK);
-    struct trace_estimator t = {
-        .model = &a, .scene = {.volume = &scene}, .seed = 3, .configuration = c, .n_configuration = N_ROW};
+    struct trace_estimator t = {.request = {.input = {.scene = {.volume = &scene}, .model = &a},
+                                            .configuration = c,
+                                            .n_configuration = N_ROW,
+                                            .seed = 3}};
     fit(&t, 0, "broken_flake.v1", NULL);
     fit(&t, 40000, "broken_flake.v1", NULL);
     volume_scene_release(&scene);

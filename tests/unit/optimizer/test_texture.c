@@ -6,12 +6,12 @@
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
 #include "optimizer/job/method_names.h"
-#include "renderer/transport/appearance_estimate.h"
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -36,56 +36,57 @@ static double true_contrast(double t) { return t * t * CELL / (CELL - 1.0); }
 
 struct board {
     const double *param;
-    bool want_jacobian, whole_blocks;
+    bool want_jacobian;
     struct thread_pool *pool;
     struct configuration configuration[2 * N_VIEW];
     size_t n_call, fail_after;
 };
 
-static uint32_t trace(void *context, size_t i_configuration, double x, double y, struct rng *rng, float *value)
+static void trace_one(const struct board *b, const double xy[2], struct rng *rng, float *value)
 {
-    const struct board *b = context;
-    (void)i_configuration;
-    double sign = ((size_t)(x * SIDE) + (size_t)(y * SIDE)) % 2 == 0 ? 1.0 : -1.0, bright = -log(1.0 - rng_double(rng));
+    double sign = ((size_t)(xy[0] * SIDE) + (size_t)(xy[1] * SIDE)) % 2 == 0 ? 1.0 : -1.0;
+    double bright = -log(1.0 - rng_double(rng));
     for (size_t c = 0; c < 3; c++) {
         value[c] = (float)(b->param[c] * (1.0 + sign * b->param[3]) * bright);
         if (!b->want_jacobian) continue;
         value[3 + c * N_PARAM + c] = (float)((1.0 + sign * b->param[3]) * bright);
         value[3 + c * N_PARAM + 3] = (float)(b->param[c] * sign * bright);
     }
-    return 1;
 }
 
-static uint64_t trace_block(void *context, size_t i_configuration, double (*xy)[2], struct rng *rng, float *value)
+static uint64_t trace(const void *state, const struct radiance_block *block, float *value)
 {
-    const struct board *b = context;
+    const struct board *b = state;
     size_t n_value = 3 + (b->want_jacobian ? 3 * N_PARAM : 0);
-    for (size_t i = 0; i < ESTIMATE_BLOCK_PATHS; i++)
-        trace(context, i_configuration, xy[i][0], xy[i][1], &rng[i], value + i * n_value);
-    return ESTIMATE_BLOCK_PATHS;
+    for (size_t i = 0; i < block->n_path; i++) trace_one(b, block->xy[i], &block->rng[i], value + i * n_value);
+    return block->n_path;
 }
+
+static const struct radiance_tracer board_tracer = {.max_member = 1, .trace = trace};
 
 static status estimate(void *context, const struct estimator_call *call, const struct progress *progress,
                        struct estimate *out, double *wall_s, struct error *err)
 {
     struct board *b = context;
-    size_t bad[2];
     if (b->fail_after > 0 && b->n_call == b->fail_after) return error_set(err, STATUS_IO, "killed here");
     b->n_call++;
     b->param = call->param;
     b->want_jacobian = call->want_jacobian;
-    struct estimate_blocks q = {.n_configuration = 2 * N_VIEW,
-                                .n_path = call->n_path,
-                                .configuration = b->configuration,
-                                .seed = 5,
-                                .iteration = call->iteration,
-                                .replica = call->replica,
-                                .n_jac = call->want_jacobian ? 3 * N_PARAM : 0,
-                                .trace = trace,
-                                .context = b};
-    if (b->whole_blocks) q.trace_block = trace_block;
+    struct path_groups groups;
+    struct estimate_fault fault;
+    const struct radiance_source source = {
+        .tracer = &board_tracer, .state = b, .n_set = 1, .n_flat = call->want_jacobian ? N_PARAM : 0};
+    const struct estimate_blocks q = {.source = &source,
+                                      .configuration = b->configuration,
+                                      .n_configuration = 2 * N_VIEW,
+                                      .groups = &groups,
+                                      .key = {.seed = 5, .iteration = call->iteration, .replica = call->replica},
+                                      .progress = progress};
     *wall_s = 0.0;
-    return estimate_blocks_run(&q, b->pool, progress, out, &bad[0], &bad[1], err);
+    assert_int_equal(path_groups_single(&groups, call->n_path, 2 * N_VIEW, err), STATUS_OK);
+    status s = estimate_blocks_run(&q, b->pool, out, &fault, err);
+    path_groups_release(&groups);
+    return s;
 }
 
 static void board_init(struct board *b, size_t n_thread)
@@ -117,7 +118,7 @@ static void test_unbiased(void **state)
         ask(&b, truth, 4 * CELL, k, e);
         for (size_t i = N_VIEW; i < 2 * N_VIEW; i++, n += 1.0) {
             assert_int_equal(e[i].n_path, 4 * CELL);
-            assert_int_equal(e[i].n_path, appearance_n_path(&b.configuration[i], 4 * CELL));
+            assert_int_equal(e[i].n_path, estimate_n_path(&b.configuration[i], 4 * CELL));
             sum += e[i].mean[1];
             sum2 += e[i].mean[1] * e[i].mean[1];
             var += e[i].var[1];
@@ -163,21 +164,17 @@ static void test_derivative(void **state)
     thread_pool_free(b.pool);
 }
 
-/* Any number of threads, one by one or whole blocks. */
+/* Any number of threads. */
 static void test_same_bits(void **state)
 {
     (void)state;
     struct estimate want[2 * N_VIEW], got[2 * N_VIEW];
     for (size_t n_path = 1; n_path < 50000; n_path = 3 * n_path + 100) {
-        for (size_t variant = 0; variant < 4; variant++) {
+        for (size_t n_thread = 1; n_thread <= 3; n_thread++) {
             struct board b;
-            board_init(&b, variant % 2 == 0 ? 1 : 3);
-            b.whole_blocks = variant >= 2;
-            ask(&b, truth, n_path, 9, variant == 0 ? want : got);
-            for (size_t i = 0; i < 2 * N_VIEW && variant > 0; i++) {
-                got[i].n_vertex = want[i].n_vertex; /* whole blocks trace a few more that are not used */
-                assert_memory_equal(&got[i], &want[i], sizeof got[i]);
-            }
+            board_init(&b, n_thread);
+            ask(&b, truth, n_path, 9, n_thread == 1 ? want : got);
+            if (n_thread > 1) assert_memory_equal(got, want, sizeof got);
             thread_pool_free(b.pool);
         }
         assert_true(want[N_VIEW].n_path >= n_path && want[N_VIEW].n_path < n_path + 4 * CELL);
@@ -203,9 +200,8 @@ static void test_against_picture(void **state)
     configuration[0].crop_m = 0.0011;
     assert_int_equal(scene_new(&f, &(struct scene_option){true}, &scene, NULL), STATUS_OK);
     assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
-    struct render_request picture = {.scene = scene,
-                                     .model = model,
-                                     .param = param,
+    struct appearance appearance;
+    struct render_request picture = {.input = trace_input_surface(scene, model, param, &appearance),
                                      .configuration = configuration,
                                      .width = SIDE,
                                      .height = SIDE,
@@ -213,14 +209,12 @@ static void test_against_picture(void **state)
                                      .seed = 3};
     assert_int_equal(render_run(&picture, pool, NULL, &im, NULL), STATUS_OK);
     configuration[0].contrast_cells = SIDE;
-    struct estimate_request q = {.scene = scene,
-                                 .model = model,
-                                 .param = param,
+    struct estimate_request q = {.input = trace_input_surface(scene, model, param, &appearance),
                                  .configuration = configuration,
                                  .n_configuration = 1,
                                  .n_path = &n_path,
-                                 .seed = 4,
-                                 .want_jacobian = true};
+                                 .seed = 4};
+    q.input.want_derivative = true;
     assert_int_equal(estimate_run(&q, pool, NULL, &e, NULL), STATUS_OK);
     for (size_t c = 0; c < 3; c++) {
         double mean = 0.0, sum = 0.0, noise = 0.0, var = 0.0;

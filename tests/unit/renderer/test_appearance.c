@@ -1,8 +1,10 @@
 /* The list of models that a fit can choose from, and the estimates behind it: the same figures as from the tracers
  * themselves. */
 #include "renderer/scattering/appearance.h"
-#include "renderer/transport/appearance_estimate.h"
-#include "renderer/transport/volume_estimate.h"
+#include "renderer/transport/camera.h"
+#include "renderer/transport/estimate.h"
+#include "renderer/transport/surface/path_tracer.h"
+#include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
@@ -15,6 +17,8 @@
 #include <string.h>
 
 #include <cmocka.h>
+
+enum { SEED = 3 };
 
 static void test_ids_are_unique_and_found(void **unused)
 {
@@ -55,31 +59,108 @@ static void test_volume_models_end_with_the_density_multiplier(void **unused)
     }
 }
 
-static void request_init(struct appearance_request *q, const struct appearance *a, double *param,
+static void request_init(struct estimate_request *q, const struct appearance *a, double *param,
                          const struct configuration *c, const size_t *n_path)
 {
     for (size_t p = 0; p < a->n_param; p++) param[p] = a->param[p].start;
-    *q = (struct appearance_request){.model = a,
-                                     .param = param,
-                                     .configuration = c,
-                                     .n_configuration = 2,
-                                     .n_path = n_path,
-                                     .seed = 3,
-                                     .want_jacobian = true};
+    *q = (struct estimate_request){.input = {.model = a, .param = param, .want_derivative = true},
+                                   .configuration = c,
+                                   .n_configuration = 2,
+                                   .n_path = n_path,
+                                   .seed = SEED};
+}
+
+/* The paths of an estimate, traced one by one with the tracer itself. */
+struct by_hand {
+    const struct scene *fibers;
+    const struct volume_scene *volume;
+    const struct appearance *model;
+    const double *param;
+    const struct configuration *c;
+    uint32_t n_path;
+    double mean_green;
+};
+
+static void start_path(uint32_t i, struct rng *rng, double xy[2])
+{
+    rng_start(rng, &(struct rng_key){.seed = SEED}, i / RADIANCE_BLOCK_PATHS, i % RADIANCE_BLOCK_PATHS);
+    for (int a = 0; a < 2; a++) xy[a] = rng_double(rng);
+}
+
+static void trace_fibers(void *context, size_t i_task, size_t i_thread)
+{
+    struct by_hand *h = context;
+    struct parameter_sets sets;
+    struct path_setting setting;
+    struct camera camera;
+    (void)i_task, (void)i_thread;
+    assert_int_equal(parameter_sets_init(&sets, h->fibers, h->model->surface, h->param, 1, NULL), STATUS_OK);
+    path_setting_init_sets(&setting, h->fibers, &sets, h->c, true);
+    camera_init(&camera, h->c);
+    for (uint32_t i = 0; i < h->n_path; i++) {
+        struct rng rng;
+        struct scene_ray ray;
+        struct path_result path;
+        double xy[2];
+        start_path(i, &rng, xy);
+        assert_true(camera_ray(&camera, h->fibers, xy, &ray));
+        path_trace(&setting, &ray, &rng, &path, NULL);
+        h->mean_green += (double)path.radiance[1] / h->n_path;
+    }
+    parameter_sets_release(&sets);
+}
+
+static void trace_volume(void *context, size_t i_task, size_t i_thread)
+{
+    struct by_hand *h = context;
+    const struct appearance *m = h->model;
+    struct volume_parameters parameters = {.model = m->volume, .multiplier_per_m = h->param[m->n_param - 1]};
+    struct volume_setting setting;
+    struct camera camera;
+    (void)i_task, (void)i_thread;
+    assert_int_equal(m->volume->prepare(h->param, &parameters.state, NULL), STATUS_OK);
+    volume_setting_init(&setting, h->volume, &parameters, h->c, true);
+    camera_init(&camera, h->c);
+    for (uint32_t i = 0; i < h->n_path; i++) {
+        struct rng rng;
+        struct volume_ray ray;
+        struct volume_result path;
+        double xy[2], origin_mm[3], direction[3];
+        start_path(i, &rng, xy);
+        camera_origin(&camera, xy, origin_mm);
+        camera_direction(&camera, xy, direction);
+        assert_true(volume_ray_enter(h->volume, origin_mm, direction, &ray));
+        volume_trace(&setting, &ray, &rng, &path, NULL);
+        h->mean_green += (double)path.radiance[1] / h->n_path;
+    }
+    m->volume->release(parameters.state);
+}
+
+/* In a thread pool, which sets the rounding of small numbers that estimates have. */
+static void same_by_hand(const struct estimate *e, const struct estimate_request *q, task_function trace)
+{
+    struct by_hand h = {.fibers = q->input.scene.fibers,
+                        .volume = q->input.scene.volume,
+                        .model = q->input.model,
+                        .param = q->input.param,
+                        .c = q->configuration,
+                        .n_path = (uint32_t)e->n_path};
+    assert_int_equal(thread_pool_run(NULL, 1, trace, &h, NULL), STATUS_OK);
+    if (!(fabs(e->mean[1] / h.mean_green - 1.0) < 1e-12)) fail_msg("%.17g, by hand %.17g", e->mean[1], h.mean_green);
 }
 
 static void test_same_figures_as_the_tracers(void **unused)
 {
     (void)unused;
-    struct thread_pool *pool = NULL;
     struct fiber_set f;
     struct direction_volume v;
     struct scene *scene = NULL;
     struct volume_scene volume;
     struct configuration c[16];
     struct appearance a;
-    struct appearance_request q;
-    struct estimate here[2], there[2];
+    struct estimate_request q;
+    struct estimate e[2];
+    struct error err;
     double param[SCATTERING_MAX_PARAM];
     const size_t n_path[2] = {512, 256}, n[3] = {16, 16, 8};
     const struct scene_option option = {.black_sheet = true};
@@ -87,47 +168,25 @@ static void test_same_figures_as_the_tracers(void **unused)
     orbit_configurations_16(c);
     hand_weave_small(&f);
     hand_volume_weave(&v, n, 4e-6, 0.4);
-    assert_int_equal(thread_pool_new(1, &pool, NULL), STATUS_OK);
     assert_int_equal(scene_new(&f, &option, &scene, NULL), STATUS_OK);
     assert_int_equal(volume_scene_init(&volume, &v, &volume_option, NULL), STATUS_OK);
 
     appearance_at(0, &a);
     request_init(&q, &a, param, c, n_path);
-    q.scene.fibers = scene;
-    const struct estimate_request surface = {.scene = scene,
-                                             .model = a.surface,
-                                             .param = param,
-                                             .configuration = c,
-                                             .n_configuration = 2,
-                                             .n_path = n_path,
-                                             .seed = 3,
-                                             .want_jacobian = true};
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, NULL), STATUS_OK);
-    assert_int_equal(estimate_run(&surface, pool, NULL, there, NULL), STATUS_OK);
-    assert_memory_equal(here, there, sizeof here);
+    q.input.scene.fibers = scene;
+    assert_int_equal(estimate_run(&q, NULL, NULL, e, NULL), STATUS_OK);
+    same_by_hand(&e[0], &q, trace_fibers);
 
     appearance_from_volume(phase_registry()[0], &a);
     request_init(&q, &a, param, c, n_path);
-    struct error err;
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, &err), STATUS_INVALID); /* no volume given */
+    assert_int_equal(estimate_run(&q, NULL, NULL, e, &err), STATUS_INVALID); /* no volume given */
     assert_non_null(strstr(err.text, a.id));
-    q.scene.volume = &volume;
-    const struct volume_estimate_request volumetric = {.scene = &volume,
-                                                       .model = a.volume,
-                                                       .param = param,
-                                                       .multiplier_per_m = 4e5,
-                                                       .configuration = c,
-                                                       .n_configuration = 2,
-                                                       .n_path = n_path,
-                                                       .seed = 3,
-                                                       .want_jacobian = true};
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, here, NULL), STATUS_OK);
-    assert_int_equal(volume_estimate_run(&volumetric, pool, NULL, there, NULL), STATUS_OK);
-    assert_memory_equal(here, there, sizeof here);
+    q.input.scene.volume = &volume;
+    assert_int_equal(estimate_run(&q, NULL, NULL, e, NULL), STATUS_OK);
+    same_by_hand(&e[0], &q, trace_volume);
 
     volume_scene_release(&volume);
     scene_free(scene);
-    thread_pool_free(pool);
     fiber_set_release(&f);
     direction_volume_release(&v);
 }
@@ -142,7 +201,7 @@ static void test_mean_over_rotations(void **unused)
     struct scene *scene = NULL;
     struct configuration c[16], by_hand[N];
     struct appearance a;
-    struct appearance_request q;
+    struct estimate_request q;
     struct estimate mean[2], turned[N];
     double param[SCATTERING_MAX_PARAM], sum = 0.0, var = 0.0;
     const size_t n_path[2] = {N_ROTATION * 512, 256}, n_turned[N] = {512, 512, 512, 512, 512, 256};
@@ -155,16 +214,16 @@ static void test_mean_over_rotations(void **unused)
     for (int k = 0; k < N_ROTATION; k++)
         by_hand[k].cloth_rotation_rad = c[1].cloth_rotation_rad + k * 2.0 * M_PI / N_ROTATION;
     request_init(&q, &a, param, by_hand, n_turned);
-    q.scene.fibers = scene;
+    q.input.scene.fibers = scene;
     q.n_configuration = N;
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, turned, NULL), STATUS_OK);
+    assert_int_equal(estimate_run(&q, pool, NULL, turned, NULL), STATUS_OK);
 
     struct configuration wanted[2] = {c[1], c[0]};
     wanted[0].n_rotation = N_ROTATION;
     q.configuration = wanted;
     q.n_configuration = 2;
     q.n_path = n_path;
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
+    assert_int_equal(estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
     assert_memory_equal(&mean[1], &turned[N_ROTATION], sizeof mean[1]);
     double least = INFINITY, most = 0.0;
     for (int k = 0; k < N_ROTATION; k++) {
@@ -180,15 +239,15 @@ static void test_mean_over_rotations(void **unused)
     for (int k = 0; k < N_ROTATION; k++) sum += turned[k].jac[i_width] / N_ROTATION;
     assert_true(fabs(mean[0].jac[i_width] - sum) < 1e-12 * fmax(1.0, fabs(sum)));
     assert_int_equal(mean[0].n_path, N_ROTATION * 512);
-    const size_t uneven[2] = {1000, 1}; /* rounded up: appearance_n_path foretells to what */
+    const size_t uneven[2] = {1000, 1}; /* rounded up: estimate_n_path foretells to what */
     q.n_path = uneven;
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
-    for (size_t i = 0; i < 2; i++) assert_int_equal(mean[i].n_path, appearance_n_path(&wanted[i], uneven[i]));
+    assert_int_equal(estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
+    for (size_t i = 0; i < 2; i++) assert_int_equal(mean[i].n_path, estimate_n_path(&wanted[i], uneven[i]));
     assert_int_equal(mean[0].n_path, N_ROTATION * 256);
 
     struct error err;
     wanted[0].contrast_cells = 4;
-    assert_int_equal(appearance_estimate_run(&q, pool, NULL, mean, &err), STATUS_INVALID);
+    assert_int_equal(estimate_run(&q, pool, NULL, mean, &err), STATUS_INVALID);
     scene_free(scene);
     thread_pool_free(pool);
     fiber_set_release(&f);

@@ -4,6 +4,7 @@
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -17,6 +18,7 @@
 
 static struct scene *scene;
 static double start[SCATTERING_MAX_PARAM];
+static struct appearance model;
 static struct configuration configuration[16];
 
 static int set_up(void **state)
@@ -41,8 +43,15 @@ static int tear_down(void **state)
 
 static struct estimate_request request(const size_t *n_path, size_t n_configuration)
 {
-    return (struct estimate_request){
-        scene, scattering_find("two_lobe.v1"), start, configuration, n_configuration, n_path, 17, 3, 1, true};
+    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
+                                 .configuration = configuration,
+                                 .n_configuration = n_configuration,
+                                 .n_path = n_path,
+                                 .seed = 17,
+                                 .iteration = 3,
+                                 .replica = 1};
+    q.input.want_derivative = true;
+    return q;
 }
 
 static void run(const struct estimate_request *q, size_t n_thread, struct estimate *e)
@@ -77,7 +86,7 @@ static void same_bits_for_any_threads(void **state)
     run(&alone, 2, more);
     assert_true(more[3].mean[0] != one[3].mean[0]);
     /* without derivatives the same radiance */
-    q.want_jacobian = false;
+    q.input.want_derivative = false;
     run(&q, 1, more);
     for (int c = 0; c < 3; c++)
         assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
@@ -120,7 +129,7 @@ static void agrees_without_avx512(void **state)
     if (scene_new(&f, &(struct scene_option){.black_sheet = true, .no_avx512 = true}, &plain, &err) != STATUS_OK)
         fail_msg("%s", err.text);
     assert_int_equal(estimate_run(&q, NULL, NULL, with, &err), STATUS_OK);
-    q.scene = plain;
+    q.input.scene.fibers = plain;
     assert_int_equal(estimate_run(&q, NULL, NULL, without, &err), STATUS_OK);
     for (int i = 0; i < 2; i++)
         for (int c = 0; c < 3; c++) {
@@ -233,7 +242,7 @@ static void cancels_within_100_ms(void **state)
     struct thread_pool *pool = NULL;
     struct error err = {0};
     double late_s[5];
-    q.param = white;
+    q.input.param = white;
     assert_int_equal(thread_pool_new(2, &pool, &err), STATUS_OK);
     for (int k = 0; k < 5; k++) {
         struct estimate e;
@@ -262,7 +271,7 @@ static void bad_requests(void **state)
     double param[SCATTERING_MAX_PARAM];
     memcpy(param, start, sizeof param);
     param[6] = NAN;
-    q.param = param;
+    q.input.param = param;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
     assert_string_equal(err.field, "beta_R");
     q = request(n_path, 1);
@@ -295,8 +304,8 @@ static void nan_is_named(void **state)
     struct estimate e[2];
     struct error err = {0};
     struct estimate_request q = request(n_path, 2);
-    q.model = &broken;
-    q.param = param;
+    q.input = trace_input_surface(scene, &broken, param, &model);
+    q.input.want_derivative = true;
     assert_int_equal(estimate_run(&q, NULL, NULL, e, &err), STATUS_NUMERIC);
     assert_non_null(strstr(err.text, "broken.v1"));
     char view[CONFIGURATION_TEXT];
@@ -326,8 +335,8 @@ static void samples_without_density(void **state)
     struct estimate e;
     struct error err = {0};
     struct estimate_request q = request(n_path, 1);
-    q.model = &rounding;
-    q.param = param;
+    q.input = trace_input_surface(scene, &rounding, param, &model);
+    q.input.want_derivative = true;
     if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_true(e.mean[0] > 0 && isfinite(e.jac[0]));
 }

@@ -1,7 +1,9 @@
 /* render_run: agrees with estimate_run, the same bits for any number of threads, layers and names, back light. */
+#include "renderer/transport/estimate.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -12,6 +14,7 @@
 #include <cmocka.h>
 
 static double start[SCATTERING_MAX_PARAM];
+static struct appearance model;
 static struct configuration configuration[16];
 
 static int set_up(void **state)
@@ -45,7 +48,14 @@ static void render(const struct render_request *q, size_t n_thread, struct image
 
 static struct render_request request(const struct scene *scene, const struct configuration *c)
 {
-    return (struct render_request){scene, scattering_find("two_lobe.v1"), start, c, 24, 20, 32, 5, 0, true};
+    struct render_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
+                               .configuration = c,
+                               .width = 24,
+                               .height = 20,
+                               .n_sample = 32,
+                               .seed = 5};
+    q.input.want_derivative = true;
+    return q;
 }
 
 static void layers_and_threads(void **state)
@@ -86,7 +96,8 @@ static void agrees_with_estimate(void **state)
         struct error err = {0};
         q.n_sample = 100;
         render(&q, 2, &im);
-        struct estimate_request r = {scene, q.model, start, &configuration[k], 1, n_path, 6, 0, 0, false};
+        struct estimate_request r = {
+            .input = q.input, .configuration = &configuration[k], .n_configuration = 1, .n_path = n_path, .seed = 6};
         if (estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
         double mean = 0, var = 0, n = (double)(im.width * im.height);
         for (size_t i = 0; i < im.width * im.height; i++) {
@@ -111,7 +122,11 @@ static void back_light(void **state)
     for (int sheet = 0; sheet < 2; sheet++) {
         struct scene *scene = small_cloth(sheet);
         struct estimate e;
-        struct estimate_request q = {scene, scattering_find("two_lobe.v1"), start, &c, 1, n_path, 6, 0, 0, false};
+        struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
+                                     .configuration = &c,
+                                     .n_configuration = 1,
+                                     .n_path = n_path,
+                                     .seed = 6};
         assert_int_equal(estimate_run(&q, NULL, NULL, &e, NULL), STATUS_OK);
         if (sheet)
             assert_true(e.mean[0] == 0);

@@ -242,7 +242,7 @@ static void camera_looks_at_the_orbit_centre(void **state)
         struct camera m;
         struct scene_ray r;
         camera_init(&m, &c);
-        assert_true(camera_ray(&m, s, 0.5, 0.5, &r));
+        assert_true(camera_ray(&m, s, (const double[2]){0.5, 0.5}, &r));
         double z = (double)r.origin_mm[2], t = -z / (double)r.direction[2];
         for (int a = 0; a < 2; a++)
             assert_true(fabs((double)r.origin_mm[a] + r.offset_mm[a] + t * (double)r.direction[a]) < 1e-3);
@@ -255,7 +255,8 @@ static void camera_looks_at_the_orbit_centre(void **state)
         /* the crop's edge is 10 mm */
         struct scene_ray left, right;
         if (i == 0) {
-            assert_true(camera_ray(&m, s, 0, 0.5, &left) && camera_ray(&m, s, 1, 0.5, &right));
+            assert_true(camera_ray(&m, s, (const double[2]){0, 0.5}, &left));
+            assert_true(camera_ray(&m, s, (const double[2]){1, 0.5}, &right));
             double dx = (double)right.origin_mm[0] + right.offset_mm[0] - (double)left.origin_mm[0] - left.offset_mm[0];
             double dy = (double)right.origin_mm[1] + right.offset_mm[1] - (double)left.origin_mm[1] - left.offset_mm[1];
             assert_true(fabs(hypot(dx, dy) - 10) < 1e-3);

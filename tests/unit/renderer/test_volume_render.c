@@ -1,10 +1,11 @@
-/* volume_render_run: agrees with volume_estimate_run, the same bits for any number of threads, layers and names, files,
- * progress and cancellation; and the renderings of both kinds of cloth through appearance_render_run. */
-#include "renderer/transport/appearance_render.h"
-#include "renderer/transport/volume_render.h"
+/* render_run for volumes: agrees with estimate_run, the same bits for any number of threads, layers and names, files,
+ * progress and cancellation. */
+#include "renderer/transport/estimate.h"
+#include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -19,6 +20,7 @@
 static double param[SCATTERING_MAX_PARAM];
 static struct configuration configuration[16];
 static struct volume_scene scene;
+static struct trace_volume volume_model;
 
 static int set_up(void **state)
 {
@@ -41,33 +43,32 @@ static int tear_down(void **state)
     return 0;
 }
 
-static struct volume_render_request request(const struct configuration *c)
+static struct render_request request(const struct configuration *c)
 {
-    return (struct volume_render_request){.scene = &scene,
-                                          .model = phase_find("phase_two_lobe.v1"),
-                                          .param = param,
-                                          .multiplier_per_m = 4e4,
-                                          .configuration = c,
-                                          .width = 24,
-                                          .height = 20,
-                                          .n_sample = 32,
-                                          .seed = 5,
-                                          .want_derivative = true};
+    struct render_request q = {
+        .input = trace_input_volume(&scene, phase_find("phase_two_lobe.v1"), param, 4e4, &volume_model),
+        .configuration = c,
+        .width = 24,
+        .height = 20,
+        .n_sample = 32,
+        .seed = 5};
+    q.input.want_derivative = true;
+    return q;
 }
 
-static void render(const struct volume_render_request *q, size_t n_thread, struct image *im)
+static void render(const struct render_request *q, size_t n_thread, struct image *im)
 {
     struct thread_pool *pool = NULL;
     struct error err = {0};
     assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    if (volume_render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
     thread_pool_free(pool);
 }
 
 static void layers_and_threads(void **state)
 {
     (void)state;
-    struct volume_render_request q = request(&configuration[1]);
+    struct render_request q = request(&configuration[1]);
     struct image im[3];
     for (size_t i = 0; i < 3; i++) render(&q, i + 1, &im[i]);
     assert_int_equal(im[0].n_channel, 6 + 39);
@@ -87,15 +88,15 @@ static void agrees_with_estimate(void **state)
     enum { N_PATH = 61440 };
     const size_t n_path[1] = {N_PATH};
     for (int k = 0; k < 16; k += 6) {
-        struct volume_render_request q = request(&configuration[k]);
+        struct render_request q = request(&configuration[k]);
         struct image im;
         struct estimate e;
         struct error err = {0};
         q.n_sample = N_PATH / (24 * 20);
         render(&q, 2, &im);
-        const struct volume_estimate_request r = {&scene, q.model, param, 4e4, &configuration[k], 1, n_path,
-                                                  6,      0,       0,     true};
-        if (volume_estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
+        struct estimate_request r = {
+            .input = q.input, .configuration = &configuration[k], .n_configuration = 1, .n_path = n_path, .seed = 6};
+        if (estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
         double mean = 0, var = 0, by_alpha = 0, by_d = 0, n = 24 * 20;
         for (size_t i = 0; i < 24 * 20; i++) {
             const float *pixel = im.pixel + i * im.n_channel;
@@ -118,7 +119,7 @@ static void agrees_with_estimate(void **state)
 
 static void files(void **state)
 {
-    struct volume_render_request q = request(&configuration[2]);
+    struct render_request q = request(&configuration[2]);
     struct image im, back;
     struct error err = {0};
     const char *exr = scratch_path(state, "v.exr"), *png = scratch_path(state, "v.png");
@@ -165,7 +166,7 @@ static void cancelled_soon(void **state)
         for (int attempt = 0; attempt < 3 && waited > 0.1; attempt++) {
             struct watch w = {.cancel = false};
             const struct progress progress = {listen, &w, &w.cancel};
-            struct volume_render_request q = request(&configuration[3]);
+            struct render_request q = request(&configuration[3]);
             struct thread_pool *pool = NULL;
             struct timespec now;
             struct image im;
@@ -174,7 +175,7 @@ static void cancelled_soon(void **state)
             q.n_sample = 40000000 / (size[k] * size[k]);
             assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
             assert_int_equal(pthread_create(&thread, NULL, cancel_soon, &w), 0);
-            assert_int_equal(volume_render_run(&q, pool, &progress, &im, NULL), STATUS_CANCELLED);
+            assert_int_equal(render_run(&q, pool, &progress, &im, NULL), STATUS_CANCELLED);
             clock_gettime(CLOCK_MONOTONIC, &now);
             pthread_join(thread, NULL);
             thread_pool_free(pool);
@@ -186,9 +187,9 @@ static void cancelled_soon(void **state)
     }
     struct watch w = {.cancel = false};
     const struct progress progress = {listen, &w, &w.cancel};
-    struct volume_render_request q = request(&configuration[3]);
+    struct render_request q = request(&configuration[3]);
     struct image im;
-    assert_int_equal(volume_render_run(&q, NULL, &progress, &im, NULL), STATUS_OK);
+    assert_int_equal(render_run(&q, NULL, &progress, &im, NULL), STATUS_OK);
     assert_true(w.fraction == 1 && !w.falling);
     image_release(&im);
 }
@@ -196,48 +197,36 @@ static void cancelled_soon(void **state)
 static void bad_requests(void **state)
 {
     (void)state;
-    struct volume_render_request q = request(&configuration[0]);
+    struct render_request q = request(&configuration[0]);
     struct configuration c = configuration[0];
     struct image im;
     struct error err = {0};
     q.n_sample = 0;
-    assert_int_equal(volume_render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
     q = request(&c);
     c.crop_m = -1;
-    assert_int_equal(volume_render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
     q = request(&configuration[0]);
-    q.multiplier_per_m = 0;
-    assert_int_equal(volume_render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "d");
+    volume_model.param[volume_model.model.n_param - 1] = 0;
+    assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_string_equal(err.field, APPEARANCE_DENSITY_MULTIPLIER);
 }
 
-static void through_the_appearance(void **state)
+static void needs_the_cloth_that_its_model_asks_for(void **state)
 {
     (void)state;
     struct appearance a;
-    struct image im, straight;
-    double flat[SCATTERING_MAX_PARAM];
-    assert_true(appearance_find("phase_two_lobe.v1", &a));
-    memcpy(flat, param, sizeof flat);
-    flat[a.n_param - 1] = 4e4;
-    struct appearance_render_request q = {.scene = {NULL, &scene},
-                                          .model = &a,
-                                          .param = flat,
-                                          .configuration = &configuration[1],
-                                          .width = 24,
-                                          .height = 20,
-                                          .n_sample = 32,
-                                          .seed = 5,
-                                          .want_derivative = true};
-    assert_int_equal(appearance_render_run(&q, NULL, NULL, &im, NULL), STATUS_OK);
-    struct volume_render_request r = request(&configuration[1]);
-    render(&r, 1, &straight);
-    assert_int_equal(im.n_channel, straight.n_channel);
-    assert_memory_equal(im.pixel, straight.pixel, 24 * 20 * im.n_channel * sizeof(float));
-    image_release(&im);
-    image_release(&straight);
+    struct image im;
+    struct error err = {0};
+    struct render_request q = request(&configuration[1]);
     assert_true(appearance_find("two_lobe.v1", &a));
-    assert_int_equal(appearance_render_run(&q, NULL, NULL, &im, NULL), STATUS_INVALID);
+    q.input.model = &a;
+    assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "model");
+    q = request(&configuration[1]);
+    q.input.n_set = 2;
+    assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "n_set");
 }
 
 int main(void)
@@ -248,7 +237,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(files, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(cancelled_soon),
         cmocka_unit_test(bad_requests),
-        cmocka_unit_test(through_the_appearance),
+        cmocka_unit_test(needs_the_cloth_that_its_model_asks_for),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

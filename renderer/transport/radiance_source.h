@@ -1,0 +1,90 @@
+/* One cloth with one model of appearance at given parameter values, ready to be traced: what estimates, pictures and
+ * the derivative check are made from. Two implementations stand behind one table of functions: fibers with a scattering
+ * model (surface/surface_radiance.c) and a density volume with a phase function (volume/volume_radiance.c).
+ *
+ * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; those of channel c start at c * n_flat.
+ * A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.
+ */
+#ifndef SELVEDGE_RENDERER_RADIANCE_SOURCE_H
+#define SELVEDGE_RENDERER_RADIANCE_SOURCE_H
+
+#include "base/progress.h"
+#include "base/rng.h"
+#include "renderer/scattering/appearance.h"
+#include "renderer/scene/configuration.h"
+#include "renderer/scene/scene.h"
+#include "renderer/transport/volume/volume_scene.h"
+
+enum { RADIANCE_BLOCK_PATHS = 256, RADIANCE_NAME_BYTES = 56 };
+
+/* One cloth in the forms in which it is at hand. */
+struct appearance_scene {
+    const struct scene *fibers;        /* NULL: surface models cannot be traced */
+    const struct volume_scene *volume; /* NULL: volume models cannot be traced */
+};
+
+struct radiance_input {
+    struct appearance_scene scene;
+    const struct appearance *model;
+    const double *param; /* max(n_set, 1) * model->n_param, internal units, one set after the other */
+    size_t n_set;        /* parameter sets for the material groups of the fibers; 0 and 1: one set for all fibers */
+    bool want_derivative;
+    bool plain_paths; /* trace without probes (path_tracer.h): same means, more variance; volumes have none */
+};
+
+/* Paths that are traced together: at most RADIANCE_BLOCK_PATHS camera paths. The same paths serve every member: members
+ * differ in their lamp only. */
+struct radiance_block {
+    const size_t *member; /* n_member indices of configurations */
+    size_t n_member;      /* at least 1; more only as far as the tracer's max_member */
+    size_t n_path;
+    double (*xy)[2];                 /* per path: a point of the crop, both in [0, 1), x to the right and y downwards */
+    struct rng *rng;                 /* per path; changed */
+    const struct progress *progress; /* tracing may stop early when it is cancelled; the values are then incomplete */
+};
+
+/* A recorded path, for radiance_tracer.replay. */
+struct radiance_record {
+    void *entry; /* the caller's: capacity * entry_bytes of the tracer */
+    size_t capacity;
+    size_t n_entry;  /* out; more than capacity: the path was too long, and the rest of it is missing */
+    size_t n_bounce; /* out: effort of a replay, in scattering events */
+};
+
+/* The table of an implementation; state is its own. */
+struct radiance_tracer {
+    size_t max_member;  /* configurations that one path can serve */
+    size_t entry_bytes; /* of a record */
+    /* STATUS_INVALID: a parameter (field: its name) or n_set; STATUS_NO_MEMORY. Leaves nothing to release on failure. */
+    status (*prepare)(const struct radiance_input *in, const struct configuration *c, size_t n_configuration,
+                      void **state, struct error *err);
+    void (*release)(void *state);
+    /* value[n_path][n_member][3 + n_jac], preset to 0: radiance, then derivatives. Result: the number of bounces. */
+    uint64_t (*trace)(const void *state, const struct radiance_block *b, float *value);
+    /* One path of configuration i through xy of the crop with its derivatives, value[3 + n_jac] preset to 0. */
+    void (*record)(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,
+                   struct radiance_record *record, float *value);
+    /* Sum over channels of the radiance that the recorded path has at the parameters of state `at`, with the sampling
+     * densities of state `traced`, which recorded it. */
+    double (*replay)(const void *at, const void *traced, const struct radiance_record *record);
+};
+
+struct radiance_source {
+    const struct radiance_tracer *tracer;
+    void *state;
+    const struct appearance *model;
+    size_t n_set;  /* at least 1 */
+    size_t n_flat; /* derivatives per channel: n_set * model->n_param, 0 when none are wanted */
+};
+
+/* STATUS_INVALID, field "model", when the cloth lacks the form that the model needs; field "n_set" for a number of sets
+ * that cloth or model do not allow, otherwise the name of a parameter. STATUS_NO_MEMORY. n_configuration may be 0 for a
+ * source that only replays. */
+status radiance_source_init(struct radiance_source *source, const struct radiance_input *in,
+                            const struct configuration *c, size_t n_configuration, struct error *err);
+/* Accepts a source that is all zero or whose init failed. */
+void radiance_source_release(struct radiance_source *source);
+/* "beta_TT", or "set1.beta_TT" when there are several sets. */
+void radiance_derivative_name(const struct radiance_source *source, size_t i_flat, char text[RADIANCE_NAME_BYTES]);
+
+#endif

@@ -1,0 +1,106 @@
+#include "renderer/transport/surface/surface_radiance.h"
+
+#include "renderer/transport/camera.h"
+#include "renderer/transport/surface/path_tracer.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct surface_state {
+    const struct scene *scene;
+    struct parameter_sets sets;
+    size_t n_jac;
+    struct path_setting *setting; /* per configuration */
+    struct camera *camera;        /* per configuration */
+};
+
+static void release(void *state)
+{
+    struct surface_state *s = state;
+    parameter_sets_release(&s->sets);
+    free(s->setting);
+    free(s->camera);
+    free(s);
+}
+
+static status prepare(const struct radiance_input *in, const struct configuration *c, size_t n_configuration,
+                      void **state, struct error *err)
+{
+    const struct scattering_model *m = in->model->surface;
+    struct surface_state *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
+    s->scene = in->scene.fibers;
+    s->setting = malloc((n_configuration + 1) * sizeof *s->setting);
+    s->camera = malloc((n_configuration + 1) * sizeof *s->camera);
+    status st = s->setting != NULL && s->camera != NULL
+                    ? parameter_sets_init(&s->sets, s->scene, m, in->param, in->n_set, err)
+                    : error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
+    if (st != STATUS_OK) {
+        release(s);
+        return st;
+    }
+    s->n_jac = in->want_derivative ? 3 * s->sets.n * m->n_param : 0;
+    for (size_t i = 0; i < n_configuration; i++) {
+        path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
+        if (in->plain_paths) s->setting[i].probes = false;
+        camera_init(&s->camera[i], &c[i]);
+    }
+    *state = s;
+    return STATUS_OK;
+}
+
+static uint64_t trace(const void *state, const struct radiance_block *b, float *value)
+{
+    const struct surface_state *s = state;
+    const struct path_setting *setting = &s->setting[b->member[0]];
+    const struct camera *camera = &s->camera[b->member[0]];
+    size_t n_lamp = setting->lights.has_lamp ? b->n_member : 0, n_value = 3 + s->n_jac;
+    uint64_t n_bounce = 0;
+    struct lamp lamp[PATH_MAX_LAMP];
+    struct path_result path[PATH_MAX_LAMP];
+    for (size_t k = 0; k < b->n_member; k++) lamp[k] = s->setting[b->member[k]].lights.lamp;
+    for (size_t i = 0; i < b->n_path; i++) {
+        struct scene_ray ray;
+        if (progress_cancelled(b->progress)) break; /* a block of white cloth takes longer than a caller will wait */
+        if (!camera_ray(camera, s->scene, b->xy[i], &ray)) continue; /* sees nothing: adds 0 */
+        path_trace_lamps(setting, lamp, n_lamp, &ray, &b->rng[i], path);
+        n_bounce += path[0].n_vertex;
+        for (size_t k = 0; k < b->n_member; k++) {
+            float *v = value + (i * b->n_member + k) * n_value;
+            memcpy(v, path[k].radiance, sizeof path[k].radiance);
+            memcpy(v + 3, path[k].jac, s->n_jac * sizeof *v);
+        }
+    }
+    return n_bounce;
+}
+
+static void record_path(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,
+                        struct radiance_record *record, float *value)
+{
+    const struct surface_state *s = state;
+    struct path_result path;
+    struct scene_ray ray;
+    struct path_record steps = {0, record->capacity, record->entry};
+    record->n_entry = record->n_bounce = 0;
+    if (!camera_ray(&s->camera[i_configuration], s->scene, xy, &ray)) return;
+    path_trace(&s->setting[i_configuration], &ray, rng, &path, &steps);
+    record->n_entry = record->n_bounce = steps.n_step;
+    memcpy(value, path.radiance, sizeof path.radiance);
+    memcpy(value + 3, path.jac, s->n_jac * sizeof *value);
+}
+
+static double replay(const void *at, const void *traced, const struct radiance_record *record)
+{
+    (void)traced; /* its sampling is in the record */
+    const struct parameter_sets *sets = &((const struct surface_state *)at)->sets;
+    const struct path_record steps = {record->n_entry, record->capacity, record->entry};
+    return path_replay(sets, &steps);
+}
+
+const struct radiance_tracer surface_radiance = {.max_member = PATH_MAX_LAMP,
+                                                 .entry_bytes = sizeof(struct path_step),
+                                                 .prepare = prepare,
+                                                 .release = release,
+                                                 .trace = trace,
+                                                 .record = record_path,
+                                                 .replay = replay};
