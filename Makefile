@@ -78,7 +78,7 @@ $(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker/worker_main.c.o $(L)
 $(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom/phantom_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
-$(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)job.a $(L)renderer.a $(L)base.a
+$(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)job.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
 $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/null)) $(L)base.a

@@ -1,6 +1,6 @@
 #include "optimizer/job/job_document.h"
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
-#include "optimizer/job/method_names.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -69,10 +69,10 @@ static struct job_document *document_new(void)
     d->camera_distance_cm = 100.0;
     d->crop_cm = 1.0;
     d->black_sheet = true;
-    snprintf(d->method, sizeof d->method, "%s", method_name_list()[0]);
+    snprintf(d->method, sizeof d->method, "%s", method_catalogue_at(0)->id);
     d->seed = 1;
     d->n_model = 1;
-    snprintf(d->model[0].id, sizeof d->model[0].id, "%s", "two_lobe.v1");
+    snprintf(d->model[0].id, sizeof d->model[0].id, "%s", model_catalogue_at(0)->id);
     for (size_t i = 0; i < JOB_MAX_MODEL; i++) {
         fill_nan(d->model[i].fixed, JOB_MAX_PARAM);
         fill_nan(d->model[i].start, JOB_MAX_PARAM);

@@ -21,7 +21,7 @@
  *   "photographs": [                                      ... or this
  *     {"file":"p00.exr","set":"fit"|"held-out","light_theta_deg":,"light_phi_deg":,"camera_theta_deg":,"camera_phi_deg":,
  *      "cloth_rotation_deg":, "scale": 1.0, "weight": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
- *   "fit": {"model": "two_lobe.v1" or "models": ["two_lobe.v1", "phase_two_lobe.v1", ...],   ids of appearance.h; several
+ *   "fit": {"model": "two_lobe.v1" or "models": ["two_lobe.v1", "phase_two_lobe.v1", ...],   ids of models.def; several
  *                                                         are fitted one after the other and compared
  *           "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
  *           "max_iterations": n, "path_budget": n,        of each model
@@ -53,6 +53,7 @@ enum {
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
     JOB_MAX_CANDIDATE = 1024,
+    JOB_MAX_TEXTURE_CELLS = 32, /* blocks of a crop a side; the renderer can do as many */
     JOB_MAX_MODEL = 8
 };
 

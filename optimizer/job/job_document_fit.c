@@ -1,7 +1,6 @@
-/* The section "fit" of a job document: names and values are checked against the registries of models and methods. */
+/* The section "fit" of a job document: names and values are checked against the catalogues of models and methods. */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
-#include "optimizer/job/method_names.h"
-#include "renderer/scattering/appearance.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -12,9 +11,16 @@ enum { MAX_LISTED = 31 };
 /* Ids of all models, NULL-terminated. */
 static void list_models(const char *name[MAX_LISTED + 1])
 {
-    struct appearance a;
     size_t n = 0;
-    for (; n < MAX_LISTED && appearance_at(n, &a); n++) name[n] = a.id;
+    for (const struct model_info *m; n < MAX_LISTED && (m = model_catalogue_at(n)) != NULL; n++) name[n] = m->id;
+    name[n] = NULL;
+}
+
+/* Ids of all descent methods, NULL-terminated. */
+static void list_methods(const char *name[MAX_LISTED + 1])
+{
+    size_t n = 0;
+    for (const struct method_info *m; n < MAX_LISTED && (m = method_catalogue_at(n)) != NULL; n++) name[n] = m->id;
     name[n] = NULL;
 }
 
@@ -63,18 +69,20 @@ static status parse_models(const struct json_field *f, struct job_document *doc,
 
 static status parse_method(const struct json_field *f, struct job_document *doc, struct error *err)
 {
+    const char *name[MAX_LISTED + 1];
     size_t i_method = MAX_LISTED;
-    status s = json_field_choice(f, "method", method_name_list(), &i_method, err);
-    if (s == STATUS_OK && i_method < MAX_LISTED)
-        snprintf(doc->method, sizeof doc->method, "%s", method_name_list()[i_method]);
+    list_methods(name);
+    status s = json_field_choice(f, "method", name, &i_method, err);
+    if (s == STATUS_OK && i_method < MAX_LISTED) snprintf(doc->method, sizeof doc->method, "%s", name[i_method]);
     return s;
 }
 
-/* Those that "fixed" and "start" speak of: d has keys of its own. */
-static size_t n_named(const struct appearance *m) { return m->n_param - (m->kind == APPEARANCE_VOLUME ? 1 : 0); }
+/* Parameters that "fixed" and "start" can name: the density multiplier, the last one of volume models, has keys of its
+ * own. */
+static size_t n_named(const struct model_info *m) { return m->n_param - (m->kind == MODEL_VOLUME ? 1 : 0); }
 
 /* "C_R, beta_R, ...": each group once. */
-static void list_symbols(const struct appearance *m, char *text, size_t n_bytes)
+static void list_symbols(const struct model_info *m, char *text, size_t n_bytes)
 {
     size_t used = 0;
     text[0] = '\0';
@@ -86,15 +94,15 @@ static void list_symbols(const struct appearance *m, char *text, size_t n_bytes)
     }
 }
 
-status job_unknown_parameter(const struct appearance *model, size_t n_model, const char *path, const char *key,
+status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,
                              struct error *err)
 {
     char list[300], text[1000];
     size_t used = 0;
     text[0] = '\0';
     for (size_t i = 0; i < n_model && used < sizeof text; i++) {
-        list_symbols(&model[i], list, sizeof list);
-        int n = snprintf(text + used, sizeof text - used, "%s model '%s' has %s", i > 0 ? ";" : "", model[i].id, list);
+        list_symbols(model[i], list, sizeof list);
+        int n = snprintf(text + used, sizeof text - used, "%s model '%s' has %s", i > 0 ? ";" : "", model[i]->id, list);
         used += n > 0 ? (size_t)n : 0;
     }
     return error_set_field(err, STATUS_INVALID, path, "unknown parameter '%.60s':%s", key, text);
@@ -102,7 +110,7 @@ status job_unknown_parameter(const struct appearance *model, size_t n_model, con
 
 /* One key of "fixed" or "start": a group ("C_TT": one number for all channels, or three) or one slot ("C_TT.r").
  * *known: set when the model has it. */
-static status parse_value(const struct json_field *f, const char *key, const json_t *value, const struct appearance *m,
+static status parse_value(const struct json_field *f, const char *key, const json_t *value, const struct model_info *m,
                           double *out, bool *known, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM], n_slot = 0;
@@ -134,7 +142,7 @@ static status parse_value(const struct json_field *f, const char *key, const jso
 }
 
 /* The section "fixed" or "start": each key for every model that has such a parameter. */
-static status parse_values(const struct json_field *fit, bool fixed, const struct appearance *model,
+static status parse_values(const struct json_field *fit, bool fixed, const struct model_info *const *model,
                            struct job_document *doc, struct error *err)
 {
     struct json_field f;
@@ -146,7 +154,7 @@ static status parse_values(const struct json_field *fit, bool fixed, const struc
         const char *key = json_object_iter_key(iter);
         bool known = false;
         for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
-            s = parse_value(&f, key, json_object_iter_value(iter), &model[i],
+            s = parse_value(&f, key, json_object_iter_value(iter), model[i],
                             fixed ? doc->model[i].fixed : doc->model[i].start, &known, err);
         if (s != STATUS_OK) return s;
         char path[JSON_PATH_BYTES];
@@ -157,22 +165,22 @@ static status parse_values(const struct json_field *fit, bool fixed, const struc
 }
 
 /* The density multiplier of volume models. */
-static status parse_density(const struct json_field *f, const struct appearance *model, struct job_document *doc,
+static status parse_density(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
                             struct error *err)
 {
     bool any_volume = false;
     for (size_t i = 0; i < doc->n_model; i++) {
-        if (model[i].kind != APPEARANCE_VOLUME) continue;
-        const struct param_info *d = &model[i].param[model[i].n_param - 1];
+        if (model[i]->kind != MODEL_VOLUME) continue;
+        const struct param_info *d = &model[i]->param[model[i]->n_param - 1];
         status s = json_field_number(f, "density_multiplier_per_cm", param_to_file_unit(d, d->lower),
                                      param_to_file_unit(d, d->upper), &doc->density_multiplier_per_cm, err);
         if (s == STATUS_OK) s = json_field_bool(f, "fit_density", &doc->fit_density, err);
         if (s != STATUS_OK) return s;
         bool given = !isnan(doc->density_multiplier_per_cm);
         double value = given ? doc->density_multiplier_per_cm : param_to_file_unit(d, d->start);
-        if (!doc->fit_density) doc->model[i].fixed[model[i].n_param - 1] = value;
+        if (!doc->fit_density) doc->model[i].fixed[model[i]->n_param - 1] = value;
         if (doc->fit_density && given)
-            doc->model[i].start[model[i].n_param - 1] = value; /* else a prior's mean may be */
+            doc->model[i].start[model[i]->n_param - 1] = value; /* else a prior's mean may be */
         any_volume = true;
     }
     static const char *const key[] = {"density_multiplier_per_cm", "fit_density"};
@@ -187,7 +195,7 @@ static status parse_density(const struct json_field *f, const struct appearance 
 }
 
 /* true, false or the range to search. */
-static status parse_radius(const struct json_field *f, const struct appearance *model, struct job_document *doc,
+static status parse_radius(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
                            struct error *err)
 {
     static const char *const key[] = {"lower_um", "upper_um", NULL};
@@ -211,14 +219,14 @@ static status parse_radius(const struct json_field *f, const struct appearance *
                                    doc->radius_upper_um, doc->radius_lower_um);
     }
     for (size_t i = 0; i < doc->n_model && doc->fit_radius; i++)
-        if (model[i].kind == APPEARANCE_SURFACE) return STATUS_OK;
+        if (model[i]->kind == MODEL_SURFACE) return STATUS_OK;
     return doc->fit_radius
                ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
-                                 "'fit.fit_radius' needs a model of fibers' surfaces: '%s' sees a volume", model[0].id)
+                                 "'fit.fit_radius' needs a model of fibers' surfaces: '%s' sees a volume", model[0]->id)
                : STATUS_OK;
 }
 
-static status check_free_parameters(const struct appearance *m, const struct job_model *given, struct error *err)
+static status check_free_parameters(const struct model_info *m, const struct job_model *given, struct error *err)
 {
     size_t n_free = 0;
     for (size_t p = 0; p < m->n_param; p++) {
@@ -237,9 +245,9 @@ static status check_free_parameters(const struct appearance *m, const struct job
 /* Parameters of all models that are named. */
 static status parse_parameters(const struct json_field *f, struct job_document *doc, struct error *err)
 {
-    struct appearance model[JOB_MAX_MODEL];
+    const struct model_info *model[JOB_MAX_MODEL];
     for (size_t i = 0; i < doc->n_model; i++)
-        if (!appearance_find(doc->model[i].id, &model[i]))
+        if ((model[i] = model_catalogue_find(doc->model[i].id)) == NULL)
             return error_set_field(err, STATUS_INVALID, "fit.model", "the model '%s' is not in this program",
                                    doc->model[i].id);
     status s = parse_values(f, true, model, doc, err);
@@ -247,7 +255,7 @@ static status parse_parameters(const struct json_field *f, struct job_document *
     if (s == STATUS_OK) s = parse_density(f, model, doc, err);
     if (s == STATUS_OK) s = parse_radius(f, model, doc, err);
     for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
-        s = check_free_parameters(&model[i], &doc->model[i], err);
+        s = check_free_parameters(model[i], &doc->model[i], err);
     return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
 }
 

@@ -1,14 +1,11 @@
 /* Ties, bounds, priors, starts and nuisance terms of the section "fit" (job_fit_option.h). */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
-#include "optimizer/job/method_names.h"
 
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-
-/* Random keys of one start (fit_run.h) are enough for six runs of the published method with so many. */
-enum { MAX_ITERATION_OF_STARTS = 500 };
 
 void job_fit_option_init(struct job_fit_option *o)
 {
@@ -21,12 +18,12 @@ void job_fit_option_init(struct job_fit_option *o)
 }
 
 struct reader {
-    const struct appearance *model;
+    const struct model_info *const *model;
     struct job_document *doc;
 };
 
 /* Slots of one model that a key names: a group ("C_TT") or one parameter ("C_TT.r"). */
-static size_t find_slots(const struct appearance *m, const char *key, size_t slot[JOB_MAX_PARAM])
+static size_t find_slots(const struct model_info *m, const char *key, size_t slot[JOB_MAX_PARAM])
 {
     size_t n = 0;
     for (size_t p = 0; p < m->n_param; p++)
@@ -38,7 +35,7 @@ static status check_known(const struct reader *r, const char *path, const char *
 {
     size_t slot[JOB_MAX_PARAM];
     for (size_t i = 0; i < r->doc->n_model; i++)
-        if (find_slots(&r->model[i], key, slot) > 0) return STATUS_OK;
+        if (find_slots(r->model[i], key, slot) > 0) return STATUS_OK;
     return job_unknown_parameter(r->model, r->doc->n_model, path, key, err);
 }
 
@@ -85,7 +82,7 @@ static bool is_tied(const struct job_fit_option *o, size_t n_param, size_t p)
 }
 
 /* Ties the slots of one model that a group names; *n_slot: how many those are. */
-static status apply_tie(const struct tie *t, const struct appearance *m, struct job_fit_option *o, size_t *n_slot,
+static status apply_tie(const struct tie *t, const struct model_info *m, struct job_fit_option *o, size_t *n_slot,
                         struct error *err)
 {
     size_t slot[JOB_MAX_PARAM * 3], leader = SIZE_MAX;
@@ -104,7 +101,7 @@ static status apply_tie(const struct tie *t, const struct appearance *m, struct 
             if (used)
                 return error_set_field(err, STATUS_INVALID, t->path, "'%s' ties '%s' a second time", t->path,
                                        m->param[p].name);
-            if (strcmp(m->param[p].unit, m->param[leader].unit) != 0)
+            if (m->param[p].unit != m->param[leader].unit)
                 return error_set_field(err, STATUS_INVALID, t->path,
                                        "'%s' ties '%s' to '%s': only parameters of the same unit can be tied", t->path,
                                        m->param[p].name, m->param[leader].name);
@@ -131,7 +128,7 @@ static status parse_tied(const struct reader *r, const struct json_field *fit, s
         for (size_t i = 0; i < t.n_name && s == STATUS_OK; i++) s = check_known(r, f.path, t.name[i], err);
         for (size_t i = 0; i < r->doc->n_model && s == STATUS_OK; i++) {
             size_t n_slot;
-            s = apply_tie(&t, &r->model[i], &r->doc->model[i].option, &n_slot, err);
+            s = apply_tie(&t, r->model[i], &r->doc->model[i].option, &n_slot, err);
             if (n_slot > largest) largest = n_slot;
         }
         if (s != STATUS_OK) return s;
@@ -144,7 +141,7 @@ static status parse_tied(const struct reader *r, const struct json_field *fit, s
 
 /* ---- bounds and priors ---- */
 
-static status parse_bound(const struct json_field *f, const char *key, const struct appearance *m,
+static status parse_bound(const struct json_field *f, const char *key, const struct model_info *m,
                           struct job_fit_option *o, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM], n_slot = find_slots(m, key, slot);
@@ -172,7 +169,7 @@ static status parse_bound(const struct json_field *f, const char *key, const str
     return STATUS_OK;
 }
 
-static status parse_prior(const struct json_field *f, const char *key, const struct appearance *m,
+static status parse_prior(const struct json_field *f, const char *key, const struct model_info *m,
                           struct job_fit_option *o, struct error *err)
 {
     static const char *const allowed[] = {"mean", "se", NULL};
@@ -201,7 +198,7 @@ static status parse_prior(const struct json_field *f, const char *key, const str
 }
 
 static status parse_each(const struct reader *r, const struct json_field *fit, const char *section,
-                         status (*one)(const struct json_field *f, const char *key, const struct appearance *m,
+                         status (*one)(const struct json_field *f, const char *key, const struct model_info *m,
                                        struct job_fit_option *o, struct error *err),
                          struct error *err)
 {
@@ -216,7 +213,7 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
         json_field_path(&f, key, path);
         s = check_known(r, path, key, err);
         for (size_t i = 0; i < r->doc->n_model && s == STATUS_OK; i++)
-            s = one(&f, key, &r->model[i], &r->doc->model[i].option, err);
+            s = one(&f, key, r->model[i], &r->doc->model[i].option, err);
     }
     return s;
 }
@@ -252,17 +249,20 @@ static status parse_nuisance(const struct json_field *fit, struct job_fit_option
     return STATUS_OK;
 }
 
-/* The published method knows nothing of priors and nuisance terms. */
+/* Refuses priors and nuisance terms that the method does not take. */
 static status check_method(const struct job_document *doc, struct error *err)
 {
     bool has_prior = false;
     for (size_t i = 0; i < doc->n_model; i++)
         for (size_t p = 0; p < JOB_MAX_PARAM; p++) has_prior = has_prior || !isnan(doc->model[i].option.prior_mean[p]);
     const struct job_fit_option *o = &doc->model[0].option;
-    const char *path = has_prior ? "fit.priors" : o->gain != JOB_GAIN_NONE || o->stray_light ? "fit.nuisance" : NULL;
-    if (path == NULL || strcmp(doc->method, METHOD_GAUSS_NEWTON) == 0) return STATUS_OK;
+    unsigned wanted = (has_prior ? METHOD_TAKES_PRIORS : 0u) |
+                      (o->gain != JOB_GAIN_NONE || o->stray_light ? METHOD_TAKES_NUISANCE : 0u);
+    unsigned missing = wanted & ~method_catalogue_find(doc->method)->takes;
+    if (missing == 0) return STATUS_OK;
+    const char *path = (missing & METHOD_TAKES_PRIORS) != 0 ? "fit.priors" : "fit.nuisance";
     return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' has no such terms", path,
-                           METHOD_GAUSS_NEWTON, doc->method);
+                           method_catalogue_taking(wanted)->id, doc->method);
 }
 
 /* What is the same for all models. */
@@ -273,10 +273,11 @@ static status parse_common(const struct json_field *f, struct job_document *doc,
     status s = json_field_size(f, "starts", 1, JOB_MAX_START, &common.n_start, err);
     if (s == STATUS_OK) s = parse_nuisance(f, &common, err);
     if (s != STATUS_OK) return s;
-    if (common.n_start > 1 && doc->max_iteration > MAX_ITERATION_OF_STARTS)
+    size_t most = method_catalogue_find(doc->method)->max_iteration_of_starts;
+    if (common.n_start > 1 && doc->max_iteration > most)
         return error_set_field(err, STATUS_INVALID, "fit.max_iterations",
-                               "'fit.max_iterations' is %zu: with several starts at most %d are allowed",
-                               doc->max_iteration, MAX_ITERATION_OF_STARTS);
+                               "'fit.max_iterations' is %zu: with several starts at most %zu are allowed",
+                               doc->max_iteration, most);
     for (size_t i = 0; i < doc->n_model; i++) {
         struct job_fit_option *o = &doc->model[i].option;
         o->n_start = common.n_start;
@@ -288,8 +289,8 @@ static status parse_common(const struct json_field *f, struct job_document *doc,
     return STATUS_OK;
 }
 
-status job_parse_fit_options(const struct json_field *f, const struct appearance *model, struct job_document *doc,
-                             struct error *err)
+status job_parse_fit_options(const struct json_field *f, const struct model_info *const *model,
+                             struct job_document *doc, struct error *err)
 {
     struct reader r = {model, doc};
     struct job_fit_parameter resolved[JOB_MAX_PARAM];
@@ -299,7 +300,7 @@ status job_parse_fit_options(const struct json_field *f, const struct appearance
     if (s == STATUS_OK) s = parse_common(f, doc, err);
     if (s == STATUS_OK) s = check_method(doc, err);
     for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
-        s = job_fit_resolve(model[i].param, model[i].n_param, &doc->model[i], resolved, err);
+        s = job_fit_resolve(model[i]->param, model[i]->n_param, &doc->model[i], resolved, err);
     return s;
 }
 
@@ -344,7 +345,7 @@ static status group_bounds(const struct param_info *info, size_t n_param, const 
 }
 
 /* Stated by keys of its own, density_multiplier_per_cm and fit_density. */
-static bool is_density(const struct param_info *info) { return strcmp(info->name, APPEARANCE_DENSITY_MULTIPLIER) == 0; }
+static bool is_density(const struct param_info *info) { return info->kind == PARAM_DENSITY; }
 
 /* A prior is one of its leader's value: it must lie where the leader's coordinate is defined, and agree with some value
  * between the bounds that the group has. */

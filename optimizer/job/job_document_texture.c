@@ -1,7 +1,6 @@
 /* "texture" of the section "fit": the contrast of photographs at a stated scale. */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
-#include "optimizer/job/method_names.h"
-#include "renderer/scene/configuration.h"
 
 #include <math.h>
 #include <string.h>
@@ -22,10 +21,10 @@ static status check_use(const struct job_document *doc, struct error *err)
     if (doc->measurement_file[0] != '\0')
         return error_set_field(err, STATUS_INVALID, field, "'%s' needs photographs: a table of means has no texture",
                                field);
-    if (doc->texture_weight > 0.0 && strcmp(doc->method, METHOD_GAUSS_NEWTON) != 0)
+    if (doc->texture_weight > 0.0 && (method_catalogue_find(doc->method)->takes & METHOD_TAKES_TEXTURE) == 0)
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' with a weight needs the method '%s': '%s' has no such terms", field,
-                               METHOD_GAUSS_NEWTON, doc->method);
+                               method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, doc->method);
     if (doc->model[0].option.stray_light)
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' cannot be used with 'fit.nuisance.stray_light': a contrast that is lowered by "
@@ -47,11 +46,11 @@ status job_parse_texture(const struct json_field *fit, struct job_document *doc,
     if (s == STATUS_OK) s = json_field_required_number(&f, "block_mm", 1e-3, 1e3, &block_mm, err);
     if (s == STATUS_OK) s = json_field_number(&f, "weight", 0.0, 1e3, &doc->texture_weight, err);
     if (s != STATUS_OK) return s;
-    if (block_mm > crop_mm / 2.0 || lround(crop_mm / block_mm) > CONFIGURATION_MAX_CELLS)
+    if (block_mm > crop_mm / 2.0 || lround(crop_mm / block_mm) > JOB_MAX_TEXTURE_CELLS)
         return error_set_field(err, STATUS_INVALID, "fit.texture.block_mm",
                                "'fit.texture.block_mm' is %g: it must divide the crop of %g mm into 2 to %d blocks a "
                                "side, which is %g to %g mm",
-                               block_mm, crop_mm, CONFIGURATION_MAX_CELLS, crop_mm / CONFIGURATION_MAX_CELLS,
+                               block_mm, crop_mm, JOB_MAX_TEXTURE_CELLS, crop_mm / JOB_MAX_TEXTURE_CELLS,
                                crop_mm / 2.0);
     doc->texture_block_mm = block_mm;
     return check_use(doc, err);

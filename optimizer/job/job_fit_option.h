@@ -12,10 +12,12 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_FIT_OPTION_H
 #define SELVEDGE_OPTIMIZER_JOB_FIT_OPTION_H
 
+#include "base/catalogue/model_catalogue.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { JOB_MAX_PARAM = 16, JOB_MAX_START = 16 };
+enum { JOB_MAX_PARAM = MODEL_MAX_PARAM, JOB_MAX_START = 16 };
 
 enum job_gain { JOB_GAIN_NONE, JOB_GAIN_GLOBAL, JOB_GAIN_PER_PHOTOGRAPH };
 

@@ -58,7 +58,8 @@ status phantom_param_parse(const struct scattering_model *model, const char *tex
         double v = param_from_file_unit(p, n_value == 3 ? value[p->channel] : value[0]);
         if (!(v >= p->lower && v <= p->upper))
             return error_set_field(err, STATUS_INVALID, "param", "parameter '%s': it must lie between %g and %g %s",
-                                   text, param_to_file_unit(p, p->lower), param_to_file_unit(p, p->upper), p->unit);
+                                   text, param_to_file_unit(p, p->lower), param_to_file_unit(p, p->upper),
+                                   param_unit_name(p->unit));
         param[i] = v;
         n_match++;
     }

@@ -82,9 +82,9 @@ static json_t *parameters_json(const struct worker_series_model *model)
     for (size_t p = 0; p < model->appearance->n_param; p++) {
         const struct param_info *info = &model->appearance->param[p];
         const struct fit_parameter *k = &model->parameter[p];
-        json_array_append_new(list, json_pack("{s:s, s:s, s:f, s:f, s:b}", "name", info->name, "unit", info->unit,
-                                              "lower", param_to_file_unit(info, k->lower), "upper",
-                                              param_to_file_unit(info, k->upper), "fixed", (int)k->fixed));
+        json_array_append_new(list, json_pack("{s:s, s:s, s:f, s:f, s:b}", "name", info->name, "unit",
+                                              param_unit_name(info->unit), "lower", param_to_file_unit(info, k->lower),
+                                              "upper", param_to_file_unit(info, k->upper), "fixed", (int)k->fixed));
     }
     return list;
 }

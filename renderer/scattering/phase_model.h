@@ -1,5 +1,5 @@
 /* Scattering models of a volume of fibers: phase function with albedo, and how extinction depends on direction. One
- * file per model, one row in the registry, found by id. The volume tracer's twin of scattering.h.
+ * file per model, one row in the catalogue, found by id. The volume tracer's twin of scattering.h.
  *
  * Frame: fiber frame u, v, w with u along the fiber; directions point away from the scattering point. A model stands
  * for sigma_t(w) = d rho(x) s(w)              s a function of the sine of the angle between w and the fiber source
@@ -29,9 +29,8 @@ struct phase_extinction {
 struct phase_state;
 
 struct phase_model {
-    const char *id;    /* "phase_two_lobe.v1": never reused for changed physics */
-    const char *title; /* one line for people, with the source */
-    size_t n_param;    /* at most PHASE_MAX_PARAM */
+    const char *id, *title; /* these four: VOLUME_MODEL_ROW of the catalogue */
+    size_t n_param;         /* at most PHASE_MAX_PARAM */
     const struct param_info *param;
 
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
@@ -48,7 +47,7 @@ struct phase_model {
                       float f_rgb[3], float *score);
 };
 
-/* All models, NULL-terminated; and by id (NULL when unknown). */
+/* All models, NULL-terminated, in the order of the catalogue; and by id (NULL when unknown). */
 const struct phase_model *const *phase_registry(void);
 const struct phase_model *phase_find(const char *id);
 

@@ -1,34 +1,24 @@
-/* Scattering models of fibers: one file per model, one row in the registry, found by id.
+/* Scattering models of fibers: one file per model, one row in the catalogue (base/catalogue/models.def), found by id.
  *
  * Frame: fiber frame u, v, w with u along the fiber; w = (sin th, cos th cos ph, cos th sin ph), th in [-pi/2, pi/2]
  * from the normal plane (fabric thesis, section 5.4). Directions point away from the fiber. S(wi, wo) is the BCSDF; the
  * light leaving along wo is the integral of S Li cos(th_i) dwi. Energy: integral of S cos(th_o) dwo <= 1 for every wi.
  *
- * A model describes its parameters; everyone else (tracer, optimizer, API, dashboard) learns of them from here.
- * Parameters are numbered flat: a colour parameter takes three consecutive slots r, g, b. Angles are radians inside,
- * degrees in files (param_info.unit "deg").
+ * The catalogue describes the parameters (param_info.h): they are numbered flat, in internal units.
  */
 #ifndef SELVEDGE_RENDERER_SCATTERING_H
 #define SELVEDGE_RENDERER_SCATTERING_H
 
+#include "base/catalogue/model_catalogue.h"
 #include "base/status.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
 enum {
-    SCATTERING_MAX_PARAM = 16, /* of one model */
-    SCATTERING_MAX_SET = 8,    /* parameter sets in a mixed cloth (scene.h: material groups) */
-    SCATTERING_MAX_FLAT = 64   /* parameters of all sets together */
-};
-
-/* One flat parameter slot. */
-struct param_info {
-    const char *name;           /* "C_R.r", "beta_TT": unique in the model */
-    const char *symbol;         /* group name: "C_R" */
-    const char *unit;           /* "", "deg" or "1/cm" (how files and users see it) */
-    int channel;                /* 0 r, 1 g, 2 b; -1 acts on all channels */
-    double lower, upper, start; /* internal unit: radians for "deg", 1/m for "1/cm" */
+    SCATTERING_MAX_PARAM = MODEL_MAX_PARAM, /* of one model */
+    SCATTERING_MAX_SET = 8,                 /* parameter sets in a mixed cloth (scene.h: material groups) */
+    SCATTERING_MAX_FLAT = 64                /* parameters of all sets together */
 };
 
 /* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by
@@ -36,8 +26,7 @@ struct param_info {
 struct scattering_state;
 
 struct scattering_model {
-    const char *id;    /* "two_lobe.v1": never reused for changed physics */
-    const char *title; /* one line for people, with the source */
+    const char *id, *title; /* these four: SURFACE_MODEL_ROW of the catalogue */
     size_t n_param;
     const struct param_info *param;
 
@@ -62,13 +51,10 @@ struct scattering_model {
                       const float *weight_rgb, float s_rgb[3], float *score);
 };
 
-/* All models, NULL-terminated; and by id (NULL when unknown). */
+/* All models, NULL-terminated, in the order of the catalogue; and by id (NULL when unknown). */
 const struct scattering_model *const *scattering_registry(void);
 const struct scattering_model *scattering_find(const char *id);
 /* Index of a flat parameter by name, or -1. */
 int scattering_param_index(const struct scattering_model *m, const char *name);
-/* value in the unit of files -> internal unit, and back. */
-double param_from_file_unit(const struct param_info *p, double value);
-double param_to_file_unit(const struct param_info *p, double value);
 
 #endif

@@ -28,8 +28,8 @@
  *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
  *                                        from the normal, as fitted by each model to the 16 photographs; _brightest: at 80 degrees, of any microflakes
  */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/job/method_names.h"
 #include "tests/bench/fit_bench.h"
 #include "tests/support/cloth/fit_fabrics.h"
 #include "tests/support/tracer/fake_estimator.h"
@@ -105,7 +105,7 @@ static void bench_fabric(const struct bench *b, const char *name)
     fprintf(stderr, "  the truth scores %.4f +- %.4f, %.4f expected of the photographs' stated errors\n", truth.rel_rms,
             truth.se, expected_score(&f));
     if (!b->prepare) {
-        bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
+        bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget, NULL, &r, NULL);
         bench_tell_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
         fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
@@ -127,7 +127,7 @@ static void cover_fabric(const struct bench *b, const char *name, size_t *n_insi
     for (uint64_t i = 0; i < N_PART; i++) {
         struct fit_result r;
         fit_phantom_photograph(&f, &(struct fit_photography){b->photograph_paths / N_PART, BENCH_NOISE, 100 + i, i});
-        bench_run_fit(&f, METHOD_GAUSS_NEWTON, 100 + i, b->path_budget, NULL, &r, NULL);
+        bench_run_fit(&f, method_gauss_newton.id, 100 + i, b->path_budget, NULL, &r, NULL);
         bench_tell_fit(&f, &r);
         for (size_t p = 0; p < f.model.n_param; p++) {
             if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
@@ -168,7 +168,7 @@ static void bench_seeds(const struct bench *b)
     open_fabric(b, "gabardine", &f);
     for (uint64_t i = 0; i < N_SEED; i++) {
         struct fit_result r;
-        bench_run_fit(&f, METHOD_GAUSS_NEWTON, 200 + i, b->path_budget, NULL, &r, NULL);
+        bench_run_fit(&f, method_gauss_newton.id, 200 + i, b->path_budget, NULL, &r, NULL);
         bench_tell_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
         fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
@@ -210,7 +210,7 @@ static void bench_curve(const struct bench *b)
     const struct {
         const char *method;
         uint64_t budget;
-    } run[] = {{METHOD_GAUSS_NEWTON, b->path_budget}, {METHOD_PUBLISHED_SGD, b->sgd_budget}};
+    } run[] = {{method_gauss_newton.id, b->path_budget}, {method_published_sgd.id, b->sgd_budget}};
     struct fit_phantom f;
     struct fit_curve *c = calloc(1, sizeof *c);
     if (c == NULL) exit(1);
@@ -233,7 +233,7 @@ static void bench_published(const struct bench *b)
     char of[64];
     snprintf(of, sizeof of, "published.%s", b->fabric);
     open_fabric(b, b->fabric, &f);
-    bench_run_fit(&f, METHOD_PUBLISHED_SGD, 1, 0, b->journal, &r, NULL);
+    bench_run_fit(&f, method_published_sgd.id, 1, 0, b->journal, &r, NULL);
     bench_tell_fit(&f, &r);
     bench_print(of, "wall_s", r.wall_s, "s", "lower");
     bench_print(of, "paths", (double)r.n_path, "path", "lower");
@@ -285,8 +285,8 @@ static void bench_analytic(void)
     struct fit_curve *c = calloc(1, sizeof *c);
     if (c == NULL) exit(1);
     for (uint64_t seed = 1; seed <= N_SEED; seed++) {
-        fit_analytic(METHOD_GAUSS_NEWTON, seed, c);
-        fit_analytic(METHOD_PUBLISHED_SGD, seed, c);
+        fit_analytic(method_gauss_newton.id, seed, c);
+        fit_analytic(method_published_sgd.id, seed, c);
     }
     free(c);
 }

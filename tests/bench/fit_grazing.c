@@ -1,6 +1,6 @@
 /* Lamp and camera in mirrored directions, from the normal to grazing: figures fit.grazing.* of bench_fit. */
 #include "base/angle.h"
-#include "optimizer/job/method_names.h"
+#include "base/catalogue/method_catalogue.h"
 #include "tests/bench/fit_bench.h"
 #include "tests/support/cloth/fit_fabrics.h"
 
@@ -104,7 +104,7 @@ void bench_grazing(const struct bench *b)
         fprintf(stderr, "grazing, %s\n", bench_model[k].name);
         fit_phantom_init_on(&f, b->folder, b->pool, &cloth, bench_model[k].id, NULL);
         fit_phantom_observe(&f, &truth.observation);
-        bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget, NULL, &r, NULL);
+        bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget, NULL, &r, NULL);
         bench_tell_fit(&f, &r);
         print_mirror_curve(b, &f, bench_model[k].name, r.param);
         fit_phantom_release(&f);

@@ -1,8 +1,8 @@
 /* Measured tables: figures fit.real.* and fit.real_all_rotations.* of bench_fit. */
 #include "base/angle.h"
+#include "base/catalogue/method_catalogue.h"
 #include "base/durable.h"
 #include "optimizer/fit/photographs/measurement_table.h"
-#include "optimizer/job/method_names.h"
 #include "tests/bench/fit_bench.h"
 
 #include <glob.h>
@@ -101,7 +101,7 @@ static void fit_table(const struct real *real, const struct fit_cloth *cloth, si
     fprintf(stderr, "%s, %s\n", row->sample, bench_model[k].name);
     fit_phantom_init_on(&f, b->folder, b->pool, cloth, bench_model[k].id, NULL);
     fit_phantom_observe(&f, &row->observation);
-    bench_run_fit(&f, METHOD_GAUSS_NEWTON, 1, b->path_budget > 0 ? b->path_budget : REAL_BUDGET, NULL, &r, NULL);
+    bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget > 0 ? b->path_budget : REAL_BUDGET, NULL, &r, NULL);
     bench_tell_fit(&f, &r);
     if (b->row_paths > 0) tell_rows(&f, r.param, b->row_paths);
     score_table(real, &f, r.param, k, row);

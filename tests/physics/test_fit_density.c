@@ -1,10 +1,10 @@
 /* The density multiplier of a volume model as a fitted parameter: with the lamp behind the cloth it comes back within
  * its standard error; and one that nothing depends on is said not to be determined. */
 #include "base/angle.h"
+#include "base/catalogue/method_catalogue.h"
 #include "base/rng.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/trace_estimator.h"
-#include "optimizer/job/method_names.h"
 #include "tests/support/cloth/hand_volume.h"
 
 #include <math.h>
@@ -99,12 +99,12 @@ static void fit(const struct volume_scene *scene, size_t n, uint64_t budget, str
                                         .estimator = &e,
                                         .path_budget = budget};
     struct error err = {0};
-    if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
     for (size_t p = 0; p < model.n_param; p++)
         print_message("%-18s true %9.4g  fitted %9.4g +- %.3g %s%s\n", model.param[p].name,
                       param_to_file_unit(&model.param[p], truth[p]), param_to_file_unit(&model.param[p], r->param[p]),
-                      param_to_file_unit(&model.param[p], r->uncertainty.se_param[p]), model.param[p].unit,
-                      r->uncertainty.determined[p] ? "" : " not determined");
+                      param_to_file_unit(&model.param[p], r->uncertainty.se_param[p]),
+                      param_unit_name(model.param[p].unit), r->uncertainty.determined[p] ? "" : " not determined");
     observation_set_release(&o);
     thread_pool_free(pool);
 }

@@ -1,4 +1,4 @@
-/* Methods of descent: one file each, one row in the registry, found by id.
+/* Methods of descent: one file each, one row in the catalogue (base/catalogue/methods.def), found by id.
  *
  * A method is a deterministic function of the problem and of the estimates it asks for; it keeps nothing between runs
  * and never looks at a clock. That is what makes a fit bit-identical for any number of threads and after a resume
@@ -7,6 +7,7 @@
 #ifndef SELVEDGE_OPTIMIZER_DESCENT_H
 #define SELVEDGE_OPTIMIZER_DESCENT_H
 
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/estimator.h"
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/objective/fit_layout.h"
@@ -81,17 +82,14 @@ struct fit_result {
 };
 
 struct descent_method {
-    const char *id;
-    const char *title;
-    uint64_t default_path_budget;
-    size_t default_max_iteration;
-    bool plain_paths; /* estimator.h */
+    const struct method_info *info; /* its row of the catalogue */
+    bool plain_paths;               /* estimator.h */
     /* Paths that a fit takes however small its budget is: with this budget, or more, it stays inside. */
     uint64_t (*least_budget)(const struct fit_problem *problem);
     status (*run)(const struct fit_problem *problem, struct fit_result *result, struct error *err);
 };
 
-/* All methods, NULL-terminated, in the order of method_names.h; and by id (NULL when unknown). */
+/* All methods, NULL-terminated, in the order of the catalogue; and by id (NULL when unknown). */
 const struct descent_method *const *descent_registry(void);
 const struct descent_method *descent_find(const char *id);
 

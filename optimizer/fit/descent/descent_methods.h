@@ -4,8 +4,8 @@
 
 #include "optimizer/fit/descent/descent.h"
 
-extern const struct descent_method descent_gauss_newton;
-extern const struct descent_method descent_published_sgd;
+#define DESCENT_METHOD(name, ...) extern const struct descent_method descent_##name;
+#include "base/catalogue/methods.def"
 
 /* A running fit: buffers and totals that every method needs. */
 struct descent_run {

@@ -31,7 +31,7 @@ status descent_run_init(struct descent_run *run, const struct fit_problem *probl
     status s = descent_check(problem, err);
     if (s != STATUS_OK) return s;
     size_t n = problem->observation->n;
-    run->path_budget = problem->path_budget > 0 ? problem->path_budget : method->default_path_budget;
+    run->path_budget = problem->path_budget > 0 ? problem->path_budget : method->info->default_path_budget;
     run->plain_paths = method->plain_paths;
     run->n_path = calloc(n, sizeof *run->n_path);
     run->replica[0] = calloc(n, sizeof(struct estimate));

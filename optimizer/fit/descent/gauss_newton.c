@@ -24,7 +24,6 @@
  */
 #include "base/small_matrix.h"
 #include "optimizer/fit/descent/descent_methods.h"
-#include "optimizer/job/method_names.h"
 #include "renderer/transport/estimate.h"
 
 #include <math.h>
@@ -37,9 +36,7 @@ enum {
     MIN_PATH = 1024,
     FIRST_PATH = 2048,
     PATH_PER_CELL = 16, /* of a contrast, at least: its noise falls with the square of these */
-    MAX_ITERATION = 80,
-    LEAST_ITERATION = 12,
-    DEFAULT_BUDGET = 6000000
+    LEAST_ITERATION = 12
 };
 
 /* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is; share of
@@ -121,10 +118,10 @@ static bool pull_target(const struct gauss_newton *g, size_t p, double *x)
     const struct coordinate *k = &g->run.coordinate[p];
     const struct param_info *info = &g->run.problem->info[p];
     double start = g->run.problem->param[p].start;
-    bool width = strcmp(info->unit, "deg") == 0;
+    bool width = info->kind == PARAM_LOBE_WIDTH;
     *x = coordinate_from_param(k, start);
     if (width && start == info->start) *x = fmax(*x, k->lower + wide_share * (k->upper - k->lower));
-    return !g->run.fixed[p] && (width || k->kind != COORDINATE_LOG);
+    return !g->run.fixed[p] && (width || k->kind != PARAM_LOG);
 }
 
 /* As strong as a prior of pull_sd step limits. */
@@ -373,7 +370,8 @@ static void let_go(struct gauss_newton *g, size_t max_iteration)
 static status iterate(struct gauss_newton *g, struct fit_result *result, struct error *err)
 {
     const struct fit_problem *problem = g->run.problem;
-    size_t max_iteration = problem->max_iteration > 0 ? problem->max_iteration : MAX_ITERATION;
+    size_t max_iteration =
+        problem->max_iteration > 0 ? problem->max_iteration : method_gauss_newton.default_max_iteration;
     double dx[N];
     for (;;) {
         status s = estimate_here(g, err);
@@ -465,10 +463,7 @@ out:
 }
 
 const struct descent_method descent_gauss_newton = {
-    .id = METHOD_GAUSS_NEWTON,
-    .title = "bounded Gauss-Newton on the Monte-Carlo Jacobian, all iterations pooled",
-    .default_path_budget = DEFAULT_BUDGET,
-    .default_max_iteration = MAX_ITERATION,
+    .info = &method_gauss_newton,
     .run = run_gauss_newton,
     .least_budget = least_budget,
 };

@@ -13,7 +13,6 @@
  */
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/rescale.h"
-#include "optimizer/job/method_names.h"
 #include "renderer/transport/estimate.h"
 
 #include <math.h>
@@ -21,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM, N_RUN = 6, N_ITERATION = 60, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5 };
+enum { N = SCATTERING_MAX_PARAM, N_RUN = 6, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5 };
 
 static const uint64_t published_path = 64 * 64 * 64;
 static const double first_move = 0.005, factor = 3.0, turn_limit = 0.3;
@@ -213,7 +212,8 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
 /* Renderings of one configuration: the curves, the first rate, the runs, settling, the end. */
 static double n_rendering(const struct fit_problem *problem, const struct coordinate *k)
 {
-    size_t n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
+    size_t n_iteration =
+        problem->max_iteration > 0 ? problem->max_iteration : method_published_sgd.default_max_iteration;
     return RESCALE_POINTS * (double)rescale_n_curve(problem, k) +
            2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
 }
@@ -256,7 +256,8 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
     if (g == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start a fit: out of memory");
     status s = descent_run_init(&g->run, problem, &descent_published_sgd, err);
     if (s != STATUS_OK) goto out;
-    size_t n_iteration = problem->max_iteration > 0 ? problem->max_iteration : N_ITERATION;
+    size_t n_iteration =
+        problem->max_iteration > 0 ? problem->max_iteration : method_published_sgd.default_max_iteration;
     plan_paths(&g->run);
     struct fit_problem planned = *problem;
     planned.path_budget = g->run.path_budget;
@@ -280,10 +281,7 @@ out:
 }
 
 const struct descent_method descent_published_sgd = {
-    .id = METHOD_PUBLISHED_SGD,
-    .title = "stochastic gradient descent in rescaled parameters, as published (fabric thesis 5.5)",
-    .default_path_budget = 0,
-    .default_max_iteration = N_ITERATION,
+    .info = &method_published_sgd,
     .plain_paths = true,
     .run = run_published_sgd,
     .least_budget = least_budget,

@@ -1,16 +1,13 @@
-/* Fit coordinates: the scale on which a parameter is moved. Colours and albedos strictly inside (0, 1) move in ln(p /
- * (1 - p)), positive quantities (lobe widths) in ln p, all others linearly; the model's range decides, so tighter bounds
- * of a fit change nothing. The bounds are finite in all three, so a parameter can reach one and stay there.
+/* Fit coordinates: the scale on which a fit moves a parameter, p, ln p or ln(p / (1 - p)), as the parameter declares it
+ * (param_info.h). The bounds are finite in all three, so a parameter can reach one and stay there.
  */
 #ifndef SELVEDGE_OPTIMIZER_COORDINATE_H
 #define SELVEDGE_OPTIMIZER_COORDINATE_H
 
-#include "renderer/scattering/scattering.h"
-
-enum coordinate_kind { COORDINATE_LINEAR, COORDINATE_LOG, COORDINATE_LOGIT };
+#include "base/catalogue/param_info.h"
 
 struct coordinate {
-    enum coordinate_kind kind;
+    enum param_coordinate kind;
     double param_lower, param_upper; /* internal unit */
     double lower, upper;             /* the same in the coordinate */
     double step_limit; /* largest step of one iteration: 1 in logit, 0.25 in log, 1/8 of the range otherwise */

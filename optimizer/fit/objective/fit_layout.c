@@ -47,12 +47,36 @@ static bool said_before(const struct fit_layout *l, const struct param_info *inf
     return false;
 }
 
-static size_t add_nuisance(struct fit_layout *l, const char *name, double lower, double upper, double start,
-                           double prior_mean, double prior_sd)
+static struct param_info gain_info(double sd)
+{
+    double range = exp(gain_range * sd);
+    return (struct param_info){.name = NUISANCE_GAIN,
+                               .symbol = NUISANCE_GAIN,
+                               .kind = PARAM_NUISANCE,
+                               .channel = -1,
+                               .lower = 1.0 / range,
+                               .upper = range,
+                               .start = 1.0,
+                               .coordinate = PARAM_LOG,
+                               .meaning = "Gain of all photographs."};
+}
+
+static struct param_info stray_light_info(double sd)
+{
+    return (struct param_info){.name = NUISANCE_STRAY_LIGHT,
+                               .symbol = NUISANCE_STRAY_LIGHT,
+                               .kind = PARAM_NUISANCE,
+                               .channel = -1,
+                               .upper = stray_range * sd,
+                               .coordinate = PARAM_LINEAR,
+                               .meaning = "Radiance that stray light adds to all photographs."};
+}
+
+static size_t add_nuisance(struct fit_layout *l, const struct param_info *info, double prior_mean, double prior_sd)
 {
     size_t k = l->n_unknown++;
-    l->info[k] = (struct param_info){name, name, "", -1, lower, upper, start};
-    l->parameter[k] = (struct fit_parameter){lower, upper, start, false};
+    l->info[k] = *info;
+    l->parameter[k] = (struct fit_parameter){info->lower, info->upper, info->start, false};
     add_prior(&l->prior[k], prior_mean, prior_sd);
     l->has_prior = true;
     return k;
@@ -92,12 +116,13 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
         add_parameter_prior(l, l->owner[p], mean, o->prior_se[p] / o->ratio[p]);
     }
     if (o->global_gain_sd > 0.0) {
-        double range = exp(gain_range * o->global_gain_sd);
-        l->i_gain = add_nuisance(l, NUISANCE_GAIN, 1.0 / range, range, 1.0, 0.0, o->global_gain_sd);
+        const struct param_info gain = gain_info(o->global_gain_sd);
+        l->i_gain = add_nuisance(l, &gain, 0.0, o->global_gain_sd);
     }
-    if (o->stray_light_sd > 0.0)
-        l->i_stray =
-            add_nuisance(l, NUISANCE_STRAY_LIGHT, 0.0, stray_range * o->stray_light_sd, 0.0, 0.0, o->stray_light_sd);
+    if (o->stray_light_sd > 0.0) {
+        const struct param_info stray = stray_light_info(o->stray_light_sd);
+        l->i_stray = add_nuisance(l, &stray, 0.0, o->stray_light_sd);
+    }
     return STATUS_OK;
 }
 

@@ -113,7 +113,7 @@ static void scatter(const double *cov, const size_t *index, size_t n, size_t n_p
 /* Near the low end of a log range the range alone is a small error of the parameter: judged in the coordinate, too. */
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param)
 {
-    bool in_proportion = k->kind != COORDINATE_LOG || sd < log_determined;
+    bool in_proportion = k->kind != PARAM_LOG || sd < log_determined;
     return in_proportion && sd < 0.5 * (k->upper - k->lower) / sqrt(12.0) &&
            se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
 }
@@ -135,7 +135,7 @@ static void mean_variances(const struct linear_model *m, struct uncertainty *u)
 /* Within a thousandth of the range; what spans decades is judged in the logarithm. */
 static bool at_bound(const struct coordinate *k, double x)
 {
-    if (k->kind == COORDINATE_LOG) {
+    if (k->kind == PARAM_LOG) {
         double margin = 1e-3 * (k->upper - k->lower);
         return x <= k->lower + margin || x >= k->upper - margin;
     }

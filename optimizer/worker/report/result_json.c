@@ -74,9 +74,9 @@ static json_t *parameters_json(const struct pipeline_model *m)
         const struct param_info *info = &m->appearance.param[p];
         const struct fit_parameter *k = &m->parameter[p];
         json_t *parameter =
-            json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit", info->unit,
-                      "value", json_number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
-                      json_number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
+            json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit",
+                      param_unit_name(info->unit), "value", json_number(param_to_file_unit(info, m->fit.param[p])),
+                      "standard_error", json_number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
                       param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
                       param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
                       (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);

@@ -18,7 +18,7 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
         const struct uncertainty *u = &m->fit.uncertainty;
         char allowed[64];
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
-                 param_to_file_unit(info, k->upper), info->unit);
+                 param_to_file_unit(info, k->upper), param_unit_name(info->unit));
         fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, m->fit.param[p]),
                 param_to_file_unit(info, u->se_param[p]), allowed,
                 k->fixed                    ? "fixed "

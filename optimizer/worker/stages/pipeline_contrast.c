@@ -5,6 +5,7 @@
 
 /* Other random numbers than those of the means (pipeline_validation.c). */
 enum { ITERATION = 2 };
+_Static_assert((int)JOB_MAX_TEXTURE_CELLS <= (int)CONFIGURATION_MAX_CELLS, "the renderer takes every texture of a job");
 
 status pipeline_validate_contrast(struct pipeline_context *c, size_t i_model, const size_t *n_path,
                                   const struct progress *progress, struct error *err)

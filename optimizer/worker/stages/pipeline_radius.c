@@ -1,7 +1,7 @@
 #include "optimizer/worker/stages/pipeline_radius.h"
+#include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/job/method_names.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
@@ -56,8 +56,8 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
 {
     struct pipeline_context *c = q->c;
     struct pipeline_model *m = &c->model[c->radius.i_model];
-    const struct descent_method *method = descent_find(METHOD_GAUSS_NEWTON);
-    uint64_t budget = c->doc->path_budget > 0 ? c->doc->path_budget : method->default_path_budget;
+    const struct descent_method *method = descent_find(method_gauss_newton.id);
+    uint64_t budget = c->doc->path_budget > 0 ? c->doc->path_budget : method->info->default_path_budget;
     double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)c->fitted.n);
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
     struct fit_option option;

@@ -11,12 +11,6 @@ struct scattering_state {
     float c[3];
 };
 
-static const struct param_info param_table[3] = {
-    {"C.r", "C", "", 0, 0.001, 1, 0.85},
-    {"C.g", "C", "", 1, 0.001, 1, 0.85},
-    {"C.b", "C", "", 2, 0.001, 1, 0.85},
-};
-
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
     status st = scattering_check_param(&scattering_isotropic, param, err);
@@ -70,14 +64,6 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 }
 
 const struct scattering_model scattering_isotropic = {
-    .id = "isotropic.v1",
-    .title = "Uniform scattering by a fiber of one colour",
-    .n_param = 3,
-    .param = param_table,
-    .prepare = prepare,
-    .release = release,
-    .eval = eval,
-    .sample = sample,
-    .pdf = pdf,
+    SURFACE_MODEL_ROW(isotropic), .prepare = prepare, .release = release, .eval = eval, .sample = sample, .pdf = pdf,
     .eval_pdf = eval_pdf,
 };

@@ -13,23 +13,11 @@
 
 #include <stdlib.h>
 
-#define DEG (M_PI / 180)
-
-enum { N_PARAM = 7, P_C_D = 0, P_C_S = 3, P_BETA_S = 6 };
+enum { N_PARAM = surface_kajiya_kay_n_param, P_C_D = 0, P_C_S = 3, P_BETA_S = 6 };
 
 struct scattering_state {
     float c_d[3], c_s[3], not_c_s[3];
     struct cone_lobe lobe;
-};
-
-static const struct param_info param_table[N_PARAM] = {
-    {"C_D.r", "C_D", "", 0, 0.001, 0.999, 0.5},
-    {"C_D.g", "C_D", "", 1, 0.001, 0.999, 0.5},
-    {"C_D.b", "C_D", "", 2, 0.001, 0.999, 0.5},
-    {"C_S.r", "C_S", "", 0, 0.001, 0.999, 0.2},
-    {"C_S.g", "C_S", "", 1, 0.001, 0.999, 0.2},
-    {"C_S.b", "C_S", "", 2, 0.001, 0.999, 0.2},
-    {"beta_S", "beta_S", "deg", -1, 2 * DEG, 45 * DEG, 10 * DEG},
 };
 
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
@@ -107,14 +95,6 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 const struct scattering_model scattering_kajiya_kay = {
-    .id = "kajiya_kay.v1",
-    .title = "Kajiya and Kay's diffuse and specular fiber, energy-bounded",
-    .n_param = N_PARAM,
-    .param = param_table,
-    .prepare = prepare,
-    .release = release,
-    .eval = eval,
-    .sample = sample,
-    .pdf = pdf,
+    SURFACE_MODEL_ROW(kajiya_kay), .prepare = prepare, .release = release, .eval = eval, .sample = sample, .pdf = pdf,
     .eval_pdf = eval_pdf,
 };

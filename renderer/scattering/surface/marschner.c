@@ -19,10 +19,8 @@
 
 #include <stdlib.h>
 
-#define DEG (M_PI / 180)
-
 enum { LOBE_R, LOBE_TT, LOBE_TRT, N_LOBE };
-enum { N_PARAM = 9, P_C_T = 0, P_ETA = 3, P_BETA = 4, P_GAMMA = 7 };
+enum { N_PARAM = surface_marschner_n_param, P_C_T = 0, P_ETA = 3, P_BETA = 4, P_GAMMA = 7 };
 enum { N_TABLE = 256, N_OFFSET = 96 };
 
 struct attenuation_entry { /* at one cos th_d; [0] TT, [1] TRT */
@@ -35,18 +33,6 @@ struct scattering_state {
     struct von_mises azimuth[2]; /* TT, TRT */
     struct attenuation_entry attenuation[N_TABLE + 1];
     float fresnel[N_TABLE + 1][2]; /* by cos of the angle of incidence: F, d F / d eta */
-};
-
-static const struct param_info param_table[N_PARAM] = {
-    {"C_T.r", "C_T", "", 0, 0.001, 0.999, 0.7},
-    {"C_T.g", "C_T", "", 1, 0.001, 0.999, 0.7},
-    {"C_T.b", "C_T", "", 2, 0.001, 0.999, 0.7},
-    {"eta", "eta", "", -1, 1.3, 1.8, 1.5},
-    {"beta_R", "beta_R", "deg", -1, 2 * DEG, 20 * DEG, 8 * DEG},
-    {"beta_TT", "beta_TT", "deg", -1, 2 * DEG, 30 * DEG, 8 * DEG},
-    {"beta_TRT", "beta_TRT", "deg", -1, 3 * DEG, 45 * DEG, 16 * DEG},
-    {"gamma_TT", "gamma_TT", "deg", -1, 3 * DEG, 60 * DEG, 20 * DEG},
-    {"gamma_TRT", "gamma_TRT", "deg", -1, 5 * DEG, 90 * DEG, 45 * DEG},
 };
 
 /* Unpolarised Fresnel reflectance from outside. */
@@ -234,14 +220,6 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 const struct scattering_model scattering_marschner = {
-    .id = "marschner.v1",
-    .title = "R, TT and TRT of a dielectric fiber (Marschner et al. 2003, lobes of d'Eon et al. 2011)",
-    .n_param = N_PARAM,
-    .param = param_table,
-    .prepare = prepare,
-    .release = release,
-    .eval = eval,
-    .sample = sample,
-    .pdf = pdf,
+    SURFACE_MODEL_ROW(marschner), .prepare = prepare, .release = release, .eval = eval, .sample = sample, .pdf = pdf,
     .eval_pdf = eval_pdf,
 };

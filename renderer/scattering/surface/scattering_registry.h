@@ -4,11 +4,9 @@
 
 #include "renderer/scattering/scattering.h"
 
-extern const struct scattering_model scattering_two_lobe;
-extern const struct scattering_model scattering_two_lobe_balanced;
-extern const struct scattering_model scattering_isotropic;
-extern const struct scattering_model scattering_kajiya_kay;
-extern const struct scattering_model scattering_marschner;
+#define SURFACE_MODEL(name, ...) extern const struct scattering_model scattering_##name;
+#define VOLUME_MODEL(name, ...)
+#include "base/catalogue/models.def"
 
 /* STATUS_INVALID, field = parameter name, for NaN or a value outside its bounds. */
 status scattering_check_param(const struct scattering_model *m, const double *param, struct error *err);

@@ -70,14 +70,6 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 }
 
 const struct scattering_model scattering_two_lobe = {
-    .id = "two_lobe.v1",
-    .title = "Two-lobe textile fiber (R and TT), fabric thesis section 5.4",
-    .n_param = TWO_LOBE_N_PARAM,
-    .param = two_lobe_param,
-    .prepare = prepare,
-    .release = two_lobe_release,
-    .eval = eval,
-    .sample = two_lobe_sample,
-    .pdf = two_lobe_pdf,
-    .eval_pdf = eval_pdf,
+    SURFACE_MODEL_ROW(two_lobe), .prepare = prepare,  .release = two_lobe_release, .eval = eval,
+    .sample = two_lobe_sample,   .pdf = two_lobe_pdf, .eval_pdf = eval_pdf,
 };

@@ -212,10 +212,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 }
 
 const struct scattering_model scattering_two_lobe_balanced = {
-    .id = "two_lobe_balanced.v1",
-    .title = "Two-lobe textile fiber, reciprocal and lossless from both sides",
-    .n_param = TWO_LOBE_N_PARAM,
-    .param = two_lobe_param,
+    SURFACE_MODEL_ROW(two_lobe_balanced),
     .prepare = prepare,
     .release = two_lobe_release,
     .eval = eval,

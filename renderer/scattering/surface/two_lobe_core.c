@@ -2,21 +2,6 @@
 
 #include <math.h>
 
-#define DEG (M_PI / 180)
-
-/* Fabric thesis, Table 5.1. */
-const struct param_info two_lobe_param[TWO_LOBE_N_PARAM] = {
-    {"C_R.r", "C_R", "", 0, 0.001, 0.999, 0.1},
-    {"C_R.g", "C_R", "", 1, 0.001, 0.999, 0.1},
-    {"C_R.b", "C_R", "", 2, 0.001, 0.999, 0.1},
-    {"C_TT.r", "C_TT", "", 0, 0.001, 0.999, 0.85},
-    {"C_TT.g", "C_TT", "", 1, 0.001, 0.999, 0.85},
-    {"C_TT.b", "C_TT", "", 2, 0.001, 0.999, 0.85},
-    {"beta_R", "beta_R", "deg", -1, 1 * DEG, 10 * DEG, 5 * DEG},
-    {"beta_TT", "beta_TT", "deg", -1, 10 * DEG, 45 * DEG, 10 * DEG},
-    {"gamma_TT", "gamma_TT", "deg", -1, 1 * DEG, 45 * DEG, 10 * DEG},
-};
-
 struct scattering_state *two_lobe_state_new(const double *param)
 {
     struct scattering_state *s = calloc(1, sizeof *s);

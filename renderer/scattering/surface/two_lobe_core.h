@@ -20,7 +20,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-enum { TWO_LOBE_N_TABLE = 1024, TWO_LOBE_N_PARAM = 9, TWO_LOBE_R = 0, TWO_LOBE_TT = 1 };
+enum { TWO_LOBE_N_TABLE = 1024, TWO_LOBE_N_PARAM = surface_two_lobe_n_param, TWO_LOBE_R = 0, TWO_LOBE_TT = 1 };
 enum {
     TWO_LOBE_P_C_R = 0,
     TWO_LOBE_P_C_TT = 3,
@@ -51,8 +51,6 @@ struct scattering_state {
     struct two_lobe_sampling_entry sampling[TWO_LOBE_N_TABLE + 1];
     float cross[TWO_LOBE_N_TABLE + 1]; /* balanced only, by |th|: d ln of TT's scale / d beta_R */
 };
-
-extern const struct param_info two_lobe_param[TWO_LOBE_N_PARAM];
 
 /* Everything but the tables; NULL without memory. */
 struct scattering_state *two_lobe_state_new(const double *param);

@@ -10,12 +10,6 @@ struct phase_state {
     struct phase_extinction extinction;
 };
 
-static const struct param_info param_table[3] = {
-    {"alpha.r", "alpha", "", 0, 0.001, 0.999, 0.85}, /* at 1 paths end only where they leave, and long ones are cut */
-    {"alpha.g", "alpha", "", 1, 0.001, 0.999, 0.85},
-    {"alpha.b", "alpha", "", 2, 0.001, 0.999, 0.85},
-};
-
 static status prepare(const double *param, struct phase_state **state, struct error *err)
 {
     status st = phase_check_param(&phase_isotropic, param, err);
@@ -60,13 +54,6 @@ static float eval_pdf(const struct phase_state *s, const float wi[3], const floa
 }
 
 const struct phase_model phase_isotropic = {
-    .id = "phase_isotropic.v1",
-    .title = "Uniform scattering in all directions",
-    .n_param = 3,
-    .param = param_table,
-    .prepare = prepare,
-    .release = release,
-    .extinction = extinction,
-    .sample = sample,
-    .eval_pdf = eval_pdf,
+    VOLUME_MODEL_ROW(isotropic), .prepare = prepare, .release = release,
+    .extinction = extinction,    .sample = sample,   .eval_pdf = eval_pdf,
 };

@@ -15,20 +15,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { N_PARAM = 4, P_GAMMA = 3, N_NODE = 128 };
+enum { N_PARAM = volume_microflake_n_param, P_GAMMA = 3, N_NODE = 128 };
 
 struct phase_state {
     float alpha[3];
     float k, inv_2var, gamma, inv_cube, d_ln_k; /* d ln k / d gamma */
     float erf_end;                              /* erf(1 / (sqrt 2 gamma)) */
     struct phase_extinction extinction;
-};
-
-static const struct param_info param_table[N_PARAM] = {
-    {"alpha.r", "alpha", "", 0, 0.001, 0.999, 0.85},
-    {"alpha.g", "alpha", "", 1, 0.001, 0.999, 0.85},
-    {"alpha.b", "alpha", "", 2, 0.001, 0.999, 0.85},
-    {"gamma", "gamma", "", -1, 0.005, 1.5, 0.3},
 };
 
 static float azimuth_integral(float a, float b)
@@ -123,13 +116,6 @@ static float eval_pdf(const struct phase_state *s, const float wi[3], const floa
 }
 
 const struct phase_model phase_microflake = {
-    .id = "microflake.v1",
-    .title = "Specular microflakes about a fiber (Jakob et al. 2010, Zhao et al. 2011)",
-    .n_param = N_PARAM,
-    .param = param_table,
-    .prepare = prepare,
-    .release = release,
-    .extinction = extinction,
-    .sample = sample,
-    .eval_pdf = eval_pdf,
+    VOLUME_MODEL_ROW(microflake), .prepare = prepare, .release = release,
+    .extinction = extinction,     .sample = sample,   .eval_pdf = eval_pdf,
 };

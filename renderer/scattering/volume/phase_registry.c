@@ -5,9 +5,9 @@
 #include <string.h>
 
 static const struct phase_model *const registry[] = {
-    &phase_two_lobe,
-    &phase_microflake,
-    &phase_isotropic,
+#define SURFACE_MODEL(name, ...)
+#define VOLUME_MODEL(name, ...) &phase_##name,
+#include "base/catalogue/models.def"
     NULL,
 };
 

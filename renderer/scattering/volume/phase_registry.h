@@ -4,9 +4,9 @@
 
 #include "renderer/scattering/phase_model.h"
 
-extern const struct phase_model phase_two_lobe;
-extern const struct phase_model phase_microflake;
-extern const struct phase_model phase_isotropic;
+#define SURFACE_MODEL(name, ...)
+#define VOLUME_MODEL(name, ...) extern const struct phase_model phase_##name;
+#include "base/catalogue/models.def"
 
 /* STATUS_INVALID, field = parameter name, for NaN or a value outside its bounds. */
 status phase_check_param(const struct phase_model *m, const double *param, struct error *err);

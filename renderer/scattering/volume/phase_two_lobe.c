@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-enum { N_PARAM = TWO_LOBE_N_PARAM + 3, P_ALPHA = TWO_LOBE_N_PARAM, N_TABLE = TWO_LOBE_N_TABLE, N_NODE = 48 };
+enum { N_PARAM = volume_two_lobe_n_param, P_ALPHA = TWO_LOBE_N_PARAM, N_TABLE = TWO_LOBE_N_TABLE, N_NODE = 48 };
 
 struct energy_entry {          /* by |th_o| */
     float value[3], d_beta[3]; /* E_0, E_1 by beta_R; E_2 by beta_TT */
@@ -23,23 +23,6 @@ struct phase_state {
     float alpha[3];
     struct energy_entry energy[N_TABLE + 1];
     struct phase_extinction extinction;
-};
-
-#define DEG (M_PI / 180)
-
-static const struct param_info param_table[N_PARAM] = {
-    {"C_R.r", "C_R", "", 0, 0.001, 0.999, 0.1},
-    {"C_R.g", "C_R", "", 1, 0.001, 0.999, 0.1},
-    {"C_R.b", "C_R", "", 2, 0.001, 0.999, 0.1},
-    {"C_TT.r", "C_TT", "", 0, 0.001, 0.999, 0.85},
-    {"C_TT.g", "C_TT", "", 1, 0.001, 0.999, 0.85},
-    {"C_TT.b", "C_TT", "", 2, 0.001, 0.999, 0.85},
-    {"beta_R", "beta_R", "deg", -1, 1 * DEG, 10 * DEG, 5 * DEG},
-    {"beta_TT", "beta_TT", "deg", -1, 10 * DEG, 45 * DEG, 10 * DEG},
-    {"gamma_TT", "gamma_TT", "deg", -1, 1 * DEG, 45 * DEG, 10 * DEG},
-    {"alpha.r", "alpha", "", 0, 0.001, 0.999, 0.85},
-    {"alpha.g", "alpha", "", 1, 0.001, 0.999, 0.85},
-    {"alpha.b", "alpha", "", 2, 0.001, 0.999, 0.85},
 };
 
 /* Adds lobe k's energies at theta_o: Simpson's rule over +-5 widths about -theta_o. */
@@ -138,13 +121,6 @@ static float eval_pdf(const struct phase_state *s, const float wi[3], const floa
 }
 
 const struct phase_model phase_two_lobe = {
-    .id = "phase_two_lobe.v1",
-    .title = "Two-lobe textile fiber as a phase function with albedo, fabric thesis section 5.4",
-    .n_param = N_PARAM,
-    .param = param_table,
-    .prepare = prepare,
-    .release = release,
-    .extinction = extinction,
-    .sample = sample,
-    .eval_pdf = eval_pdf,
+    VOLUME_MODEL_ROW(two_lobe), .prepare = prepare, .release = release,
+    .extinction = extinction,   .sample = sample,   .eval_pdf = eval_pdf,
 };

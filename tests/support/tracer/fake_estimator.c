@@ -8,15 +8,18 @@
 #include <string.h>
 
 const struct param_info fake_param[FAKE_N_PARAM] = {
-    {"C_R.r", "C_R", "", 0, 0.001, 0.999, 0.1},
-    {"C_R.g", "C_R", "", 1, 0.001, 0.999, 0.1},
-    {"C_R.b", "C_R", "", 2, 0.001, 0.999, 0.1},
-    {"C_TT.r", "C_TT", "", 0, 0.001, 0.999, 0.85},
-    {"C_TT.g", "C_TT", "", 1, 0.001, 0.999, 0.85},
-    {"C_TT.b", "C_TT", "", 2, 0.001, 0.999, 0.85},
-    {"beta_R", "beta_R", "deg", -1, 1.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG},
-    {"beta_TT", "beta_TT", "deg", -1, 10.0 * RAD_PER_DEG, 45.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG},
-    {"gamma_TT", "gamma_TT", "deg", -1, 1.0 * RAD_PER_DEG, 45.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG},
+    {"C_R.r", "C_R", PARAM_COLOUR, PARAM_UNIT_NONE, 0, 0.001, 0.999, 0.1, PARAM_LOGIT, ""},
+    {"C_R.g", "C_R", PARAM_COLOUR, PARAM_UNIT_NONE, 1, 0.001, 0.999, 0.1, PARAM_LOGIT, ""},
+    {"C_R.b", "C_R", PARAM_COLOUR, PARAM_UNIT_NONE, 2, 0.001, 0.999, 0.1, PARAM_LOGIT, ""},
+    {"C_TT.r", "C_TT", PARAM_COLOUR, PARAM_UNIT_NONE, 0, 0.001, 0.999, 0.85, PARAM_LOGIT, ""},
+    {"C_TT.g", "C_TT", PARAM_COLOUR, PARAM_UNIT_NONE, 1, 0.001, 0.999, 0.85, PARAM_LOGIT, ""},
+    {"C_TT.b", "C_TT", PARAM_COLOUR, PARAM_UNIT_NONE, 2, 0.001, 0.999, 0.85, PARAM_LOGIT, ""},
+    {"beta_R", "beta_R", PARAM_LOBE_WIDTH, PARAM_UNIT_DEG, -1, 1.0 * RAD_PER_DEG, 10.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG,
+     PARAM_LOG, ""},
+    {"beta_TT", "beta_TT", PARAM_LOBE_WIDTH, PARAM_UNIT_DEG, -1, 10.0 * RAD_PER_DEG, 45.0 * RAD_PER_DEG,
+     10.0 * RAD_PER_DEG, PARAM_LOG, ""},
+    {"gamma_TT", "gamma_TT", PARAM_LOBE_WIDTH, PARAM_UNIT_DEG, -1, 1.0 * RAD_PER_DEG, 45.0 * RAD_PER_DEG,
+     10.0 * RAD_PER_DEG, PARAM_LOG, ""},
 };
 
 /* light theta, camera theta, camera phi; light phi is 0; every row twice, with the cloth turned by 0 and by 90 degrees

@@ -1,10 +1,10 @@
 /* Measurements that no one should have: too few, contradictory, dark, all zero; and an estimator that fails. A fit ends,
  * says what it does not know, and never gives a number that is not finite. */
 #include "base/angle.h"
+#include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/photographs/observation_check.h"
-#include "optimizer/job/method_names.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
@@ -48,11 +48,11 @@ static void setup(struct fixture *x, size_t n_row)
                                       .max_iteration = 40};
 }
 
-static void fit(struct fixture *x, const char *method, struct fit_result *r)
+static void fit(struct fixture *x, const struct descent_method *method, struct fit_result *r)
 {
     struct error err = {0};
-    x->problem.max_iteration = strcmp(method, METHOD_PUBLISHED_SGD) == 0 ? 6 : 40;
-    if (fit_run(descent_find(method), &x->problem, NULL, r, &err) != STATUS_OK) fail_msg("%s: %s", method, err.text);
+    x->problem.max_iteration = method->info == &method_published_sgd ? 6 : 40;
+    if (fit_run(method, &x->problem, NULL, r, &err) != STATUS_OK) fail_msg("%s: %s", method->info->id, err.text);
     assert_true(r->reason[0] != '\0' && isfinite(r->objective.value) && isfinite(r->objective.se));
     for (size_t p = 0; p < N; p++) {
         assert_true(r->param[p] >= fake_param[p].lower && r->param[p] <= fake_param[p].upper);
@@ -66,17 +66,18 @@ static void test_fewer_numbers_than_parameters(void **state)
 {
     (void)state;
     for (size_t n_row = 1; n_row <= 2; n_row++) {
-        for (const char *const *method = method_name_list(); *method != NULL; method++) {
+        for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
             struct fixture x;
             struct fit_result r;
             size_t n_undetermined = 0;
             setup(&x, n_row);
             fit(&x, *method, &r);
             for (size_t p = 0; p < N; p++) n_undetermined += !r.uncertainty.determined[p];
-            print_message("%s, %zu numbers: %zu parameters undetermined, relative RMS error %.3f\n", *method, 3 * n_row,
-                          n_undetermined, fake_rel_rms(&x.cloth, 0, n_row, r.param, x.truth));
+            print_message("%s, %zu numbers: %zu parameters undetermined, relative RMS error %.3f\n",
+                          (*method)->info->id, 3 * n_row, n_undetermined,
+                          fake_rel_rms(&x.cloth, 0, n_row, r.param, x.truth));
             assert_true(n_undetermined >= 2);
-            if (strcmp(*method, METHOD_GAUSS_NEWTON) == 0)
+            if ((*method)->info == &method_gauss_newton)
                 assert_true(fake_rel_rms(&x.cloth, 0, n_row, r.param, x.truth) < 0.1);
             observation_set_release(&x.observation);
         }
@@ -86,7 +87,7 @@ static void test_fewer_numbers_than_parameters(void **state)
 static void test_contradictory(void **state)
 {
     (void)state;
-    for (const char *const *method = method_name_list(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result honest, r;
         setup(&x, FAKE_N_FIT);
@@ -109,14 +110,14 @@ static void test_contradictory(void **state)
 static void test_all_zero(void **state)
 {
     (void)state;
-    for (const char *const *method = method_name_list(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         setup(&x, FAKE_N_FIT);
         for (size_t i = 0; i < x.observation.n; i++)
             for (int c = 0; c < 3; c++) x.observation.item[i].mean_rgb[c] = 0.0;
         fit(&x, *method, &r);
-        if (strcmp(*method, METHOD_GAUSS_NEWTON) == 0)
+        if ((*method)->info == &method_gauss_newton)
             for (size_t p = 3; p < 6; p++) assert_true(r.param[p] < 0.05); /* black */
         observation_set_release(&x.observation);
     }
@@ -131,7 +132,7 @@ static void test_one_dark_row(void **state)
     setup(&x, FAKE_N_FIT);
     for (int c = 0; c < 3; c++) x.observation.item[4].mean_rgb[c] *= 1e-3;
     x.observation.item[4].weight = 0.0; /* the remedy that a user has */
-    fit(&x, METHOD_GAUSS_NEWTON, &r);
+    fit(&x, descent_find(method_gauss_newton.id), &r);
     assert_true(fake_rel_rms(&x.cloth, 0, FAKE_N_FIT, r.param, x.truth) < 0.1);
     observation_set_release(&x.observation);
 }
@@ -140,14 +141,15 @@ static void test_one_dark_row(void **state)
 static void test_no_row_has_weight(void **state)
 {
     (void)state;
-    for (const char *const *method = method_name_list(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         setup(&x, FAKE_N_FIT);
         for (size_t i = 0; i < x.observation.n; i++) x.observation.item[i].weight = 0.0;
         fit(&x, *method, &r);
         for (size_t p = 0; p < N; p++) {
-            if (r.uncertainty.determined[p]) fail_msg("%s: %s counts as determined", *method, fake_param[p].name);
+            if (r.uncertainty.determined[p])
+                fail_msg("%s: %s counts as determined", (*method)->info->id, fake_param[p].name);
             assert_true(fabs(r.param[p] - x.parameter[p].start) < 1e-9);
         }
         observation_set_release(&x.observation);
@@ -164,13 +166,13 @@ static status fail_numeric(void *context, const struct estimator_call *call, con
 static void test_failing_model(void **state)
 {
     (void)state;
-    for (const char *const *method = method_name_list(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         struct error err = {0};
         setup(&x, FAKE_N_FIT);
         x.estimator.run = fail_numeric;
-        assert_int_equal(fit_run(descent_find(*method), &x.problem, NULL, &r, &err), STATUS_NUMERIC);
+        assert_int_equal(fit_run(*method, &x.problem, NULL, &r, &err), STATUS_NUMERIC);
         assert_string_equal(err.field, "beta_R");
         assert_non_null(strstr(err.text, "x.v1"));
         observation_set_release(&x.observation);

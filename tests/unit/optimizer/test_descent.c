@@ -1,11 +1,11 @@
 /* Every method of the registry: it recovers a known cloth, honours fixed parameters and bounds, repeats itself bit by
  * bit, and resumes bit by bit from its journal wherever it was cut. */
+#include "base/catalogue/method_catalogue.h"
 #include "base/durable.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/estimate_journal.h"
-#include "optimizer/job/method_names.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/fake_estimator.h"
 
@@ -69,7 +69,7 @@ static void run(struct fixture *x, const struct descent_method *method, struct f
 {
     struct error err = {0};
     x->n_reported = 0;
-    if (method->run(&x->problem, result, &err) != STATUS_OK) fail_msg("%s: %s", method->id, err.text);
+    if (method->run(&x->problem, result, &err) != STATUS_OK) fail_msg("%s: %s", method->info->id, err.text);
     assert_int_equal(result->n_step, x->n_reported);
     assert_true(result->reason[0] != '\0' && result->n_path > 0);
 }
@@ -100,7 +100,7 @@ static void test_kind_of_paths(void **state)
         struct estimator e = {&c, x.estimator.n_configuration, x.estimator.n_param, counted_run};
         x.problem.estimator = &e;
         run(&x, *m, &r);
-        bool published = strcmp((*m)->id, METHOD_PUBLISHED_SGD) == 0;
+        bool published = (*m)->info == &method_published_sgd;
         assert_true(c.n_plain + c.n_probing > 0 && (published ? c.n_probing : c.n_plain) == 0);
         observation_set_release(&x.observation);
     }
@@ -147,7 +147,7 @@ static void test_progress(void **state)
             x.problem.estimator = &e;
             x.problem.progress = &progress;
             run(&x, *m, &r);
-            print_message("%s: progress %.3f after the first of %zu renderings, %.3f at the end\n", (*m)->id,
+            print_message("%s: progress %.3f after the first of %zu renderings, %.3f at the end\n", (*m)->info->id,
                           h.after_first, h.n_call, h.fraction);
             assert_true(h.after_first > 0.0 && h.after_first < 4.0 / (double)h.n_call);
             assert_true(h.fraction > 0.9);
@@ -168,7 +168,8 @@ static void test_least_budget(void **state)
             if (bounded) x.parameter[1].lower = 1.5 * x.parameter[0].lower; /* a channel with a curve of its own */
             uint64_t least = (*m)->least_budget(&x.problem);
             run(&x, *m, &r);
-            print_message("%s: least budget %.0f, takes %.0f of 1000\n", (*m)->id, (double)least, (double)r.n_path);
+            print_message("%s: least budget %.0f, takes %.0f of 1000\n", (*m)->info->id, (double)least,
+                          (double)r.n_path);
             assert_true(r.n_path <= least && (double)r.n_path > 0.9 * (double)least);
             x.problem.path_budget = least;
             run(&x, *m, &r);
@@ -187,7 +188,7 @@ static void test_published_sgd_needs_steps(void **state)
         struct fit_result r;
         setup(&x, 1, 400000);
         x.problem.max_iteration = n_iteration;
-        run(&x, descent_find(METHOD_PUBLISHED_SGD), &r);
+        run(&x, descent_find(method_published_sgd.id), &r);
         if (r.converged || strstr(r.reason, "too few to tell") == NULL)
             fail_msg("%zu iterations: %s", n_iteration, r.reason);
         observation_set_release(&x.observation);
@@ -205,7 +206,7 @@ static void test_published_sgd_mean_cosine_has_no_start(void **state)
     x.cloth.noise = 1e-3;
     x.problem.max_iteration = 11;
     for (size_t p = 0; p < FAKE_N_PARAM; p++) x.parameter[p].fixed = p != 8; /* one parameter: cosines are 1 or -1 */
-    run(&x, descent_find(METHOD_PUBLISHED_SGD), &r);
+    run(&x, descent_find(method_published_sgd.id), &r);
     const char *text = strstr(r.reason, "mean cosine of ");
     assert_non_null(text);
     cosine = strtod(text + strlen("mean cosine of "), NULL);
@@ -223,8 +224,8 @@ static void test_every_method_recovers(void **state)
         setup(&x, 1, 400000000);
         run(&x, *m, &r);
         double error = fake_rel_rms(&x.cloth, 0, FAKE_N_FIT, r.param, x.truth);
-        print_message("%s: relative RMS error %.4f, objective %.4g -> %.4g, %zu steps\n", (*m)->id, error, x.first,
-                      r.objective.value, r.n_step);
+        print_message("%s: relative RMS error %.4f, objective %.4g -> %.4g, %zu steps\n", (*m)->info->id, error,
+                      x.first, r.objective.value, r.n_step);
         assert_true(error < 0.1);
         assert_true(r.objective.value < 0.1 * x.first);
         observation_set_release(&x.observation);

@@ -63,16 +63,16 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
     for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
         struct error err = {0};
         atomic_store(&n_good, n_before);
-        if (fit_run(*m, &problem, NULL, &r, &err) != STATUS_NUMERIC) fail_msg("%s: %s", (*m)->id, err.text);
+        if (fit_run(*m, &problem, NULL, &r, &err) != STATUS_NUMERIC) fail_msg("%s: %s", (*m)->info->id, err.text);
         if (strstr(err.text, model) == NULL || strstr(err.text, "not finite") == NULL)
-            fail_msg("%s: %s", (*m)->id, err.text);
+            fail_msg("%s: %s", (*m)->info->id, err.text);
         bool named = false;
         for (size_t i = 0; i < N_ROW; i++) {
             char view[CONFIGURATION_TEXT];
             configuration_describe(&t->request.configuration[i], view);
             named = named || strstr(err.text, view) != NULL;
         }
-        if (!named) fail_msg("%s names no configuration: %s", (*m)->id, err.text);
+        if (!named) fail_msg("%s names no configuration: %s", (*m)->info->id, err.text);
         if (field != NULL) assert_string_equal(err.field, field);
     }
     observation_set_release(&o);

@@ -1,10 +1,10 @@
 /* What a job may ask of a fit beyond the method: ties, bounds, priors, nuisance terms, several starts; and that a fit
  * with any of them resumes bit by bit. */
+#include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "base/rng.h"
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/job/method_names.h"
 #include "renderer/scattering/appearance.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/fake_estimator.h"
@@ -78,7 +78,7 @@ static void fit(struct fixture *x, struct fit_result *r)
 {
     struct error err = {0};
     x->n_reported = 0;
-    if (fit_run(descent_find(METHOD_GAUSS_NEWTON), &x->problem, &x->option, r, &err) != STATUS_OK)
+    if (fit_run(descent_find(method_gauss_newton.id), &x->problem, &x->option, r, &err) != STATUS_OK)
         fail_msg("%s: %s", err.field, err.text);
     assert_int_equal(r->n_step, x->n_reported);
 }
@@ -138,7 +138,7 @@ static void test_plain(void **state)
     setup(&x, mid_range, 3, false, 0.005);
     fit(&x, &r);
     x.n_reported = 0;
-    assert_int_equal(descent_find(METHOD_GAUSS_NEWTON)->run(&x.problem, &direct, NULL), STATUS_OK);
+    assert_int_equal(descent_find(method_gauss_newton.id)->run(&x.problem, &direct, NULL), STATUS_OK);
     assert_memory_equal(r.param, direct.param, sizeof r.param);
     assert_memory_equal(r.uncertainty.correlation, direct.uncertainty.correlation, sizeof r.uncertainty.correlation);
     for (size_t p = 0; p < FAKE_N_PARAM; p++)
@@ -417,7 +417,7 @@ static void test_resume(void **state)
             assert_int_equal(estimate_journal_open(path, 7, &x.estimator, NULL, NULL, &j, NULL), STATUS_OK);
             struct estimator through = estimate_journal_estimator(j);
             x.problem.estimator = &through;
-            status s = fit_run(descent_find(METHOD_GAUSS_NEWTON), &x.problem, &x.option, &got, NULL);
+            status s = fit_run(descent_find(method_gauss_newton.id), &x.problem, &x.option, &got, NULL);
             assert_int_equal(s, round == 0 ? STATUS_CANCELLED : STATUS_OK);
             if (round == 1) assert_int_equal(estimate_journal_n_replayed(j), cut);
             estimate_journal_close(j);
@@ -502,7 +502,13 @@ static status fit_wide(size_t n_param, const struct fit_option *o, const char *m
     observation_set_init(&observation);
     for (size_t p = 0; p < n_param; p++) {
         snprintf(name[p], sizeof name[p], "p%zu", p);
-        info[p] = (struct param_info){name[p], name[p], "", -1, 0.001, 0.999, 0.5};
+        info[p] = (struct param_info){.name = name[p],
+                                      .symbol = name[p],
+                                      .channel = -1,
+                                      .lower = 0.001,
+                                      .upper = 0.999,
+                                      .start = 0.5,
+                                      .coordinate = PARAM_LOGIT};
         parameter[p] = (struct fit_parameter){0.001, 0.999, 0.5, false};
         truth[p] = 0.3 + 0.4 * (double)p / WIDE;
     }
@@ -521,7 +527,7 @@ static status fit_wide(size_t n_param, const struct fit_option *o, const char *m
                                         .path_budget = 3000000,
                                         .max_iteration = 25};
     status s = fit_run(descent_find(method), &problem, o, r, err);
-    for (size_t p = 0; s == STATUS_OK && p < n_param && strcmp(method, METHOD_GAUSS_NEWTON) == 0; p++)
+    for (size_t p = 0; s == STATUS_OK && p < n_param && strcmp(method, method_gauss_newton.id) == 0; p++)
         if (!(fabs(r->param[p] - truth[p]) < 0.02))
             fail_msg("%zu parameters: p%zu is %g, not %g", n_param, p, r->param[p], truth[p]);
     observation_set_release(&observation);
@@ -540,9 +546,9 @@ static void test_as_many_unknowns_as_there_is_room_for(void **state)
     nuisance.photograph_gain_sd = 0.001;
     nuisance.n_start = 2;
     for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++)
-        if (fit_wide(WIDE, &plain, (*m)->id, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
-    if (fit_wide(WIDE - 1, &nuisance, METHOD_GAUSS_NEWTON, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
-    assert_int_equal(fit_wide(WIDE, &nuisance, METHOD_GAUSS_NEWTON, &r, &err), STATUS_INVALID);
+        if (fit_wide(WIDE, &plain, (*m)->info->id, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (fit_wide(WIDE - 1, &nuisance, method_gauss_newton.id, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(fit_wide(WIDE, &nuisance, method_gauss_newton.id, &r, &err), STATUS_INVALID);
     assert_string_equal(err.field, OPTION_NUISANCE);
 }
 

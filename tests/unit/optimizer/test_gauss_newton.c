@@ -1,7 +1,7 @@
 /* Gauss-Newton over several cloths and seeds: error, honesty of the standard errors, and that it says when it has not
  * converged. */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/descent.h"
-#include "optimizer/job/method_names.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
@@ -41,7 +41,7 @@ static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double 
                                   .observation = &o,
                                   .estimator = &e,
                                   .path_budget = budget};
-    if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
     observation_set_release(&o);
 }
 
@@ -252,7 +252,7 @@ static struct blind fit_blind(const struct param_info *eighth, double start, siz
                                   .max_iteration = max_iteration,
                                   .report = blind_report,
                                   .report_context = &b};
-    if (descent_find(METHOD_GAUSS_NEWTON)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
     observation_set_release(&o);
     return b;
 }
@@ -266,7 +266,7 @@ static void test_pull(void **state)
     struct fake_cloth f;
     const struct param_info width = fake_param[8];
     struct param_info density = width;
-    density.unit = "1/cm";
+    density.kind = PARAM_SHAPE;
     double stated = 1.5 * width.start, range = log(width.upper / width.lower);
     struct blind b = fit_blind(&width, width.start, 0, &r[0]);
     assert_true(b.first == width.start);

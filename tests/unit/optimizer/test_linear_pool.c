@@ -77,7 +77,7 @@ struct one_row {
 
 static void one_row_init(struct one_row *r)
 {
-    const struct param_info info = {"w", "w", "deg", -1, 0.1, 10.0, 1.0};
+    const struct param_info info = {.lower = 0.1, .upper = 10.0, .start = 1.0, .coordinate = PARAM_LOG};
     const struct observation item = {.mean_rgb = {1.0, 1.0, 1.0}, .weight = 1.0};
     coordinate_init(&r->k, &info, info.lower, info.upper);
     observation_set_init(&r->o);

@@ -128,7 +128,7 @@ static void test_coordinates(void **state)
     for (size_t p = 0; p < FAKE_N_PARAM; p++) {
         struct coordinate k;
         coordinate_init(&k, &fake_param[p], fake_param[p].lower, fake_param[p].upper);
-        assert_int_equal(k.kind, p < 6 ? COORDINATE_LOGIT : COORDINATE_LOG);
+        assert_int_equal(k.kind, p < 6 ? PARAM_LOGIT : PARAM_LOG);
         assert_true(coordinate_to_param(&k, k.upper) == fake_param[p].upper &&
                     coordinate_to_param(&k, k.lower) == fake_param[p].lower);
         assert_true(coordinate_to_param(&k, k.upper + 9.0) == fake_param[p].upper);
@@ -141,13 +141,13 @@ static void test_coordinates(void **state)
             assert_true(fabs(coordinate_slope(&k, v) / difference - 1.0) < 1e-6);
         }
     }
-    struct param_info gamma = {"gamma", "gamma", "", -1, 0.005, 1.5, 0.1},
-                      shift = {"shift", "shift", "", -1, -1.0, 1.0, 0.0};
+    struct param_info gamma = {.lower = 0.005, .upper = 1.5, .start = 0.1, .coordinate = PARAM_LOG},
+                      shift = {.lower = -1.0, .upper = 1.0, .start = 0.0, .coordinate = PARAM_LINEAR};
     struct coordinate k;
     coordinate_init(&k, &gamma, gamma.lower, gamma.upper);
-    assert_int_equal(k.kind, COORDINATE_LOG);
+    assert_int_equal(k.kind, PARAM_LOG);
     coordinate_init(&k, &shift, shift.lower, shift.upper);
-    assert_int_equal(k.kind, COORDINATE_LINEAR);
+    assert_int_equal(k.kind, PARAM_LINEAR);
 }
 
 /* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called
@@ -189,7 +189,7 @@ static void test_uncertainty(void **state)
 static void test_bound_of_a_wide_range(void **state)
 {
     (void)state;
-    const struct param_info density = {"density_multiplier", "density_multiplier", "1/cm", -1, 10.0, 100000.0, 4000.0};
+    const struct param_info density = {.lower = 10.0, .upper = 100000.0, .start = 4000.0, .coordinate = PARAM_LOG};
     const struct {
         double value;
         bool at_bound;

@@ -1,9 +1,9 @@
 /* The step rule of published_sgd.v1 (fabric thesis 5.5.4), on a problem whose gradient is the same everywhere: the i-th
  * step of a run is a / (50 + i), a grows threefold from run to run, and a run that oscillates is followed by ten steps of
  * a tenth of its last one. */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/rescale.h"
-#include "optimizer/job/method_names.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -15,7 +15,8 @@
 
 enum { N_RUN = 6, N_ITERATION = 60, N_EXTRA = 10, N_FINAL = 4, MAX_STEP = N_RUN * N_ITERATION + N_EXTRA + N_FINAL };
 
-static const struct param_info one_param[1] = {{"x", "x", "", -1, 0.0, 1.0, 0.5}};
+static const struct param_info one_param[1] = {
+    {"x", "x", PARAM_SHAPE, PARAM_UNIT_NONE, -1, 0.0, 1.0, 0.5, PARAM_LINEAR, ""}};
 
 struct slope {
     bool alternates; /* the gradient changes its sign from one iteration to the next */
@@ -71,7 +72,7 @@ static void run(struct slope *x, double start)
                                   .estimator = &estimator,
                                   .report = on_step,
                                   .report_context = x};
-    if (descent_find(METHOD_PUBLISHED_SGD)->run(&problem, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (descent_find(method_published_sgd.id)->run(&problem, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
     observation_set_release(&observation);
 }
 

@@ -44,7 +44,8 @@ static void test_points_within_bounds(void **state)
         assert_true(curve.c[0] == fake_param[p].lower && curve.c[curve.n - 1] == fake_param[p].upper);
         for (size_t i = 1; i < curve.n; i++) assert_true(curve.c[i] > curve.c[i - 1]);
     }
-    struct param_info alpha = {"alpha.r", "alpha", "", 0, 0.001, 0.999, 0.85};
+    struct param_info alpha = {
+        .symbol = "alpha", .lower = 0.001, .upper = 0.999, .start = 0.85, .coordinate = PARAM_LOGIT};
     struct coordinate k;
     struct rescale_curve curve;
     coordinate_init(&k, &alpha, alpha.lower, alpha.upper);

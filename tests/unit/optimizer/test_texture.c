@@ -1,11 +1,11 @@
 /* The contrast of a texture: estimates without bias at any number of paths, with their errors and derivatives; equal to
  * what a picture says; photographs measured alike; and a fit that only the contrast can determine, resumed bit by bit. */
+#include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/objective/linear_gain.h"
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
-#include "optimizer/job/method_names.h"
 #include "renderer/transport/estimate_blocks.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -26,10 +26,12 @@
  * exponential deviate (relative variance 1). Parameters: a_r, a_g, a_b, t. */
 enum { N_PARAM = 4, SIDE = 8, CELL = SIDE * SIDE, N_VIEW = 3 };
 
-static const struct param_info board_param[N_PARAM] = {{"a.r", "a", "", 0, 0.01, 1.0, 0.5},
-                                                       {"a.g", "a", "", 1, 0.01, 1.0, 0.5},
-                                                       {"a.b", "a", "", 2, 0.01, 1.0, 0.5},
-                                                       {"t", "t", "", -1, 0.01, 0.9, 0.1}};
+static const struct param_info board_param[N_PARAM] = {
+    {"a.r", "a", PARAM_COLOUR, PARAM_UNIT_NONE, 0, 0.01, 1.0, 0.5, PARAM_LOG, ""},
+    {"a.g", "a", PARAM_COLOUR, PARAM_UNIT_NONE, 1, 0.01, 1.0, 0.5, PARAM_LOG, ""},
+    {"a.b", "a", PARAM_COLOUR, PARAM_UNIT_NONE, 2, 0.01, 1.0, 0.5, PARAM_LOG, ""},
+    {"t", "t", PARAM_SHAPE, PARAM_UNIT_NONE, -1, 0.01, 0.9, 0.1, PARAM_LOGIT, ""},
+};
 static const double truth[N_PARAM] = {0.3, 0.2, 0.4, 0.3};
 
 static double true_contrast(double t) { return t * t * CELL / (CELL - 1.0); }
@@ -396,7 +398,7 @@ static void release(struct fixture *x)
 static void fit(struct fixture *x, struct fit_result *r)
 {
     struct error err = {0};
-    if (fit_run(descent_find(METHOD_GAUSS_NEWTON), &x->problem, &x->option, r, &err) != STATUS_OK)
+    if (fit_run(descent_find(method_gauss_newton.id), &x->problem, &x->option, r, &err) != STATUS_OK)
         fail_msg("%s", err.text);
 }
 
@@ -489,7 +491,7 @@ static void test_resume(void **state)
             assert_int_equal(estimate_journal_open(path, 7, &x.estimator, NULL, NULL, &j, NULL), STATUS_OK);
             struct estimator through = estimate_journal_estimator(j);
             x.problem.estimator = &through;
-            status s = fit_run(descent_find(METHOD_GAUSS_NEWTON), &x.problem, &x.option, &got, NULL);
+            status s = fit_run(descent_find(method_gauss_newton.id), &x.problem, &x.option, &got, NULL);
             assert_int_equal(s, round == 0 ? STATUS_IO : STATUS_OK);
             if (round == 1) assert_int_equal(estimate_journal_n_replayed(j), cut);
             estimate_journal_close(j);

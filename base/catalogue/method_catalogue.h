@@ -1,0 +1,40 @@
+/* The catalogue of descent methods: which there are, what they can take and what their defaults are. Pure data out of
+ * methods.def, so that a program can check a job document without linking the methods. A new method is a row there and
+ * a file in optimizer/fit/descent; the registry of methods follows from the same rows.
+ */
+#ifndef SELVEDGE_BASE_METHOD_CATALOGUE_H
+#define SELVEDGE_BASE_METHOD_CATALOGUE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Terms of the objective that not every method knows. */
+enum method_ability {
+    METHOD_TAKES_PRIORS = 1,   /* Gaussian priors of parameters */
+    METHOD_TAKES_NUISANCE = 2, /* gains and stray light of the photographs, which have priors of their own */
+    METHOD_TAKES_TEXTURE = 4,  /* contrasts of the photographs, with a weight above 0 */
+    METHOD_N_ABILITY = 3
+};
+
+struct method_info {
+    const char *id;               /* "gauss_newton.v1": never used again for another method */
+    const char *title;            /* one line for people, with the source */
+    unsigned takes;               /* of method_ability */
+    uint64_t default_path_budget; /* of one fit; 0: follows from the method's schedule */
+    size_t default_max_iteration;
+    size_t
+        max_iteration_of_starts; /* with several starts: the random keys of one start (fit_run.h) suffice for these */
+};
+
+/* The i-th method, NULL behind the last. The first is the default. */
+const struct method_info *method_catalogue_at(size_t i);
+/* NULL when no method has that id. */
+const struct method_info *method_catalogue_find(const char *id);
+/* The first method that takes all of these (of method_ability); NULL when none does. */
+const struct method_info *method_catalogue_taking(unsigned abilities);
+
+/* The rows: method_gauss_newton, ... */
+#define DESCENT_METHOD(name, ...) extern const struct method_info method_##name;
+#include "base/catalogue/methods.def"
+
+#endif

@@ -1,0 +1,41 @@
+#include "base/catalogue/model_catalogue.h"
+
+#include <string.h>
+
+/* The last parameter of every volume model. 10 to 100,000 per cm are mean free paths of 0.1 um to 1 mm in solid
+ * material; the thesis holds it at 4000. */
+#define DENSITY                                                                                                        \
+    {                                                                                                                  \
+        .name = MODEL_DENSITY_MULTIPLIER, .symbol = MODEL_DENSITY_MULTIPLIER, .kind = PARAM_DENSITY,                   \
+        .unit = PARAM_UNIT_PER_CM, .channel = -1, .lower = 1e3, .upper = 1e7, .start = 4e5, .coordinate = PARAM_LOG,   \
+        .meaning = "Extinction of full density across the fibers."                                                     \
+    }
+
+#define TEXTS(row, id, title) const char row##_id[] = id, row##_title[] = title;
+#define SURFACE_MODEL(name, id, title, ...)                                                                            \
+    TEXTS(surface_##name, id, title)                                                                                   \
+    const struct param_info surface_##name##_param[] = {__VA_ARGS__};
+#define VOLUME_MODEL(name, id, title, ...)                                                                             \
+    TEXTS(volume_##name, id, title)                                                                                    \
+    const struct param_info volume_##name##_param[] = {__VA_ARGS__, DENSITY};
+#include "base/catalogue/models.def"
+
+static const struct model_info catalogue[] = {
+#define SURFACE_MODEL(name, ...)                                                                                       \
+    {surface_##name##_id, surface_##name##_title, MODEL_SURFACE, surface_##name##_n_param, surface_##name##_param},
+#define VOLUME_MODEL(name, ...)                                                                                        \
+    {volume_##name##_id, volume_##name##_title, MODEL_VOLUME, volume_##name##_n_param + 1, volume_##name##_param},
+#include "base/catalogue/models.def"
+};
+
+const struct model_info *model_catalogue_at(size_t i)
+{
+    return i < sizeof catalogue / sizeof *catalogue ? &catalogue[i] : NULL;
+}
+
+const struct model_info *model_catalogue_find(const char *id)
+{
+    for (size_t i = 0; i < sizeof catalogue / sizeof *catalogue; i++)
+        if (strcmp(catalogue[i].id, id) == 0) return &catalogue[i];
+    return NULL;
+}

@@ -1,0 +1,46 @@
+/* The catalogue of models: which there are, and what their parameters are. Pure data out of models.def, so that a program
+ * can check a job document without linking the renderer. A new model is a row there and a file below
+ * renderer/scattering; the registries of the renderer follow from the same rows.
+ */
+#ifndef SELVEDGE_BASE_MODEL_CATALOGUE_H
+#define SELVEDGE_BASE_MODEL_CATALOGUE_H
+
+#include "base/angle.h"
+#include "base/catalogue/param_info.h"
+
+enum { MODEL_MAX_PARAM = 16 };
+
+#define MODEL_DENSITY_MULTIPLIER "density_multiplier"
+
+/* What a model sees: the surfaces of fibers, or the cloth as a volume. */
+enum model_kind { MODEL_SURFACE, MODEL_VOLUME };
+
+struct model_info {
+    const char *id;    /* "two_lobe.v1": no other model has it, whatever its kind */
+    const char *title; /* one line for people, with the source */
+    enum model_kind kind;
+    size_t n_param;                 /* at most MODEL_MAX_PARAM */
+    const struct param_info *param; /* of a volume model: those of the phase function, then the density multiplier */
+};
+
+/* The models of surfaces first: the i-th, NULL behind the last. */
+const struct model_info *model_catalogue_at(size_t i);
+/* NULL when no model has that id. */
+const struct model_info *model_catalogue_find(const char *id);
+
+/* The rows as constants, for the implementations of models: a scattering_model or a phase_model begins with
+ * SURFACE_MODEL_ROW(name) or VOLUME_MODEL_ROW(name). n_param of a volume model's row does not count the density
+ * multiplier, which belongs to the volume and not to the phase function. */
+#define SURFACE_MODEL_ROW(name) MODEL_ROW_FIELDS(surface_##name)
+#define VOLUME_MODEL_ROW(name) MODEL_ROW_FIELDS(volume_##name)
+#define MODEL_ROW_FIELDS(row) .id = row##_id, .title = row##_title, .n_param = row##_n_param, .param = row##_param
+
+#define MODEL_ROW_CONSTANTS(row, ...)                                                                                  \
+    extern const char row##_id[], row##_title[];                                                                       \
+    extern const struct param_info row##_param[];                                                                      \
+    enum { row##_n_param = sizeof((const struct param_info[]){__VA_ARGS__}) / sizeof(struct param_info) };
+#define SURFACE_MODEL(name, id, title, ...) MODEL_ROW_CONSTANTS(surface_##name, __VA_ARGS__)
+#define VOLUME_MODEL(name, id, title, ...) MODEL_ROW_CONSTANTS(volume_##name, __VA_ARGS__)
+#include "base/catalogue/models.def"
+
+#endif

@@ -1,0 +1,45 @@
+#include "base/catalogue/param_info.h"
+#include "base/angle.h"
+
+#include <string.h>
+
+/* to file unit: value * multiplier / divisor. Each direction has its own constants, because 1 / (pi / 180) is not
+ * exactly 180 / pi. */
+static const struct {
+    const char *name;
+    double internal_per_file, multiplier, divisor;
+} unit_table[PARAM_N_UNIT] = {
+    [PARAM_UNIT_NONE] = {"", 1, 1, 1},
+    [PARAM_UNIT_DEG] = {"deg", RAD_PER_DEG, DEG_PER_RAD, 1},
+    [PARAM_UNIT_PER_CM] = {"1/cm", 100, 1, 100},
+};
+
+static const char *const coordinate_name[PARAM_N_COORDINATE] = {
+    [PARAM_LINEAR] = "linear", [PARAM_LOG] = "log", [PARAM_LOGIT] = "logit"};
+
+static const char *const kind_name[PARAM_N_KIND] = {[PARAM_COLOUR] = "colour",
+                                                    [PARAM_LOBE_WIDTH] = "lobe_width",
+                                                    [PARAM_SHAPE] = "shape",
+                                                    [PARAM_DENSITY] = "density",
+                                                    [PARAM_NUISANCE] = "nuisance"};
+
+const char *param_unit_name(enum param_unit unit) { return unit_table[unit].name; }
+const char *param_coordinate_name(enum param_coordinate coordinate) { return coordinate_name[coordinate]; }
+const char *param_kind_name(enum param_kind kind) { return kind_name[kind]; }
+
+double param_from_file_unit(const struct param_info *p, double value)
+{
+    return value * unit_table[p->unit].internal_per_file;
+}
+
+double param_to_file_unit(const struct param_info *p, double value)
+{
+    return value * unit_table[p->unit].multiplier / unit_table[p->unit].divisor;
+}
+
+int param_index(const struct param_info *info, size_t n_param, const char *name)
+{
+    for (size_t p = 0; p < n_param; p++)
+        if (strcmp(info[p].name, name) == 0) return (int)p;
+    return -1;
+}

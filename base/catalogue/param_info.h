@@ -1,0 +1,52 @@
+/* What is known about one parameter of a model: its name, unit, range, start, the scale on which a fit moves it, what
+ * kind of quantity it is and what it means. Pure data: everyone who handles parameters (renderer, fit, job document,
+ * reports) reads it from here and infers nothing from names, units or ranges.
+ *
+ * Parameters are numbered flat: a colour takes three consecutive slots r, g, b. Values are in internal units (radians,
+ * 1/m); files and users see the unit that `unit` names.
+ */
+#ifndef SELVEDGE_BASE_PARAM_INFO_H
+#define SELVEDGE_BASE_PARAM_INFO_H
+
+#include <stddef.h>
+
+/* The unit of a parameter in files. Inside: dimensionless, radians, 1/m. */
+enum param_unit { PARAM_UNIT_NONE, PARAM_UNIT_DEG, PARAM_UNIT_PER_CM, PARAM_N_UNIT };
+
+/* The scale on which a fit moves a parameter (optimizer/fit/objective/coordinate.h): p, ln p, or ln(p / (1 - p)). */
+enum param_coordinate { PARAM_LINEAR, PARAM_LOG, PARAM_LOGIT, PARAM_N_COORDINATE };
+
+enum param_kind {
+    PARAM_COLOUR,     /* share of light, one value for each channel */
+    PARAM_LOBE_WIDTH, /* angular width of a scattering lobe */
+    PARAM_SHAPE,      /* any other quantity of a model */
+    PARAM_DENSITY,    /* the density multiplier of a cloth that is seen as a volume */
+    PARAM_NUISANCE,   /* of the photographs (gain, stray light), not of the cloth */
+    PARAM_N_KIND
+};
+
+/* One flat parameter slot. */
+struct param_info {
+    const char *name;   /* "C_R.r", "beta_TT": unique in the model */
+    const char *symbol; /* group name: "C_R" */
+    enum param_kind kind;
+    enum param_unit unit;       /* of files */
+    int channel;                /* 0 r, 1 g, 2 b; -1 acts on all channels */
+    double lower, upper, start; /* internal unit */
+    enum param_coordinate coordinate;
+    const char *meaning; /* one sentence */
+};
+
+/* "", "deg" or "1/cm"; "linear", "log" or "logit"; "colour", "lobe_width", "shape", "density" or "nuisance". */
+const char *param_unit_name(enum param_unit unit);
+const char *param_coordinate_name(enum param_coordinate coordinate);
+const char *param_kind_name(enum param_kind kind);
+
+/* A value in the unit of files -> internal unit, and back. */
+double param_from_file_unit(const struct param_info *p, double value);
+double param_to_file_unit(const struct param_info *p, double value);
+
+/* Index of a flat parameter by name, or -1. */
+int param_index(const struct param_info *info, size_t n_param, const char *name);
+
+#endif

@@ -1,0 +1,133 @@
+/* The catalogue of models and methods against itself and against the registries: what a new row must satisfy. */
+#include "base/catalogue/method_catalogue.h"
+#include "base/catalogue/model_catalogue.h"
+#include "optimizer/fit/descent/descent.h"
+#include "renderer/scattering/appearance.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void check_parameter(const struct model_info *m, const struct param_info *p)
+{
+    bool logarithm = p->coordinate == PARAM_LOG || p->coordinate == PARAM_LOGIT;
+    size_t n = strlen(p->meaning);
+    if (!(p->lower < p->upper && p->start >= p->lower && p->start <= p->upper))
+        fail_msg("%s: %s starts at %g, its range is %g to %g", m->id, p->name, p->start, p->lower, p->upper);
+    if (n < 10 || p->meaning[n - 1] != '.') fail_msg("%s: %s means '%s'", m->id, p->name, p->meaning);
+    assert_true(p->unit < PARAM_N_UNIT && p->kind < PARAM_N_KIND && p->coordinate < PARAM_N_COORDINATE);
+    assert_true(p->kind != PARAM_NUISANCE);
+    if (logarithm && !(p->lower > 0)) fail_msg("%s: %s has no logarithm at %g", m->id, p->name, p->lower);
+    if (p->coordinate == PARAM_LOGIT && !(p->upper < 1)) fail_msg("%s: %s has no logit", m->id, p->name);
+    if (p->kind == PARAM_LOBE_WIDTH) assert_int_equal(p->unit, PARAM_UNIT_DEG);
+}
+
+/* The three slots of a colour follow each other: "C_R.r", "C_R.g", "C_R.b"; all others stand alone. */
+static void check_slots(const struct model_info *m)
+{
+    for (size_t p = 0, channel = 0; p < m->n_param; p++) {
+        const struct param_info *k = &m->param[p];
+        char name[64];
+        if (k->kind != PARAM_COLOUR) {
+            assert_int_equal(channel, 0);
+            assert_int_equal(k->channel, -1);
+            assert_string_equal(k->name, k->symbol);
+            continue;
+        }
+        snprintf(name, sizeof name, "%s.%c", k->symbol, "rgb"[channel]);
+        assert_string_equal(k->name, name);
+        assert_int_equal(k->channel, channel);
+        channel = (channel + 1) % 3;
+    }
+}
+
+static void models_are_sound(void **unused)
+{
+    (void)unused;
+    size_t n = 0;
+    for (const struct model_info *m; (m = model_catalogue_at(n)) != NULL; n++) {
+        assert_ptr_equal(model_catalogue_find(m->id), m); /* no other has its id */
+        assert_true(strlen(m->title) > 10);
+        assert_true(m->n_param >= 1 && m->n_param <= MODEL_MAX_PARAM);
+        for (size_t p = 0; p < m->n_param; p++) {
+            check_parameter(m, &m->param[p]);
+            assert_int_equal(param_index(m->param, m->n_param, m->param[p].name), p);
+            assert_true((m->param[p].kind == PARAM_DENSITY) == (m->kind == MODEL_VOLUME && p == m->n_param - 1));
+        }
+        check_slots(m);
+    }
+    assert_int_equal(n, 8);
+    assert_null(model_catalogue_find("no_such_model.v1"));
+}
+
+static void registries_follow_the_catalogue(void **unused)
+{
+    (void)unused;
+    const struct scattering_model *const *surface = scattering_registry();
+    const struct phase_model *const *volume = phase_registry();
+    for (size_t i = 0; model_catalogue_at(i) != NULL; i++) {
+        const struct model_info *m = model_catalogue_at(i);
+        bool s = m->kind == MODEL_SURFACE;
+        assert_string_equal(s ? (*surface)->id : (*volume)->id, m->id);
+        assert_string_equal(s ? (*surface)->title : (*volume)->title, m->title);
+        assert_ptr_equal(s ? (*surface)->param : (*volume)->param, m->param);
+        assert_int_equal(s ? (*surface)->n_param : (*volume)->n_param + 1, m->n_param);
+        if (s)
+            surface++;
+        else
+            volume++;
+    }
+    assert_null(*surface);
+    assert_null(*volume);
+}
+
+static void methods_are_sound(void **unused)
+{
+    (void)unused;
+    const struct descent_method *const *method = descent_registry();
+    size_t n = 0;
+    for (const struct method_info *m; (m = method_catalogue_at(n)) != NULL; n++) {
+        assert_ptr_equal(method_catalogue_find(m->id), m);
+        assert_non_null(method[n]);
+        assert_ptr_equal(method[n]->info, m);
+        assert_ptr_equal(descent_find(m->id), method[n]);
+        assert_true(strlen(m->title) > 10 && m->default_max_iteration > 0 && m->max_iteration_of_starts > 0);
+        assert_true(m->takes < 1u << METHOD_N_ABILITY);
+    }
+    assert_null(method[n]);
+    assert_null(method_catalogue_find("no_such_method.v1"));
+    assert_string_equal(method_catalogue_at(0)->id, "gauss_newton.v1"); /* the documented default */
+    assert_ptr_equal(method_catalogue_taking(METHOD_TAKES_PRIORS | METHOD_TAKES_TEXTURE), &method_gauss_newton);
+    assert_null(method_catalogue_taking(1u << METHOD_N_ABILITY));
+}
+
+static void units_convert(void **unused)
+{
+    (void)unused;
+    const struct param_info angle = {.unit = PARAM_UNIT_DEG}, density = {.unit = PARAM_UNIT_PER_CM}, plain = {0};
+    assert_true(param_from_file_unit(&angle, 10.0) == 10.0 * (M_PI / 180.0));
+    assert_true(fabs(param_to_file_unit(&angle, M_PI) - 180.0) < 1e-13);
+    assert_true(param_from_file_unit(&density, 4000.0) == 4e5 && param_to_file_unit(&density, 4e5) == 4000.0);
+    assert_true(param_from_file_unit(&plain, 0.3) == 0.3 && param_to_file_unit(&plain, 0.3) == 0.3);
+    assert_string_equal(param_unit_name(PARAM_UNIT_DEG), "deg");
+    assert_string_equal(param_unit_name(PARAM_UNIT_PER_CM), "1/cm");
+    assert_string_equal(param_unit_name(PARAM_UNIT_NONE), "");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(models_are_sound),
+        cmocka_unit_test(registries_follow_the_catalogue),
+        cmocka_unit_test(methods_are_sound),
+        cmocka_unit_test(units_convert),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
