@@ -2,7 +2,7 @@
  * Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our error text. */
 #include "base/durable.h"
 #include "base/option_id.h"
-#include "geometry/volume/sample_type.h"
+#include "geometry/volume/tiff_page.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>
@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <tiffio.h>
 
-enum { MAX_PAGE = 1 << 20, MAX_EDGE = 1 << 20 };
+enum { MAX_PAGE = 1 << 20 };
 
 struct page {
     size_t i_path;
@@ -24,9 +24,8 @@ struct tiff_handle {
     size_t n_path;
     struct page *page;
     size_t n_page;
-    uint32_t width, height;
-    enum sample_type sample;
-    TIFF *tiff; /* the file open now */
+    struct tiff_page first; /* all others are like it */
+    TIFF *tiff;             /* the file open now */
     size_t i_open;
     void *block; /* one strip or tile */
     size_t block_bytes;
@@ -92,123 +91,26 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     return STATUS_OK;
 }
 
-static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
-{
-    static const struct {
-        uint16_t format, bits;
-        enum sample_type sample;
-    } kind[] = {
-        {SAMPLEFORMAT_UINT, 8, SAMPLE_UINT8},      {SAMPLEFORMAT_UINT, 16, SAMPLE_UINT16},
-        {SAMPLEFORMAT_UINT, 32, SAMPLE_UINT32},    {SAMPLEFORMAT_INT, 8, SAMPLE_INT8},
-        {SAMPLEFORMAT_INT, 16, SAMPLE_INT16},      {SAMPLEFORMAT_INT, 32, SAMPLE_INT32},
-        {SAMPLEFORMAT_IEEEFP, 32, SAMPLE_FLOAT32}, {SAMPLEFORMAT_IEEEFP, 64, SAMPLE_FLOAT64},
-    };
-    if (format == SAMPLEFORMAT_VOID) format = SAMPLEFORMAT_UINT;
-    for (size_t i = 0; i < sizeof kind / sizeof kind[0]; i++)
-        if (kind[i].format == format && kind[i].bits == bits) {
-            *t = kind[i].sample;
-            return true;
-        }
-    return false;
-}
-
-/* How many bytes one stored byte can stand for. Constant slices come near: 1032 with deflate, 7000 with LZMA, 32768 with zstd
- * (blocks of 128 KiB in four bytes); LERC stores one block of 90 bytes whatever the slice's size. The others stay far below. */
-static uint64_t most_expansion(uint16_t compression)
-{
-    switch (compression) {
-    case COMPRESSION_NONE:
-        return 1;
-    case COMPRESSION_LZMA:
-        return 1 << 14;
-    case COMPRESSION_ZSTD:
-        return 1 << 16;
-    case COMPRESSION_LERC:
-        return 1 << 20;
-    default:
-        return 1 << 12;
-    }
-}
-
-/* The stored bytes of a page must lie in the file and be enough for what the header promises, before we allocate. */
-static bool page_fits_file(TIFF *tiff, uint16_t compression, uint64_t page_bytes, uint64_t file_bytes)
-{
-    uint32_t n_block = TIFFIsTiled(tiff) ? TIFFNumberOfTiles(tiff) : TIFFNumberOfStrips(tiff);
-    if (n_block == 0 || n_block > file_bytes) return false;
-    uint64_t stored = 0;
-    for (uint32_t i = 0; i < n_block; i++) {
-        uint64_t n = TIFFGetStrileByteCount(tiff, i), at = TIFFGetStrileOffset(tiff, i);
-        if (at > file_bytes || n > file_bytes - at) return false;
-        stored += n;
-        if (stored > file_bytes * 2) return false;
-    }
-    uint64_t most = most_expansion(compression);
-    return (page_bytes + most - 1) / most <= stored;
-}
-
-/* Reads the header of the current page: all must be alike. i_page counts from 0. */
+/* Checks the current page, number i_page from 0: it can be read, is like the first one, and the file, which has file_bytes
+ * bytes, is long enough for it. STATUS_FORMAT, STATUS_TOO_LARGE, STATUS_UNSUPPORTED. */
 static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_bytes, struct error *err)
 {
     const char *name = path_file_name(h->path[h->i_open]);
-    uint32_t width = 0, height = 0;
-    uint16_t bits = 1, format = SAMPLEFORMAT_UINT, per_pixel = 1, photometric = PHOTOMETRIC_MINISBLACK,
-             compression = COMPRESSION_NONE;
-    TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
-    TIFFGetField(h->tiff, TIFFTAG_IMAGELENGTH, &height);
-    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_BITSPERSAMPLE, &bits);
-    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_SAMPLEFORMAT, &format);
-    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_SAMPLESPERPIXEL, &per_pixel);
-    TIFFGetField(h->tiff, TIFFTAG_PHOTOMETRIC, &photometric);
-    TIFFGetFieldDefaulted(h->tiff, TIFFTAG_COMPRESSION, &compression);
-    if (width == 0 || height == 0)
-        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': page %zu has no pixels",
-                               name, i_page + 1);
-    if (width > MAX_EDGE || height > MAX_EDGE)
-        return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu has %u x %u pixels, the limit is %d an edge", name,
-                               i_page + 1, width, height, MAX_EDGE);
-    if (per_pixel != 1 || photometric == PHOTOMETRIC_PALETTE)
-        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu is a color image", name, i_page + 1);
-    if (photometric ==
-        PHOTOMETRIC_MINISWHITE) /* programs disagree whether the values or only their display are turned round */
-        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu has PhotometricInterpretation 0 (white is zero): "
-                               "save the stack with black as "
-                               "zero, so that denser material has higher values",
-                               name, i_page + 1);
-    enum sample_type t;
-    if (!page_sample(bits, format, &t))
-        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu has %u-bit samples of an unsupported kind", name,
-                               i_page + 1, bits);
-    if (i_page == 0) {
-        h->width = width;
-        h->height = height;
-        h->sample = t;
-    }
-    if (width != h->width || height != h->height)
-        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu has %u x %u pixels, page 1 has %u x %u", name,
-                               i_page + 1, width, height, h->width, h->height);
-    if (t != h->sample && sample_bytes(t) != sample_bytes(h->sample))
-        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu is %u-bit, page 1 is %zu-bit", name, i_page + 1, bits,
-                               8 * sample_bytes(h->sample));
-    if (t != h->sample)
-        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu is %s, page 1 is %s", name, i_page + 1,
-                               sample_name(t), sample_name(h->sample));
+    struct tiff_page p;
+    status s = tiff_page_read(h->tiff, name, i_page + 1, &p, err);
+    if (s != STATUS_OK) return s;
+    if (i_page == 0) h->first = p;
+    s = tiff_page_compare(&p, &h->first, name, i_page + 1, err);
+    if (s != STATUS_OK) return s;
     h->message[0] = '\0';
-    uint64_t page_bytes = (uint64_t)width * height * sample_bytes(t);
-    if (compression != COMPRESSION_NONE && page_bytes > UINT32_MAX) /* as in voxel_stream.c */
+    if (p.compression != COMPRESSION_NONE && tiff_page_bytes(&p) > UINT32_MAX) /* as in voxel_stream.c */
         return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu is compressed and over 4 GiB", name, i_page + 1);
-    if (!page_fits_file(h->tiff, compression, page_bytes, file_bytes))
+    if (!tiff_page_fits(h->tiff, &p, file_bytes))
         return error_set_field(
             err, STATUS_FORMAT, OPTION_SCAN_FILES,
             "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them", name,
-            i_page + 1, width, height);
+            i_page + 1, p.width, p.height);
     return STATUS_OK;
 }
 
@@ -278,9 +180,9 @@ static status tiff_open(const char *const *path, size_t n_path, void **handle, s
         s = scan_file(h, i, &capacity, err);
         if (s != STATUS_OK) goto fail;
     }
-    *info = (struct volume_source_info){.n = {h->width, h->height, h->n_page},
+    *info = (struct volume_source_info){.n = {h->first.width, h->first.height, h->n_page},
                                         .voxel_size_m = {NAN, NAN, NAN}, /* TIFF resolution tags are rarely meant */
-                                        .sample = sample_name(h->sample)};
+                                        .sample = sample_name(h->first.sample)};
     *handle = h;
     return STATUS_OK;
 no_memory:
@@ -308,17 +210,18 @@ static status block_error(struct tiff_handle *h, size_t i_page, struct error *er
 
 static status read_strips(struct tiff_handle *h, size_t i_page, float *value, struct error *err)
 {
-    uint32_t rows = h->height;
+    uint32_t rows = h->first.height;
     TIFFGetFieldDefaulted(h->tiff, TIFFTAG_ROWSPERSTRIP, &rows);
-    if (rows == 0 || rows > h->height) rows = h->height;
-    size_t row_bytes = h->width * sample_bytes(h->sample);
+    if (rows == 0 || rows > h->first.height) rows = h->first.height;
+    size_t row_bytes = h->first.width * sample_bytes(h->first.sample);
     status s = reserve_block(h, (uint64_t)row_bytes * rows, err);
     if (s != STATUS_OK) return s;
-    for (uint32_t y = 0; y < h->height; y += rows) {
-        uint32_t n_row = y + rows <= h->height ? rows : h->height - y;
+    for (uint32_t y = 0; y < h->first.height; y += rows) {
+        uint32_t n_row = y + rows <= h->first.height ? rows : h->first.height - y;
         tmsize_t want = (tmsize_t)(row_bytes * n_row);
         if (TIFFReadEncodedStrip(h->tiff, y / rows, h->block, want) != want) return block_error(h, i_page, err);
-        sample_to_float(h->sample, false, (size_t)n_row * h->width, h->block, value + (size_t)y * h->width);
+        sample_to_float(h->first.sample, false, (size_t)n_row * h->first.width, h->block,
+                        value + (size_t)y * h->first.width);
     }
     return STATUS_OK;
 }
@@ -328,19 +231,20 @@ static status read_tiles(struct tiff_handle *h, size_t i_page, float *value, str
     uint32_t tw = 0, th = 0;
     TIFFGetField(h->tiff, TIFFTAG_TILEWIDTH, &tw);
     TIFFGetField(h->tiff, TIFFTAG_TILELENGTH, &th);
-    if (tw == 0 || th == 0 || tw > h->width + 4096u || th > h->height + 4096u) return block_error(h, i_page, err);
-    size_t bytes = sample_bytes(h->sample);
+    if (tw == 0 || th == 0 || tw > h->first.width + 4096u || th > h->first.height + 4096u)
+        return block_error(h, i_page, err);
+    size_t bytes = sample_bytes(h->first.sample);
     status s = reserve_block(h, (uint64_t)tw * th * bytes, err);
     if (s != STATUS_OK) return s;
-    for (uint32_t y = 0; y < h->height; y += th)
-        for (uint32_t x = 0; x < h->width; x += tw) {
+    for (uint32_t y = 0; y < h->first.height; y += th)
+        for (uint32_t x = 0; x < h->first.width; x += tw) {
             uint32_t i_tile = TIFFComputeTile(h->tiff, x, y, 0, 0);
             tmsize_t want = (tmsize_t)((size_t)tw * th * bytes);
             if (TIFFReadEncodedTile(h->tiff, i_tile, h->block, want) != want) return block_error(h, i_page, err);
-            size_t n = x + tw <= h->width ? tw : h->width - x;
-            for (uint32_t r = 0; r < th && y + r < h->height; r++)
-                sample_to_float(h->sample, false, n, (uint8_t *)h->block + (size_t)r * tw * bytes,
-                                value + (size_t)(y + r) * h->width + x);
+            size_t n = x + tw <= h->first.width ? tw : h->first.width - x;
+            for (uint32_t r = 0; r < th && y + r < h->first.height; r++)
+                sample_to_float(h->first.sample, false, n, (uint8_t *)h->block + (size_t)r * tw * bytes,
+                                value + (size_t)(y + r) * h->first.width + x);
         }
     return STATUS_OK;
 }
@@ -348,7 +252,7 @@ static status read_tiles(struct tiff_handle *h, size_t i_page, float *value, str
 static status tiff_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err)
 {
     struct tiff_handle *h = handle;
-    for (size_t i = i_slice; i < i_slice + n_slice; i++, value += (size_t)h->width * h->height) {
+    for (size_t i = i_slice; i < i_slice + n_slice; i++, value += (size_t)h->first.width * h->first.height) {
         status s = open_file(h, h->page[i].i_path, err);
         if (s != STATUS_OK) return s;
         h->message[0] = '\0';
@@ -356,7 +260,7 @@ static status tiff_read(void *handle, size_t i_slice, size_t n_slice, float *val
         uint32_t width = 0, height = 0; /* the file may have changed since it was opened */
         TIFFGetField(h->tiff, TIFFTAG_IMAGEWIDTH, &width);
         TIFFGetField(h->tiff, TIFFTAG_IMAGELENGTH, &height);
-        if (width != h->width || height != h->height) return block_error(h, i, err);
+        if (width != h->first.width || height != h->first.height) return block_error(h, i, err);
         s = TIFFIsTiled(h->tiff) ? read_tiles(h, i, value, err) : read_strips(h, i, value, err);
         if (s != STATUS_OK) return s;
     }
