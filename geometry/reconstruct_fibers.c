@@ -69,7 +69,8 @@ static status find_chains(struct fiber_job *job, struct polyline_set *chains, st
         size_t n_chain = 0;
         slice_frame_init(&frame, i, job->v->n);
         enter_part(job, 0.6 * i / N_SLICE_FRAME, 0.6 * (i + 1) / N_SLICE_FRAME);
-        s = centers_detect(job->v, job->d, &sub, &frame, job->diameter, job->pool, &job->inner, &list, err);
+        const struct center_search search = {job->v, job->d, &sub, &frame, job->diameter};
+        s = centers_detect(&search, job->pool, &job->inner, &list, err);
         if (s != STATUS_OK) break;
         s = centers_link(&list, &frame, job->o->link_sigma_voxel, job->diameter, MIN_PIECE, chains, &n_chain, err);
         job->report->n_center[frame_axis(&frame)] += list.first[list.n_slice];

@@ -164,10 +164,14 @@ static status check_view(const struct phantom_photograph_option *o, const struct
     return STATUS_OK;
 }
 
+/* The array "photographs" of a job document, and what is true of each photograph without its noise. */
+struct photograph_lists {
+    json_t *photographs, *truth;
+};
+
 static status make_photograph(const struct phantom_photograph_option *o, const struct scene *scene,
                               const struct job_photograph *v, size_t number, struct thread_pool *pool,
-                              const struct progress *progress, json_t *photographs, json_t *truth_rows,
-                              struct error *err)
+                              const struct progress *progress, struct photograph_lists *lists, struct error *err)
 {
     char path[4096];
     struct image im = {0};
@@ -189,14 +193,14 @@ static status make_photograph(const struct phantom_photograph_option *o, const s
                   v->set == JOB_SET_FIT ? "fit" : "held-out", "light_theta_deg", v->light_theta_deg, "light_phi_deg",
                   v->light_phi_deg, "camera_theta_deg", v->camera_theta_deg, "camera_phi_deg", v->camera_phi_deg,
                   "cloth_rotation_deg", v->cloth_rotation_deg, "scale", v->scale);
-    json_t *told = json_pack("{s:s}", "file", v->file);
+    json_t *truth = json_pack("{s:s}", "file", v->file);
     int n = snprintf(path, sizeof path, "%s/%s", o->folder, v->file);
     if (n < 0 || (size_t)n >= sizeof path)
         st = error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", o->folder);
     else
-        st = finish_picture(o, &im, number, path, told, err);
-    json_array_append_new(photographs, row);
-    json_array_append_new(truth_rows, told);
+        st = finish_picture(o, &im, number, path, truth, err);
+    json_array_append_new(lists->photographs, row);
+    json_array_append_new(lists->truth, truth);
     image_release(&im);
     return st;
 }
@@ -237,8 +241,9 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
     if (st == STATUS_OK) st = durable_make_folder(o->folder, err);
     if (st == STATUS_OK) st = load_scene(o, &scene, truth, err);
     const struct progress quiet = progress_silent(progress);
+    struct photograph_lists lists = {photographs, rows};
     for (size_t i = 0; i < t->n && st == STATUS_OK; i++) {
-        st = make_photograph(o, scene, &t->view[i], i, pool, &quiet, photographs, rows, err);
+        st = make_photograph(o, scene, &t->view[i], i, pool, &quiet, &lists, err);
         progress_report(progress, (double)(i + 1) / (double)t->n);
     }
     if (st != STATUS_OK) goto out;

@@ -168,27 +168,31 @@ static bool lattice_range(const struct point_lattice *l, const struct segment *g
     return true;
 }
 
+/* Points of a lattice that follow each other along x: (x0 + i spacing, y, z) for i < n, relative to the segment's end a. */
+struct lattice_row {
+    float x0, spacing, y, z;
+    size_t n;
+};
+
 /* Largest |x| in a row. */
-static float reach_of_row(float px0, float spacing, size_t n)
+static float reach_of_row(const struct lattice_row *r)
 {
-    return fmaxf(fabsf(px0), fabsf(px0 + spacing * (float)n));
+    return fmaxf(fabsf(r->x0), fabsf(r->x0 + r->spacing * (float)r->n));
 }
 
-/* The part of a row (n points from px0 on, relative to g->a) that lies in the slab. False when none does. */
-static bool slab_range(const struct view *w, float px0, float spacing, float py, float pz, size_t n, size_t *from,
-                       size_t *to)
+/* The part from .. to - 1 of a row that lies in the slab. False when none does. */
+static bool slab_range(const struct view *w, const struct lattice_row *r, size_t *from, size_t *to)
 {
-    float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (py * w->u[1] + pz * w->u[2]) * scale;
+    float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (r->y * w->u[1] + r->z * w->u[2]) * scale;
     *from = 0;
-    *to = n;
+    *to = r->n;
     if (fabsf(c) < 0.05f)
-        return fixed > w->from_voxel - reach_of_row(px0, spacing, n) * 0.05f &&
-               fixed < w->to_voxel + reach_of_row(px0, spacing, n) * 0.05f;
+        return fixed > w->from_voxel - reach_of_row(r) * 0.05f && fixed < w->to_voxel + reach_of_row(r) * 0.05f;
     float x0 = (w->from_voxel - fixed) / c, x1 = (w->to_voxel - fixed) / c;
-    float lo = (fminf(x0, x1) - px0) / spacing, hi = (fmaxf(x0, x1) - px0) / spacing;
-    if (hi < 0.0f || lo > (float)(n - 1)) return false;
+    float lo = (fminf(x0, x1) - r->x0) / r->spacing, hi = (fmaxf(x0, x1) - r->x0) / r->spacing;
+    if (hi < 0.0f || lo > (float)(r->n - 1)) return false;
     if (lo > 0.0f) *from = (size_t)ceilf(lo);
-    if (hi < (float)(n - 1)) *to = (size_t)hi + 1;
+    if (hi < (float)(r->n - 1)) *to = (size_t)hi + 1;
     return *from < *to;
 }
 
@@ -202,20 +206,23 @@ static inline float squared_distance(float px, float py, float pz, const float u
     return dx * dx + dy * dy + dz * dz;
 }
 
-static void stamp_row(const float u[3], float inverse2, float px0, float spacing, float py, float pz, size_t n,
-                      float *restrict distance2)
+static void stamp_row(const struct view *w, const struct lattice_row *row, float *restrict distance2)
 {
-    for (size_t i = 0; i < n; i++) {
-        float d2 = squared_distance(px0 + (float)(int)i * spacing, py, pz, u, inverse2);
+    const struct lattice_row r = *row;
+    const float u[3] = {w->u[0], w->u[1], w->u[2]}, inverse2 = w->inverse2;
+    for (size_t i = 0; i < r.n; i++) {
+        float d2 = squared_distance(r.x0 + (float)(int)i * r.spacing, r.y, r.z, u, inverse2);
         distance2[i] = d2 < distance2[i] ? d2 : distance2[i];
     }
 }
 
-static void stamp_row_nearest(const float u[3], float inverse2, float px0, float spacing, float py, float pz, size_t n,
-                              uint32_t id, float *restrict distance2, uint32_t *restrict nearest)
+static void stamp_row_nearest(const struct view *w, const struct lattice_row *row, uint32_t id,
+                              float *restrict distance2, uint32_t *restrict nearest)
 {
-    for (size_t i = 0; i < n; i++) {
-        float d2 = squared_distance(px0 + (float)(int)i * spacing, py, pz, u, inverse2), old = distance2[i];
+    const struct lattice_row r = *row;
+    const float u[3] = {w->u[0], w->u[1], w->u[2]}, inverse2 = w->inverse2;
+    for (size_t i = 0; i < r.n; i++) {
+        float d2 = squared_distance(r.x0 + (float)(int)i * r.spacing, r.y, r.z, u, inverse2), old = distance2[i];
         uint32_t old_id = nearest[i];
         nearest[i] = d2 < old ? id : old_id;
         distance2[i] = d2 < old ? d2 : old;
@@ -236,16 +243,19 @@ void segment_distances(const struct segment_bricks *s, size_t i_brick, const str
         float px = l->origin[0] + ((float)from[0] + 0.5f) * l->spacing - g->a[0];
         for (size_t k = from[2]; k <= to[2]; k++)
             for (size_t j = from[1]; j <= to[1]; j++) {
-                size_t row = (k * l->n[1] + j) * l->n[0] + from[0], i0, i1;
-                float py = l->origin[1] + ((float)j + 0.5f) * l->spacing - g->a[1];
-                float pz = l->origin[2] + ((float)k + 0.5f) * l->spacing - g->a[2];
-                if (!slab_range(&w, px, l->spacing, py, pz, to[0] - from[0] + 1, &i0, &i1)) continue;
-                float px0 = px + (float)i0 * l->spacing;
+                size_t at = (k * l->n[1] + j) * l->n[0] + from[0], i0, i1;
+                struct lattice_row r = {.x0 = px,
+                                        .spacing = l->spacing,
+                                        .y = l->origin[1] + ((float)j + 0.5f) * l->spacing - g->a[1],
+                                        .z = l->origin[2] + ((float)k + 0.5f) * l->spacing - g->a[2],
+                                        .n = to[0] - from[0] + 1};
+                if (!slab_range(&w, &r, &i0, &i1)) continue;
+                r.x0 = px + (float)i0 * l->spacing;
+                r.n = i1 - i0;
                 if (nearest == NULL)
-                    stamp_row(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, distance2 + row + i0);
+                    stamp_row(&w, &r, distance2 + at + i0);
                 else
-                    stamp_row_nearest(w.u, w.inverse2, px0, l->spacing, py, pz, i1 - i0, s->index[e],
-                                      distance2 + row + i0, nearest + row + i0);
+                    stamp_row_nearest(&w, &r, s->index[e], distance2 + at + i0, nearest + at + i0);
             }
     }
 }

@@ -307,11 +307,14 @@ static size_t picture_margin(double largest_sigma, double diameter)
     return (size_t)ceil(4.0 * largest_sigma + diameter) + 8;
 }
 
-status centers_detect(const struct volume *v, const struct direction_volume *d, const struct subvolumes *sub,
-                      const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
-                      const struct progress *progress, struct center_list *list, struct error *err)
+status centers_detect(const struct center_search *search, struct thread_pool *pool, const struct progress *progress,
+                      struct center_list *list, struct error *err)
 {
-    struct detect_job job = {.v = v, .d = d, .mask = sub->mask, .frame = frame};
+    const struct volume *v = search->v;
+    const struct subvolumes *sub = search->sub;
+    const struct slice_frame *frame = search->frame;
+    const double diameter_voxel = search->diameter_voxel;
+    struct detect_job job = {.v = v, .d = search->d, .mask = sub->mask, .frame = frame};
     struct slice_source source = {.v = v, .mask = sub->mask, .frame = frame};
     size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool), n_pixel = frame->width * frame->height;
     size_t n_slab = scratch_buffer_bytes(v->space) / (n_pixel * sizeof(float));

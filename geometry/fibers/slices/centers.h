@@ -28,9 +28,17 @@ struct center_list {
 
 void center_list_release(struct center_list *l);
 
-/* Centers of all slices of a frame. diameter_voxel sets the scales. STATUS_CANCELLED, STATUS_NO_MEMORY. */
-status centers_detect(const struct volume *v, const struct direction_volume *d, const struct subvolumes *sub,
-                      const struct slice_frame *frame, double diameter_voxel, struct thread_pool *pool,
-                      const struct progress *progress, struct center_list *list, struct error *err);
+/* Where centers are looked for. */
+struct center_search {
+    const struct volume *v;
+    const struct direction_volume *d; /* of v */
+    const struct subvolumes *sub;     /* of d */
+    const struct slice_frame *frame;
+    double diameter_voxel; /* of the fibers; it determines the scales of the filters */
+};
+
+/* Finds the centers in all slices of the frame. STATUS_CANCELLED, STATUS_NO_MEMORY. */
+status centers_detect(const struct center_search *search, struct thread_pool *pool, const struct progress *progress,
+                      struct center_list *list, struct error *err);
 
 #endif

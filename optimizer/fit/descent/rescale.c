@@ -98,27 +98,38 @@ static struct progress_part part_of_budget(const struct fit_problem *problem, co
         .outer = problem->progress, .from = from, .share = budget > 0.0 ? fmin(1.0 - from, call / budget) : 0.0};
 }
 
+/* What the measurement of all curves needs and counts. */
+struct measurement {
+    const struct fit_problem *problem;
+    const struct coordinate *k;
+    const size_t *n_path;       /* of one rendering, per configuration */
+    struct estimate *buffer[2]; /* the last two renderings */
+    uint64_t n_path_used;
+    double wall_s;
+};
+
 /* One curve: all slots of the same symbol move together, each as far as its own bounds go (beyond those of a tied parameter
  * the ones that follow it would leave the model's). */
-static status measure_symbol(const struct fit_problem *problem, const struct coordinate *k, size_t first, size_t n_slot,
-                             const size_t *n_path, struct rescale_curve *curve, struct estimate *buffer[2],
-                             uint64_t *n_path_used, double *wall_s, struct error *err)
+static status measure_symbol(struct measurement *m, size_t first, size_t n_slot, struct rescale_curve *curve,
+                             struct error *err)
 {
     double param[SCATTERING_MAX_PARAM];
+    const struct fit_problem *problem = m->problem;
+    const struct coordinate *k = m->k;
     const struct estimator *e = problem->estimator;
     for (size_t p = 0; p < problem->n_param; p++) param[p] = problem->param[p].start;
     for (size_t j = 0; j < curve->n; j++) {
         for (size_t p = first; p < first + n_slot; p++)
             param[p] = fmin(fmax(curve->c[j], k[p].param_lower), k[p].param_upper);
-        struct estimator_call call = {param, n_path, 0, REPLICA_RESCALE, false, true};
+        struct estimator_call call = {param, m->n_path, 0, REPLICA_RESCALE, false, true};
         double seconds = 0.0;
-        struct progress_part part = part_of_budget(problem, n_path, *n_path_used);
+        struct progress_part part = part_of_budget(problem, m->n_path, m->n_path_used);
         struct progress progress = progress_of_part(&part);
-        status s = e->run(e->context, &call, &progress, buffer[j % 2], &seconds, err);
+        status s = e->run(e->context, &call, &progress, m->buffer[j % 2], &seconds, err);
         if (s != STATUS_OK) return s;
-        *wall_s += seconds;
-        for (size_t i = 0; i < e->n_configuration; i++) *n_path_used += buffer[j % 2][i].n_path;
-        double step = j > 0 ? curve_step(problem->observation, buffer[0], buffer[1]) : 0.0;
+        m->wall_s += seconds;
+        for (size_t i = 0; i < e->n_configuration; i++) m->n_path_used += m->buffer[j % 2][i].n_path;
+        double step = j > 0 ? curve_step(problem->observation, m->buffer[0], m->buffer[1]) : 0.0;
         /* a parameter without any effect still needs a curve that can be inverted */
         if (j > 0) curve->r[j] = curve->r[j - 1] + fmax(step, 1e-9) / (double)n_slot;
     }
@@ -144,11 +155,12 @@ size_t rescale_n_curve(const struct fit_problem *problem, const struct coordinat
 status rescale_measure(const struct fit_problem *problem, const struct coordinate *k, const size_t *n_path,
                        struct rescale_curve *curve, uint64_t *n_path_used, double *wall_s, struct error *err)
 {
-    struct estimate *buffer[2];
+    struct measurement m = {
+        .problem = problem, .k = k, .n_path = n_path, .n_path_used = *n_path_used, .wall_s = *wall_s};
     status s = STATUS_OK;
-    buffer[0] = calloc(2 * problem->estimator->n_configuration, sizeof(struct estimate));
-    if (buffer[0] == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure rescaling curves: out of memory");
-    buffer[1] = buffer[0] + problem->estimator->n_configuration;
+    m.buffer[0] = calloc(2 * problem->estimator->n_configuration, sizeof(struct estimate));
+    if (m.buffer[0] == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure rescaling curves: out of memory");
+    m.buffer[1] = m.buffer[0] + problem->estimator->n_configuration;
     for (size_t p = 0, n_slot; p < problem->n_param && s == STATUS_OK; p += n_slot) {
         for (n_slot = 1; p + n_slot < problem->n_param; n_slot++)
             if (strcmp(problem->info[p + n_slot].symbol, problem->info[p].symbol) != 0) break;
@@ -159,9 +171,11 @@ status rescale_measure(const struct fit_problem *problem, const struct coordinat
                 continue;
             }
             rescale_points(&problem->info[i], &k[i], &curve[i]);
-            s = measure_symbol(problem, k, p, n_slot, n_path, &curve[i], buffer, n_path_used, wall_s, err);
+            s = measure_symbol(&m, p, n_slot, &curve[i], err);
         }
     }
-    free(buffer[0]);
+    *n_path_used = m.n_path_used;
+    *wall_s = m.wall_s;
+    free(m.buffer[0]);
     return s;
 }
