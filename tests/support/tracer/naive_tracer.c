@@ -45,12 +45,22 @@ static bool inside_fiber(const struct fiber_set *f, size_t k, struct vec p)
     return false;
 }
 
+/* Whether the ray's line stays farther from the middle of the segment a b than any of its points lies; d is a unit vector.
+ * (length / 2 + r)^2 <= length^2 / 2 + 2 r^2. */
+static bool passes_by(struct vec o, struct vec d, struct vec a, struct vec b, double r)
+{
+    struct vec axis = add(b, -1, a), to = add(add(a, 0.5, axis), -1, o);
+    double along = dot(to, d);
+    return dot(to, to) - along * along > 0.5 * dot(axis, axis) + 2 * r * r;
+}
+
 /* Entry into the side of segment v of fiber k, or into the balls at its ends; nearer than h->t and beyond tnear. */
 static void intersect_segment(const struct fiber_set *f, size_t k, size_t v, struct vec o, struct vec d, double tnear,
                               struct hit *h)
 {
     struct vec a = vertex(f, v), b = vertex(f, v + 1), axis = add(b, -1, a), oa = add(o, -1, a);
     double length = sqrt(dot(axis, axis)), r = (double)f->radius_m[k];
+    if (passes_by(o, d, a, b, r)) return;
     axis = unit(axis);
     for (int ball = 0; ball < 3; ball++) { /* cylinder, ball at a, ball at b */
         struct vec p = ball == 2 ? add(o, -1, b) : oa, dd = d, pp = p;
