@@ -1,5 +1,4 @@
 """Real scans with real measured reflectances, end to end (see real_jobs.py)."""
-import math
 import sys
 import os
 
@@ -7,6 +6,11 @@ import pytest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import real_jobs
+
+# Largest relative RMS errors over the fitted and the held-out rows, and the least factor by which the objective falls. The scanned cloth
+# is not the measured one, so neither error is small; with the budget below they are 0.344, 0.286 and 83 (fiber_ct) and
+# 0.351, 0.291 and 10.7 (weave_ct). An error far below those would be as wrong as one above.
+BAR = {"fiber_ct": (0.38, 0.32, 50), "weave_ct": (0.39, 0.33, 8)}
 
 
 @pytest.mark.parametrize("name", sorted(real_jobs.JOBS))
@@ -22,9 +26,10 @@ def test_real_input(name, tmp_path):
           f"objective {first:.4g} -> {last:.4g} in {wall_s:.0f} s; {result['geometry']['n_fiber']} fibers")
     assert len([r for r in result["rows"] if r["set"] == "fit"]) == 16
     assert len([r for r in result["rows"] if r["set"] == "held-out"]) == 24
-    assert math.isfinite(held_out) and 0 < fit < 1
+    most_fit, most_held_out, least_fall = BAR[name]
+    assert 0.7 * most_fit < fit <= most_fit
+    assert 0.7 * most_held_out < held_out <= most_held_out
+    assert first >= least_fall * last, f"the objective fell only {first / last:.2f} times"
     for p in result["parameters"]:
         assert p["lower"] <= p["value"] <= p["upper"]
         assert p["fixed"] or not p["determined"] or p["standard_error"] > 0
-    if name == "fiber_ct":  # the issue's bar for the blue fabric
-        assert first >= 5 * last, f"the objective fell only {first / last:.2f} times"
