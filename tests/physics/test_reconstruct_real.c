@@ -99,12 +99,16 @@ static void test_fiber_ct(void **state)
     data_path(path, "fiber-ct/crop256.tif");
     reconstruct_scan(path, "xyz", "fiber_ct", 112, &s);
     double diameter = 2.0 * s.r.radius_m[0] / s.v.voxel_size_m[0];
-    assert_true(diameter > 4.0 && diameter < 9.0);
-    assert_true(s.r.dice > 0.8);
+    /* At half the contrast round sections in a slice are 5 to 6 voxels across, the finest fibers 4.5. With their soft edges they
+     * are 7 to 9, which is what the data's description says. */
+    assert_true(diameter > 4.5 && diameter < 6.0);
+    assert_true(s.r.dice > 0.84); /* 0.858 */
     /* Fibers of the fitted radius hold as much material as the scan shows. */
     double model = M_PI * s.r.radius_m[0] * s.r.radius_m[0] * s.r.total_length_m;
     double voxel_m3 = s.v.voxel_size_m[0] * s.v.voxel_size_m[1] * s.v.voxel_size_m[2];
-    assert_true(fabs(model / ((double)s.r.n_kept_voxel * voxel_m3) - 1.0) < 0.25);
+    double ratio = model / ((double)s.r.n_kept_voxel * voxel_m3);
+    print_message("material of the fibers over that of the scan: %.3f\n", ratio);
+    assert_true(fabs(ratio - 1.0) < 0.25);
     release(&s);
 }
 
