@@ -1,0 +1,201 @@
+/* TIFF volumes that are not what they claim to be, or hold values that no scan has: the errors name the file. */
+#include "base/option_id.h"
+#include "geometry/reconstruct.h"
+#include "tests/support/cloth/tiff_stack.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <tiffio.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static void test_unlike_pages(void **state)
+{
+    (void)state;
+    char path[128];
+    void *p8 = stack_pixels(0, 8), *p16 = stack_pixels(0, 16), *p32 = stack_pixels(0, 32);
+    stack_path(path, "silk.tif");
+    struct test_page depth[3] = {
+        {STACK_WIDTH, STACK_HEIGHT, 16, p16}, {STACK_WIDTH, STACK_HEIGHT, 16, p16}, {STACK_WIDTH, STACK_HEIGHT, 8, p8}};
+    test_write_tiff(path, depth, 3, COMPRESSION_NONE, TEST_STRIPS);
+    stack_expect_open_error(path, STATUS_FORMAT, "cannot read volume 'silk.tif': page 3 is 8-bit, page 1 is 16-bit");
+    struct test_page size[2] = {{STACK_WIDTH, STACK_HEIGHT, 16, p16}, {STACK_WIDTH, STACK_HEIGHT - 1, 16, p16}};
+    test_write_tiff(path, size, 2, COMPRESSION_NONE, TEST_STRIPS);
+    stack_expect_open_error(path, STATUS_FORMAT, "page 2 has 37 x 22 pixels, page 1 has 37 x 23");
+    free(p8);
+    free(p16);
+    free(p32);
+}
+
+/* Cut at every place: an error, never a crash, never silence about missing data. */
+static void test_truncated(void **state)
+{
+    (void)state;
+    char path[128];
+    static uint8_t data[1 << 16];
+    const char *list[1] = {path};
+    stack_path(path, "cut.tif");
+    stack_write(path, 16, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    for (size_t keep = 0; keep < n; keep += 61) {
+        struct error err = {0};
+        struct volume_source *s = NULL;
+        test_write_bytes(path, data, keep);
+        assert_int_not_equal(volume_source_open(list, 1, &s, &err), STATUS_OK);
+        assert_true(strlen(err.text) > 20);
+    }
+}
+
+/* Flipped bytes: any outcome but a crash or an unlimited allocation. */
+static void test_damaged(void **state)
+{
+    (void)state;
+    char path[128];
+    static uint8_t data[1 << 16];
+    static float value[STACK_WIDTH * STACK_HEIGHT * STACK_PAGES];
+    const char *list[1] = {path};
+    stack_path(path, "damaged.tif");
+    stack_write(path, 16, STACK_PAGES, COMPRESSION_ADOBE_DEFLATE, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    for (size_t i = 0; i < n; i += 7) {
+        struct error err = {0};
+        struct volume_source *s = NULL;
+        data[i] ^= 0xff;
+        test_write_bytes(path, data, n);
+        if (volume_source_open(list, 1, &s, &err) == STATUS_OK) {
+            const size_t *shape = volume_source_describe(s)->n;
+            if (shape[0] * shape[1] * shape[2] <= STACK_WIDTH * STACK_HEIGHT * STACK_PAGES)
+                volume_source_read(s, 0, shape[2], value, &err);
+            volume_source_close(s);
+        }
+        data[i] ^= 0xff;
+    }
+}
+
+static void test_lying_header(void **state)
+{
+    (void)state;
+    char path[128];
+    static uint8_t data[1 << 16];
+    stack_path(path, "liar.tif");
+    stack_write(path, 8, 1, COMPRESSION_NONE, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    tiff_patch_tag(data, TIFFTAG_IMAGEWIDTH, 400000);
+    test_write_bytes(path, data, n);
+    stack_expect_open_error(path, STATUS_FORMAT, "cannot read volume 'liar.tif': page 1 promises 400000 x 23 pixels");
+}
+
+/* Sums of rows of such a page wrap around. Little need be stored for it: deflate may shrink it a thousandfold. */
+static void test_enormous_pages(void **state)
+{
+    (void)state;
+    static const uint32_t edge[][2] = {{1, 3000000000u}, {3000000000u, 1}, {(1u << 20) + 1, STACK_HEIGHT}};
+    const uint32_t stored = 8u << 20;
+    static uint8_t data[1 << 16];
+    char path[128];
+    stack_path(path, "enormous.tif");
+    stack_write(path, 32, 1, COMPRESSION_ADOBE_DEFLATE, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    tiff_patch_tag(data, TIFFTAG_ROWSPERSTRIP, UINT32_MAX); /* one strip */
+    tiff_patch_tag(data, TIFFTAG_STRIPOFFSETS, 8);
+    tiff_patch_tag(data, TIFFTAG_STRIPBYTECOUNTS, stored);
+    for (size_t i = 0; i < sizeof edge / sizeof edge[0]; i++) {
+        tiff_patch_tag(data, TIFFTAG_IMAGEWIDTH, edge[i][0]);
+        tiff_patch_tag(data, TIFFTAG_IMAGELENGTH, edge[i][1]);
+        test_write_bytes(path, data, n);
+        assert_int_equal(truncate(path, 8 + stored), 0);
+        stack_expect_open_error(path, STATUS_TOO_LARGE, "the limit is 1048576");
+    }
+}
+
+/* A compressed page of 2^40 bytes that a file of a MiB might hold. */
+static void test_compressed_pages_have_a_limit(void **state)
+{
+    (void)state;
+    static uint8_t data[1 << 16];
+    char path[128];
+    stack_path(path, "bomb.tif");
+    stack_write(path, 8, 1, COMPRESSION_ZSTD, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    tiff_patch_tag(data, TIFFTAG_IMAGEWIDTH, 1 << 20);
+    tiff_patch_tag(data, TIFFTAG_IMAGELENGTH, 1 << 20);
+    test_write_bytes(path, data, n);
+    stack_expect_open_error(path, STATUS_TOO_LARGE, "page 1 is compressed and over 4 GiB");
+}
+
+static status read_whole(const char *path, struct reconstruct_option *o, struct error *err)
+{
+    struct volume v;
+    struct reconstruct_report r = {0};
+    status s = reconstruct_read(&path, 1, o, NULL, NULL, NULL, &v, &r, err);
+    if (s == STATUS_OK) volume_release(&v);
+    return s;
+}
+
+static void test_bad_values(void **state)
+{
+    (void)state;
+    char path[128];
+    struct error err = {0};
+    struct reconstruct_option o;
+    float pixel[STACK_WIDTH * STACK_HEIGHT];
+    struct test_page page[STACK_PAGES];
+    stack_path(path, "values.tif");
+    for (size_t i = 0; i < STACK_WIDTH * STACK_HEIGHT; i++) pixel[i] = (float)(i % 9);
+    for (size_t i = 0; i < STACK_PAGES; i++) page[i] = (struct test_page){STACK_WIDTH, STACK_HEIGHT, 32, pixel};
+    reconstruct_option_default(&o);
+    test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.field, OPTION_VOXEL_SIZE);
+    for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
+    pixel[40] = NAN;
+    test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.text, "cannot use the volume: voxel (3, 1, 0) is NaN");
+    pixel[40] = -INFINITY; /* what cells from outside of the scan are marked with */
+    test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.text, "cannot use the volume: voxel (3, 1, 0) is infinite");
+    for (size_t i = 0; i < STACK_WIDTH * STACK_HEIGHT; i++) pixel[i] = 7.0f;
+    test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.text, "cannot use the volume: every voxel has the value 7");
+    for (size_t i = 0; i < STACK_WIDTH * STACK_HEIGHT; i++) pixel[i] = (float)(i % 9);
+    test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
+    o.density_low = 100.0;
+    o.density_high = 200.0;
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "it is empty, no density reaches 0.5"));
+    o.density_high = 50.0;
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.field, OPTION_DENSITY_HIGH);
+    memcpy(o.axes, "xyy", 4);
+    assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.field, OPTION_AXES);
+}
+
+static void test_missing(void **state)
+{
+    (void)state;
+    stack_expect_open_error("/nonexistent/a.tif", STATUS_NOT_FOUND, "cannot read volume 'a.tif': no such file");
+    char path[128];
+    stack_path(path, "text.tif");
+    test_write_bytes(path, "hello, this is not a volume", 27);
+    stack_expect_open_error(path, STATUS_UNSUPPORTED, "neither TIFF nor MetaImage");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_unlike_pages),   cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_damaged),        cmocka_unit_test(test_lying_header),
+        cmocka_unit_test(test_enormous_pages), cmocka_unit_test(test_compressed_pages_have_a_limit),
+        cmocka_unit_test(test_bad_values),     cmocka_unit_test(test_missing),
+    };
+    return cmocka_run_group_tests(tests, stack_folder_setup, NULL);
+}
