@@ -202,6 +202,8 @@ format:            ## format the C sources with clang-format 14
 format-check:      ## fails when a C source is not formatted as `make format` would
 	@clang-format-14 --dry-run -Werror $(FORMATTED) && echo "format ok"
 
+include tests/mutants/mutants.mk
+
 clean:             ## remove build/
 	rm -rf build
 

@@ -1,0 +1,16 @@
+# Targets for the night: `make nightly` runs them; neither is part of `make test`.
+.PHONY: test-long mutants
+
+# tests that know a long variant (tests/support/agreement.h)
+TEST_LONG := physics/test_naive physics/test_volume_naive
+test-long: | deps-test ## the renderer against the naive tracers with enough paths to see a difference of 0.5 % (40 minutes on 2 quiet cores)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(addprefix $(BUILD)/tests/,$(TEST_LONG))
+	@for t in $(TEST_LONG); do echo "$$t"; SELVEDGE_TEST_LONG=1 $(BUILD)/tests/$$t || exit 1; done
+
+# PART: only files whose path begins so. QUICK=1: the tests of `make check`. The copy of the tree and all results stay in build/mutants.
+MUTANTS ?= 200
+SEED ?= 1
+MUTANT_SECONDS ?= 900
+mutants: | deps-test ## MUTANTS (200) small faults, one at a time, in a copy of the tree: the share that the tests catch (SEED, PART, QUICK, MUTANT_SECONDS)
+	@/usr/bin/python3 tests/mutants/run_mutants.py --mutants $(MUTANTS) --seed $(SEED) --limit-s $(MUTANT_SECONDS) \
+		$(if $(PART),--part $(PART)) $(if $(QUICK),--quick)

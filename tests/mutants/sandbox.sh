@@ -1,0 +1,25 @@
+#!/bin/sh
+# sandbox.sh FOLDER COMMAND...: run a command that may be out of its mind. It sees its own processes only, may write to
+# FOLDER (mounted on /mnt, the working folder is /mnt/tree) and to FOLDER/tmp (mounted on /tmp), and everything that it
+# started ends with it. Needs root or user namespaces.
+set -eu
+if [ "$1" != --inside ]; then
+    user=; [ "$(id -u)" = 0 ] || user=--map-root-user
+    # shellcheck disable=SC2086
+    exec unshare $user --mount --pid --fork --mount-proc --kill-child "$0" --inside "$@"
+fi
+folder=$2; shift 2
+mount --make-rprivate /
+mount --bind "$folder" /mnt
+mkdir -p /mnt/tmp
+mount --bind /mnt/tmp /tmp
+while read -r _ point type _; do
+    case "$point:$type" in
+    /mnt:* | /tmp:*) ;;
+    *:ext[234] | *:xfs | *:btrfs | *:overlay | *:zfs | *:f2fs | *:nfs*) mount -o remount,bind,ro "$point" ;;
+    esac
+done < /proc/self/mounts
+cd /mnt/tree
+ulimit -f 4194304
+ulimit -c 0
+exec "$@"
