@@ -1,4 +1,4 @@
-/* The table of volume readers. A new format is one file and one line in volume_source.c. */
+/* The table of volume readers. A new format is one file and one row of VOLUME_READERS. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_READER_H
 #define SELVEDGE_GEOMETRY_VOLUME_READER_H
 
@@ -20,7 +20,11 @@ typedef struct volume_reader {
     void (*close)(void *handle);
 } volume_reader;
 
-extern const volume_reader tiff_reader, metaimage_reader, nrrd_reader, vol_reader;
+/* All formats that a file's beginning or name tells, in the order in which they are asked. */
+#define VOLUME_READERS(READER) READER(tiff_reader) READER(metaimage_reader) READER(nrrd_reader) READER(vol_reader)
+
+#define VOLUME_READER_DECLARATION(name) extern const volume_reader name;
+VOLUME_READERS(VOLUME_READER_DECLARATION)
 
 size_t volume_reader_count(void);
 const volume_reader *volume_reader_at(size_t i);

@@ -9,7 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const volume_reader *const reader[] = {&tiff_reader, &metaimage_reader, &nrrd_reader, &vol_reader};
+#define READER_ADDRESS(name) &name,
+static const volume_reader *const reader[] = {VOLUME_READERS(READER_ADDRESS)};
 /* Not in the table: nothing in the file tells that it is this one's. Opened by raw_source_open with a declaration. */
 static const volume_reader raw_reader = {.id = "raw.v1", .read = raw_source_read, .close = raw_source_close};
 
