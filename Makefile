@@ -160,8 +160,8 @@ docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (m
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
 
-layers:            ## includes go one way: base <- geometry <- renderer <- optimizer
-	@/usr/bin/python3 tests/check_layers.py
+layers:            ## includes go one way, the daemon holds no symbol of the computing parts, headers say their purpose
+	@/usr/bin/python3 tests/check_layers.py --build $(BUILD)
 
 asan: | deps-test ## unit and quick API tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests

@@ -98,7 +98,8 @@ def main():
     def run_layers():
         if not wanted("layers"):
             return
-        code, output, seconds = run([sys.executable, "tests/check_layers.py"], TIMEOUT_S, environment)
+        code, output, seconds = run([sys.executable, "tests/check_layers.py", "--build", arguments.build], TIMEOUT_S,
+                                    environment)
         totals.add_one("layers", code, output, seconds)
 
     def run_c(folder):
