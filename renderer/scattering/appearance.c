@@ -3,7 +3,7 @@
 static struct appearance describe(const struct model_info *row)
 {
     return (struct appearance){
-        .kind = (enum appearance_kind)row->kind,
+        .kind = row->kind,
         .id = row->id,
         .title = row->title,
         .n_param = row->n_param,

@@ -12,18 +12,14 @@
 #include "renderer/scattering/phase_model.h"
 #include "renderer/scattering/scattering.h"
 
-enum appearance_kind { APPEARANCE_SURFACE = MODEL_SURFACE, APPEARANCE_VOLUME = MODEL_VOLUME };
-
 struct appearance {
-    enum appearance_kind kind;
+    enum model_kind kind;
     const char *id, *title; /* these four: the model's row of the catalogue */
     size_t n_param;
     const struct param_info *param;
-    const struct scattering_model *surface; /* APPEARANCE_SURFACE, otherwise NULL */
-    const struct phase_model *volume;       /* APPEARANCE_VOLUME, otherwise NULL */
+    const struct scattering_model *surface; /* MODEL_SURFACE, otherwise NULL */
+    const struct phase_model *volume;       /* MODEL_VOLUME, otherwise NULL */
 };
-
-#define APPEARANCE_DENSITY_MULTIPLIER MODEL_DENSITY_MULTIPLIER
 
 /* All models, those of surfaces first: the i-th, false behind the last. */
 bool appearance_at(size_t i, struct appearance *a);

@@ -8,7 +8,7 @@
 
 static status check_scene(const struct appearance_scene *scene, const struct appearance *model, struct error *err)
 {
-    bool surface = model->kind == APPEARANCE_SURFACE;
+    bool surface = model->kind == MODEL_SURFACE;
     if (surface ? scene->fibers != NULL : scene->volume != NULL) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "model", "cannot trace model '%s': the cloth has no %s", model->id,
                            surface ? "fibers" : "density volume");
@@ -20,7 +20,7 @@ status radiance_source_init(struct radiance_source *s, const struct radiance_inp
     memset(s, 0, sizeof *s);
     status st = check_scene(&in->scene, in->model, err);
     if (st != STATUS_OK) return st;
-    s->tracer = in->model->kind == APPEARANCE_SURFACE ? &surface_radiance : &volume_radiance;
+    s->tracer = in->model->kind == MODEL_SURFACE ? &surface_radiance : &volume_radiance;
     s->model = in->model;
     s->n_set = in->n_set > 1 ? in->n_set : 1;
     s->n_flat = in->want_derivative ? s->n_set * in->model->n_param : 0;

@@ -66,8 +66,7 @@ void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t see
     }
     for (size_t p = 0; p < f->model.n_param; p++) {
         const struct param_info *info = &f->model.param[p];
-        parameter[p] = (struct fit_parameter){info->lower, info->upper, info->start,
-                                              strcmp(info->name, APPEARANCE_DENSITY_MULTIPLIER) == 0};
+        parameter[p] = (struct fit_parameter){info->lower, info->upper, info->start, info->kind == PARAM_DENSITY};
     }
     struct fit_curve own = {0};
     if (curve == NULL) curve = &own;

@@ -75,7 +75,7 @@ static void every_model(void **state)
             if (place == 0 || place == 2) /* white cloth for ever, or nothing to see: colours stay inside */
                 for (size_t p = 0; p < m.n_param; p++)
                     if (m.param[p].channel >= 0) param[p] = place == 0 ? 0.2 : 0.9;
-            if (m.kind == APPEARANCE_VOLUME) param[m.n_param - 1] = m.param[m.n_param - 1].start;
+            if (m.kind == MODEL_VOLUME) param[m.n_param - 1] = m.param[m.n_param - 1].start;
             struct derivative_check_request q = request(x, &m, param);
             if (derivative_check_run(&q, NULL, &check, &err) != STATUS_OK) fail_msg("%s: %s", m.id, err.text);
             print_message("%-24s %d: worst %.1e +- %.0e (%s), %zu paths, %zu steps\n", m.id, place,

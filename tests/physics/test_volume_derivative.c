@@ -164,7 +164,7 @@ static void nonsense_is_refused(void **state)
                                  .seed = 1};
     q.input.want_derivative = true;
     assert_int_equal(estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);
-    assert_string_equal(err.field, APPEARANCE_DENSITY_MULTIPLIER);
+    assert_string_equal(err.field, MODEL_DENSITY_MULTIPLIER);
     q.input = trace_input_volume(&k.scene, m, bad, 1e4, &volume_model);
     q.input.want_derivative = true;
     assert_int_equal(estimate_run(&q, k.pool, NULL, e, &err), STATUS_INVALID);

@@ -136,7 +136,7 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
 static json_t *model_json(const struct pipeline_context *c, size_t i_model)
 {
     const struct pipeline_model *m = &c->model[i_model];
-    bool surface = m->appearance.kind == APPEARANCE_SURFACE;
+    bool surface = m->appearance.kind == MODEL_SURFACE;
     json_t *json = json_pack("{s:s, s:s, s:s, s:b}", "id", m->appearance.id, "title", m->appearance.title, "kind",
                              surface ? "surface" : "volume", "best", (int)(i_model == pipeline_best_model(c)));
     json_t *rows = json_array();

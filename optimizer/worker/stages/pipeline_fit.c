@@ -79,7 +79,7 @@ static void warn_convergence(struct pipeline_context *c, const struct pipeline_m
 
 static void warn_density(struct pipeline_context *c, const struct pipeline_model *m)
 {
-    int d = appearance_param_index(&m->appearance, APPEARANCE_DENSITY_MULTIPLIER);
+    int d = appearance_param_index(&m->appearance, MODEL_DENSITY_MULTIPLIER);
     if (d < 0 || m->parameter[d].fixed || m->fit.uncertainty.determined[d]) return;
     worker_status_warn(
         c->status,
@@ -105,7 +105,7 @@ static void warn_parameters(struct pipeline_context *c, const struct pipeline_mo
     bool at_bound[SCATTERING_MAX_PARAM], unknown[SCATTERING_MAX_PARAM];
     char names[300];
     for (size_t p = 0; p < m->appearance.n_param; p++) {
-        bool density = strcmp(m->appearance.param[p].name, APPEARANCE_DENSITY_MULTIPLIER) == 0; /* warn_density */
+        bool density = m->appearance.param[p].kind == PARAM_DENSITY; /* warn_density */
         at_bound[p] = !m->parameter[p].fixed && m->fit.uncertainty.at_bound[p];
         unknown[p] = !m->parameter[p].fixed && !m->fit.uncertainty.determined[p] && !density;
     }

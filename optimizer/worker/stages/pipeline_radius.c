@@ -208,7 +208,7 @@ status pipeline_radius_search(struct pipeline_context *c, struct worker_series *
     size_t n_bytes = c->fiber.n_fiber * sizeof *q.radius_m;
     memset(&c->radius, 0, sizeof c->radius);
     c->radius.start_m = mean_radius_m(&c->fiber);
-    while (c->model[c->radius.i_model].appearance.kind != APPEARANCE_SURFACE) c->radius.i_model++;
+    while (c->model[c->radius.i_model].appearance.kind != MODEL_SURFACE) c->radius.i_model++;
     status s = check_range(c, err);
     if (s != STATUS_OK) return s;
     warn_of_range(c);

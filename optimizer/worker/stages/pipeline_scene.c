@@ -13,7 +13,7 @@ static const double um = 1e-6;
 static bool wants_volume_scene(const struct pipeline_context *c)
 {
     for (size_t i = 0; i < c->n_model; i++)
-        if (c->model[i].appearance.kind == APPEARANCE_VOLUME) return true;
+        if (c->model[i].appearance.kind == MODEL_VOLUME) return true;
     return false;
 }
 

@@ -12,7 +12,7 @@ static uint64_t fingerprint(const struct pipeline_context *c, size_t i_model)
     uint32_t sum = (uint32_t)crc32_z(0, (const void *)f->position_m, 3 * f->n_vertex * sizeof *f->position_m);
     sum = (uint32_t)crc32_z(sum, (const void *)f->radius_m, f->n_fiber * sizeof *f->radius_m);
     sum = (uint32_t)crc32_z(sum, (const void *)id, strlen(id));
-    if (c->model[i_model].appearance.kind == APPEARANCE_VOLUME)
+    if (c->model[i_model].appearance.kind == MODEL_VOLUME)
         sum = (uint32_t)crc32_z(sum, (const void *)c->direction.density, volume_n_voxel(c->direction.n));
     for (size_t i = 0; i < c->observation.n; i++) {
         sum = (uint32_t)crc32_z(sum, (const void *)c->observation.item[i].mean_rgb,

@@ -112,8 +112,8 @@ void fit_phantom_init(struct fit_phantom *f, const char *folder, struct thread_p
                       const char *model_id, const double *truth_file_unit)
 {
     start(f, folder, pool, model_id, truth_file_unit);
-    fit_cloth_init(&f->cloth,
-                   &(struct fit_cloth_option){.weave = weave, .with_volume = f->model.kind == APPEARANCE_VOLUME}, pool);
+    fit_cloth_init(&f->cloth, &(struct fit_cloth_option){.weave = weave, .with_volume = f->model.kind == MODEL_VOLUME},
+                   pool);
 }
 
 void fit_phantom_init_on(struct fit_phantom *f, const char *folder, struct thread_pool *pool,

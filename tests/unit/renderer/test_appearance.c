@@ -48,8 +48,8 @@ static void test_volume_models_end_with_the_density_multiplier(void **unused)
     (void)unused;
     struct appearance a;
     for (size_t i = 0; appearance_at(i, &a); i++) {
-        int d = appearance_param_index(&a, APPEARANCE_DENSITY_MULTIPLIER);
-        if (a.kind == APPEARANCE_SURFACE) {
+        int d = appearance_param_index(&a, MODEL_DENSITY_MULTIPLIER);
+        if (a.kind == MODEL_SURFACE) {
             assert_int_equal(d, -1);
             continue;
         }

@@ -209,7 +209,7 @@ static void bad_requests(void **state)
     q = request(&configuration[0]);
     volume_model.param[volume_model.model.n_param - 1] = 0;
     assert_int_equal(render_run(&q, NULL, NULL, &im, &err), STATUS_INVALID);
-    assert_string_equal(err.field, APPEARANCE_DENSITY_MULTIPLIER);
+    assert_string_equal(err.field, MODEL_DENSITY_MULTIPLIER);
 }
 
 static void needs_the_cloth_that_its_model_asks_for(void **state)
