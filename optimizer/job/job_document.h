@@ -127,6 +127,7 @@ struct job_document {
     double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
     double texture_block_mm, texture_weight; /* block 0: not asked for */
     size_t n_candidate;                      /* for the next photograph; 0: not asked for */
+    bool candidate_grid;                     /* the candidates are the built-in ones */
     struct job_candidate *candidate;
     size_t render_px, render_sample;
 };
@@ -151,6 +152,8 @@ void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* The error of a job that wants the density fitted without a row that is lit from behind. */
 status job_density_undetermined(bool black_sheet, struct error *err);
+/* STATUS_INVALID with the key `path` when job_file_name_valid is false. */
+status job_check_file_name(const char *path, const char *name, struct error *err);
 /* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
 bool job_file_name_valid(const char *name);
 /* The like of any text: '_' for what is not allowed, cut to 127 bytes. */

@@ -1,6 +1,7 @@
-/* The section "fit" of a job document: names and values are checked against the catalogues of models and methods. */
+/* The part of the section "fit" that depends on the models: which there are, and values of their parameters. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/options/option_checks.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -8,19 +9,23 @@
 
 enum { MAX_LISTED = 31 };
 
+const char *job_model_id(size_t i)
+{
+    const struct model_info *m = model_catalogue_at(i);
+    return m != NULL ? m->id : NULL;
+}
+
+const char *job_method_id(size_t i)
+{
+    const struct method_info *m = method_catalogue_at(i);
+    return m != NULL ? m->id : NULL;
+}
+
 /* Ids of all models, NULL-terminated. */
 static void list_models(const char *name[MAX_LISTED + 1])
 {
     size_t n = 0;
-    for (const struct model_info *m; n < MAX_LISTED && (m = model_catalogue_at(n)) != NULL; n++) name[n] = m->id;
-    name[n] = NULL;
-}
-
-/* Ids of all descent methods, NULL-terminated. */
-static void list_methods(const char *name[MAX_LISTED + 1])
-{
-    size_t n = 0;
-    for (const struct method_info *m; n < MAX_LISTED && (m = method_catalogue_at(n)) != NULL; n++) name[n] = m->id;
+    while (n < MAX_LISTED && (name[n] = job_model_id(n)) != NULL) n++;
     name[n] = NULL;
 }
 
@@ -53,28 +58,12 @@ static status parse_model_list(const struct json_field *f, const char *const *na
 static status parse_models(const struct json_field *f, struct job_document *doc, struct error *err)
 {
     const char *name[MAX_LISTED + 1];
+    if (json_object_get(f->object, "models") == NULL) return STATUS_OK;
+    if (json_object_get(f->object, "model") != NULL)
+        return error_set_field(err, STATUS_INVALID, "fit.models",
+                               "'fit.model' and 'fit.models' are both given: a job takes one of them");
     list_models(name);
-    if (json_object_get(f->object, "models") != NULL) {
-        if (json_object_get(f->object, "model") != NULL)
-            return error_set_field(err, STATUS_INVALID, "fit.models",
-                                   "'fit.model' and 'fit.models' are both given: a job takes one of them");
-        return parse_model_list(f, name, doc, err);
-    }
-    size_t i_model = MAX_LISTED;
-    status s = json_field_choice(f, "model", name, &i_model, err);
-    if (s == STATUS_OK && i_model < MAX_LISTED)
-        snprintf(doc->model[0].id, sizeof doc->model[0].id, "%s", name[i_model]);
-    return s;
-}
-
-static status parse_method(const struct json_field *f, struct job_document *doc, struct error *err)
-{
-    const char *name[MAX_LISTED + 1];
-    size_t i_method = MAX_LISTED;
-    list_methods(name);
-    status s = json_field_choice(f, "method", name, &i_method, err);
-    if (s == STATUS_OK && i_method < MAX_LISTED) snprintf(doc->method, sizeof doc->method, "%s", name[i_method]);
-    return s;
+    return parse_model_list(f, name, doc, err);
 }
 
 /* Parameters that "fixed" and "start" can name: the density multiplier, the last one of volume models, has keys of its
@@ -164,18 +153,14 @@ static status parse_values(const struct json_field *fit, bool fixed, const struc
     return STATUS_OK;
 }
 
-/* The density multiplier of volume models. */
-static status parse_density(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
-                            struct error *err)
+/* The density multiplier of volume models is fixed, or starts, at the value that is given. */
+static status set_density(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
+                          struct error *err)
 {
     bool any_volume = false;
     for (size_t i = 0; i < doc->n_model; i++) {
         if (model[i]->kind != MODEL_VOLUME) continue;
         const struct param_info *d = &model[i]->param[model[i]->n_param - 1];
-        status s = json_field_number(f, "density_multiplier_per_cm", param_to_file_unit(d, d->lower),
-                                     param_to_file_unit(d, d->upper), &doc->density_multiplier_per_cm, err);
-        if (s == STATUS_OK) s = json_field_bool(f, "fit_density", &doc->fit_density, err);
-        if (s != STATUS_OK) return s;
         bool given = !isnan(doc->density_multiplier_per_cm);
         double value = given ? doc->density_multiplier_per_cm : param_to_file_unit(d, d->start);
         if (!doc->fit_density) doc->model[i].fixed[model[i]->n_param - 1] = value;
@@ -194,30 +179,8 @@ static status parse_density(const struct json_field *f, const struct model_info 
     return STATUS_OK;
 }
 
-/* true, false or the range to search. */
-static status parse_radius(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
-                           struct error *err)
+static status check_radius(const struct model_info *const *model, const struct job_document *doc, struct error *err)
 {
-    static const char *const key[] = {"lower_um", "upper_um", NULL};
-    const json_t *value = json_object_get(f->object, "fit_radius");
-    struct json_field range;
-    if (value == NULL) return STATUS_OK;
-    if (json_is_boolean(value)) {
-        doc->fit_radius = json_is_true(value);
-    } else if (!json_is_object(value)) {
-        return error_set_field(err, STATUS_INVALID, "fit.fit_radius",
-                               "'fit.fit_radius' must be true, false or an object of lower_um and upper_um");
-    } else {
-        status s = json_field_object(f, "fit_radius", &range, &doc->fit_radius, err);
-        if (s == STATUS_OK) s = json_field_check_keys(&range, key, err);
-        if (s == STATUS_OK) s = json_field_number(&range, "lower_um", 0.05, 1000.0, &doc->radius_lower_um, err);
-        if (s == STATUS_OK) s = json_field_number(&range, "upper_um", 0.05, 1000.0, &doc->radius_upper_um, err);
-        if (s != STATUS_OK) return s;
-        if (doc->radius_upper_um < 1.1 * doc->radius_lower_um)
-            return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
-                                   "'fit.fit_radius.upper_um' is %g: it must be at least 1.1 times lower_um (%g)",
-                                   doc->radius_upper_um, doc->radius_lower_um);
-    }
     for (size_t i = 0; i < doc->n_model && doc->fit_radius; i++)
         if (model[i]->kind == MODEL_SURFACE) return STATUS_OK;
     return doc->fit_radius
@@ -252,31 +215,17 @@ static status parse_parameters(const struct json_field *f, struct job_document *
                                    doc->model[i].id);
     status s = parse_values(f, true, model, doc, err);
     if (s == STATUS_OK) s = parse_values(f, false, model, doc, err);
-    if (s == STATUS_OK) s = parse_density(f, model, doc, err);
-    if (s == STATUS_OK) s = parse_radius(f, model, doc, err);
+    if (s == STATUS_OK) s = set_density(f, model, doc, err);
+    if (s == STATUS_OK) s = check_radius(model, doc, err);
     for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
         s = check_free_parameters(model[i], &doc->model[i], err);
     return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
 }
 
-status job_parse_fit(const struct json_field *f, struct job_document *doc, struct error *err)
+status job_check_fit(const struct option_value *v, struct error *err)
 {
-    static const char *const key[] = {"model",       "models",         "method",
-                                      "seed",        "max_iterations", "path_budget",
-                                      "fixed",       "start",          "density_multiplier_per_cm",
-                                      "fit_density", "render_px",      "render_samples",
-                                      "tied",        "bounds",         "priors",
-                                      "starts",      "nuisance",       "fit_radius",
-                                      "candidates",  "texture",        NULL};
-    status s = json_field_check_keys(f, key, err);
-    if (s == STATUS_OK) s = parse_models(f, doc, err);
-    if (s == STATUS_OK) s = parse_method(f, doc, err);
-    if (s == STATUS_OK) s = json_field_u64(f, "seed", 0, &doc->seed, err);
-    if (s == STATUS_OK) s = json_field_size(f, "max_iterations", 1, 10000, &doc->max_iteration, err);
-    if (s == STATUS_OK) s = json_field_u64(f, "path_budget", 1000, &doc->path_budget, err);
-    if (s == STATUS_OK) s = json_field_size(f, "render_px", 8, 2048, &doc->render_px, err);
-    if (s == STATUS_OK) s = json_field_size(f, "render_samples", 1, 65536, &doc->render_sample, err);
-    if (s == STATUS_OK) s = job_parse_candidates(f, doc, err);
-    if (s == STATUS_OK) s = parse_parameters(f, doc, err);
-    return s == STATUS_OK ? job_parse_texture(f, doc, err) : s;
+    struct json_field f = {.object = v->value};
+    snprintf(f.path, sizeof f.path, "%s", v->path);
+    status s = parse_models(&f, v->doc, err);
+    return s == STATUS_OK ? parse_parameters(&f, v->doc, err) : s;
 }

@@ -1,4 +1,4 @@
-/* Ties, bounds, priors, starts and nuisance terms of the section "fit" (job_fit_option.h). */
+/* Ties, bounds and priors of the section "fit" (job_fit_option.h), and what they leave of each parameter. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
 
@@ -9,7 +9,7 @@
 
 void job_fit_option_init(struct job_fit_option *o)
 {
-    *o = (struct job_fit_option){.n_start = 1, .gain_prior_rel = 0.05, .stray_light_prior = 0.01};
+    *o = (struct job_fit_option){.n_start = 1};
     for (size_t p = 0; p < JOB_MAX_PARAM; p++) {
         o->lower[p] = o->upper[p] = o->prior_mean[p] = o->prior_se[p] = NAN;
         o->leader[p] = p;
@@ -218,37 +218,6 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
     return s;
 }
 
-/* ---- nuisance terms ---- */
-
-static status parse_nuisance(const struct json_field *fit, struct job_fit_option *o, struct error *err)
-{
-    static const char *const key[] = {"gain", "gain_prior_rel", "stray_light", "stray_light_prior", NULL};
-    static const char *const gain[] = {"none", "global", "per_photograph", NULL};
-    struct json_field f;
-    bool present;
-    size_t i_gain = 0;
-    double gain_prior = NAN, stray_prior = NAN;
-    status s = json_field_object(fit, "nuisance", &f, &present, err);
-    if (s != STATUS_OK || !present) return s;
-    s = json_field_check_keys(&f, key, err);
-    if (s == STATUS_OK) s = json_field_choice(&f, "gain", gain, &i_gain, err);
-    if (s == STATUS_OK) s = json_field_number(&f, "gain_prior_rel", 1e-4, 1.0, &gain_prior, err);
-    if (s == STATUS_OK) s = json_field_bool(&f, "stray_light", &o->stray_light, err);
-    if (s == STATUS_OK) s = json_field_number(&f, "stray_light_prior", 1e-6, 1.0, &stray_prior, err);
-    if (s != STATUS_OK) return s;
-    o->gain = (enum job_gain)i_gain;
-    if (!isnan(gain_prior) && o->gain == JOB_GAIN_NONE)
-        return error_set_field(err, STATUS_INVALID, "fit.nuisance.gain_prior_rel",
-                               "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
-    if (!isnan(stray_prior) && !o->stray_light)
-        return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
-                               "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
-                               "fitted");
-    if (!isnan(gain_prior)) o->gain_prior_rel = gain_prior;
-    if (!isnan(stray_prior)) o->stray_light_prior = stray_prior;
-    return STATUS_OK;
-}
-
 /* Refuses priors and nuisance terms that the method does not take. */
 static status check_method(const struct job_document *doc, struct error *err)
 {
@@ -265,26 +234,22 @@ static status check_method(const struct job_document *doc, struct error *err)
                            method_catalogue_taking(wanted)->id, doc->method);
 }
 
-/* What is the same for all models. */
-static status parse_common(const struct json_field *f, struct job_document *doc, struct error *err)
+/* What is the same for all models has been read into the first one. */
+static status share_common(struct job_document *doc, struct error *err)
 {
-    struct job_fit_option common;
-    job_fit_option_init(&common);
-    status s = json_field_size(f, "starts", 1, JOB_MAX_START, &common.n_start, err);
-    if (s == STATUS_OK) s = parse_nuisance(f, &common, err);
-    if (s != STATUS_OK) return s;
+    const struct job_fit_option *common = &doc->model[0].option;
     size_t most = method_catalogue_find(doc->method)->max_iteration_of_starts;
-    if (common.n_start > 1 && doc->max_iteration > most)
+    if (common->n_start > 1 && doc->max_iteration > most)
         return error_set_field(err, STATUS_INVALID, "fit.max_iterations",
                                "'fit.max_iterations' is %zu: with several starts at most %zu are allowed",
                                doc->max_iteration, most);
-    for (size_t i = 0; i < doc->n_model; i++) {
+    for (size_t i = 1; i < doc->n_model; i++) {
         struct job_fit_option *o = &doc->model[i].option;
-        o->n_start = common.n_start;
-        o->gain = common.gain;
-        o->gain_prior_rel = common.gain_prior_rel;
-        o->stray_light = common.stray_light;
-        o->stray_light_prior = common.stray_light_prior;
+        o->n_start = common->n_start;
+        o->gain = common->gain;
+        o->gain_prior_rel = common->gain_prior_rel;
+        o->stray_light = common->stray_light;
+        o->stray_light_prior = common->stray_light_prior;
     }
     return STATUS_OK;
 }
@@ -297,7 +262,7 @@ status job_parse_fit_options(const struct json_field *f, const struct model_info
     status s = parse_tied(&r, f, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "bounds", parse_bound, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
-    if (s == STATUS_OK) s = parse_common(f, doc, err);
+    if (s == STATUS_OK) s = share_common(doc, err);
     if (s == STATUS_OK) s = check_method(doc, err);
     for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
         s = job_fit_resolve(model[i]->param, model[i]->n_param, &doc->model[i], resolved, err);

@@ -148,8 +148,8 @@ status json_field_size(const struct json_field *f, const char *key, size_t lower
     return check_size(value, path, lower, upper, out, err);
 }
 
-status json_field_size_array(const struct json_field *f, const char *key, size_t n, size_t upper, size_t *out,
-                             struct error *err)
+status json_field_size_array(const struct json_field *f, const char *key, size_t n, size_t lower, size_t upper,
+                             size_t *out, struct error *err)
 {
     const json_t *value = json_object_get(f->object, key);
     if (value == NULL) return STATUS_OK;
@@ -159,7 +159,7 @@ status json_field_size_array(const struct json_field *f, const char *key, size_t
         return error_set_field(err, STATUS_INVALID, path, "'%s' must be a list of %zu whole numbers", path, n);
     for (size_t i = 0; i < n; i++) {
         snprintf(element, sizeof element, "%.140s[%zu]", path, i);
-        status s = check_size(json_array_get(value, i), element, 0, upper, &out[i], err);
+        status s = check_size(json_array_get(value, i), element, lower, upper, &out[i], err);
         if (s != STATUS_OK) return s;
     }
     return STATUS_OK;

@@ -37,8 +37,8 @@ status json_field_number_array(const struct json_field *f, const char *key, size
                                double *out, struct error *err);
 status json_field_size(const struct json_field *f, const char *key, size_t lower, size_t upper, size_t *out,
                        struct error *err);
-status json_field_size_array(const struct json_field *f, const char *key, size_t n, size_t upper, size_t *out,
-                             struct error *err);
+status json_field_size_array(const struct json_field *f, const char *key, size_t n, size_t lower, size_t upper,
+                             size_t *out, struct error *err);
 status json_field_u64(const struct json_field *f, const char *key, uint64_t lower, uint64_t *out, struct error *err);
 status json_field_bool(const struct json_field *f, const char *key, bool *out, struct error *err);
 /* One of a NULL-terminated list; *index is its place. */

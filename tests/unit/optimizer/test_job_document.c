@@ -454,7 +454,7 @@ static void test_raw_volume(void **state)
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\"}"), "volume.raw", "lacks 'endian'");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5]}"), "volume.raw", "lacks 'type'");
     check_error(VOLUME_OF("\"raw\":{\"type\":\"uint8\"}"), "volume.raw", "lacks 'shape'");
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,0,5],\"type\":\"uint8\"}"), "volume.raw.shape", "from 1");
+    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,0,5],\"type\":\"uint8\"}"), "volume.raw.shape[1]", "allowed are 1 to");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,5],\"type\":\"uint8\"}"), "volume.raw.shape", "3");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint12\"}"), "volume.raw.type", "uint8");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\",\"order\":1}"), "volume.raw.order", "order");

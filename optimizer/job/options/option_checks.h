@@ -1,0 +1,36 @@
+/* Checks of the option table: what the range of one number cannot say, and what relates several options. Each returns
+ * STATUS_INVALID with the key at fault and what is allowed.
+ */
+#ifndef SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
+#define SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
+
+#include "optimizer/job/options/option_table.h"
+
+status job_check_document(const struct option_value *v, struct error *err);
+status job_check_sample(const struct option_value *v, struct error *err);
+/* the cloth */
+status job_check_volume(const struct option_value *v, struct error *err);
+status job_check_raw(const struct option_value *v, struct error *err);
+status job_check_axes(const struct option_value *v, struct error *err);
+status job_check_matrix(const struct option_value *v, struct error *err);
+status job_check_crop_voxel(const struct option_value *v, struct error *err);
+status job_check_filter(const struct option_value *v, struct error *err);
+/* the set-up and the photographs */
+status job_check_lamp(const struct option_value *v, struct error *err);
+status job_check_camera(const struct option_value *v, struct error *err);
+status job_check_light_theta(const struct option_value *v, struct error *err);
+status job_check_crop_px(const struct option_value *v, struct error *err);
+status job_check_photographs(const struct option_value *v, struct error *err);
+/* the fit */
+status job_check_fit(const struct option_value *v, struct error *err);
+status job_check_fit_radius(const struct option_value *v, struct error *err);
+status job_check_nuisance(const struct option_value *v, struct error *err);
+status job_check_texture(const struct option_value *v, struct error *err);
+/* Makes the grid where one is asked for. */
+status job_check_candidates(const struct option_value *v, struct error *err);
+
+/* Words of the catalogues: id of model i, of method i; NULL behind the last. */
+const char *job_model_id(size_t i);
+const char *job_method_id(size_t i);
+
+#endif

@@ -1,0 +1,85 @@
+/* Checks of the sections "volume" and its parts. */
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/options/option_checks.h"
+
+#include <math.h>
+#include <string.h>
+
+/* What is given wins over what is chosen from the data, so that a job can be repeated with the values of its result. */
+status job_check_volume(const struct option_value *v, struct error *err)
+{
+    struct job_document *doc = v->doc;
+    if (json_object_get(v->value, "matrix") != NULL) doc->align = false;
+    if (json_object_get(v->value, "crop_voxel") != NULL) doc->crop = false;
+    if (doc->density_low >= doc->density_high) /* false where one is NaN */
+        return error_set_field(err, STATUS_INVALID, "volume.density_high",
+                               "'volume.density_high' (%g) must be above density_low (%g)", doc->density_high,
+                               doc->density_low);
+    if (json_object_get(v->value, "raw") != NULL && doc->n_volume_file != 1)
+        return error_set_field(err, STATUS_INVALID, "volume.raw",
+                               "'volume.raw' describes one file, 'volume.files' names %zu", doc->n_volume_file);
+    return STATUS_OK;
+}
+
+/* Samples of several bytes have a byte order. */
+status job_check_raw(const struct option_value *v, struct error *err)
+{
+    const char *type = v->doc->raw_type;
+    bool one_byte = type[0] != '\0' && type[strlen(type) - 1] == '8';
+    if (one_byte || json_object_get(v->value, "endian") != NULL) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path, "'%s' lacks 'endian': 'little' or 'big'", v->path);
+}
+
+/* Three of x, y, z in any order, each with an optional minus sign. */
+static bool axes_valid(const char *text)
+{
+    unsigned seen = 0;
+    size_t n = 0;
+    for (const char *p = text; *p != '\0'; p++, n++) {
+        if (*p == '-') p++;
+        if (*p < 'x' || *p > 'z') return false;
+        seen |= 1u << (*p - 'x');
+    }
+    return n == 3 && seen == 7;
+}
+
+status job_check_axes(const struct option_value *v, struct error *err)
+{
+    if (axes_valid(v->doc->axes)) return STATUS_OK;
+    return error_set_field(
+        err, STATUS_INVALID, v->path,
+        "'%s' is '%s': allowed is each of x, y, z once, with an optional minus sign, such as 'xyz' or '-zxy'", v->path,
+        v->doc->axes);
+}
+
+status job_check_matrix(const struct option_value *v, struct error *err)
+{
+    const double *m = v->doc->matrix;
+    double det =
+        m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    if (fabs(det) >= 1e-6) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path, "'%s' has determinant %g: it must be invertible", v->path,
+                           det);
+}
+
+status job_check_crop_voxel(const struct option_value *v, struct error *err)
+{
+    const size_t *c = v->doc->crop_voxel;
+    for (size_t a = 0; a < 3; a++)
+        if (c[a + 3] <= c[a])
+            return error_set_field(err, STATUS_INVALID, v->path,
+                                   "'%s' is empty along %c: the order is x0, y0, z0, x1, y1, z1 with x0 < x1", v->path,
+                                   "xyz"[a]);
+    return STATUS_OK;
+}
+
+status job_check_filter(const struct option_value *v, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    if (doc->filter_t <= 0.5 * doc->filter_s) /* false where one is NaN: left to the data */
+        return error_set_field(
+            err, STATUS_INVALID, "volume.filter.t",
+            "'volume.filter.t' is %g: it must be above half of s (%g), or no direction answers to fibers",
+            doc->filter_t, doc->filter_s);
+    return STATUS_OK;
+}

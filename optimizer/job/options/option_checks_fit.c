@@ -1,0 +1,96 @@
+/* Checks of the parts of the section "fit" that do not depend on a model's parameters. */
+#include "base/catalogue/method_catalogue.h"
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/options/option_checks.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+status job_check_fit_radius(const struct option_value *v, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    if (doc->radius_upper_um < 1.1 * doc->radius_lower_um) /* false where one is NaN */
+        return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
+                               "'fit.fit_radius.upper_um' is %g: it must be at least 1.1 times lower_um (%g)",
+                               doc->radius_upper_um, doc->radius_lower_um);
+    return STATUS_OK;
+}
+
+status job_check_nuisance(const struct option_value *v, struct error *err)
+{
+    const struct job_fit_option *o = &v->doc->model[0].option;
+    if (json_object_get(v->value, "gain_prior_rel") != NULL && o->gain == JOB_GAIN_NONE)
+        return error_set_field(err, STATUS_INVALID, "fit.nuisance.gain_prior_rel",
+                               "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
+    if (json_object_get(v->value, "stray_light_prior") != NULL && !o->stray_light)
+        return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
+                               "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
+                               "fitted");
+    return STATUS_OK;
+}
+
+/* ---- texture ---- */
+
+size_t job_texture_cells(const struct job_document *doc)
+{
+    return (size_t)lround(10.0 * doc->crop_cm / doc->texture_block_mm);
+}
+
+double job_texture_cell_mm(const struct job_document *doc)
+{
+    return 10.0 * doc->crop_cm / (double)job_texture_cells(doc);
+}
+
+/* Blocks divide the crop, a table of means has none, and contrasts are terms that not every method knows. */
+status job_check_texture(const struct option_value *v, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    double crop_mm = 10.0 * doc->crop_cm, block_mm = doc->texture_block_mm;
+    if (block_mm > crop_mm / 2.0 || lround(crop_mm / block_mm) > JOB_MAX_TEXTURE_CELLS)
+        return error_set_field(err, STATUS_INVALID, "fit.texture.block_mm",
+                               "'fit.texture.block_mm' is %g: it must divide the crop of %g mm into 2 to %d blocks a "
+                               "side, which is %g to %g mm",
+                               block_mm, crop_mm, JOB_MAX_TEXTURE_CELLS, crop_mm / JOB_MAX_TEXTURE_CELLS,
+                               crop_mm / 2.0);
+    if (doc->measurement_file[0] != '\0')
+        return error_set_field(err, STATUS_INVALID, v->path, "'%s' needs photographs: a table of means has no texture",
+                               v->path);
+    if (doc->texture_weight > 0.0 && (method_catalogue_find(doc->method)->takes & METHOD_TAKES_TEXTURE) == 0)
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' with a weight needs the method '%s': '%s' has no such terms", v->path,
+                               method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, doc->method);
+    if (doc->model[0].option.stray_light)
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' cannot be used with 'fit.nuisance.stray_light': a contrast that is lowered by "
+                               "stray light is not modelled",
+                               v->path);
+    return STATUS_OK;
+}
+
+/* ---- candidates for the next photograph ---- */
+
+static const double light_theta[] = {20, 45, 65, 80}, camera_theta[] = {0, 30, 60, 75}, camera_phi[] = {180, 90},
+                    rotation[] = {0, 90};
+
+/* Lamp at phi 0, camera opposite or beside it, cloth along and across; with the lamp behind a cloth without its sheet. */
+static status make_grid(struct job_document *doc, struct error *err)
+{
+    enum { FRONT = 4 * 4 * 2 * 2, BACK = 4 };
+    doc->candidate = calloc(FRONT + BACK, sizeof *doc->candidate);
+    if (doc->candidate == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
+    for (size_t i = 0; i < FRONT; i++) {
+        struct job_candidate c = {light_theta[i / 16], 0.0, camera_theta[i / 4 % 4], camera_phi[i / 2 % 2],
+                                  rotation[i % 2]};
+        if (c.camera_theta_deg == 0.0 && c.camera_phi_deg != 180.0) continue; /* from above, phi means nothing */
+        doc->candidate[doc->n_candidate++] = c;
+    }
+    for (size_t i = 0; i < BACK && !doc->black_sheet; i++)
+        doc->candidate[doc->n_candidate++] =
+            (struct job_candidate){150.0, 0.0, i / 2 ? 45.0 : 0.0, 180.0, rotation[i % 2]};
+    return STATUS_OK;
+}
+
+status job_check_candidates(const struct option_value *v, struct error *err)
+{
+    return v->doc->candidate_grid ? make_grid(v->doc, err) : STATUS_OK;
+}

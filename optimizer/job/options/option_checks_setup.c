@@ -1,0 +1,161 @@
+/* Checks of the set-up, of the measurements, and of the document as a whole. */
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/json_field.h"
+#include "optimizer/job/options/option_checks.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+status job_check_sample(const struct option_value *v, struct error *err)
+{
+    size_t n = 0;
+    for (const char *p = v->doc->sample; *p != '\0'; p++)
+        if (((unsigned char)*p & 0xC0) != 0x80) n++;
+    if (n > 200)
+        return error_set_field(err, STATUS_INVALID, v->path, "'sample' has %zu characters: allowed are 1 to 200", n);
+    return STATUS_OK;
+}
+
+status job_check_lamp(const struct option_value *v, struct error *err)
+{
+    if (v->doc->lamp_side_cm <= 2.0 * v->doc->lamp_distance_cm) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "lamp.side_cm",
+                           "'lamp.side_cm' is %g: allowed is at most twice lamp.distance_cm (%g)", v->doc->lamp_side_cm,
+                           v->doc->lamp_distance_cm);
+}
+
+status job_check_camera(const struct option_value *v, struct error *err)
+{
+    if (v->doc->crop_cm <= v->doc->camera_distance_cm) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "camera.crop_cm",
+                           "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)", v->doc->crop_cm,
+                           v->doc->camera_distance_cm);
+}
+
+/* A lamp behind the cloth lights it through; that needs a cloth without its black sheet. */
+status job_check_light_theta(const struct option_value *v, struct error *err)
+{
+    double theta_deg = *(const double *)v->target;
+    if (theta_deg < 90.0 || (theta_deg > 90.0 && !v->doc->black_sheet)) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' is %g: allowed are 0 to below 90 degrees from the normal (above 90, from behind, "
+                           "without black_sheet)",
+                           v->path, theta_deg);
+}
+
+status job_check_crop_px(const struct option_value *v, struct error *err)
+{
+    const size_t *crop = v->target;
+    if (crop[2] > crop[0] && crop[3] > crop[1]) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' is empty: the order is x0, y0, x1, y1 with x0 < x1 and y0 < y1", v->path);
+}
+
+status job_check_photographs(const struct option_value *v, struct error *err)
+{
+    for (size_t i = 0; i < v->doc->n_photograph; i++)
+        if (v->doc->photograph[i].set == JOB_SET_FIT) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' has no photograph with \"set\": \"fit\": give at least one", v->path);
+}
+
+/* ---- the document ---- */
+
+static bool given(const struct option_value *document, const char *key)
+{
+    return json_object_get(document->value, key) != NULL;
+}
+
+static status check_one_cloth(const struct option_value *v, struct error *err)
+{
+    if (given(v, "volume") && given(v, "fibers"))
+        return error_set_field(err, STATUS_INVALID, "fibers",
+                               "'volume' and 'fibers' are both given: a job takes one of them");
+    if (!given(v, "volume") && !given(v, "fibers"))
+        return error_set_field(err, STATUS_INVALID, "volume",
+                               "'volume' is missing: give a scan ('volume') or a fiber file ('fibers')");
+    return STATUS_OK;
+}
+
+static status check_one_measurement(const struct option_value *v, struct error *err)
+{
+    if (given(v, "measurements") && given(v, "photographs"))
+        return error_set_field(err, STATUS_INVALID, "photographs",
+                               "'measurements' and 'photographs' are both given: a job takes one of them");
+    if (!given(v, "measurements") && !given(v, "photographs"))
+        return error_set_field(err, STATUS_INVALID, "photographs",
+                               "'photographs' is missing: give a list of photographs, or 'measurements' with a table");
+    return STATUS_OK;
+}
+
+status job_density_undetermined(bool black_sheet, struct error *err)
+{
+    return error_set_field(err, STATUS_INVALID, "fit.fit_density",
+                           "'fit.fit_density' cannot be fitted: no photograph to be fitted has the lamp behind the "
+                           "cloth (light_theta_deg above 90%s), and from the front brightness hardly depends on "
+                           "density; add one, or give density_multiplier_per_cm",
+                           black_sheet ? ", black_sheet false" : "");
+}
+
+/* Seen from the front, cloths of different density look alike: fitting the density needs light that went through the
+ * cloth. Rows of a table are checked when it is read. */
+static status check_density(const struct job_document *doc, struct error *err)
+{
+    bool from_behind = false;
+    for (size_t i = 0; i < doc->n_photograph; i++)
+        if (doc->photograph[i].set == JOB_SET_FIT && doc->photograph[i].light_theta_deg > 90.0) from_behind = true;
+    if (!doc->fit_density || from_behind || (doc->n_photograph == 0 && !doc->black_sheet)) return STATUS_OK;
+    return job_density_undetermined(doc->black_sheet, err);
+}
+
+struct name_list {
+    const char **name;
+    size_t n;
+};
+
+static int compare_names(const void *a, const void *b)
+{
+    const char *const *x = a, *const *y = b;
+    return strcmp(*x, *y);
+}
+
+static void collect_name(void *context, const char *name, const char *role)
+{
+    struct name_list *list = context;
+    (void)role;
+    list->name[list->n++] = name;
+}
+
+/* The key whose file is named elsewhere too. */
+static status named_twice(const struct job_document *doc, const char *name, struct error *err)
+{
+    char path[JSON_PATH_BYTES] = "measurements.file";
+    for (size_t i = 0; i < doc->n_volume_file; i++)
+        if (strcmp(doc->volume_file[i], name) == 0) snprintf(path, sizeof path, "volume.files[%zu]", i);
+    for (size_t i = 0; i < doc->n_photograph; i++)
+        if (strcmp(doc->photograph[i].file, name) == 0) snprintf(path, sizeof path, "photographs[%zu].file", i);
+    return error_set_field(err, STATUS_INVALID, path,
+                           "'%s' names the file '%s' a second time: each input file has one use", path, name);
+}
+
+static status check_files(const struct job_document *doc, struct error *err)
+{
+    status s = STATUS_OK;
+    struct name_list list = {.name = malloc((doc->n_volume_file + doc->n_photograph + 2) * sizeof *list.name)};
+    if (list.name == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check the job document: out of memory");
+    job_document_visit_files(doc, collect_name, &list);
+    qsort(list.name, list.n, sizeof *list.name, compare_names);
+    for (size_t i = 1; i < list.n && s == STATUS_OK; i++)
+        if (strcmp(list.name[i - 1], list.name[i]) == 0) s = named_twice(doc, list.name[i], err);
+    free(list.name);
+    return s;
+}
+
+status job_check_document(const struct option_value *v, struct error *err)
+{
+    status s = check_one_cloth(v, err);
+    if (s == STATUS_OK) s = check_one_measurement(v, err);
+    if (s == STATUS_OK) s = check_density(v->doc, err);
+    return s == STATUS_OK ? check_files(v->doc, err) : s;
+}

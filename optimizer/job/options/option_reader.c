@@ -1,0 +1,294 @@
+#include "optimizer/job/options/option_reader.h"
+#include "optimizer/job/json_field.h"
+#include "optimizer/job/options/option_table.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_KEY = 40, MAX_CHOICE = 40 };
+
+static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
+                           struct error *err);
+
+static status no_memory(struct error *err)
+{
+    return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
+}
+
+/* Index of the word in row's choice. */
+static status read_choice(const struct job_option *row, const struct json_field *f, const char *key, size_t *index,
+                          struct error *err)
+{
+    const char *name[MAX_CHOICE + 1];
+    size_t n = 0;
+    while (n < MAX_CHOICE && (name[n] = job_option_choice(row, n)) != NULL) n++;
+    name[n] = NULL;
+    return json_field_choice(f, key, name, index, err);
+}
+
+static status read_word(const struct job_option *row, const struct json_field *f, const char *key, void *target,
+                        struct error *err)
+{
+    size_t index = 0;
+    status s = read_choice(row, f, key, &index, err);
+    if (s != STATUS_OK) return s;
+    if (row->kind == OPTION_SWITCH)
+        *(bool *)target = index == 1;
+    else if (row->kind == OPTION_CHOICE)
+        memcpy(target, &(unsigned){(unsigned)index}, sizeof(unsigned));
+    else
+        snprintf(target, row->n, "%s", job_option_choice(row, index));
+    return STATUS_OK;
+}
+
+static status read_number_or_list(const struct job_option *row, const struct json_field *f, const char *key,
+                                  double *target, struct error *err)
+{
+    if (json_is_array(json_object_get(f->object, key)))
+        return json_field_number_array(f, key, row->n, row->lower, row->upper, target, err);
+    status s = json_field_number(f, key, row->lower, row->upper, &target[0], err);
+    for (size_t i = 1; i < row->n; i++) target[i] = target[0];
+    return s;
+}
+
+static status read_bool(const struct job_option *row, const struct json_field *f, const char *key, void *base,
+                        struct job_document *doc, struct error *err)
+{
+    void *target = (char *)base + row->at;
+    const json_t *value = json_object_get(f->object, key);
+    struct json_field sub = {.object = value};
+    bool given = false;
+    json_field_path(f, key, sub.path);
+    if (row->or_section && json_is_object(value)) {
+        *(bool *)target = true;
+        return read_section(&sub, row->path, base, doc, err);
+    }
+    if (row->or_section && !json_is_boolean(value))
+        return error_set_field(err, STATUS_INVALID, sub.path, "'%s' must be true, false or an object of %s", sub.path,
+                               row->items);
+    status s = json_field_bool(f, key, &given, err);
+    if (s != STATUS_OK) return s;
+    if (row->kind == OPTION_BOOL_OR_LEFT_OUT)
+        *(int *)target = given;
+    else
+        *(bool *)target = given;
+    return STATUS_OK;
+}
+
+/* Room for the elements of a list that is not empty and not too long; the count begins at 0. */
+static status new_list(const struct job_option *row, const struct json_field *list, void *base, char **element,
+                       struct error *err)
+{
+    size_t n = json_array_size(list->object);
+    if (!json_is_array(list->object) || n == 0 || n > (size_t)row->upper)
+        return error_set_field(err, STATUS_INVALID, list->path, "'%s' must be a list of 1 to %d %s", list->path,
+                               (int)row->upper, row->items);
+    *element = calloc(n, row->element_bytes);
+    if (*element == NULL) return no_memory(err);
+    memcpy((char *)base + row->at, element, sizeof *element);
+    *(size_t *)((char *)base + row->count_at) = 0;
+    return STATUS_OK;
+}
+
+static status read_file_names(const struct job_option *row, const struct json_field *list, void *base,
+                              struct error *err)
+{
+    char *name, path[JSON_PATH_BYTES];
+    status s = new_list(row, list, base, &name, err);
+    for (size_t i = 0; s == STATUS_OK && i < json_array_size(list->object); i++, name += row->element_bytes) {
+        const char *text = json_string_value(json_array_get(list->object, i));
+        snprintf(path, sizeof path, "%.140s[%zu]", list->path, i);
+        if (text == NULL)
+            return error_set_field(err, STATUS_INVALID, path, "'%s' must be a text: the name of an input file", path);
+        s = job_check_file_name(path, text, err);
+        if (s != STATUS_OK) return s;
+        snprintf(name, row->element_bytes, "%s", text);
+        ++*(size_t *)((char *)base + row->count_at);
+    }
+    return s;
+}
+
+static status default_section(const char *pattern, void *base, struct job_document *doc, struct error *err);
+
+static status read_list(const struct job_option *row, const struct json_field *list, void *base,
+                        struct job_document *doc, struct error *err)
+{
+    char *element, pattern[JSON_PATH_BYTES];
+    if (row->or_section && json_is_object(list->object)) return read_section(list, row->path, base, doc, err);
+    status s = new_list(row, list, base, &element, err);
+    snprintf(pattern, sizeof pattern, "%s[]", row->path);
+    for (size_t i = 0; s == STATUS_OK && i < json_array_size(list->object); i++, element += row->element_bytes) {
+        struct json_field f = {.object = json_array_get(list->object, i)};
+        snprintf(f.path, sizeof f.path, "%.140s[%zu]", list->path, i);
+        s = default_section(pattern, element, doc, err);
+        if (s == STATUS_OK) s = read_section(&f, pattern, element, doc, err);
+        if (s == STATUS_OK) ++*(size_t *)((char *)base + row->count_at);
+    }
+    return s;
+}
+
+static status read_file_name(const struct job_option *row, const struct json_field *f, const char *key, char *target,
+                             struct error *err)
+{
+    char path[JSON_PATH_BYTES];
+    json_field_path(f, key, path);
+    status s = json_field_text(f, key, row->required, target, JOB_MAX_NAME_BYTES, err);
+    return s == STATUS_OK ? job_check_file_name(path, target, err) : s;
+}
+
+static status read_object(const struct job_option *row, const struct json_field *f, const char *key, void *base,
+                          struct job_document *doc, struct error *err)
+{
+    struct json_field sub;
+    bool present;
+    status s = json_field_object(f, key, &sub, &present, err);
+    if (s != STATUS_OK) return s;
+    if (row->stored) *(bool *)((char *)base + row->at) = present;
+    return read_section(&sub, row->path, base, doc, err);
+}
+
+/* The value of a key that is given or required. */
+static status read_value(const struct job_option *row, const struct json_field *f, const char *key, void *base,
+                         struct job_document *doc, struct error *err)
+{
+    void *target = (char *)base + row->at;
+    struct json_field sub = {.object = json_object_get(f->object, key)};
+    json_field_path(f, key, sub.path);
+    switch (row->kind) {
+    case OPTION_SECTION:
+        return read_object(row, f, key, base, doc, err);
+    case OPTION_LIST:
+        return read_list(row, &sub, base, doc, err);
+    case OPTION_FILE_NAMES:
+        return read_file_names(row, &sub, base, err);
+    case OPTION_NUMBER:
+        return json_field_required_number(f, key, row->lower, row->upper, target, err);
+    case OPTION_NUMBERS:
+        return json_field_number_array(f, key, row->n, row->lower, row->upper, target, err);
+    case OPTION_NUMBER_OR_LIST:
+        return read_number_or_list(row, f, key, target, err);
+    case OPTION_COUNT:
+        return json_field_size(f, key, (size_t)row->lower, (size_t)row->upper, target, err);
+    case OPTION_COUNTS:
+        return json_field_size_array(f, key, row->n, (size_t)row->lower, (size_t)row->upper, target, err);
+    case OPTION_LARGE_COUNT:
+        return json_field_u64(f, key, (uint64_t)row->lower, target, err);
+    case OPTION_BOOL:
+    case OPTION_BOOL_OR_LEFT_OUT:
+        return read_bool(row, f, key, base, doc, err);
+    case OPTION_CHOICE:
+    case OPTION_SWITCH:
+    case OPTION_WORD:
+        return read_word(row, f, key, target, err);
+    case OPTION_TEXT:
+        return json_field_text(f, key, row->required, target, row->n, err);
+    case OPTION_FILE_NAME:
+        return read_file_name(row, f, key, target, err);
+    case OPTION_OWN:
+    case OPTION_N_KIND:
+        break;
+    }
+    return STATUS_OK;
+}
+
+/* Kinds whose readers do not say what is missing. */
+static bool lacks_message(enum option_kind kind)
+{
+    return kind != OPTION_NUMBER && kind != OPTION_TEXT && kind != OPTION_FILE_NAME && kind != OPTION_FILE_NAMES;
+}
+
+static status read_option(const struct job_option *row, const struct json_field *f, const char *key, void *base,
+                          struct job_document *doc, struct error *err)
+{
+    struct option_value v = {
+        .row = row, .value = json_object_get(f->object, key), .target = (char *)base + row->at, .doc = doc};
+    char path[JSON_PATH_BYTES];
+    if (v.value == NULL && !row->required) return STATUS_OK;
+    if (v.value == NULL && lacks_message(row->kind))
+        return error_set_field(err, STATUS_INVALID, f->path, "'%s' lacks '%s'", f->path, key);
+    status s = read_value(row, f, key, base, doc, err);
+    if (s != STATUS_OK || row->check == NULL) return s;
+    json_field_path(f, key, path);
+    v.path = path;
+    return row->check(&v, err);
+}
+
+/* All members of an object. pattern: its path in the table; base: the struct that the members' offsets are of. */
+static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
+                           struct error *err)
+{
+    const char *key, *allowed[MAX_KEY + 1];
+    const struct job_option *row;
+    size_t n = 0;
+    for (size_t i = 0; (row = job_option_at(i)) != NULL && n < MAX_KEY; i++)
+        if ((key = job_option_key_in(row, pattern)) != NULL) allowed[n++] = key;
+    allowed[n] = NULL;
+    status s = json_field_check_keys(f, allowed, err);
+    for (size_t i = 0; s == STATUS_OK && (row = job_option_at(i)) != NULL; i++)
+        if ((key = job_option_key_in(row, pattern)) != NULL) s = read_option(row, f, key, base, doc, err);
+    return s;
+}
+
+/* ---- defaults ---- */
+
+static status read_default(const struct job_option *row, void *base, struct job_document *doc, struct error *err)
+{
+    json_t *object = json_pack("{s:o?}", "default", json_loads(row->standard, JSON_DECODE_ANY, NULL));
+    struct json_field f = {.object = object};
+    if (object == NULL) return no_memory(err);
+    status s = read_value(row, &f, "default", base, doc, err);
+    json_decref(object);
+    return s;
+}
+
+static status put_default(const struct job_option *row, void *base, struct job_document *doc, struct error *err)
+{
+    void *target = (char *)base + row->at;
+    if (!row->stored) return STATUS_OK;
+    if (row->standard != NULL) return read_default(row, base, doc, err);
+    switch (row->kind) {
+    case OPTION_NUMBER:
+        if (!row->required) *(double *)target = NAN;
+        break;
+    case OPTION_NUMBERS:
+    case OPTION_NUMBER_OR_LIST:
+        for (size_t i = 0; i < row->n; i++) ((double *)target)[i] = NAN;
+        break;
+    case OPTION_BOOL_OR_LEFT_OUT:
+        *(int *)target = -1;
+        break;
+    case OPTION_WORD:
+        if (!row->required) snprintf(target, row->n, "%s", job_option_choice(row, 0));
+        break;
+    default:
+        break;
+    }
+    return STATUS_OK;
+}
+
+/* Of a section or an element of a list and the sections in it, but not of further lists. */
+static status default_section(const char *pattern, void *base, struct job_document *doc, struct error *err)
+{
+    const struct job_option *row;
+    size_t n = strlen(pattern);
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && (row = job_option_at(i)) != NULL; i++)
+        if (strncmp(row->path, pattern, n) == 0 && (n == 0 || row->path[n] == '.') &&
+            strchr(row->path + n, '[') == NULL)
+            s = put_default(row, base, doc, err);
+    return s;
+}
+
+status job_options_default(struct job_document *doc, struct error *err) { return default_section("", doc, doc, err); }
+
+status job_options_read(const json_t *document, struct job_document *doc, struct error *err)
+{
+    const struct json_field root = {.object = document};
+    const struct job_option *row = job_option_find("");
+    status s = read_section(&root, row->path, doc, doc, err);
+    return s == STATUS_OK
+               ? row->check(&(struct option_value){.row = row, .value = document, .path = "", .doc = doc}, err)
+               : s;
+}

@@ -1,0 +1,15 @@
+/* Reads a job document by the rows of the option table. */
+#ifndef SELVEDGE_OPTIMIZER_OPTION_READER_H
+#define SELVEDGE_OPTIMIZER_OPTION_READER_H
+
+#include "optimizer/job/job_document.h"
+
+#include <jansson.h>
+
+/* Puts the default of every option into a zeroed document. */
+status job_options_default(struct job_document *doc, struct error *err);
+/* Reads all options into doc, which has their defaults. Unknown keys are errors, as is every value that its row does not
+ * allow: STATUS_INVALID with the key in err->field. Lists that were allocated belong to doc, also after an error. */
+status job_options_read(const json_t *document, struct job_document *doc, struct error *err);
+
+#endif

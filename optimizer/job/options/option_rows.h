@@ -1,0 +1,46 @@
+/* Inside the option table: its parts, and short forms for what rows have in common. */
+#ifndef SELVEDGE_OPTIMIZER_OPTION_ROWS_H
+#define SELVEDGE_OPTIMIZER_OPTION_ROWS_H
+
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/options/option_checks.h"
+#include "optimizer/job/options/option_table.h"
+
+/* Each ends with a row without a path. */
+extern const struct job_option option_rows_cloth[], option_rows_setup[], option_rows_fit[];
+
+#define INTO_OF(type, member) .stored = true, .at = offsetof(type, member)
+#define TEXT_INTO_OF(type, member) INTO_OF(type, member), .n = sizeof((type *)NULL)->member
+#define NUMBERS_INTO_OF(type, member)                                                                                  \
+    INTO_OF(type, member), .n = sizeof((type *)NULL)->member / sizeof((type *)NULL)->member[0]
+/* Into struct job_document. */
+#define INTO(member) INTO_OF(struct job_document, member)
+#define TEXT_INTO(member) TEXT_INTO_OF(struct job_document, member)
+#define NUMBERS_INTO(member) NUMBERS_INTO_OF(struct job_document, member)
+#define LIST_INTO(pointer, n_member)                                                                                   \
+    INTO(pointer), .count_at = offsetof(struct job_document, n_member),                                                \
+                   .element_bytes = sizeof *((struct job_document *)NULL)->pointer
+
+#define RANGE(from, to) .lower = (from), .upper = (to)
+
+/* The angles of a photograph, or of one that could be taken: members of `type` in the list `list`. */
+#define ANGLE(list, type, name, from, to, ...)                                                                         \
+    {                                                                                                                  \
+        .path = list "." #name, .kind = OPTION_NUMBER, RANGE(from, to), .unit = "degrees", INTO_OF(type, name),        \
+        __VA_ARGS__                                                                                                    \
+    }
+#define ANGLES(list, type)                                                                                             \
+    ANGLE(list, type, light_theta_deg, 0, 180, .required = true, .check = job_check_light_theta,                       \
+          .allowed = "0 to below 90; above 90 to 180 without the black sheet",                                         \
+          .meaning = "Angle of the lamp from the normal of the cloth. Above 90 the lamp is behind the cloth."),        \
+        ANGLE(list, type, light_phi_deg, -360, 360, .required = true,                                                  \
+              .meaning = "Azimuth of the lamp, from +x towards +y."),                                                  \
+        ANGLE(list, type, camera_theta_deg, 0, 89.999, .required = true, .allowed = "0 to below 90",                   \
+              .meaning = "Angle of the camera from the normal of the cloth."),                                         \
+        ANGLE(list, type, camera_phi_deg, -360, 360, .required = true,                                                 \
+              .meaning = "Azimuth of the camera, from +x towards +y."),                                                \
+        ANGLE(list, type, cloth_rotation_deg, -360, 360, .standard = "0",                                              \
+              .meaning = "Turn of the cloth about its normal, counter-clockwise seen from above, under fixed lamp "    \
+                         "and camera.")
+
+#endif
