@@ -48,7 +48,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
+.PHONY: all generate deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -85,6 +85,14 @@ $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/n
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ -lcurl -ljansson -lsodium $(LINK_BASE)
 
+# the option table as JSON: of this the description of the API, the guide's table and the form of the dashboard are made
+PRINT_OPTIONS := $(BUILD)/tools/print-options
+$(PRINT_OPTIONS): $(BUILD)/obj/optimizer/job/options/print_options_main.c.o $(L)job.a $(L)renderer.a $(L)base.a
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
+generate: $(PRINT_OPTIONS) ## write what follows from the table of job options: config/openapi.json, docs/sample-preparation.md
+	@/usr/bin/python3 config/generate_options.py $(PRINT_OPTIONS)
+
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -105,7 +113,7 @@ deps:              ## install what is missing (Debian packages, as root or throu
 deps-test:
 	@./config/install-dependencies test
 
-build-tests: $(TEST_BINS)
+build-tests: $(TEST_BINS) $(PRINT_OPTIONS)
 
 check: | deps-test ## quick inner loop: unit tests, quick API tests and layer rules (< 2 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests

@@ -1,5 +1,6 @@
 #include "base/version.h"
 #include "optimizer/job/job_document.h"
+#include "optimizer/job/options/option_json.h"
 #include "optimizer/job/stage_table.h"
 #include "server/http/handlers.h"
 #include "server/http/http_reply.h"
@@ -32,6 +33,8 @@ void handle_about(struct http_request *r)
                json_pack("{s:s,s:s,s:o,s:o,s:o}", "name", "selvedge", "version", SELVEDGE_VERSION, "stages", stages,
                          "states", states, "limits", limits));
 }
+
+void handle_options(struct http_request *r) { reply_json(r, MHD_HTTP_OK, job_options_json()); }
 
 static void reply_static(struct http_request *r, const char *url)
 {

@@ -34,6 +34,7 @@ void handle_get_result(struct http_request *r);
 void handle_archive(struct http_request *r);
 /* handle_service.c */
 void handle_about(struct http_request *r);
+void handle_options(struct http_request *r);
 void handle_openapi(struct http_request *r);
 void handle_livez(struct http_request *r);
 void handle_readyz(struct http_request *r);

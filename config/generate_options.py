@@ -1,0 +1,171 @@
+#!/usr/bin/python3
+"""Writes what follows from the table of job options: the schema JobDocument of config/openapi.json and the table of section 4 of
+docs/sample-preparation.md.
+
+    config/generate_options.py [--check] PRINT-OPTIONS
+
+PRINT-OPTIONS is the program that prints the table as JSON (optimizer/job/options/option_json.h). With --check nothing is written and
+the exit status is 1 when a file is out of date."""
+import json
+import os
+import re
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+OPENAPI = os.path.join(ROOT, "config", "openapi.json")
+GUIDE = os.path.join(ROOT, "docs", "sample-preparation.md")
+BEGIN, END = "<!-- options: written by `make generate` -->\n", "<!-- options: end -->\n"
+FILE_NAME = "^[A-Za-z0-9_-][A-Za-z0-9._-]{0,126}$"
+WIDTH = 160
+
+
+def members(options, path):
+    """Key and row of the options that stand directly under a path."""
+    start = path + "." if path else ""
+    for row in options:
+        key = row["path"][len(start):]
+        if key and row["path"].startswith(start) and not re.search(r"[.\[]", key):
+            yield key, row
+
+
+# ---- config/openapi.json ----
+
+def number_schema(row):
+    schema = {"type": "integer" if row["kind"].startswith("integer") else "number", "minimum": row["lower"]}
+    if "upper" in row:
+        schema["maximum"] = row["upper"]
+    return schema
+
+
+def several(items, n):
+    return {"type": "array", "items": items, "minItems": n, "maxItems": n}
+
+
+def section_schema(options, path):
+    properties = {key: option_schema(options, row) for key, row in members(options, path)}
+    required = [key for key, row in members(options, path) if row["required"]]
+    return {"type": "object", "properties": properties, "additionalProperties": False, **({"required": required} if required else {})}
+
+
+def value_schema(options, row):
+    kind = row["kind"]
+    if kind == "section":
+        return section_schema(options, row["path"])
+    if kind == "list":
+        return {"type": "array", "items": section_schema(options, row["path"] + "[]"), "minItems": 1, "maxItems": row["max_items"]}
+    if kind == "file_names":
+        return {"type": "array", "items": {"type": "string", "pattern": FILE_NAME}, "minItems": 1, "maxItems": row["max_items"]}
+    if kind == "number_or_numbers":
+        return {"anyOf": [number_schema(row), several(number_schema(row), row["n"])]}
+    if kind in ("numbers", "integers"):
+        return several(number_schema(row), row["n"])
+    if kind in ("number", "integer"):
+        return number_schema(row)
+    return {"boolean": {"type": "boolean"}, "choice": {"enum": row.get("choices")}, "text": {"type": "string"},
+            "file_name": {"type": "string", "pattern": FILE_NAME}, "other": {}}[kind]
+
+
+def option_schema(options, row):
+    schema = value_schema(options, row)
+    if row.get("or_section"):
+        schema = {"anyOf": [schema, section_schema(options, row["path"])]}
+    schema.update(row.get("schema", {}))
+    if "default" in row:
+        schema["default"] = row["default"]
+    unit = f" Unit: {row['unit']}." if "unit" in row else ""
+    otherwise = f" Default: {row['left_out']}." if "left_out" in row else ""
+    schema["description"] = row["meaning"] + unit + otherwise
+    return schema
+
+
+def json_text(value, indent):
+    """JSON with whatever fits on a line on one line."""
+    line = json.dumps(value, ensure_ascii=False)
+    if len(line) + indent <= WIDTH or not isinstance(value, (dict, list)) or not value:
+        return line
+    inner = " " * (indent + 2)
+    if isinstance(value, dict):
+        rows = [f"{inner}{json.dumps(key)}: {json_text(member, indent + 2)}" for key, member in value.items()]
+    else:
+        rows = [inner + json_text(member, indent + 2) for member in value]
+    first, last = "{}" if isinstance(value, dict) else "[]"
+    return first + "\n" + ",\n".join(rows) + "\n" + " " * indent + last
+
+
+def with_schema(text, options):
+    schema = json_text(option_schema(options, next(row for row in options if row["path"] == "")), 6)
+    begin = re.search(r'^      "JobDocument": ', text, re.M).end()
+    _, length = json.JSONDecoder().raw_decode(text[begin:])
+    return text[:begin] + schema + text[begin + length:]
+
+
+# ---- docs/sample-preparation.md ----
+
+def plain(number):
+    return f"{number:g}" if isinstance(number, float) else str(number)
+
+
+def allowed_text(row):
+    if "allowed" in row:
+        return row["allowed"]
+    if row["kind"] == "choice":
+        return ", ".join(f"`{word}`" for word in row["choices"])
+    if row["kind"] == "boolean":
+        return "`true`, `false`"
+    if "max_items" in row:
+        return f"1..{row['max_items']}" + (" names" if row["kind"] == "file_names" else "")
+    if "upper" not in row:
+        return ""
+    span = f"{plain(row['lower'])}..{plain(row['upper'])}"
+    return f"{row['n']} numbers, {span}" if "n" in row else span
+
+
+def table_row(row, key):
+    default = f"`{json.dumps(row['default'])}`" if "default" in row else "required" if row["required"] else row.get("left_out", "")
+    cells = [key, row.get("unit", ""), default, allowed_text(row), row["meaning"]]
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def option_table(options):
+    lines = ["| key | unit | default | allowed | meaning |", "|---|---|---|---|---|"]
+    for row in options:
+        top, _, rest = row["path"].partition(".")
+        if row["path"] == "":
+            continue
+        if rest:
+            lines.append(table_row(row, f"`{rest}`"))
+        else:
+            head = f"`{top}[]`" if row["kind"] == "list" else f"`{top}`"
+            lines.append(table_row(row, f"**{head}**" if row["kind"] in ("section", "list") else head))
+    return "\n".join(lines) + "\n"
+
+
+def with_table(text, options):
+    begin, end = text.index(BEGIN) + len(BEGIN), text.index(END)
+    return text[:begin] + option_table(options) + text[end:]
+
+
+def main():
+    check = "--check" in sys.argv[1:]
+    program = [a for a in sys.argv[1:] if a != "--check"]
+    if len(program) != 1:
+        sys.exit(__doc__)
+    options = json.loads(subprocess.run(program, check=True, capture_output=True, text=True).stdout)["options"]
+    stale = []
+    for path, renew in ((OPENAPI, with_schema), (GUIDE, with_table)):
+        with open(path, encoding="utf-8") as file:
+            old = file.read()
+        new = renew(old, options)
+        if new != old:
+            stale.append(os.path.relpath(path, ROOT))
+            if not check:
+                with open(path, "w", encoding="utf-8") as file:
+                    file.write(new)
+    if stale:
+        print(("out of date, run `make generate`: " if check else "written: ") + ", ".join(stale))
+    return 1 if check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
