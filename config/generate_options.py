@@ -103,7 +103,8 @@ def with_schema(text, options):
 # ---- docs/sample-preparation.md ----
 
 def plain(number):
-    return f"{number:g}" if isinstance(number, float) else str(number)
+    """1000, 0.05, 1e9"""
+    return re.sub(r"e([+-])0*", lambda sign: "e" + sign[1].strip("+"), f"{number:g}") if abs(number) >= 1e8 or isinstance(number, float) else str(number)
 
 
 def allowed_text(row):

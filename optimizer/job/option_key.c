@@ -30,8 +30,10 @@ void job_option_resolve(const char *field, char *key, size_t n_bytes)
 status job_option_name_field(status code, struct error *err)
 {
     if (code == STATUS_OK || err == NULL) return code;
-    char key[sizeof err->field];
+    char key[sizeof err->field], section[64];
     job_option_resolve(err->field, key, sizeof key);
+    snprintf(section, sizeof section, "%.*s", (int)strcspn(key, ".["), key);
+    if (job_option_find(section) == NULL) key[0] = '\0';
     memcpy(err->field, key, sizeof key);
     return code;
 }

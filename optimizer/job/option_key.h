@@ -16,7 +16,8 @@ const char *job_option_key(const char *id);
  * is copied. */
 void job_option_resolve(const char *field, char *key, size_t n_bytes);
 
-/* Puts the key into err->field; err may be NULL. Returns code, so that `return job_option_name_field(s, err)` reads well. */
+/* Puts the key into err->field, and empties a field that is neither an option's id nor a key: such a field names an argument
+ * inside the program, and the text says what is wrong. err may be NULL. Returns code, so that `return job_option_name_field(s, err)` reads well. */
 status job_option_name_field(status code, struct error *err);
 
 #endif

@@ -162,7 +162,7 @@ static uint32_t program_sum(void)
     return sum;
 }
 
-static status read_inputs(struct pipeline_context *c, struct error *err)
+static status read_document(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
     size_t n = 0;
@@ -172,7 +172,12 @@ static status read_inputs(struct pipeline_context *c, struct error *err)
     s = job_document_parse(text, n, &c->doc, err);
     c->fingerprint = crc32_z(program_sum(), (const void *)text, n);
     free(text);
-    if (s == STATUS_OK) s = set_models(c, err);
+    return s;
+}
+
+static status read_rows(struct pipeline_context *c, struct error *err)
+{
+    status s = set_models(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);
     if (s == STATUS_OK) s = load_observations(c, err);
     if (s == STATUS_OK) s = select_rows(c, err);
@@ -183,5 +188,6 @@ static status read_inputs(struct pipeline_context *c, struct error *err)
 
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
 {
-    return job_option_name_field(read_inputs(c, err), err);
+    status s = read_document(c, err);
+    return s == STATUS_OK ? job_option_name_field(read_rows(c, err), err) : s;
 }

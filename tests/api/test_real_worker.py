@@ -182,6 +182,15 @@ def test_bad_input_gets_a_clear_error_and_nothing_is_lost(real, scan, kind):
         assert real.get(f"/v1/jobs/{job}/files/{n}").content == data
 
 
+def test_a_filter_that_keeps_no_voxel_is_named(real, scan):
+    job = real.create({**document(), "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0, "filter": {"eps_J": -900000}}})
+    real.upload(job, "scan.tif", scan, "volume")
+    real.upload(job, "rows.csv", TABLE, "measurements")
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    failed = real.wait_state(job, "failed", "succeeded", timeout_s=120)
+    assert failed["error"]["field"] == "volume.filter.eps_J" and "cannot find fibers" in failed["error"]["text"], failed["error"]
+
+
 def test_a_bad_file_is_replaced_and_the_job_succeeds(real, scan, finished):
     job = submit(real, scan, row("fit,6,20,0,20,180,0,nan,0.1,0.1"))
     real.wait_state(job, "failed", timeout_s=120)

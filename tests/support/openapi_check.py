@@ -11,10 +11,39 @@ METHODS = ("get", "put", "post", "delete", "head", "patch", "options")
 # replies that any request can get (docs/api.md, Errors): bad framing, Host or Origin, and errors of the machine
 GENERAL = {"400", "403", "500", "503", "507"}
 
+HEADERS = ("Idempotency-Key", "If-Match")  # fields of errors that are not about the document
+
 
 def load():
     with open(os.path.join(ROOT, "config", "openapi.json"), encoding="utf-8") as f:
         return json.load(f)
+
+
+def names_a_key(field, schema=None):
+    """True when the field of an error is a key of the job document: "volume.filter.s", "photographs[3].file", "fit.fixed.C_R.g"."""
+    if schema is None:
+        schema = load()["components"]["schemas"]["JobDocument"]
+    if field == "":
+        return True
+    if any(names_a_key(field, one) for one in schema.get("anyOf", [])):
+        return True
+    element = re.match(r"\[\d+\]", field)
+    if element:
+        return "items" in schema and names_a_key(field[element.end():], schema["items"])
+    rest = field.removeprefix(".")
+    for key, member in schema.get("properties", {}).items():
+        if re.match(re.escape(key) + r"($|[.\[])", rest) and names_a_key(rest[len(key):], member):
+            return True
+    free = re.match(r"\w+(\.[rgb]\b)?", rest)
+    more = schema.get("additionalProperties")
+    return isinstance(more, dict) and free is not None and names_a_key(rest[free.end():], more)
+
+
+def check_field(field, text):
+    """The field of an error about a job document names a key, or a key that the document should not have."""
+    unknown = re.search(r"unknown (field|parameter)", text)
+    known = names_a_key(field.rpartition(".")[0] if unknown else field)
+    assert known, f"'{field}' is no key of the job document: {text}"
 
 
 class OpenApiCheck:
@@ -40,6 +69,16 @@ class OpenApiCheck:
                 {**schema, "components": self.document["components"]})
         return self.validators[key]
 
+    def check_fields(self, method, template, reply):
+        """Errors of job documents, and of jobs, name keys of the document."""
+        takes_document = (method, template) in (("post", "/v1/jobs"), ("put", "/v1/jobs/{id}/document"))
+        if takes_document and reply.status_code == 422 and reply.json().get("code") == "invalid":
+            field = reply.json().get("field", "")
+            if field not in HEADERS:
+                check_field(field, reply.json()["detail"])
+        elif template == "/v1/jobs/{id}" and method == "get" and reply.status_code == 200 and reply.json()["error"]:
+            check_field(reply.json()["error"]["field"] or "", reply.json()["error"]["text"])
+
     def __call__(self, method, path, reply):
         template, method, status = self.template(path), method.lower(), str(reply.status_code)
         if template is None:
@@ -50,6 +89,7 @@ class OpenApiCheck:
             return
         operation = operations.get(method) or operations["get"]
         self.seen.add((template, method, status))
+        self.check_fields(method, template, reply)
         documented = operation["responses"].get(status)
         if documented is None:
             assert status in GENERAL, f"{method} {template} answered {status}, which is not documented: {reply.text[:500]}"
