@@ -87,7 +87,7 @@ $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/n
 
 # the option table as JSON: of this the description of the API, the guide's table and the form of the dashboard are made
 PRINT_OPTIONS := $(BUILD)/tools/print-options
-$(PRINT_OPTIONS): $(BUILD)/obj/optimizer/job/options/print_options_main.c.o $(L)job.a $(L)renderer.a $(L)base.a
+$(PRINT_OPTIONS): $(BUILD)/obj/optimizer/job/options/print_options_main.c.o $(L)job.a $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
 generate: $(PRINT_OPTIONS) ## write what follows from the table of job options: config/openapi.json, docs/sample-preparation.md

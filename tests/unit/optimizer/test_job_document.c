@@ -1,7 +1,9 @@
 /* The job document: what is accepted, and that every mistake is refused with the path of the field at fault. */
 #include "base/catalogue/method_catalogue.h"
+#include "base/catalogue/model_catalogue.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/job/job_document.h"
+#include "optimizer/job/options/option_table.h"
 #include "optimizer/job/stage_table.h"
 #include "renderer/scattering/appearance.h"
 
@@ -460,9 +462,28 @@ static void test_raw_volume(void **state)
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\",\"order\":1}"), "volume.raw.order", "order");
 }
 
+/* The row of the density multiplier has the range and the start of the models' parameter. */
+static void test_density_row(void **state)
+{
+    (void)state;
+    const struct job_option *row = job_option_find("fit.density_multiplier_per_cm");
+    const struct model_info *m;
+    size_t n = 0;
+    for (size_t i = 0; (m = model_catalogue_at(i)) != NULL; i++) {
+        if (m->kind != MODEL_VOLUME) continue;
+        const struct param_info *d = &m->param[m->n_param - 1];
+        assert_true(fabs(row->lower / param_to_file_unit(d, d->lower) - 1.0) < 1e-12);
+        assert_true(fabs(row->upper / param_to_file_unit(d, d->upper) - 1.0) < 1e-12);
+        assert_true(fabs(strtod(row->left_out, NULL) / param_to_file_unit(d, d->start) - 1.0) < 1e-12);
+        n++;
+    }
+    assert_true(n >= 3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_density_row),
         cmocka_unit_test(test_raw_volume),
         cmocka_unit_test(test_alignment),
         cmocka_unit_test(test_defaults),
