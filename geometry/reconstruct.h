@@ -12,7 +12,7 @@
 #include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/fibers/shape/radius.h"
-#include "geometry/orientation/main_directions.h"
+#include "geometry/orientation/alignment.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
 #include "geometry/volume/volume_source.h"

@@ -7,20 +7,21 @@
  * J at the best node of a fine set of directions and at the node's neighbours. Where the neighbourhood has another
  * direction whose J is almost as low, that direction is used. The result does not depend on how the work is divided. */
 #include "base/option_id.h"
+#include "geometry/filter_choice.h"
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/consensus.h"
 #include "geometry/orientation/fiber_diameter.h"
 #include "geometry/orientation/line_bound.h"
+#include "geometry/orientation/line_descent.h"
 #include "geometry/orientation/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
-#include "geometry/volume/density_map.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_FINE = 900, MAX_STEP = 24, N_CONSENSUS_BLUR = 3, MAX_CLIMB = 19 };
+enum { N_FINE = 900, N_CONSENSUS_BLUR = 3, MAX_CLIMB = 19 };
 
 /* difference of two minima of J up to which noise and touching fibers may decide between them */
 #define J_TOLERANCE 0.07
@@ -163,56 +164,14 @@ static void climb_band(void *context, size_t i_task, size_t i_thread)
     o->n_material[i_task] = material;
 }
 
-/* Cache of the values of J at a voxel. */
-struct j_cache {
-    size_t n;
-    uint16_t node[MAX_STEP * DIRECTION_NEIGHBOURS + 1];
-    float value[MAX_STEP * DIRECTION_NEIGHBOURS + 1];
-};
-
-static float cached_j(const struct orientation_job *o, const struct line_filter_site *site, struct j_cache *m,
-                      uint16_t node)
-{
-    for (size_t i = m->n; i-- > 0;)
-        if (m->node[i] == node) return m->value[i];
-    float j = line_filter_j(o->filter, site, node);
-    m->node[m->n] = node;
-    m->value[m->n++] = j;
-    return j;
-}
-
-/* Descends from node seed. Writes the direction to d, and returns J at the best node. */
-static float descend(const struct orientation_job *o, const struct line_filter_site *site, uint16_t seed, float d[3])
-{
-    struct j_cache m = {.n = 0};
-    uint16_t here = seed;
-    float value = cached_j(o, site, &m, here), around[DIRECTION_NEIGHBOURS];
-    for (int step = 0; step < MAX_STEP; step++) {
-        const struct direction_node *node = &o->fine.node[here];
-        uint16_t best = here;
-        float least = value;
-        for (int k = 0; k < DIRECTION_NEIGHBOURS; k++) {
-            around[k] = cached_j(o, site, &m, node->neighbour[k]);
-            if (around[k] < least) {
-                least = around[k];
-                best = node->neighbour[k];
-            }
-        }
-        if (best == here || step == MAX_STEP - 1) break;
-        here = best;
-        value = least;
-    }
-    direction_set_refine(&o->fine, here, value, around, d);
-    return value;
-}
-
 /* Descends at ridge voxel x from the node nearest to `start`. Writes the direction to d, and returns J as a share of
  * J in solid material. */
 static double descend_at(const struct orientation_job *o, const size_t x[3], const float start[3], float *scratch,
                          float d[3])
 {
+    const struct line_descent descent = {&o->fine, o->filter};
     struct line_filter_site site = line_filter_at(o->filter, &o->blurred, x[0], x[1], x[2], scratch);
-    return (double)descend(o, &site, (uint16_t)direction_set_nearest(&o->fine, start), d) / o->j_full;
+    return (double)line_descend(&descent, &site, (uint16_t)direction_set_nearest(&o->fine, start), d) / o->j_full;
 }
 
 typedef void (*ridge_visitor)(struct orientation_job *o, const size_t x[3], size_t at, float *scratch);
@@ -309,41 +268,6 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
     o->n_kept[k] = kept;
 }
 
-/* J in a block of density 1. */
-static double solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
-
-/* J as a share of that of solid material is 0.9 on axes of fibers, 0.5 on those of thin and blurred ones, and below
- * 0.2 for noise in void. */
-static const double EPS_J_SHARE = 0.35;
-
-/* Chooses filter parameters from the fiber diameter. Over the six fabrics of thesis Table 5.2 s times the squared
- * radius in voxels is between 0.7 and 11, with a geometric mean of about 4; for most of them t is twice s. A line
- * must be some diameters long, because a shorter one fits into a fiber in many directions: h is about 2.8 diameters. */
-static void choose_parameters(struct reconstruct_option *o, const struct volume *v, double diameter_voxel)
-{
-    struct density_modes modes;
-    double radius = 0.5 * diameter_voxel;
-    if (isnan(o->s)) o->s = fmin(2.0, 4.0 / (radius * radius));
-    if (isnan(o->t)) o->t = 2.0 * o->s;
-    if (o->h == 0) {
-        size_t h = 2 * (size_t)lrint(1.4 * diameter_voxel) + 1;
-        o->h = h < 9 ? 9 : h > 41 ? 41 : h;
-    }
-    if (isnan(o->eps_d)) /* half way between the modes of void and of material */
-        o->eps_d = density_modes_find(v, &modes, NULL) == STATUS_OK ? fmin(0.6, fmax(0.25, modes.half)) : 0.5;
-    if (isnan(o->eps_j)) o->eps_j = EPS_J_SHARE * solid_j(o->s, o->t, o->h);
-}
-
-/* J of solid material is below that of void, 0, only for t > s / 2. A job may give one of the two; the other is then
- * chosen here. */
-static status check_parameters(const struct reconstruct_option *o, struct error *err)
-{
-    if (o->t > 0.5 * o->s) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, OPTION_FILTER_T,
-                           "cannot find fibers: the direction filter's t, %g, must be above half of its s, %g", o->t,
-                           o->s);
-}
-
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
                       size_t n_thread, struct error *err)
 {
@@ -368,7 +292,7 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     o->eps_d = (float)option->eps_d;
     o->eps_j = (float)option->eps_j;
-    o->j_full = solid_j(option->s, option->t, option->h);
+    o->j_full = filter_solid_j(option->s, option->t, option->h);
     tensor_window_init(&o->window, 0.28 * diameter_voxel);
     o->n_climb = (int)ceil(0.5 * diameter_voxel);
     if (o->n_climb > MAX_CLIMB) o->n_climb = MAX_CLIMB;
@@ -431,8 +355,8 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     *d = (struct direction_volume){0};
     status s = fiber_diameter_measure(v, pool, &inner, &report->fiber_diameter_voxel, err);
     if (s != STATUS_OK) return s;
-    choose_parameters(option, v, report->fiber_diameter_voxel);
-    s = check_parameters(option, err);
+    filter_choose(option, v, report->fiber_diameter_voxel);
+    s = filter_check(option, err);
     if (s != STATUS_OK) return s;
     s = prepare(&o, option, report->fiber_diameter_voxel, thread_pool_n_thread(pool), err);
     if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);

@@ -1,7 +1,7 @@
 /* Main directions of cloths that were turned and sheared by known matrices, and the box that tiles. */
 #include "base/angle.h"
 #include "base/scratch_space.h"
-#include "geometry/orientation/main_directions.h"
+#include "geometry/orientation/alignment.h"
 #include "geometry/orientation/repeat_direction.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/density_map.h"

@@ -1,0 +1,37 @@
+#include "geometry/filter_choice.h"
+#include "base/option_id.h"
+#include "geometry/volume/density_map.h"
+
+#include <math.h>
+
+double filter_solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
+
+/* J as a share of that of solid material is 0.9 on axes of fibers, 0.5 on those of thin and blurred ones, and below
+ * 0.2 for noise in void. */
+static const double EPS_J_SHARE = 0.35;
+
+/* Over the six fabrics of thesis Table 5.2 s times the squared radius in voxels is between 0.7 and 11, with a geometric
+ * mean of about 4; for most of them t is twice s. A line must be some diameters long, because a shorter one fits into a
+ * fiber in many directions: h is about 2.8 diameters. */
+void filter_choose(struct reconstruct_option *o, const struct volume *v, double diameter_voxel)
+{
+    struct density_modes modes;
+    double radius = 0.5 * diameter_voxel;
+    if (isnan(o->s)) o->s = fmin(2.0, 4.0 / (radius * radius));
+    if (isnan(o->t)) o->t = 2.0 * o->s;
+    if (o->h == 0) {
+        size_t h = 2 * (size_t)lrint(1.4 * diameter_voxel) + 1;
+        o->h = h < 9 ? 9 : h > 41 ? 41 : h;
+    }
+    if (isnan(o->eps_d)) /* half way between the modes of void and of material */
+        o->eps_d = density_modes_find(v, &modes, NULL) == STATUS_OK ? fmin(0.6, fmax(0.25, modes.half)) : 0.5;
+    if (isnan(o->eps_j)) o->eps_j = EPS_J_SHARE * filter_solid_j(o->s, o->t, o->h);
+}
+
+status filter_check(const struct reconstruct_option *o, struct error *err)
+{
+    if (o->t > 0.5 * o->s) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, OPTION_FILTER_T,
+                           "cannot find fibers: the direction filter's t, %g, must be above half of its s, %g", o->t,
+                           o->s);
+}
