@@ -1,4 +1,4 @@
-/* Cem Yuksel's .hair; byte layout in docs/file-formats.md. All numbers little-endian. */
+/* Reads and writes Cem Yuksel's .hair; docs/file-formats.md has the byte layout. All numbers are little-endian. */
 #include "base/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
@@ -52,10 +52,11 @@ static float get_f32(const uint8_t *from)
     return v;
 }
 
-/* Strands that a fiber of n vertices is written as: the format counts a strand's segments in 16 bits. */
+/* Number of strands that a fiber of n vertices is written as, because the format counts a strand's segments in 16
+ * bits. */
 static size_t n_strand_of(size_t n) { return (n - 2) / HAIR_MAX_SEGMENT + 1; }
 
-/* What the file will have; the vertex between two strands of a fiber is in both. */
+/* Counts what the file will hold. The vertex between two strands of a fiber is in both. */
 static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point,
                             struct error *err)
 {
@@ -64,14 +65,14 @@ static status count_strands(const struct fiber_set *f, const char *name, size_t 
         size_t n = f->first_vertex[i + 1] - f->first_vertex[i];
         if (n < 2)
             return error_set(err, STATUS_INVALID,
-                             "cannot write fibers '%s': fiber %zu has %zu vertices, at least 2 make a fiber", name, i,
-                             n);
+                             "cannot write fibers '%s': fiber %zu has %zu vertices, but needs at least 2", name, i, n);
         *n_strand += n_strand_of(n);
     }
     *n_point = f->n_vertex + (*n_strand - f->n_fiber);
-    if (*n_point > UINT32_MAX) /* strands are fewer */
-        return error_set(err, STATUS_TOO_LARGE, "cannot write fibers '%s': %zu vertices, the format ends at %u", name,
-                         *n_point, UINT32_MAX);
+    if (*n_point > UINT32_MAX) /* there are fewer strands than points */
+        return error_set(err, STATUS_TOO_LARGE,
+                         "cannot write fibers '%s': %zu vertices, but the format is limited to %u", name, *n_point,
+                         UINT32_MAX);
     return STATUS_OK;
 }
 
@@ -121,12 +122,14 @@ struct hair_header {
     float default_thickness;
 };
 
-/* Counts of the header against the length of the file; *n_bytes is what the header promises (at most 2^37). */
+/* Checks the counts of the header against the length of the file. *n_bytes: length that follows from the header (at
+ * most 2^37). */
 static status check_header(const struct hair_header *h, uint64_t file_bytes, const char *name, struct error *err)
 {
     if ((h->flags & HAIR_POINTS) == 0 || (h->flags & ~(uint32_t)HAIR_KNOWN) != 0)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': flags 0x%x, points are missing or flags unknown",
-                         name, h->flags);
+        return error_set(err, STATUS_FORMAT,
+                         "cannot read fibers '%s': flags 0x%x: there are no points, or a flag is unknown", name,
+                         h->flags);
     if (h->n_strand == 0) return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", name);
     uint64_t want = HAIR_HEADER_BYTES + 12 * (uint64_t)h->n_point;
     if (h->flags & HAIR_SEGMENTS) want += 2 * (uint64_t)h->n_strand;
@@ -134,8 +137,8 @@ static status check_header(const struct hair_header *h, uint64_t file_bytes, con
     if (h->flags & HAIR_TRANSPARENCY) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_COLOUR) want += 12 * (uint64_t)h->n_point;
     if (want != file_bytes)
-        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %llu bytes, its header promises %llu", name,
-                         (unsigned long long)file_bytes, (unsigned long long)want);
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has %llu bytes, but its header requires %llu",
+                         name, (unsigned long long)file_bytes, (unsigned long long)want);
     if (2 * (uint64_t)h->n_strand > h->n_point)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': %u fibers but only %u points", name, h->n_strand,
                          h->n_point);
@@ -145,7 +148,7 @@ static status check_header(const struct hair_header *h, uint64_t file_bytes, con
     return STATUS_OK;
 }
 
-/* first_vertex from the segment counts. */
+/* Computes first_vertex from the segment counts. */
 static status get_strands(struct fiber_set *f, const struct hair_header *h, const uint8_t *segments, const char *name,
                           struct error *err)
 {
@@ -181,7 +184,7 @@ static status get_radii(struct fiber_set *f, const struct hair_header *h, const 
     return STATUS_OK;
 }
 
-/* Tile size from the header's text; 0 where another program wrote the file. */
+/* Reads the tile size from the text of the header; 0 if another program wrote the file. */
 static void get_tile(struct fiber_set *f, const uint8_t *header)
 {
     char text[HAIR_TEXT_BYTES + 1];
@@ -228,7 +231,7 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
     return STATUS_OK;
 }
 
-/* The header is looked at before the rest is read, so that a wrong count costs nothing. */
+/* Checks the header before the rest is read, so that a wrong count allocates nothing. */
 static status check_file(const char *path, struct error *err)
 {
     const char *name = path_file_name(path);

@@ -9,14 +9,14 @@ static const double FADE_RADII = 8.0, JOIN_RADII = 2.0, SAME_COSINE = 0.7071;
 
 struct end {
     size_t i_fiber;
-    bool last;         /* of the fiber's two ends */
-    double p[3], t[3]; /* t: unit, outwards */
+    bool last;         /* the fiber's last vertex instead of its first */
+    double p[3], t[3]; /* t: unit tangent, outwards */
     double radius;
 };
 
 struct pair {
     double distance;
-    size_t low, high; /* indices of ends at face 0 and at the opposite one */
+    size_t low, high; /* indices of an end at face 0 and of one at the opposite face */
 };
 
 struct seam {
@@ -24,7 +24,7 @@ struct seam {
     int axis;
     struct end *end[2];
     size_t n[2];
-    struct pair *pair; /* matched, nearest first */
+    struct pair *pair; /* matched pairs, nearest first */
     size_t n_pair;
 };
 
@@ -98,7 +98,7 @@ static status add_pair(struct seam *s, size_t *capacity, struct pair p, struct e
     return STATUS_OK;
 }
 
-/* All pairs within reach (ends are sorted by height), then the nearest first. */
+/* Finds all pairs within reach (ends are sorted by height), then matches the nearest first. */
 static status match(struct seam *s, double reach_radii, struct error *err)
 {
     size_t capacity = 0, from = 0;
@@ -156,7 +156,7 @@ status fiber_seam_measure(const struct fiber_set *f, struct fiber_seam *seam, st
     return st;
 }
 
-/* Moves an end and, fading, what is next to it. */
+/* Moves an end and the vertices next to it; the shift fades out along the fiber. */
 static void shift_end(struct fiber_set *f, const struct end *e, const double shift[3])
 {
     size_t first = f->first_vertex[e->i_fiber], n = f->first_vertex[e->i_fiber + 1] - first;

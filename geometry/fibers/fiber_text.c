@@ -1,4 +1,5 @@
-/* Fibers as text: "x y z radius" per line in millimetres, a blank line between fibers (docs/file-formats.md). */
+/* Fibers as text: a line "x y z radius" in millimetres for each vertex, and a blank line between fibers
+ * (docs/file-formats.md). */
 #include "base/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
@@ -33,14 +34,14 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
 
 struct line_reader {
     const char *at, *end;
-    size_t i_line; /* of the line last read, from 1 */
+    size_t i_line; /* number of the line last read, from 1 */
 };
 
 enum { LINE_BYTES = 256 };
 
 enum line_kind { LINE_END, LINE_BLANK, LINE_POINT, LINE_TOO_LONG };
 
-/* Next line into a buffer of its own, so that strtod cannot run over the line's end. */
+/* Copies the next line to a buffer, so that strtod cannot read beyond the end of the line. */
 static enum line_kind next_line(struct line_reader *r, char line[LINE_BYTES])
 {
     if (r->at >= r->end) return LINE_END;
@@ -75,7 +76,7 @@ static size_t count_points(const char *data, size_t n_bytes, size_t *n_fiber)
     return n_vertex;
 }
 
-/* Four finite numbers; false for anything else. */
+/* Parses four finite numbers. Returns false for anything else. */
 static bool parse_point(const char *line, double value[4])
 {
     for (int a = 0; a < 4; a++) {

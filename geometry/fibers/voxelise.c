@@ -7,23 +7,23 @@
 
 enum { SLAB = 2, BYTES_PER_VOXEL = 5 };
 
-/* What a thread needs for the voxels of one slab. */
+/* Buffers of one thread for the voxels of one slab. */
 struct slab {
-    uint32_t *owner;  /* fiber that last touched a voxel, + 1 */
-    float *share;     /* and its share */
+    uint32_t *owner;  /* number + 1 of the fiber that last touched a voxel */
+    float *share;     /* share of that fiber */
     float *density;   /* sum of shares */
-    float *distance;  /* to the nearest axis, in widths */
-    float *direction; /* of that axis: 3 */
+    float *distance;  /* distance to the nearest axis, in widths */
+    float *direction; /* direction of that axis, three numbers */
 };
 
 struct job {
     const struct fiber_set *f;
     struct direction_volume *v;
-    double z_low_m, per_voxel[3]; /* voxels a metre */
-    struct slab *slab;            /* per thread */
+    double z_low_m, per_voxel[3]; /* voxels per metre */
+    struct slab *slab;            /* one per thread */
 };
 
-/* One segment, in metres; positions relative to the grid's corner. */
+/* One segment, in metres, with positions relative to the corner of the grid. */
 struct capsule {
     double a[3], d[3], length2, length;
     double ramp_m, width_m, scale; /* share = scale * clamp(1/2 + (ramp - distance) / width) */
@@ -46,7 +46,7 @@ static bool capsule_init(struct capsule *c, const struct job *job, size_t i_fibe
     c->width_m = cbrt(size[0] * size[1] * size[2]);
     c->ramp_m = sqrt(fmax(0.0, r * r - c->width_m * c->width_m / 12.0));
     c->scale = 1.0;
-    if (c->ramp_m < 0.5 * c->width_m) { /* the ramp would not end before the axis: a cone */
+    if (c->ramp_m < 0.5 * c->width_m) { /* the ramp would not end before the axis, so the fiber is drawn as a cone */
         c->ramp_m = 0.5 * c->width_m;
         c->scale = 3.0 * r * r / (c->width_m * c->width_m);
     }
@@ -56,7 +56,7 @@ static bool capsule_init(struct capsule *c, const struct job *job, size_t i_fibe
     return c->length2 > 0.0;
 }
 
-/* Distance of a point from the axis, in metres; negative behind an end of the fiber. */
+/* Distance of a point from the axis in metres; negative beyond an end of the fiber. */
 static double axis_distance(const struct capsule *c, const double p[3])
 {
     double q[3] = {p[0] - c->a[0], p[1] - c->a[1], p[2] - c->a[2]}, sum = 0.0;
@@ -69,11 +69,11 @@ static double axis_distance(const struct capsule *c, const double p[3])
 
 static double share_at(const struct capsule *c, double distance)
 {
-    if (distance < 0.0) return 0.0; /* behind an end */
+    if (distance < 0.0) return 0.0; /* beyond an end */
     return c->scale * fmin(fmax(0.0, 0.5 + (c->ramp_m - distance) / c->width_m), 1.0);
 }
 
-/* What a cone has beyond the first and the last slice, where the grid ends with the cloth, belongs to that slice. */
+/* Share of a cone beyond the first and last slice, where the grid ends with the cloth. It is added to that slice. */
 static double share_beyond(const struct job *job, const struct capsule *c, const double p[3], long k)
 {
     const double step = job->v->voxel_size_m[2];
@@ -178,7 +178,7 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     store_slab(job, s, z_from, n);
 }
 
-/* Voxels for an edge length; the product as a double, which cannot overflow. */
+/* Number of voxels for an edge length. The product is returned as a double, which cannot overflow. */
 static double grid_for(const struct fiber_set *f, double height_m, double edge_m, double n[3])
 {
     for (int a = 0; a < 2; a++) n[a] = fmax(1.0, round(f->tile_size_m[a] / edge_m));
@@ -186,7 +186,7 @@ static double grid_for(const struct fiber_set *f, double height_m, double edge_m
     return n[0] * n[1] * n[2];
 }
 
-/* The edge length, the grid and where it begins. */
+/* Chooses the edge length, the grid and its position. */
 static status choose_grid(const struct fiber_set *f, const struct voxelise_option *o, double *edge_m, size_t n[3],
                           double size_m[3], double *z_low_m, struct error *err)
 {
@@ -202,7 +202,7 @@ static status choose_grid(const struct fiber_set *f, const struct voxelise_optio
     while (grid_for(f, height_m, *edge_m, count) > limit) {
         if (given)
             return error_set(err, STATUS_TOO_LARGE,
-                             "cannot voxelise fibers with voxels of %g um: %.0f x %.0f x %.0f voxels need %.0f MB, "
+                             "cannot voxelise fibers with voxels of %g um: %.0f x %.0f x %.0f voxels need %.0f MB, but "
                              "the limit is %.0f MB",
                              1e6 * *edge_m, count[0], count[1], count[2],
                              BYTES_PER_VOXEL * count[0] * count[1] * count[2] / 1e6, (double)o->limit_bytes / 1e6);

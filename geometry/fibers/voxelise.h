@@ -1,15 +1,15 @@
-/* Fibers as a density and direction volume: what a volume model of appearance sees of a cloth that was given as fibers.
+/* Converts fibers to a volume of densities and directions, for volume models of a cloth that was given as fibers.
  *
- * Density of a voxel: the share of it inside fibers, taken as clamp(1/2 + (r' - d) / w) of the distance d of its centre
- * from a fiber's axis, w its width; r'^2 = r^2 - w^2 / 12 keeps the area of the section, pi (r'^2 + w^2 / 12), as long as
- * the ramp ends before the axis (r' >= w / 2). Thinner fibers are drawn as wide as that, as cones of the fiber's area:
- * 3 r^2 / w^2 (1 - d / w). Narrower ones would slip between the centres of voxels; what is wider than the cloth is thick
- * goes to its first and last slice. Shares of different fibers add, up to 1. Ends are flat. Direction:
- * the tangent of the fiber whose axis is nearest, as in the direction transfer of the fabric thesis (5.6.7).
+ * The density of a voxel is the share of it inside fibers. For a voxel of width w whose centre has distance d from
+ * the axis of a fiber it is clamp(1/2 + (r' - d) / w), where r'^2 = r^2 - w^2 / 12 preserves the area of the
+ * section, pi (r'^2 + w^2 / 12), if the ramp ends before the axis (r' >= w / 2). Thinner fibers are drawn as cones
+ * of that width and of the fiber's area, 3 r^2 / w^2 (1 - d / w), because narrower profiles would miss the centres
+ * of voxels. What extends above or below the cloth is added to its first or last slice. Shares of different fibers
+ * add, up to 1. Ends are flat. The direction is the tangent of the fiber whose axis is nearest, as in the direction
+ * transfer of the fabric thesis (5.6.7).
  *
- * The grid has a whole number of voxels in a tile, so it is periodic in x and y; its top is the
- * highest fiber's. Everything depends on the fibers and options only, not on the number of threads.
- */
+ * A tile has a whole number of voxels, so the grid is periodic in x and y. Its top is that of the highest fiber. The
+ * result depends only on the fibers and the options, not on the number of threads. */
 #ifndef SELVEDGE_GEOMETRY_VOXELISE_H
 #define SELVEDGE_GEOMETRY_VOXELISE_H
 
@@ -19,13 +19,13 @@
 #include "geometry/volume/volume.h"
 
 struct voxelise_option {
-    double voxel_size_m; /* NaN: half of the mean radius, or as much more as the limit asks for */
-    size_t limit_bytes;  /* of the volume: 5 bytes a voxel */
+    double voxel_size_m; /* NaN: half of the mean radius, or the smallest size that the limit allows */
+    size_t limit_bytes;  /* of the volume, 5 bytes per voxel */
 };
 
-/* v: release it. *voxel_size_m: what was used (edges of voxels differ from it by the rounding to whole tiles). f must
- * satisfy fiber_set_validate. STATUS_TOO_LARGE (a given voxel size that needs more than the limit), STATUS_INVALID (one
- * wider than the tile), STATUS_NO_MEMORY, STATUS_CANCELLED. */
+/* The caller releases v. *voxel_size_m: size used; the edges of voxels differ from it by the rounding to whole
+ * tiles. f must satisfy fiber_set_validate. STATUS_TOO_LARGE (a given voxel size needs more than the limit),
+ * STATUS_INVALID (it is wider than the tile), STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status fibers_voxelise(const struct fiber_set *f, const struct voxelise_option *o, struct thread_pool *pool,
                        const struct progress *progress, struct direction_volume *v, double *voxel_size_m,
                        struct error *err);

@@ -6,7 +6,7 @@
 
 enum { REACH = 4 };
 
-/* Squared sine of the angle at vertex i; negative where the voxel is empty. */
+/* Squared sine of the angle at vertex i; negative if the voxel is empty. */
 static float sine2(const struct polyline_set *p, size_t line, size_t i, const struct direction_volume *d)
 {
     size_t a = i >= p->first[line] + 2 ? i - 2 : p->first[line],

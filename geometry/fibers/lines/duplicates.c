@@ -4,7 +4,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-/* Tangent at vertex i of a line, central difference. */
+/* Tangent at vertex i of a line, by central difference. */
 static void tangent_at(const struct polyline_set *p, size_t line, size_t i, float t[3])
 {
     size_t a = i > p->first[line] + 1 ? i - 2 : p->first[line],
@@ -18,18 +18,18 @@ static void tangent_at(const struct polyline_set *p, size_t line, size_t i, floa
     for (int c = 0; c < 3; c++) t[c] *= norm;
 }
 
-/* a wins over b: longer, or earlier of equals. */
+/* Line a has precedence over b: it is longer, or the earlier one of equals. */
 static bool wins(const struct polyline_set *p, size_t a, size_t b)
 {
     size_t na = polyline_length(p, a), nb = polyline_length(p, b);
     return na != nb ? na > nb : a < b;
 }
 
-/* Does a winning line pass vertex i of `line` within `near`? */
+/* Returns whether a line with precedence passes vertex i of `line` within `near`. */
 static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i, float near)
 {
     const float *x = p->vertex[i];
-    float reach = sqrtf(near * near + 1.0f); /* vertices are at most about 1.5 apart */
+    float reach = sqrtf(near * near + 1.0f); /* vertices are at most about 1.5 voxels apart */
     size_t from[3], to[3], c[3];
     vertex_grid_range(g, x, reach, from, to);
     for (c[2] = from[2]; c[2] <= to[2]; c[2]++)

@@ -8,11 +8,11 @@
 enum { END_FIT = 7, NEAR_END = 4, MAX_WALK = 256 };
 static const float FLOOR = 0.15f;
 
-/* Vertices in a grid that takes new ones: a list per cell. */
+/* A grid of vertices to which more can be added: one linked list per cell. */
 struct live_grid {
     float cell;
     size_t n[3];
-    uint32_t *head; /* per cell: entry + 1 */
+    uint32_t *head; /* per cell: number of its first entry + 1 */
     struct live_entry {
         float x[3];
         uint32_t line, next;
@@ -56,7 +56,7 @@ static bool grid_add(struct live_grid *g, const float x[3], uint32_t line, bool 
     return true;
 }
 
-/* Vertices of other lines within `reach` of x, at most max; squared distance of the nearest in *least2. */
+/* Finds at most max vertices of other lines within `reach` of x. *least2: squared distance of the nearest. */
 static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t line, float reach, float (*found)[3],
                          size_t max, float *least2, uint32_t *nearest)
 {
@@ -86,9 +86,9 @@ static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t l
     return n;
 }
 
-/* Material around x in the disk of radius r and thickness 1.5 perpendicular to t that is nearer to x than to the neighbours:
- * mean offset (perpendicular), and mean density within half of r of x. Near a face only voxels whose mirror image through x is in the
- * volume too count, or the walk would turn along the face. */
+/* Finds the material in the disk of radius r and thickness 1.5 around x, perpendicular to t, that is nearer to x
+ * than to the neighbours: its mean perpendicular offset, and the mean density within half of r of x. Near a face
+ * only voxels whose mirror image through x lies in the volume count, or the walk would turn along the face. */
 static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r, float (*other)[3],
                           size_t n_other, float offset[3], float *core)
 {
@@ -145,8 +145,8 @@ static float normalise(float t[3])
     return norm;
 }
 
-/* From position x with unit tangent t; writes at most max_step positions. A walk that runs into the middle of another line was not
- * along a fiber of its own: nothing of it counts. */
+/* Walks from position x with unit tangent t and writes at most max_step positions. A walk that reaches the middle of
+ * another line did not follow a fiber of its own, so all of it is discarded. */
 static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], float (*path)[3])
 {
     float other[64][3], r = 0.5f * w->o->diameter_voxel, stop2 = 0.25f * w->o->diameter_voxel * w->o->diameter_voxel;
@@ -179,7 +179,7 @@ static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], 
     return n;
 }
 
-/* Tangent of an end, outwards, from its last vertices. */
+/* Outward tangent of an end, from its last vertices. */
 static void end_tangent(const struct polyline_set *p, size_t line, bool last, float x[3], float t[3])
 {
     size_t n = polyline_length(p, line), back = n - 1 < END_FIT ? n - 1 : END_FIT;

@@ -1,9 +1,9 @@
-/* Free ends of polylines walk on along their fiber, through material that no other polyline claims.
+/* Extends free ends of polylines along their fiber, through material that belongs to no other polyline.
  *
- * A step is one voxel along the tangent, followed by a move to the centroid of the material around, perpendicular to the tangent, that
- * is nearer to this line than to any other. The walk ends where the material does, at another line, at a face of the volume, or
- * after max_step steps. It closes what slices miss: fibers at 45 degrees to two axes, sharp bends, ends near faces.
- */
+ * A step is one voxel along the tangent, followed by a move to the centroid of the material that is nearer to this
+ * line than to any other, perpendicular to the tangent. The walk ends where the material ends, at another line, at a
+ * face of the volume, or after max_step steps. It closes gaps that slices leave: fibers at 45 degrees to two axes,
+ * sharp bends, ends near faces. */
 #ifndef SELVEDGE_GEOMETRY_GROWING_H
 #define SELVEDGE_GEOMETRY_GROWING_H
 
@@ -16,7 +16,7 @@ struct grow_option {
     int max_step; /* voxels per end */
 };
 
-/* lines in, result (initialised, empty) out; *n_grown is the number of vertices added. STATUS_NO_MEMORY. */
+/* Writes the extended lines to result (initialised, empty). *n_grown: number of vertices added. STATUS_NO_MEMORY. */
 status polylines_grow(const struct polyline_set *lines, const struct volume *v, const struct grow_option *o,
                       struct polyline_set *result, size_t *n_grown, struct error *err);
 

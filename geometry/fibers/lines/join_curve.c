@@ -7,7 +7,7 @@
 enum {
     SIDE = 10,
     N_PROBE = 9
-}; /* vertices of each side that the curve goes through; places where its curvature is taken */
+}; /* vertices of each side that the curve is fitted to; places where its curvature is evaluated */
 
 const float *line_end_vertex(const struct polyline_set *p, uint32_t end, size_t k)
 {
@@ -22,7 +22,7 @@ static double distance(const float a[3], const float b[3])
     return sqrt(sum);
 }
 
-/* Vertices of one side from the gap outwards with their arc length from the gap. */
+/* Collects vertices of one side from the gap outwards, with their arc length from the gap. */
 static size_t take_side(const struct polyline_set *p, uint32_t end, size_t trim, const float *vertex[SIDE],
                         double arc[SIDE])
 {
@@ -60,7 +60,7 @@ static void add_vertex(double m[4][4], double b[4][3], double u, const float x[3
     }
 }
 
-/* Distance of x from the curve near u: across its tangent there. */
+/* Squared distance of x from the curve near u, across its tangent there. */
 static double residual2(const struct join_curve *j, double u, const float x[3])
 {
     double y[3], t[3], norm = 0.0, along = 0.0, d2 = 0.0;
@@ -81,7 +81,7 @@ bool join_curve_fit(const struct polyline_set *p, uint32_t a, uint32_t b, const 
     size_t na = take_side(p, a, trim[0], va, sa), nb = take_side(p, b, trim[1], vb, sb);
     if (na < 3 || nb < 3) return false;
     *j = (struct join_curve){.gap = distance(va[0], vb[0]), .trim = {trim[0], trim[1]}};
-    for (int k = 0; k < 3; k++) /* from the far end of a to the far end of b the way must lead through the gap */
+    for (int k = 0; k < 3; k++) /* the way from the far end of a to the far end of b must lead through the gap */
         ahead += (double)(vb[0][k] - va[0][k]) *
                  ((double)(va[0][k] - va[na - 1][k]) / sa[na - 1] + (double)(vb[nb - 1][k] - vb[0][k]) / sb[nb - 1]);
     if (!(ahead > 0.0)) return false;

@@ -8,13 +8,14 @@
 #include <string.h>
 
 enum { MAX_TRIM = 6, TRIM_STEP = 3 };
-/* Limits of a join. Lines keep within a tenth of a diameter of smooth curves; fibers bend with radii of more than a diameter or so. */
+/* Limits of a join. Lines stay within a tenth of a diameter of smooth curves; fibers bend with radii of about a
+ * diameter or more. */
 static const float FACE_STEPS = 1.5f;                              /* voxels along the fiber to a face */
 static const double MAX_RMS = 0.13, MAX_BEND = 1.2, MAX_GAP = 1.5; /* diameters, per diameter, diameters */
 
 struct join {
     double cost;
-    uint32_t a, b; /* ends: 2 l the first vertex of line l, 2 l + 1 the last */
+    uint32_t a, b; /* ends: 2 l is the first vertex of line l, 2 l + 1 the last */
     uint8_t trim[2];
 };
 
@@ -45,7 +46,7 @@ static double density_at(const struct volume *v, const double x[3])
     return sum / 7.0;
 }
 
-/* Does a third line pass within half a diameter of x? */
+/* Returns whether a third line passes within half a diameter of x. */
 static bool is_claimed(const struct join_job *job, const float x[3], uint32_t a, uint32_t b)
 {
     const struct vertex_grid *g = &job->grid;
@@ -67,7 +68,7 @@ static bool is_claimed(const struct join_job *job, const float x[3], uint32_t a,
     return false;
 }
 
-/* The way over the gap lies in material, without a hole, that no other line claims. */
+/* Returns whether the way over the gap lies in material without a hole, and no other line passes there. */
 static bool is_way_free(const struct join_job *job, const struct join_curve *j, uint32_t a, uint32_t b)
 {
     double sum = 0.0, last[2] = {1.0, 1.0};
@@ -96,7 +97,8 @@ static void end_tangent(const struct polyline_set *p, uint32_t end, float t[3])
     for (int a = 0; a < 3; a++) t[a] = norm > 0.0f ? (x[a] - before[a]) / sqrtf(norm) : 0.0f;
 }
 
-/* Spares most pairs the fits: ends that do not face each other, even when they are trimmed and the fiber bends a good deal. */
+/* A fast test that excludes most pairs before they are fitted: ends that do not face each other, even if they are
+ * trimmed and the fiber bends strongly. */
 static bool may_face(const struct join_job *job, uint32_t a, uint32_t b)
 {
     const float *x = line_end_vertex(job->lines, a, 0), *y = line_end_vertex(job->lines, b, 0);
@@ -113,7 +115,7 @@ static bool may_face(const struct join_job *job, uint32_t a, uint32_t b)
     return cosine > -0.2f && ahead > -(float)MAX_TRIM && side2 < (wide + 0.4f * free_way) * (wide + 0.4f * free_way);
 }
 
-/* Best of the ways to join two ends; cost INFINITY if they do not belong together. */
+/* Finds the best way to join two ends; its cost is INFINITY if they do not belong together. */
 static struct join best_join(const struct join_job *job, uint32_t a, uint32_t b)
 {
     struct join best = {.cost = INFINITY, .a = a, .b = b};
@@ -156,7 +158,7 @@ static int cheaper_first(const void *p, const void *q)
     return (x->b > y->b) - (x->b < y->b);
 }
 
-/* A fiber that leaves the volume ends there. */
+/* An end at a face: the fiber leaves the volume there. */
 static bool is_at_face(const struct join_job *job, uint32_t end)
 {
     size_t length = polyline_length(job->lines, end / 2);
@@ -171,7 +173,8 @@ static bool is_at_face(const struct join_job *job, uint32_t end)
     return false;
 }
 
-/* Pairs of ends that may be joined. Ends are filed in a grid through a polyline set with one "line" of 2 n vertices. */
+/* Finds pairs of ends that may be joined. The ends are put into a grid as a polyline set with one "line" of 2 n
+ * vertices. */
 static status find_joins(const struct join_job *job, struct join_list *joins, struct error *err)
 {
     struct polyline_set points;
@@ -237,7 +240,7 @@ static void accept_joins(const struct join_list *joins, const struct polyline_se
     }
 }
 
-/* Vertices about one voxel apart on the curve over a gap. */
+/* Adds vertices about one voxel apart on the curve over a gap. */
 static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b, const uint8_t *trim,
                        struct polyline_set *out, struct error *err)
 {
@@ -245,7 +248,7 @@ static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b,
     const uint8_t own_trim[2] = {trim[a], trim[b]};
     status s = STATUS_OK;
     if (!join_curve_fit(lines, a, b, own_trim, &j))
-        return error_set(err, STATUS_INTERNAL, "cannot join fibers: a join is gone");
+        return error_set(err, STATUS_INTERNAL, "cannot join fibers: an accepted join cannot be fitted again");
     int n = (int)lrint(j.gap);
     for (int i = 1; i < n && s == STATUS_OK; i++) {
         double y[3];
@@ -255,7 +258,7 @@ static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b,
     return s;
 }
 
-/* The vertices of a line, entered at end e, without what is trimmed. */
+/* Appends the vertices of a line from end e on, without those that are trimmed. */
 static status append_line(const struct polyline_set *lines, uint32_t e, const uint8_t *trim, struct polyline_set *out,
                           struct error *err)
 {
@@ -266,7 +269,7 @@ static status append_line(const struct polyline_set *lines, uint32_t e, const ui
     return s;
 }
 
-/* Walk from every free end through partners to the other free end. */
+/* Goes from every free end through partners to the other free end. */
 static status emit_joined(const struct polyline_set *lines, const uint32_t *partner, const uint8_t *trim, bool *done,
                           struct polyline_set *out, struct error *err)
 {

@@ -4,14 +4,14 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-static const double QUANTILE = 0.95, LEAST_LIMIT = 1.2; /* the last per diameter */
-/* Near ends, where lines go astray and a cut costs a few vertices only, it takes less. */
+static const double QUANTILE = 0.95, LEAST_LIMIT = 1.2; /* LEAST_LIMIT in radians per diameter */
+/* The limit is lower near ends, where lines often deviate and a cut costs only a few vertices. */
 static const double END_DIAMETERS = 1.5, END_SHARE = 0.7;
 
-/* Vertices over which the turn is taken on either side. */
+/* Number of vertices on either side over which the turn is measured. */
 static size_t span(double diameter_voxel) { return (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5); }
 
-/* Angle between the chords to and from vertex i per voxel of their mean length; 0 near the ends. */
+/* Angle between the chords to and from vertex i, per voxel of their mean length; 0 near the ends. */
 static float turn_at(const struct polyline_set *p, size_t line, size_t i, size_t reach)
 {
     if (i < p->first[line] + reach || i + reach >= p->first[line + 1]) return 0.0f;

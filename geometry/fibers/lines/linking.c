@@ -37,7 +37,7 @@ static bool edge_push(struct edge_list *l, struct edge e)
     return true;
 }
 
-/* Candidates between slices k and k + 1. Centers of a slice are sorted by v, so a window slides. */
+/* Finds candidates between slices k and k + 1. Centers of a slice are sorted by v, so a window slides over them. */
 static bool candidate_edges(const struct center_list *list, size_t k, float reach, struct edge_list *edges)
 {
     size_t a_end = list->first[k + 1], b_begin = list->first[k + 1], b_end = list->first[k + 2];

@@ -1,5 +1,5 @@
-/* Growing sets of polylines while fibers are being traced. Positions are in voxels of the cloth frame: the centre of voxel
- * (i, j, k) is (i + 1/2, j + 1/2, k + 1/2). */
+/* Sets of polylines that grow while fibers are traced. Positions are in voxels of the cloth frame: the centre of
+ * voxel (i, j, k) is (i + 1/2, j + 1/2, k + 1/2). */
 #ifndef SELVEDGE_GEOMETRY_POLYLINE_H
 #define SELVEDGE_GEOMETRY_POLYLINE_H
 
@@ -9,35 +9,37 @@
 
 struct polyline_set {
     size_t n_line, n_vertex, line_capacity, vertex_capacity;
-    size_t *first; /* n_line + 1 */
+    size_t *first; /* n_line + 1 entries */
     float (*vertex)[3];
-    uint8_t *axis; /* n_line: subvolume (slice frame) that the line was found in, later the axis class */
+    uint8_t *axis; /* per line: index of the subvolume (slice frame) it was found in; later its axis class */
 };
 
 void polyline_set_init(struct polyline_set *p);
 void polyline_set_release(struct polyline_set *p);
-/* Start a line; vertices added from now on are its. STATUS_NO_MEMORY; STATUS_TOO_LARGE at 2^32 vertices. */
+/* polyline_begin starts a line, and polyline_add adds a vertex to it. STATUS_NO_MEMORY; STATUS_TOO_LARGE at 2^32
+ * vertices. */
 status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err);
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
-/* A line of `from` over again: its vertices i .. end - 1 (indices in from->vertex). */
+/* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line. */
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
                          struct error *err);
 static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
 
-/* Every vertex filed by cell of a grid, for neighbour searches. */
+/* The vertices sorted by the cells of a grid, for neighbour searches. */
 struct vertex_grid {
     float cell; /* edge, voxels */
     size_t n[3];
-    size_t *first;     /* per cell (x fastest), and one more: where its vertices begin in `vertex` */
+    size_t *first;     /* index in `vertex` of the first of each cell (x fastest), and one entry more */
     uint32_t *vertex;  /* index into polyline_set.vertex */
     uint32_t *line_of; /* of each vertex */
 };
 
-/* Over a volume of n_voxel; vertices outside of it are filed in the cells at its faces. STATUS_NO_MEMORY. */
+/* Makes the grid over a volume of n_voxel. Vertices outside of it are put into the cells at its faces.
+ * STATUS_NO_MEMORY. */
 status vertex_grid_init(struct vertex_grid *g, const struct polyline_set *p, const size_t n_voxel[3], float cell,
                         struct error *err);
 void vertex_grid_release(struct vertex_grid *g);
-/* Cells from[a]..to[a] (inclusive) that a ball of radius r about x touches. */
+/* Finds the cells from[a]..to[a] (inclusive) that a ball of radius r about x touches. */
 void vertex_grid_range(const struct vertex_grid *g, const float x[3], float r, size_t from[3], size_t to[3]);
 
 #endif

@@ -25,7 +25,7 @@ static void brick_range(const struct segment_bricks *s, const struct segment *g,
 }
 
 /* Counting pass and filling pass of a compressed row list. */
-static void file_segments(struct segment_bricks *s, bool fill)
+static void sort_segments(struct segment_bricks *s, bool fill)
 {
     for (size_t i = 0; i < s->n_segment; i++) {
         size_t from[3], to[3], b[3];
@@ -42,20 +42,20 @@ static void file_segments(struct segment_bricks *s, bool fill)
     }
 }
 
-static status file_all(struct segment_bricks *s, struct error *err)
+static status sort_all(struct segment_bricks *s, struct error *err)
 {
     size_t n = segment_n_brick(s);
     s->first = calloc(n + 2, sizeof *s->first);
     if (s->first == NULL) goto no_memory;
-    file_segments(s, false);
+    sort_segments(s, false);
     for (size_t b = 2; b <= n + 1; b++) s->first[b] += s->first[b - 1];
     s->index = malloc((s->first[n + 1] + 1) * sizeof *s->index);
     if (s->index == NULL) goto no_memory;
-    file_segments(s, true);
+    sort_segments(s, true);
     return STATUS_OK;
 no_memory:
     segment_bricks_release(s);
-    return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+    return error_set(err, STATUS_NO_MEMORY, "cannot sort fiber segments: out of memory");
 }
 
 static status start(struct segment_bricks *s, size_t n_segment, const size_t n_voxel[3], size_t edge, float reach,
@@ -64,9 +64,9 @@ static status start(struct segment_bricks *s, size_t n_segment, const size_t n_v
     *s = (struct segment_bricks){.edge = edge, .reach = reach};
     memcpy(s->n_voxel, n_voxel, sizeof s->n_voxel);
     for (int a = 0; a < 3; a++) s->n_brick[a] = (n_voxel[a] + edge - 1) / edge;
-    if (n_segment >= UINT32_MAX) return error_set(err, STATUS_TOO_LARGE, "cannot file fiber segments: over 2^32");
+    if (n_segment >= UINT32_MAX) return error_set(err, STATUS_TOO_LARGE, "cannot sort fiber segments: over 2^32");
     s->segment = malloc((n_segment + 1) * sizeof *s->segment);
-    if (s->segment == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot file fiber segments: out of memory");
+    if (s->segment == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot sort fiber segments: out of memory");
     return STATUS_OK;
 }
 
@@ -85,7 +85,7 @@ status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *
             g->is_first = i == lines->first[l];
             g->is_last = i + 2 == lines->first[l + 1];
         }
-    return file_all(s, err);
+    return sort_all(s, err);
 }
 
 status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],
@@ -105,7 +105,7 @@ status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_s
             g->is_first = i == f->first_vertex[l];
             g->is_last = i + 2 == f->first_vertex[l + 1];
         }
-    return file_all(s, err);
+    return sort_all(s, err);
 }
 
 void segment_brick_box(const struct segment_bricks *s, size_t i_brick, size_t from[3], size_t n[3])
@@ -130,11 +130,11 @@ struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_
     return l;
 }
 
-/* A segment seen from the lattice: what the inner loops need. */
+/* A segment seen from the lattice: the numbers that the inner loops need. */
 struct view {
     float u[3], inverse2;       /* b - a, 1 / |u|^2 */
     float from_voxel, to_voxel; /* slab along u, measured from a in voxels */
-    float across[3];            /* how far points at `reach` can lie beyond the segment's box on each axis */
+    float across[3];            /* distance by which points at `reach` may lie beyond the segment's box on each axis */
 };
 
 static struct view view_of(const struct segment *g, float reach)
@@ -153,7 +153,8 @@ static struct view view_of(const struct segment *g, float reach)
     return w;
 }
 
-/* Points of the lattice that the segment may be nearest to, along each axis. False when there are none. */
+/* Finds the points of the lattice along each axis that the segment may be nearest to. Returns false if there are
+ * none. */
 static bool lattice_range(const struct point_lattice *l, const struct segment *g, const struct view *w, size_t from[3],
                           size_t to[3])
 {
@@ -180,7 +181,7 @@ static float reach_of_row(const struct lattice_row *r)
     return fmaxf(fabsf(r->x0), fabsf(r->x0 + r->spacing * (float)r->n));
 }
 
-/* The part from .. to - 1 of a row that lies in the slab. False when none does. */
+/* Finds the part from .. to - 1 of a row that lies in the slab. Returns false if there is none. */
 static bool slab_range(const struct view *w, const struct lattice_row *r, size_t *from, size_t *to)
 {
     float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (r->y * w->u[1] + r->z * w->u[2]) * scale;
@@ -196,7 +197,8 @@ static bool slab_range(const struct view *w, const struct lattice_row *r, size_t
     return *from < *to;
 }
 
-/* Squared distance of a point, relative to g->a, to the segment; comparisons in place of fminf so that loops are vectorised. */
+/* Squared distance of a point, relative to g->a, from the segment. Uses comparisons instead of fminf so that loops
+ * are vectorised. */
 static inline float squared_distance(float px, float py, float pz, const float u[3], float inverse2)
 {
     float t = (px * u[0] + py * u[1] + pz * u[2]) * inverse2;

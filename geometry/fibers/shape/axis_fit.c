@@ -8,15 +8,15 @@
 #include <string.h>
 
 enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK, N_TABLE = 512 };
-static const float OUTLIER = 0.6f; /* of the density: residuals beyond are other fibers */
-/* Standard deviation of a fiber's curvature (its change from vertex to vertex), per diameter. */
+static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
+/* Standard deviation of a fiber's curvature, per diameter. */
 static const double CURVATURE_SD = 0.35;
-static const double TAIL = 2.5; /* blurs beyond the radius that a fiber is seen */
+static const double TAIL = 2.5; /* distance beyond the radius up to which a fiber is modelled, in units of the blur */
 
-/* What one brick has to say: about the vertices of its segments, and about the profile. */
+/* Sums over one brick: for the vertices of its segments, and for the profile. */
 struct brick_sum {
-    struct axis_pull *pull;                           /* two for every segment of the brick */
-    double normal[4][4], gradient[4], square, weight; /* of the residuals */
+    struct axis_pull *pull;                           /* two for each segment of the brick */
+    double normal[4][4], gradient[4], square, weight; /* square, weight: of the residuals */
     bool failed;
 };
 
@@ -25,12 +25,12 @@ struct fit_job {
     const struct segment_bricks *bricks;
     struct axis_profile profile;
     float reach, table_scale;
-    float share[N_TABLE + 2], slope[N_TABLE + 2]; /* g and dg/dd over the distance */
+    float share[N_TABLE + 2], slope[N_TABLE + 2]; /* g and dg/dd by distance */
     struct brick_scratch {
         float model[N_CELL], own2[N_CELL], by_radius[N_CELL], by_blur[N_CELL];
         uint32_t own[N_CELL], touched[N_CELL];
-    } * scratch;           /* per thread */
-    struct brick_sum *sum; /* per brick */
+    } * scratch;           /* one per thread */
+    struct brick_sum *sum; /* one per brick */
 };
 
 static void make_table(struct fit_job *job)
@@ -52,7 +52,8 @@ static float look_up(const float table[N_TABLE + 2], float at)
     return i >= N_TABLE ? 0.0f : (1.0f - f) * table[i] + f * table[i + 1];
 }
 
-/* Place along the segment of the point nearest to p (relative to a), within it; false when p lies beyond an end of the line. */
+/* Finds the point of the segment nearest to p (relative to a): *t is its position along the segment in [0, 1].
+ * Returns false if p lies beyond an end of the line. */
 static bool foot_of(const struct segment *g, const float p[3], float *t, float offset[3], float *d2)
 {
     float u[3], along = 0.0f, length2 = 0.0f;
@@ -63,7 +64,8 @@ static bool foot_of(const struct segment *g, const float p[3], float *t, float o
     }
     *t = length2 > 0.0f ? along / length2 : 0.0f;
     if ((g->is_first && *t < 0.0f) || (g->is_last && *t > 1.0f)) return false;
-    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t; /* comparisons, here and below: fminf is a call */
+    /* comparisons here and below, because fminf would be a function call */
+    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t;
     *d2 = 0.0f;
     for (int a = 0; a < 3; a++) {
         offset[a] = p[a] - *t * u[a];
@@ -72,7 +74,8 @@ static bool foot_of(const struct segment *g, const float p[3], float *t, float o
     return true;
 }
 
-/* The part of a row of voxel centres, from x on relative to a, whose feet lie within a voxel of the segment. */
+/* Finds the part of a row of voxel centres, from x on relative to a, whose nearest points lie within a voxel of the
+ * segment. */
 static void row_range(const float u[3], float length2, float x, float y, float z, size_t n, size_t *from, size_t *to)
 {
     float margin = sqrtf(length2), fixed = y * u[1] + z * u[2];
@@ -89,7 +92,7 @@ static void row_range(const float u[3], float length2, float x, float y, float z
     *to = hi <= 0.0f ? 0 : hi >= (float)n ? n : (size_t)hi;
 }
 
-/* Voxels of the brick for which this segment is the nearest of its line so far. */
+/* Lists the voxels of the brick for which this segment is the nearest of its line so far. */
 static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], const size_t n[3],
                     uint32_t segment, size_t n_touched)
 {
@@ -174,7 +177,7 @@ static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const 
     }
 }
 
-/* All lines of a brick in turn: either their densities to the model, or their pulls. */
+/* Visits all lines of a brick in turn: adds either their densities to the model or their normal equations. */
 static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t i_brick, const size_t from[3],
                       const size_t n[3], bool pulls, uint32_t *slot, struct brick_sum *sum)
 {
@@ -199,7 +202,7 @@ static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t
     }
 }
 
-/* Normal equations of the profile: radius, blur, low, high. */
+/* Adds to the normal equations of the profile: radius, blur, low, high. */
 static void add_profile(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3],
                         const size_t n[3], struct brick_sum *sum)
 {
@@ -232,7 +235,7 @@ static void fit_brick(void *context, size_t i_brick, size_t i_thread)
     struct brick_scratch *s = &job->scratch[i_thread];
     struct brick_sum *sum = &job->sum[i_brick];
     for (size_t e = b->first[i_brick], start = e; e < b->first[i_brick + 1];
-         e++) { /* how far apart the segments of a line are numbered */
+         e++) { /* range of the numbers of a line's segments */
         if (b->segment[b->index[e]].line != b->segment[b->index[start]].line) start = e;
         size_t apart = b->index[e] - b->index[start] + 1;
         longest = apart > longest ? apart : longest;
@@ -255,7 +258,7 @@ static void fit_brick(void *context, size_t i_brick, size_t i_thread)
     free(slot);
 }
 
-/* Variance of what the model leaves of the densities: noise, and what it cannot say. */
+/* Variance of the residuals: noise, and structure that the model cannot describe. */
 static double residual_variance(const struct fit_job *job, size_t n_brick)
 {
     double square = 0.0, weight = 0.0;
@@ -266,7 +269,7 @@ static double residual_variance(const struct fit_job *job, size_t n_brick)
     return weight > 0.0 ? square / weight : 1.0;
 }
 
-/* One step for the profile, kept within reason. */
+/* Makes one step for the profile, limited to plausible values. */
 static void step_profile(const struct fit_job *job, size_t n_brick, double diameter, struct axis_profile *p)
 {
     double m[16] = {0.0}, x[4] = {0.0};
@@ -303,7 +306,7 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, const u
     }
     if (s == STATUS_OK) {
         memset(total, 0, lines->n_vertex * sizeof *total);
-        for (size_t b = 0; b < n_brick; b++) /* in order, so that sums do not depend on the threads */
+        for (size_t b = 0; b < n_brick; b++) /* in order, so that sums do not depend on the number of threads */
             for (size_t e = 0; e < 2 * (bricks.first[b + 1] - bricks.first[b]); e++)
                 axis_pull_add(&total[first_vertex_of[job->sum[b].pull[e].segment] + e % 2], &job->sum[b].pull[e]);
         step_profile(job, n_brick, diameter, &job->profile);

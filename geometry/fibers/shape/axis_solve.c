@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BAND = 7 }; /* the diagonal and six below: second differences of three coordinates */
+enum { BAND = 7 }; /* the diagonal and six below it: second differences of three coordinates */
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
 {
@@ -17,7 +17,7 @@ struct solve_job {
     struct polyline_set *lines;
     const struct axis_pull *pull;
     double stiffness, hold;
-    bool *failed; /* per line */
+    bool *failed; /* one per line */
 };
 
 static void solve_line(void *context, size_t l, size_t i_thread)
@@ -48,7 +48,7 @@ static void solve_line(void *context, size_t l, size_t i_thread)
                     m[3 * (i + r) + a][3 * (r - c)] += job->stiffness * second[r] * second[c];
             }
         }
-    if (!small_solve_banded(m[0], 3 * n, BAND, x)) goto out; /* stays as it is */
+    if (!small_solve_banded(m[0], 3 * n, BAND, x)) goto out; /* the line stays as it is */
     for (size_t i = 0; i < n; i++) {
         double length = sqrt(x[3 * i] * x[3 * i] + x[3 * i + 1] * x[3 * i + 1] + x[3 * i + 2] * x[3 * i + 2]);
         for (size_t a = 0; a < 3; a++) p[i][a] += (float)(x[3 * i + a] * (length > 1.0 ? 1.0 / length : 1.0));
@@ -64,7 +64,8 @@ status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull
     struct solve_job job = {.lines = lines, .pull = pull, .failed = calloc(lines->n_line + 1, sizeof(bool))};
     double mean = 0.0;
     if (job.failed == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
-    for (size_t i = 0; i < lines->n_vertex; i++) /* half the trace: the direction along the fiber has none */
+    /* half the trace, because the direction along the fiber contributes nothing */
+    for (size_t i = 0; i < lines->n_vertex; i++)
         mean += 0.5 * (double)(pull[i].normal[0] + pull[i].normal[2] + pull[i].normal[5]);
     mean = lines->n_vertex > 0 ? mean / (double)lines->n_vertex : 0.0;
     job.stiffness = stiffness;

@@ -1,21 +1,21 @@
-/* The linear algebra of axis_fit.h: one banded system for each line. */
+/* The linear algebra of axis_fit.h: solves one banded system for each line. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_SOLVE_H
 #define SELVEDGE_GEOMETRY_AXIS_SOLVE_H
 
 #include "base/thread_pool.h"
 #include "geometry/fibers/lines/polyline.h"
 
-/* Normal equations of the position of one vertex, from the data. */
+/* Normal equations of the position of one vertex from the data. */
 struct axis_pull {
-    uint32_t segment;  /* where a sum over bricks comes from */
+    uint32_t segment;  /* segment that the terms belong to, in a sum over a brick */
     float normal[6];   /* xx, yx yy, zx zy zz */
-    float gradient[3]; /* the way to go, times normal */
+    float gradient[3]; /* normal times the step to the minimum */
 };
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
 
-/* Moves the vertices of every line to the minimum of its data terms and of stiffness |second difference|^2, by at most one voxel.
- * STATUS_NO_MEMORY. */
+/* Moves the vertices of every line to the minimum of its data terms plus stiffness |second difference|^2, by at most
+ * one voxel. STATUS_NO_MEMORY. */
 status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness,
                         struct thread_pool *pool, struct error *err);
 

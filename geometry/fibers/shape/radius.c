@@ -11,14 +11,15 @@ struct radius_job {
     const struct volume *v;
     const struct segment_bricks *bricks;
     float eps_d;
-    struct distance_histogram *histogram; /* per thread: RADIUS_PARTS */
-    float *distance2;                     /* per thread: FINE^3 */
+    struct distance_histogram *histogram; /* RADIUS_PARTS per thread */
+    float *distance2;                     /* FINE^3 per thread */
     uint32_t *nearest;
-    const uint32_t *chosen; /* bricks */
-    uint8_t *part;          /* of each segment */
+    const uint32_t *chosen; /* numbers of the bricks that are measured */
+    uint8_t *part;          /* part of each segment */
 };
 
-/* Where a point lies between voxel centres along one axis, edge values repeated: (1 - f) * value[i] + f * value[j]. */
+/* Position of a point between voxel centres along one axis, with edge values repeated: its value is (1 - f) *
+ * value[i] + f * value[j]. */
 struct between {
     size_t i, j;
     float f;
@@ -40,7 +41,7 @@ static void row_densities(const struct volume *v, const struct between *x, size_
                 *r10 = v->density + volume_index(v->n, 0, y.j, z.i);
     const float *r01 = v->density + volume_index(v->n, 0, y.i, z.j),
                 *r11 = v->density + volume_index(v->n, 0, y.j, z.j);
-    float a[BRICK + 2], b[BRICK + 2]; /* a row's points lie within a brick: its voxels and one on either side */
+    float a[BRICK + 2], b[BRICK + 2]; /* the points of a row lie within a brick: its voxels, and one on either side */
     size_t from = x[0].i;
     for (size_t i = from; i <= x[n_point - 1].j; i++) {
         a[i - from] = (1.0f - y.f) * r00[i] + y.f * r10[i];
@@ -55,7 +56,8 @@ static void row_densities(const struct volume *v, const struct between *x, size_
 
 static size_t part_of(size_t i_brick) { return (uint32_t)(i_brick * 2246822519u) >> 29; }
 
-/* Brick of the middle of a segment; false when that lies outside of the volume (in the nearest brick then). */
+/* Finds the brick of the middle of a segment. Returns false, with the nearest brick, if the middle lies outside of
+ * the volume. */
 static bool brick_of(const struct segment_bricks *b, const struct segment *g, size_t *brick)
 {
     bool inside = true;
@@ -98,7 +100,7 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
                 }
                 const struct segment *g = &job->bricks->segment[nearest[at]];
                 struct distance_histogram *h =
-                    own + job->part[nearest[at]]; /* a fiber's mass goes where its length goes */
+                    own + job->part[nearest[at]]; /* the points near a fiber count to the same part as its length */
                 uint8_t axis = g->axis;
                 (density >= job->eps_d ? h->inside : h->outside)[axis][bin]++;
                 h->density_sum[axis][bin] += (uint64_t)(255.0f * density + 0.5f);
@@ -120,19 +122,20 @@ static void add_histogram(struct distance_histogram *to, const struct distance_h
     for (int a = 0; a < 3; a++) to->length_voxel[a] += from->length_voxel[a];
 }
 
-/* Bricks with fibers near them, at most MAX_BRICK of them spread evenly: millions of fiber points are enough for a mean. */
+/* Chooses at most about MAX_BRICK of the bricks with fibers near them, spread evenly: millions of points suffice for
+ * a mean. */
 static size_t choose_bricks(const struct segment_bricks *b, uint32_t *chosen)
 {
     size_t n = 0, kept = 0;
     for (size_t i = 0; i < segment_n_brick(b); i++)
         if (b->first[i + 1] > b->first[i]) chosen[n++] = (uint32_t)i;
     if (n <= MAX_BRICK) return n;
-    for (size_t i = 0; i < n; i++) /* a multiplicative hash of the position picks MAX_BRICK of n on the average */
+    for (size_t i = 0; i < n; i++) /* a multiplicative hash of the position chooses about MAX_BRICK of n */
         if ((uint64_t)(uint32_t)(chosen[i] * 2654435761u) * n < ((uint64_t)MAX_BRICK << 32)) chosen[kept++] = chosen[i];
     return kept;
 }
 
-/* Length of the lines inside of the chosen bricks: each segment counts where its middle is. */
+/* Adds the length of the lines inside the chosen bricks. Each segment counts to the brick of its middle. */
 static void add_lengths(const struct segment_bricks *bricks, const bool *is_chosen, struct distance_histogram *part)
 {
     for (size_t i = 0; i < bricks->n_segment; i++) {
@@ -145,7 +148,7 @@ static void add_lengths(const struct segment_bricks *bricks, const bool *is_chos
     }
 }
 
-static void file_segments(const struct segment_bricks *bricks, uint8_t *part)
+static void assign_parts(const struct segment_bricks *bricks, uint8_t *part)
 {
     for (size_t i = 0; i < bricks->n_segment; i++) {
         size_t brick;
@@ -178,7 +181,7 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
         for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) job.histogram[t].bin_voxel = part[0].bin_voxel;
         size_t n_chosen = choose_bricks(&bricks, chosen);
         for (size_t i = 0; i < n_chosen; i++) is_chosen[chosen[i]] = true;
-        file_segments(&bricks, job.part);
+        assign_parts(&bricks, job.part);
         s = thread_pool_run(pool, n_chosen, measure_brick, &job, progress);
         if (s != STATUS_OK) error_set(err, s, "measuring the fiber radius was cancelled");
         for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) add_histogram(&part[t % RADIUS_PARTS], &job.histogram[t]);
@@ -202,7 +205,7 @@ void distance_histogram_sum(const struct distance_histogram part[RADIUS_PARTS], 
         if (p != without) add_histogram(sum, &part[p]);
 }
 
-/* Points of the classes in bin b. */
+/* Counts the points of the classes in bin b. */
 static void bin_points(const struct distance_histogram *h, unsigned classes, size_t b, double *in, double *out,
                        double *density)
 {
@@ -215,7 +218,7 @@ static void bin_points(const struct distance_histogram *h, unsigned classes, siz
         }
 }
 
-/* Bins with their middle between two distances. */
+/* Counts the points of bins whose middle lies between two distances. */
 static void sum_points(const struct distance_histogram *h, unsigned classes, double from, double to, double *in,
                        double *out, double *density)
 {
@@ -252,7 +255,7 @@ double radius_best_score(const struct distance_histogram *h, unsigned classes)
     return best > 0.0 ? best_r : 0.0;
 }
 
-/* Mean density of the points between two distances; fallback where there are none. */
+/* Mean density of the points between two distances; fallback if there are none. */
 static double mean_density(const struct distance_histogram *h, unsigned classes, double from, double to,
                            double fallback)
 {

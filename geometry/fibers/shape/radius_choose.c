@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Radius of some classes and its standard error: leaving out one part at a time (Efron 1979). */
+/* Radius of some classes and its standard error, by leaving out one part at a time (jackknife, Efron 1979). */
 static double with_error(const struct distance_histogram part[RADIUS_PARTS], unsigned classes,
                          struct distance_histogram *scratch, double *se)
 {

@@ -9,17 +9,17 @@
 #include <string.h>
 
 enum { BRICK = 32 };
-static const float FLOOR = 0.15f;   /* density taken as void */
-static const float MAX_MOVE = 0.7f; /* voxels a round */
+static const float FLOOR = 0.15f;   /* densities up to this count as void */
+static const float MAX_MOVE = 0.7f; /* voxels per round */
 
-/* What the voxels of one brick say about a vertex. */
+/* Sums over the voxels of one brick for one vertex. */
 struct pull {
     uint32_t vertex;
     float weight, offset[3];
 };
 
 struct brick_pulls {
-    struct pull *pull; /* two for every segment of the brick */
+    struct pull *pull; /* two for each segment of the brick */
     size_t n;
     bool failed;
 };
@@ -27,10 +27,10 @@ struct brick_pulls {
 struct relax_job {
     const struct volume *v;
     const struct segment_bricks *bricks;
-    const uint32_t *first_vertex_of; /* per segment: index of its first vertex */
-    float *distance2;                /* per thread */
+    const uint32_t *first_vertex_of; /* index of the first vertex of each segment */
+    float *distance2;                /* one per thread */
     uint32_t *nearest, *slot;
-    struct brick_pulls *result; /* per brick */
+    struct brick_pulls *result; /* one per brick */
 };
 
 static void pull_voxel(const struct relax_job *job, struct brick_pulls *r, uint32_t slot, uint32_t segment,
@@ -47,7 +47,8 @@ static void pull_voxel(const struct relax_job *job, struct brick_pulls *r, uint3
     if (!(length2 > 0.0f)) return;
     float t = along / length2;
     if (t < -0.5f || t > 1.5f) return; /* beyond the end of a line */
-    for (int a = 0; a < 3; a++) { /* near a face only what has its mirror image in the volume tells which way to go */
+    /* near a face only voxels whose mirror image is in the volume count, or the mean would be biased */
+    for (int a = 0; a < 3; a++) {
         float mirror = 2.0f * (g->a[a] + t * u[a]) - x[a];
         if (mirror < 0.0f || mirror > (float)job->v->n[a]) return;
     }
@@ -96,7 +97,7 @@ static void relax_brick(void *context, size_t i_brick, size_t i_thread)
             }
 }
 
-/* Sums over bricks in order, then a running mean over five vertices along each line. */
+/* Adds the bricks in order, then takes a running mean over five vertices along each line. */
 static void apply_pulls(const struct relax_job *job, size_t n_brick, struct polyline_set *lines, float (*sum)[4])
 {
     memset(sum, 0, lines->n_vertex * sizeof *sum);

@@ -1,7 +1,7 @@
 #include "geometry/fibers/shape/smoothing.h"
 
-/* The matrix is alpha I + D^T D, D the second differences: diagonal 1 5 6 ... 6 5 1, first off-diagonal -2 -4 ... -4 -2,
- * second 1. */
+/* The matrix is alpha I + D^T D, where D are the second differences: diagonal 1 5 6 ... 6 5 1, first off-diagonal -2
+ * -4 ... -4 -2, second off-diagonal 1. */
 static double diagonal(size_t i, size_t n)
 {
     double d = 0.0;

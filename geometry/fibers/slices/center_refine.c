@@ -5,13 +5,14 @@
 
 enum { N_ROUND = 6 };
 static const float WINDOW_RADII = 1.2f;
-static const float FLOOR = 0.15f; /* density taken as void: noise there must not pull */
+static const float FLOOR = 0.15f; /* densities up to this count as void, so that noise there has no effect */
 
 struct box {
     size_t u0, u1, v0, v1; /* inclusive */
 };
 
-/* Pixels whose perpendicular distance can be within r. False when the center lies outside of the slice. */
+/* Finds the pixels whose perpendicular distance can be within r. Returns false if the center lies outside of the
+ * slice. */
 static bool pixel_box(const struct center *c, float r, size_t width, size_t height, struct box *b)
 {
     float su = r * sqrtf(1.0f + c->slope_u * c->slope_u), sv = r * sqrtf(1.0f + c->slope_v * c->slope_v);
@@ -36,7 +37,8 @@ static void claim_pixels(const struct center *center, size_t n, float r, size_t 
                          float *distance)
 {
     struct box b;
-    for (size_t i = 0; i < n; i++) { /* only what centers can reach is looked at later: clear that */
+    /* clear only the pixels that centers can reach, because no others are read later */
+    for (size_t i = 0; i < n; i++) {
         if (!pixel_box(&center[i], r, width, height, &b)) continue;
         for (size_t v = b.v0; v <= b.v1; v++)
             for (size_t u = b.u0; u <= b.u1; u++) distance[v * width + u] = r * r;
@@ -66,7 +68,7 @@ static void move_to_centroid(const float *image, struct center *c, float index, 
             float w = image[at] - FLOOR;
             float mirror_u = 2.0f * c->u - (float)u - 0.5f, mirror_v = 2.0f * c->v - (float)v - 0.5f;
             if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)width || mirror_v > (float)height)
-                continue; /* cut by the border */
+                continue; /* its mirror image is cut off by the border */
             if (w <= 0.0f) continue;
             sum += w;
             su += w * ((float)u + 0.5f - c->u);

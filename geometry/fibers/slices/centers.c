@@ -12,9 +12,10 @@
 enum { N_SCALE = 4 };
 static const double scale_factor[N_SCALE] = {0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
 
-/* Lone disks answer 0.74, disks inside a dense bundle (neighbours fill the filter's surround) about 0.25. */
+/* An isolated disk has response 0.74; a disk inside a dense bundle, whose neighbours fill the surround of the
+ * filter, about 0.25. */
 static const float MIN_STRENGTH = 0.12f;
-/* Two centers are never nearer than this share of the diameter. */
+/* Least distance of two centers as a share of the diameter. */
 static const float MIN_SPACING = 0.55f;
 
 struct slice_result {
@@ -28,23 +29,23 @@ struct detect_job {
     const struct direction_volume *d;
     const uint16_t *mask;
     const struct slice_frame *frame;
-    size_t first;            /* slice of the slab's task 0 */
-    float *image;            /* of the slab */
+    size_t first;            /* slice of task 0 of the slab */
+    float *image;            /* pictures of the slab */
     struct pixel_range *own; /* per slice of the slab */
-    size_t margin;           /* pixels around what is its own that a picture needs */
+    size_t margin;           /* pixels that a picture needs around its own */
     double sigma[N_SCALE];
     float min_distance;
     double diameter;
     float *scratch; /* per thread: a part of the picture and N_SCALE responses */
     size_t scratch_per_thread;
     struct slice_result *slice;
-    struct error *error; /* per thread */
+    struct error *error; /* one per thread */
 };
 
-/* The part of a slice's picture that matters. */
+/* The part of a slice's picture that is used. */
 struct view {
     size_t i_slice, width, height;
-    float origin[2]; /* of pixel (0, 0) in the whole picture */
+    float origin[2]; /* position of pixel (0, 0) in the whole picture */
     float *image, *response;
 };
 
@@ -56,7 +57,7 @@ void center_list_release(struct center_list *l)
     *l = (struct center_list){0};
 }
 
-/* Voxel that holds point x; false (and the nearest voxel) when x lies outside of the volume. */
+/* Finds the voxel that holds point x. Returns false, with the nearest voxel, if x lies outside of the volume. */
 static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
 {
     bool inside = true;
@@ -78,7 +79,7 @@ static bool is_peak(const struct view *w, const float *response, size_t u, size_
     return true;
 }
 
-/* Offset of the maximum of the paraboloid through a 3 x 3 neighbourhood (least squares), at most one pixel. */
+/* Offset of the maximum of the paraboloid fitted to a 3 x 3 neighbourhood, at most one pixel. */
 static void refine_position(const struct view *w, const float *response, size_t u, size_t v, float offset[2])
 {
     offset[0] = offset[1] = 0.0f;
@@ -100,8 +101,8 @@ static void refine_position(const struct view *w, const float *response, size_t 
     offset[1] = fminf(1.0f, fmaxf(-1.0f, (uv * gu - uu * gv) / det));
 }
 
-/* Mean direction of the class's voxels within one pixel of (u, v), as slopes. False when there is none, or the center lies
- * outside of the volume. */
+/* Computes the mean direction of the class's voxels within one pixel of (u, v), as slopes. Returns false if there
+ * are none or the center lies outside of the volume. */
 static bool find_slope(const struct detect_job *job, size_t i_slice, struct center *c)
 {
     const struct slice_frame *f = job->frame;
@@ -182,7 +183,8 @@ static int lower_v_first(const void *a, const void *b)
     return (x->u > y->u) - (x->u < y->u);
 }
 
-/* Of peaks nearer to each other than min_distance the strongest stays. Those that stay are filed in cells of that edge. */
+/* Keeps the strongest of peaks nearer to each other than min_distance. Kept peaks are sorted into cells of that
+ * edge. */
 static bool thin_out(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
     size_t kept = 0, n_cell[2] = {(size_t)((float)w->width / job->min_distance) + 3,
@@ -219,7 +221,7 @@ static bool thin_out(const struct detect_job *job, const struct view *w, struct 
     return true;
 }
 
-/* The slice's own pixels and a margin around them, copied out of the slab. */
+/* Copies the slice's own pixels and a margin around them from the slab. */
 static struct view cut_view(const struct detect_job *job, size_t i_task, float *scratch)
 {
     const struct slice_frame *f = job->frame;
@@ -246,7 +248,7 @@ static void detect_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct detect_job *job = context;
     scratch_keep_within(job->v->space);
-    if (job->own[i_task].u0 >= job->own[i_task].u1) return; /* nothing of the class in it */
+    if (job->own[i_task].u0 >= job->own[i_task].u1) return; /* the slice has no voxel of the class */
     struct view w = cut_view(job, i_task, job->scratch + i_thread * job->scratch_per_thread);
     struct slice_result *r = &job->slice[w.i_slice];
     size_t n_pixel = w.width * w.height;
@@ -279,7 +281,7 @@ static status gather(struct detect_job *job, size_t n_slice, struct center_list 
     return STATUS_OK;
 }
 
-/* Slabs of slices: their pictures, then the centers in them. */
+/* Processes slabs of slices: fills their pictures, then finds the centers in them. */
 static status detect_slabs(struct detect_job *job, const struct slice_source *source, size_t n_slab,
                            struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
@@ -301,7 +303,7 @@ static status detect_slabs(struct detect_job *job, const struct slice_source *so
     return s;
 }
 
-/* Pictures need the filters' reach around centers, what a center may move, and its window stretched by the slope. */
+/* The margin covers the reach of the filters, the moves of centers, and their window stretched by the slope. */
 static size_t picture_margin(double largest_sigma, double diameter)
 {
     return (size_t)ceil(4.0 * largest_sigma + diameter) + 8;
@@ -326,7 +328,7 @@ status centers_detect(const struct center_search *search, struct thread_pool *po
     job.diameter = diameter_voxel;
     job.min_distance = MIN_SPACING * (float)diameter_voxel;
     job.margin = picture_margin(job.sigma[N_SCALE - 1], diameter_voxel);
-    for (int a = 0; a < 3; a++) { /* beyond this, pictures are void: diagonals need 3/2 of the margin for it */
+    for (int a = 0; a < 3; a++) { /* pictures are void beyond this; diagonals need 3/2 of the margin */
         size_t reach = job.margin * 3 / 2;
         source.from[a] = sub->from[a] > reach ? sub->from[a] - reach : 0;
         source.to[a] = sub->to[a] + reach < v->n[a] ? sub->to[a] + reach : v->n[a];

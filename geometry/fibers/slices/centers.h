@@ -1,10 +1,11 @@
-/* Where fibers cross the slices of a subvolume (fabric thesis, 5.6.1 and 5.6.2): blobs in scale space (Lindeberg 1998).
+/* Finds where fibers cross the slices of a subvolume (fabric thesis, 5.6.1 and 5.6.2), as blobs in scale space
+ * (Lindeberg 1998).
  *
- * A subvolume shows the density of voxels whose direction is near to the normal of its slices, all others emptied. In the paper the
- * three subvolumes share out the voxels, and fibers that turn from one to another fall apart. Here there are nine slicing directions
- * (slice_frame.h), and a voxel belongs to all within 40 degrees (every direction is within 36 of one), so that fibers between two are seen whole in both; duplicates
- * are removed after linking.
- */
+ * A subvolume shows the density of voxels whose direction is near to the normal of its slices; all other voxels are
+ * empty. In the paper three subvolumes share the voxels, and fibers that turn from one to another are broken. Here
+ * there are nine slicing directions (slice_frame.h), and a voxel belongs to all within 40 degrees (every direction
+ * is within 36 degrees of one). So fibers between two slicing directions are complete in both; the duplicates are
+ * removed after linking. */
 #ifndef SELVEDGE_GEOMETRY_CENTERS_H
 #define SELVEDGE_GEOMETRY_CENTERS_H
 
@@ -14,15 +15,15 @@
 #include "geometry/volume/volume.h"
 
 struct center {
-    float u, v;             /* in pixels of the frame: a pixel's centre is at (i + 1/2) */
+    float u, v;             /* in pixels of the frame; the centre of pixel i is at i + 1/2 */
     float slope_u, slope_v; /* du, dv per slice, from the direction volume */
-    float sigma;            /* scale of the strongest response, voxels: radius hint is sigma * sqrt 2 */
-    float strength;         /* scale-normalised response; 0.74 for a lone disk of density 1 */
+    float sigma;            /* scale of the strongest response, voxels; sigma * sqrt 2 estimates the radius */
+    float strength;         /* scale-normalised response; 0.74 for an isolated disk of density 1 */
 };
 
 struct center_list {
     size_t n_slice;
-    size_t *first;         /* n_slice + 1 */
+    size_t *first;         /* n_slice + 1 entries */
     struct center *center; /* of slice k: first[k] .. first[k + 1] - 1, sorted by v, then u */
 };
 

@@ -31,7 +31,7 @@ void slice_frame_init(struct slice_frame *f, int index, const size_t n[3])
         f->u[q] = -diagonal[index - 3].sign * (float)M_SQRT1_2;
         f->v[3 - p - q] = 1.0f;
     }
-    float extent[3] = {0.0f, 0.0f, 0.0f}; /* of the volume along u, v, w */
+    float extent[3] = {0.0f, 0.0f, 0.0f}; /* extent of the volume along u, v, w */
     for (int a = 0; a < 3; a++) {
         extent[0] += fabsf(f->u[a]) * (float)n[a];
         extent[1] += fabsf(f->v[a]) * (float)n[a];

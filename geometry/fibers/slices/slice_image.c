@@ -7,18 +7,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LINES = 16 }; /* of pixels in a task */
+enum { LINES = 16 }; /* lines of pixels in a task */
 
 struct fill_job {
     const struct slice_source *source;
     size_t first, n_slice;
-    bool by_column; /* tasks are blocks of columns: u leads through z; else blocks of rows */
+    bool by_column; /* tasks are blocks of columns, if u runs through z, or else blocks of rows */
     int third;      /* the axis that runs along v */
     float *image;
     struct pixel_range *own; /* per task and slice */
 };
 
-/* The voxels around a point of the two in-plane axes and their weights; the third axis is left to the caller. */
+/* The voxels around a point in the two in-plane axes, with their weights; the caller adds the third axis. */
 struct corners {
     size_t n, at[4];
     float weight[4];
@@ -29,7 +29,7 @@ static size_t clamped(float whole, size_t n)
     return whole <= 0.0f ? 0 : whole >= (float)n - 1.0f ? n - 1 : (size_t)whole;
 }
 
-/* False when the point lies too far outside of the volume, or where nothing is shown. */
+/* Returns false if the point lies too far outside of the volume, or where nothing is shown. */
 static bool find_corners(const struct fill_job *job, size_t u, size_t i_slice, struct corners *c)
 {
     const struct slice_source *s = job->source;
@@ -71,7 +71,7 @@ static void extend(struct pixel_range *r, size_t u, size_t v)
     if (v >= r->v1) r->v1 = v + 1;
 }
 
-/* Pixels (u, v0 .. v1 - 1) of one picture. */
+/* Fills pixels (u, v0 .. v1 - 1) of one picture. */
 static void fill_column(const struct fill_job *job, size_t u, size_t v0, size_t v1, size_t i_slice, float *image,
                         struct pixel_range *own)
 {

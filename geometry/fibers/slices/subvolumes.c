@@ -6,8 +6,8 @@
 #include <string.h>
 
 struct slice_count {
-    size_t n[3];           /* by nearest axis */
-    size_t from[2], to[2]; /* kept voxels, x and y */
+    size_t n[3];           /* number of kept voxels by nearest axis */
+    size_t from[2], to[2]; /* box around the kept voxels in x and y */
 };
 
 struct mask_job {
@@ -53,7 +53,8 @@ static void mask_slice(void *context, size_t k, size_t i_thread)
     job->count[k] = c;
 }
 
-/* An emptied voxel shows its density in a frame unless all its kept neighbours belong to others (it is then the rim of such a fiber). */
+/* Shows an empty voxel in the frames of its kept neighbours, or in all frames if it has none. So the rim of a fiber
+ * appears only in the frames of the fiber. */
 static void rim_slice(void *context, size_t k, size_t i_thread)
 {
     (void)i_thread;
@@ -65,7 +66,7 @@ static void rim_slice(void *context, size_t k, size_t i_thread)
         for (x[0] = 0; x[0] < n[0]; x[0]++, at++) {
             if (job->d->density[at] > 0) continue;
             unsigned seen = 0;
-            for (int a = 0; a < 3; a++) { /* kept neighbours only: their masks are not changed here */
+            for (int a = 0; a < 3; a++) { /* only kept neighbours are read, because their masks do not change here */
                 if (x[a] > 0 && job->d->density[at - stride[a]] > 0) seen |= job->mask[at - stride[a]];
                 if (x[a] + 1 < n[a] && job->d->density[at + stride[a]] > 0) seen |= job->mask[at + stride[a]];
             }
