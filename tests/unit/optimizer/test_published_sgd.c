@@ -2,8 +2,8 @@
  * step of a run is a / (50 + i), a grows threefold from run to run, and a run that oscillates is followed by ten steps of
  * a tenth of its last one. */
 #include "base/catalogue/method_catalogue.h"
-#include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/rescale.h"
+#include "tests/support/descent_fixture.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -112,9 +112,49 @@ static void test_steps_after_an_oscillation(void **state)
         assert_true(fabs(step_length(&x, settling + i) - 0.1 * 0.25 / (50.0 + N_ITERATION - 1.0)) < 1e-9);
 }
 
+/* A few short runs hold no steps that could be compared: that is not converged, however low the objective. */
+static void test_published_sgd_needs_steps(void **state)
+{
+    (void)state;
+    for (size_t n_iteration = 1; n_iteration <= 10; n_iteration += 3) {
+        struct descent_fixture x;
+        struct fit_result r;
+        descent_fixture_init(&x, 1, 400000);
+        x.problem.max_iteration = n_iteration;
+        descent_fixture_run(&x, descent_find(method_published_sgd.id), &r);
+        if (r.converged || strstr(r.reason, "too few to tell") == NULL)
+            fail_msg("%zu iterations: %s", n_iteration, r.reason);
+        observation_set_release(&x.observation);
+    }
+}
+
+/* Steps that all point the same way have a mean cosine near 1, also in the first run that is long enough. */
+static void test_published_sgd_mean_cosine_has_no_start(void **state)
+{
+    (void)state;
+    struct descent_fixture x;
+    struct fit_result r;
+    double cosine = 0.0;
+    descent_fixture_init(&x, 1, 40000000);
+    x.cloth.noise = 1e-3;
+    x.problem.max_iteration = 11;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) x.parameter[p].fixed = p != 8; /* one parameter: cosines are 1 or -1 */
+    descent_fixture_run(&x, descent_find(method_published_sgd.id), &r);
+    const char *text = strstr(r.reason, "mean cosine of ");
+    assert_non_null(text);
+    cosine = strtod(text + strlen("mean cosine of "), NULL);
+    print_message("%s\n", r.reason);
+    assert_true(fabs(cosine) > 0.99);
+    observation_set_release(&x.observation);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_steps_decay),
-                                       cmocka_unit_test(test_steps_after_an_oscillation)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_steps_decay),
+        cmocka_unit_test(test_steps_after_an_oscillation),
+        cmocka_unit_test(test_published_sgd_needs_steps),
+        cmocka_unit_test(test_published_sgd_mean_cosine_has_no_start),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,24 @@
+/* A fit of the analytic cloth (fake_estimator.h) by any method, without a job around it. */
+#ifndef SELVEDGE_TESTS_DESCENT_FIXTURE_H
+#define SELVEDGE_TESTS_DESCENT_FIXTURE_H
+
+#include "optimizer/fit/descent/descent.h"
+#include "tests/support/tracer/fake_estimator.h"
+
+struct descent_fixture {
+    struct fake_cloth cloth;
+    struct estimator estimator;
+    struct observation_set observation;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct fit_problem problem;
+    double truth[FAKE_N_PARAM], first, last;
+    size_t n_reported;
+};
+
+/* All parameters free from the models' starts, photographs of mid-range parameters with a relative error of 0.5 %. The caller releases
+ * x->observation. */
+void descent_fixture_init(struct descent_fixture *x, uint64_t seed, uint64_t path_budget);
+/* Runs the method; fails the test when that fails, or when a reported step is not finite or out of bounds. */
+void descent_fixture_run(struct descent_fixture *x, const struct descent_method *method, struct fit_result *result);
+
+#endif
