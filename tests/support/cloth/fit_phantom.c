@@ -3,9 +3,9 @@
 #include "base/durable.h"
 #include "base/rng.h"
 #include "geometry/fibers/voxelise.h"
-#include "optimizer/fit/objective/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/phantom/phantom_view_table.h"
+#include "tests/support/cloth/kept_estimate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,23 +13,12 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { SEED_PHOTOGRAPH = 77001, SEED_KEPT = 77002, SEED_SCORE = 77003 };
-
 void fit_check(status s, const struct error *err)
 {
     if (s == STATUS_OK) return;
     fprintf(stderr, "%s\n", err->text);
     exit(1);
 }
-
-static void check_memory(const void *p)
-{
-    if (p != NULL) return;
-    fputs("out of memory\n", stderr);
-    exit(1);
-}
-
-/* ---- cloth ---- */
 
 static void make_volume(struct fit_cloth *c, double voxel_m, struct thread_pool *pool)
 {
@@ -89,8 +78,6 @@ void fit_cloth_release(struct fit_cloth *c)
     fiber_set_release(&c->fiber);
 }
 
-/* ---- phantom ---- */
-
 static void start(struct fit_phantom *f, const char *folder, struct thread_pool *pool, const char *model_id,
                   const double *truth_file_unit)
 {
@@ -149,118 +136,14 @@ void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o)
     for (size_t i = 0; i < o->n; i++) fit_check(observation_set_append(&f->observation, &o->item[i], &err), &err);
     fit_check(observation_set_select(o, JOB_SET_FIT, &f->fitted, &err), &err);
     f->configuration = trace_configurations(&f->observation);
-    check_memory(f->configuration);
-}
-
-/* ---- estimates that are kept ---- */
-
-struct kept_call {
-    const double *param;
-    const struct configuration *configuration;
-    size_t n_configuration;
-    uint64_t seed;
-    uint32_t replica;
-    bool want_jacobian, plain_paths;
-};
-
-static void run_counts(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, const size_t *count,
-                       struct estimate *out)
-{
-    struct error err = {0};
-    const struct estimate_request q = {
-        .input = {.scene = {.fibers = f->cloth.scene, .volume = f->cloth.has_volume ? &f->cloth.volume_scene : NULL},
-                  .model = &f->model,
-                  .param = c->param,
-                  .want_derivative = c->want_jacobian,
-                  .plain_paths = c->plain_paths},
-        .configuration = c->configuration,
-        .n_configuration = c->n_configuration,
-        .n_path = count,
-        .seed = c->seed,
-        .iteration = iteration,
-        .replica = c->replica};
-    fit_check(estimate_run(&q, f->pool, NULL, out, &err), &err);
-}
-
-static void run_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
-                         struct estimate *out)
-{
-    size_t count[FIT_MAX_OBSERVATION];
-    for (size_t i = 0; i < c->n_configuration; i++) count[i] = n_path;
-    run_counts(f, c, iteration, count, out);
+    fit_check_memory(f->configuration);
 }
 
 void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out)
 {
     const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false};
-    run_estimate(f, &call, 1, n_path, out);
+    kept_run(f, &call, 1, n_path, out);
 }
-
-static uint32_t call_sum(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path)
-{
-    const struct fiber_set *s = &f->cloth.fiber;
-    const uint32_t number[] = {(uint32_t)c->seed, c->replica, chunk, c->want_jacobian, (uint32_t)n_path};
-    uint32_t sum = (uint32_t)crc32_z(0, (const void *)s->position_m, 3 * s->n_vertex * sizeof *s->position_m);
-    sum = (uint32_t)crc32_z(sum, (const void *)f->model.id, strlen(f->model.id));
-    sum = (uint32_t)crc32_z(sum, (const void *)c->param, f->model.n_param * sizeof *c->param);
-    for (size_t i = 0; i < c->n_configuration; i++) {
-        const struct configuration *k = &c->configuration[i];
-        const double angle[] = {k->light_theta_rad, k->light_phi_rad, k->camera_theta_rad, k->camera_phi_rad,
-                                k->cloth_rotation_rad};
-        sum = (uint32_t)crc32_z(sum, (const void *)angle, sizeof angle);
-        if (k->n_rotation > 1) sum = (uint32_t)crc32_z(sum, (const void *)&k->n_rotation, sizeof k->n_rotation);
-    }
-    return (uint32_t)crc32_z(sum, (const void *)number, sizeof number);
-}
-
-static void chunk_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path,
-                           struct estimate *out)
-{
-    struct error err = {0};
-    char path[1024], *data = NULL;
-    size_t n = c->n_configuration * sizeof *out, n_read = 0;
-    snprintf(path, sizeof path, "%s/%08x.estimates", f->folder, call_sum(f, c, chunk, n_path));
-    if (file_read_all(path, n, &data, &n_read, &err) == STATUS_OK && n_read == n) {
-        memcpy(out, data, n);
-    } else {
-        run_estimate(f, c, chunk, n_path, out);
-        fit_check(durable_replace_volatile(path, out, n, &err), &err);
-    }
-    free(data);
-}
-
-/* sum <- sum + part, as means over chunks with equal path counts: divide by n_chunk at the end. */
-static void merge(struct estimate *sum, const struct estimate *part, double share)
-{
-    for (int c = 0; c < 3; c++) {
-        sum->mean[c] += share * part->mean[c];
-        sum->var[c] += share * share * part->var[c];
-    }
-    for (int k = 0; k < 3 * SCATTERING_MAX_FLAT; k++) {
-        sum->jac[k] += share * part->jac[k];
-        sum->jac_var[k] += share * share * part->jac_var[k];
-    }
-    sum->n_path += part->n_path;
-    sum->n_vertex += part->n_vertex;
-}
-
-static size_t n_chunks(size_t n_path) { return (n_path + FIT_CHUNK - 1) / FIT_CHUNK; }
-
-static void kept_estimate(const struct fit_phantom *f, const struct kept_call *c, size_t first_chunk, size_t n_path,
-                          struct estimate *out)
-{
-    size_t n_chunk = n_chunks(n_path);
-    struct estimate *part = calloc(c->n_configuration, sizeof *part);
-    check_memory(part);
-    memset(out, 0, c->n_configuration * sizeof *out);
-    for (size_t k = 0; k < n_chunk; k++) {
-        chunk_estimate(f, c, (uint32_t)(first_chunk + k), n_path / n_chunk, part);
-        for (size_t i = 0; i < c->n_configuration; i++) merge(&out[i], &part[i], 1.0 / (double)n_chunk);
-    }
-    free(part);
-}
-
-/* ---- photographs ---- */
 
 static void views(struct phantom_view_table *t, struct configuration *configuration)
 {
@@ -282,11 +165,11 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
     struct observation_set o;
     struct error err = {0};
     struct rng rng;
-    check_memory(t);
-    check_memory(e);
+    fit_check_memory(t);
+    fit_check_memory(e);
     views(t, configuration);
     const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, .plain_paths = true};
-    kept_estimate(f, &call, how->part * n_chunks(how->n_path), how->n_path, e);
+    kept_estimate(f, &call, how->part * kept_n_chunks(how->n_path), how->n_path, e);
     rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);
     for (size_t i = 0; i < FIT_N_VIEW; i++) {
@@ -312,178 +195,5 @@ uint64_t fit_phantom_fingerprint(const struct fit_phantom *f)
     uint32_t sum = 0;
     for (size_t i = 0; i < f->fitted.n; i++)
         sum = (uint32_t)crc32_z(sum, (const void *)f->fitted.item[i].mean_rgb, sizeof f->fitted.item[i].mean_rgb);
-    return (uint64_t)call_sum(f, &call, 0, 0) << 32 | sum;
-}
-
-/* ---- scores ---- */
-
-struct scorer {
-    struct observation_set part;
-    struct configuration *configuration;
-    struct coordinate coordinate[SCATTERING_MAX_PARAM];
-    struct linear_history history;
-    struct linear_model model;
-    struct estimate *replica[2];
-};
-
-static void append_here(struct scorer *s, const struct fit_phantom *f, const double *param)
-{
-    struct error err = {0};
-    double x[SCATTERING_MAX_PARAM];
-    for (size_t p = 0; p < f->model.n_param; p++) x[p] = coordinate_from_param(&s->coordinate[p], param[p]);
-    fit_check(linear_history_append(&s->history, x, s->replica[0], s->replica[1], &err), &err);
-}
-
-static void scorer_start(struct scorer *s, const struct fit_phantom *f, enum job_set set)
-{
-    struct error err = {0};
-    *s = (struct scorer){0};
-    observation_set_init(&s->part);
-    fit_check(observation_set_select(&f->observation, set, &s->part, &err), &err);
-    s->configuration = trace_configurations(&s->part);
-    check_memory(s->configuration);
-    for (size_t p = 0; p < f->model.n_param; p++) {
-        const struct param_info *info = &f->model.param[p];
-        coordinate_init(&s->coordinate[p], info, info->lower, info->upper);
-    }
-    linear_history_init(&s->history, &s->part, s->coordinate, f->model.n_param);
-    fit_check(linear_model_init(&s->model, 3 * s->part.n, f->model.n_param, &err), &err);
-    for (int q = 0; q < 2; q++) check_memory(s->replica[q] = calloc(s->part.n, sizeof(struct estimate)));
-}
-
-static void scorer_release(struct scorer *s)
-{
-    linear_model_release(&s->model);
-    linear_history_release(&s->history);
-    observation_set_release(&s->part);
-    free(s->configuration);
-    free(s->replica[0]);
-    free(s->replica[1]);
-}
-
-static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
-{
-    for (uint32_t q = 0; q < 2; q++)
-        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept,
-                      s->replica[q]);
-    append_here(s, f, at);
-}
-
-static void pool_at(struct scorer *s, const struct fit_phantom *f, const double *param)
-{
-    struct error err = {0};
-    double x[SCATTERING_MAX_PARAM];
-    for (size_t p = 0; p < f->model.n_param; p++) x[p] = coordinate_from_param(&s->coordinate[p], param[p]);
-    fit_check(linear_model_pool(&s->model, &s->history, x, &err), &err);
-}
-
-static struct fit_score score_of(const struct linear_model *m)
-{
-    double se, value = fmax(linear_model_objective(m, &se), 0.0), n_row = (double)m->n_row;
-    struct fit_score score = {.rel_rms = sqrt(value / n_row)};
-    score.se = fmin(0.5 * se / (n_row * score.rel_rms), sqrt(se / n_row));
-    return score;
-}
-
-struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
-                                   const double *param, size_t n_path)
-{
-    struct scorer s;
-    scorer_start(&s, f, set);
-    if (at != NULL) append_kept(&s, f, at, n_kept);
-    if (n_path > 0) {
-        for (uint32_t q = 0; q < 2; q++)
-            run_estimate(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true}, 0, n_path,
-                         s.replica[q]);
-        append_here(&s, f, param);
-    }
-    pool_at(&s, f, param);
-    struct fit_score score = score_of(&s.model);
-    scorer_release(&s);
-    return score;
-}
-
-/* What score_of makes of the squared error's se, the other way. */
-static double squared_se(const struct linear_model *m, double rel_rms, double se)
-{
-    return fmax(2.0 * rel_rms, se) * se * (double)m->n_row;
-}
-
-/* Counts of the next round: configuration i's part of f is known to se_i with count[i] paths, so counts as se_i sqrt(count[i]) reach a
- * given se with the fewest. Where few paths bring most of the light a round may see none of them: the largest of what all rounds
- * saw counts, and no configuration gets less than a quarter of the mean. */
-static void spread(const struct linear_model *m, const struct fit_score *now, const struct fit_score_goal *goal,
-                   double work[FIT_MAX_OBSERVATION], size_t *count)
-{
-    const double reserve = 1.2; /* the errors are themselves estimates */
-    size_t n = m->n_row / 3;
-    double sum = 0.0, spent = 0.0, most = (double)(goal->most * n), se = squared_se(m, now->rel_rms, goal->se);
-    for (size_t i = 0; i < n; i++) {
-        double part;
-        linear_model_part(m, i, &part);
-        work[i] = fmax(work[i], part * sqrt((double)count[i]));
-        sum += work[i];
-        spent += (double)count[i];
-    }
-    double total = fmin(fmax(reserve * sum * sum / (se * se), 1.5 * spent), most);
-    for (size_t i = 0; i < n; i++) count[i] = (size_t)(total * fmax(work[i] / sum, 0.25 / (double)n));
-}
-
-struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set set, const double *param,
-                                      const struct fit_score_goal *goal)
-{
-    enum { ROUND = 4 };
-    size_t count[FIT_MAX_OBSERVATION];
-    double work[FIT_MAX_OBSERVATION] = {0};
-    for (size_t i = 0; i < FIT_MAX_OBSERVATION; i++) count[i] = goal->first;
-    for (uint32_t round = 0;; round++) {
-        struct scorer s;
-        scorer_start(&s, f, set);
-        for (uint32_t q = 0; q < 2; q++)
-            run_counts(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, false}, round, count,
-                       s.replica[q]);
-        append_here(&s, f, param);
-        pool_at(&s, f, param);
-        const struct fit_score score = score_of(&s.model);
-        bool last = score.se <= goal->se || round + 1 == ROUND;
-        if (!last) spread(&s.model, &score, goal, work, count);
-        scorer_release(&s);
-        if (last) return score;
-    }
-}
-
-/* trace(M J'J) / n_row on one set, J from the kept estimates at the truth. */
-static double quadratic(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *m)
-{
-    struct scorer s;
-    size_t n = f->model.n_param;
-    double sum = 0.0;
-    scorer_start(&s, f, set);
-    append_kept(&s, f, f->truth, n_kept);
-    pool_at(&s, f, f->truth);
-    for (size_t row = 0; row < s.model.n_row; row++)
-        for (size_t p = 0; p < n; p++)
-            for (size_t q = 0; q < n; q++) sum += s.model.j[0][row * n + p] * m[p * n + q] * s.model.j[1][row * n + q];
-    sum /= (double)s.model.n_row;
-    scorer_release(&s);
-    return sum;
-}
-
-double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *cov)
-{
-    return quadratic(f, set, n_kept, cov);
-}
-
-double fit_phantom_first_order(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *param)
-{
-    size_t n = f->model.n_param;
-    double dx[SCATTERING_MAX_PARAM], m[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM];
-    for (size_t p = 0; p < n; p++) {
-        struct coordinate k;
-        coordinate_init(&k, &f->model.param[p], f->model.param[p].lower, f->model.param[p].upper);
-        dx[p] = coordinate_from_param(&k, param[p]) - coordinate_from_param(&k, f->truth[p]);
-    }
-    for (size_t p = 0; p < n; p++)
-        for (size_t q = 0; q < n; q++) m[p * n + q] = dx[p] * dx[q];
-    return quadratic(f, set, n_kept, m);
+    return (uint64_t)kept_call_sum(f, &call, 0, 0) << 32 | sum;
 }

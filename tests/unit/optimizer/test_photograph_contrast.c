@@ -1,0 +1,114 @@
+/* Contrasts of photographs: those of a chess board behind noise, their stated errors, parts whose edges cut through pixels. */
+#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/fit/photographs/photograph_contrast.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/chess_board.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* The same picture with five times as many pixels a side. */
+static double magnified_contrast(const struct image *im)
+{
+    enum { TIMES = 5 };
+    struct image large;
+    double contrast, se;
+    assert_int_equal(image_init(&large, TIMES * im->width, TIMES * im->height, 3, NULL), STATUS_OK);
+    for (size_t i = 0; i < large.width * large.height; i++)
+        for (size_t c = 0; c < 3; c++)
+            large.pixel[3 * i + c] = im->pixel[3 * (i / large.width / TIMES * im->width + i % large.width / TIMES) + c];
+    assert_int_equal(image_contrast(&large, 0, 5, &contrast, &se, NULL), STATUS_OK);
+    image_release(&large);
+    return contrast;
+}
+
+/* A chess board with independent noise of every pixel, whose share is as the header says; parts whose edges cut through
+ * pixels. */
+static void test_photograph(void **state)
+{
+    enum { PX = 64, ROUND = 50 };
+    double sum = 0.0, sum2 = 0.0, contrast, se, noise = 0.5;
+    struct image im;
+    assert_int_equal(image_init(&im, PX, PX, 3, NULL), STATUS_OK);
+    for (uint32_t k = 0; k < ROUND; k++) {
+        const struct rng_key key = {.seed = 8, .iteration = k};
+        for (size_t i = 0; i < PX * PX; i++) {
+            struct rng r;
+            double z[2], sign = (i % PX / BOARD_SIDE + i / PX / BOARD_SIDE) % 2 == 0 ? 1.0 : -1.0;
+            rng_start(&r, &key, (uint32_t)i, 0);
+            rng_normal_pair(&r, z);
+            for (size_t c = 0; c < 3; c++) im.pixel[3 * i + c] = (float)(1.0 + 0.3 * sign + noise * z[0]);
+        }
+        assert_int_equal(image_contrast(&im, 1, BOARD_SIDE, &contrast, &se, NULL), STATUS_OK);
+        assert_true(se > 0.0 && se < contrast);
+        sum += contrast / ROUND;
+        sum2 += contrast * contrast / ROUND;
+    }
+    double of_noise = noise * noise / (PX / BOARD_SIDE * PX / BOARD_SIDE),
+           error = sqrt((sum2 - sum * sum) / (ROUND - 1));
+    assert_true(fabs(sum - board_contrast(0.3) - of_noise) < 4.0 * error + 0.01 * of_noise);
+    assert_true(4.0 * error < of_noise);
+    double cut;
+    assert_int_equal(image_contrast(&im, 0, 5, &cut, &se, NULL), STATUS_OK); /* parts of 12.8 pixels */
+    assert_true(fabs(cut / magnified_contrast(&im) - 1.0) < 1e-6);
+    const char *path = scratch_path(state, "board.exr");
+    const struct job_photograph whole = {.scale = 3.0};
+    double rgb[3], rgb_se[3];
+    struct error err = {0};
+    assert_int_equal(image_write_exr(&im, path, NULL), STATUS_OK);
+    image_release(&im);
+    assert_int_equal(photograph_contrast(path, &whole, BOARD_SIDE, rgb, rgb_se, NULL), STATUS_OK);
+    assert_true(fabs(rgb[2] / contrast - 1.0) < 1e-5);
+    assert_int_equal(photograph_contrast(path, &whole, CONFIGURATION_MAX_CELLS + 1, rgb, rgb_se, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "board.exr"));
+}
+
+/* Blocks that scatter at random: the stated error of a contrast is the scatter of contrasts of such photographs. A channel that is
+ * black has no contrast, and the photograph's row does not count. */
+static void test_photograph_error(void **state)
+{
+    (void)state;
+    enum { PX = 2 * BOARD_SIDE, ROUND = 1000 };
+    double sum = 0.0, sum2 = 0.0, contrast, se, stated = 0.0;
+    struct image im;
+    assert_int_equal(image_init(&im, PX, PX, 3, NULL), STATUS_OK);
+    for (uint32_t k = 0; k < ROUND; k++) {
+        const struct rng_key key = {.seed = 9, .iteration = k};
+        for (size_t i = 0; i < PX * PX; i++) {
+            struct rng r;
+            double z[2];
+            rng_start(&r, &key, (uint32_t)(i / PX / 2 * BOARD_SIDE + i % PX / 2), 0); /* of its block */
+            rng_normal_pair(&r, z);
+            im.pixel[3 * i] = im.pixel[3 * i + 1] = (float)(1.0 + 0.2 * z[0]);
+        }
+        assert_int_equal(image_contrast(&im, 0, BOARD_SIDE, &contrast, &se, NULL), STATUS_OK);
+        sum += contrast / ROUND;
+        sum2 += contrast * contrast / ROUND;
+        stated += se * se / ROUND;
+    }
+    double ratio = sqrt(stated / (sum2 - sum * sum));
+    print_message("stated error of a contrast over its scatter: %.3f\n", ratio);
+    assert_true(fabs(ratio - 1.0) < 0.15); /* 1000 rounds: 3 % */
+    assert_int_equal(image_contrast(&im, 2, BOARD_SIDE, &contrast, &se, NULL), STATUS_OK);
+    assert_true(contrast == 0.0 && se == 1.0);
+    image_release(&im);
+    struct observation o = {
+        .weight = 2.0, .n_cell = BOARD_SIDE, .contrast_rgb = {0.04, 0.04, 0.0}, .contrast_se_rgb = {0.01, 0.01, 1.0}};
+    assert_true(observation_of_contrast(&o, 3.0).weight == 0.0);
+    o.contrast_se_rgb[2] = 0.01;
+    assert_true(observation_of_contrast(&o, 3.0).weight == 6.0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_photograph),
+        cmocka_unit_test(test_photograph_error),
+    };
+    return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
+}
