@@ -29,73 +29,71 @@ static void test_kinds(void **state)
             }
 }
 
-/* Every kind of sample, with values at the edges of its range; kinds that are none are refused. */
+struct sample_kind {
+    uint16_t format, bits;
+    double value[4]; /* at the edges of its range */
+};
+
+/* The four values as the bytes of a row of pixels. */
+static void encode(const struct sample_kind *kind, void *row)
+{
+    uint8_t *at = row;
+    for (size_t i = 0; i < 4; i++, at += kind->bits / 8) {
+        double x = kind->value[i];
+        if (kind->format == SAMPLEFORMAT_IEEEFP && kind->bits == 64) memcpy(at, &x, 8);
+        if (kind->format == SAMPLEFORMAT_IEEEFP && kind->bits == 32) memcpy(at, &(float){(float)x}, 4);
+        if (kind->format == SAMPLEFORMAT_INT) memcpy(at, &(int32_t){(int32_t)x}, kind->bits / 8); /* little-endian */
+        if (kind->format == SAMPLEFORMAT_UINT) memcpy(at, &(uint32_t){(uint32_t)x}, kind->bits / 8);
+    }
+}
+
+static void write_kind(const char *path, const struct sample_kind *kind)
+{
+    uint8_t row[32];
+    TIFF *t = TIFFOpen(path, "w");
+    assert_non_null(t);
+    encode(kind, row);
+    TIFFSetField(t, TIFFTAG_IMAGEWIDTH, 4u);
+    TIFFSetField(t, TIFFTAG_IMAGELENGTH, 1u);
+    TIFFSetField(t, TIFFTAG_BITSPERSAMPLE, kind->bits);
+    TIFFSetField(t, TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(t, TIFFTAG_SAMPLEFORMAT, kind->format);
+    TIFFSetField(t, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, 1u);
+    TIFFWriteEncodedStrip(t, 0, row, 4 * kind->bits / 8);
+    TIFFClose(t);
+}
+
 static void test_sample_types(void **state)
 {
     (void)state;
-    static const struct {
-        uint16_t format, bits;
-        double value[4];
-    } kind[] = {{SAMPLEFORMAT_UINT, 8, {0, 1, 200, 255}},
-                {SAMPLEFORMAT_UINT, 16, {0, 1, 40000, 65535}},
-                {SAMPLEFORMAT_UINT, 32, {0, 1, 3000000000.0, 4294967040.0}},
-                {SAMPLEFORMAT_INT, 8, {-128, -1, 0, 127}},
-                {SAMPLEFORMAT_INT, 16, {-32768, -1, 0, 32767}},
-                {SAMPLEFORMAT_INT, 32, {-2147483648.0, -1, 0, 2000000000.0}},
-                {SAMPLEFORMAT_IEEEFP, 32, {-1.5, 0, 0.25, 1e30}},
-                {SAMPLEFORMAT_IEEEFP, 64, {-1.5, 0, 0.25, 1e30}}};
+    static const struct sample_kind kind[] = {{SAMPLEFORMAT_UINT, 8, {0, 1, 200, 255}},
+                                              {SAMPLEFORMAT_UINT, 16, {0, 1, 40000, 65535}},
+                                              {SAMPLEFORMAT_UINT, 32, {0, 1, 3000000000.0, 4294967040.0}},
+                                              {SAMPLEFORMAT_INT, 8, {-128, -1, 0, 127}},
+                                              {SAMPLEFORMAT_INT, 16, {-32768, -1, 0, 32767}},
+                                              {SAMPLEFORMAT_INT, 32, {-2147483648.0, -1, 0, 2000000000.0}},
+                                              {SAMPLEFORMAT_IEEEFP, 32, {-1.5, 0, 0.25, 1e30}},
+                                              {SAMPLEFORMAT_IEEEFP, 64, {-1.5, 0, 0.25, 1e30}}};
     char path[128];
     const char *list[1] = {path};
     stack_path(path, "kind.tif");
     for (size_t k = 0; k < sizeof kind / sizeof kind[0]; k++) {
-        union {
-            uint8_t u8[4];
-            int8_t i8[4];
-            uint16_t u16[4];
-            int16_t i16[4];
-            uint32_t u32[4];
-            int32_t i32[4];
-            float f32[4];
-            double f64[4];
-        } pixel;
-        for (size_t i = 0; i < 4; i++) {
-            double x = kind[k].value[i];
-            bool is_int = kind[k].format == SAMPLEFORMAT_INT;
-            if (kind[k].format == SAMPLEFORMAT_IEEEFP && kind[k].bits == 64)
-                pixel.f64[i] = x;
-            else if (kind[k].format == SAMPLEFORMAT_IEEEFP)
-                pixel.f32[i] = (float)x;
-            else if (kind[k].bits == 8 && is_int)
-                pixel.i8[i] = (int8_t)x;
-            else if (kind[k].bits == 8)
-                pixel.u8[i] = (uint8_t)x;
-            else if (kind[k].bits == 16 && is_int)
-                pixel.i16[i] = (int16_t)x;
-            else if (kind[k].bits == 16)
-                pixel.u16[i] = (uint16_t)x;
-            else if (is_int)
-                pixel.i32[i] = (int32_t)x;
-            else
-                pixel.u32[i] = (uint32_t)x;
-        }
-        TIFF *t = TIFFOpen(path, "w");
-        assert_non_null(t);
-        TIFFSetField(t, TIFFTAG_IMAGEWIDTH, 4u);
-        TIFFSetField(t, TIFFTAG_IMAGELENGTH, 1u);
-        TIFFSetField(t, TIFFTAG_BITSPERSAMPLE, kind[k].bits);
-        TIFFSetField(t, TIFFTAG_SAMPLESPERPIXEL, 1);
-        TIFFSetField(t, TIFFTAG_SAMPLEFORMAT, kind[k].format);
-        TIFFSetField(t, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-        TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, 1u);
-        TIFFWriteEncodedStrip(t, 0, &pixel, 4 * kind[k].bits / 8);
-        TIFFClose(t);
         struct volume_source *source;
         float value[4];
+        write_kind(path, &kind[k]);
         assert_int_equal(volume_source_open(list, 1, &source, NULL), STATUS_OK);
         assert_int_equal(volume_source_read(source, 0, 1, value, NULL), STATUS_OK);
         for (size_t i = 0; i < 4; i++) assert_true(value[i] == (float)kind[k].value[i]);
         volume_source_close(source);
     }
+}
+
+static void test_kind_of_sample_that_is_none(void **state)
+{
+    (void)state;
+    char path[128];
+    stack_path(path, "twelve.tif");
     stack_write(path, 16, 1, COMPRESSION_NONE, TEST_STRIPS);
     TIFF *t = TIFFOpen(path, "r+");
     TIFFSetField(t, TIFFTAG_BITSPERSAMPLE, 12);
@@ -180,8 +178,12 @@ static void test_white_is_zero(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kinds),           cmocka_unit_test(test_sample_types),  cmocka_unit_test(test_slices),
-        cmocka_unit_test(test_constant_slices), cmocka_unit_test(test_white_is_zero),
+        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_sample_types),
+        cmocka_unit_test(test_kind_of_sample_that_is_none),
+        cmocka_unit_test(test_slices),
+        cmocka_unit_test(test_constant_slices),
+        cmocka_unit_test(test_white_is_zero),
     };
     return cmocka_run_group_tests(tests, stack_folder_setup, NULL);
 }

@@ -27,6 +27,20 @@ static double magnified_contrast(const struct image *im)
     return contrast;
 }
 
+/* Draws one of a series of square pictures in its first n_channel channels: a chess board of the contrast `chess` with fields of BOARD_SIDE
+ * pixels, and a deviate of standard deviation sd for each block of `block` pixels a side. */
+static void draw(struct image *im, const struct rng_key *key, size_t block, double chess, double sd, size_t n_channel)
+{
+    const size_t px = im->width;
+    for (size_t i = 0; i < px * px; i++) {
+        struct rng r;
+        double z[2], sign = (i % px / BOARD_SIDE + i / px / BOARD_SIDE) % 2 == 0 ? 1.0 : -1.0;
+        rng_start(&r, key, (uint32_t)(i / px / block * (px / block) + i % px / block), 0);
+        rng_normal_pair(&r, z);
+        for (size_t c = 0; c < n_channel; c++) im->pixel[3 * i + c] = (float)(1.0 + chess * sign + sd * z[0]);
+    }
+}
+
 /* A chess board with independent noise of every pixel, whose share is as the header says; parts whose edges cut through
  * pixels. */
 static void test_photograph(void **state)
@@ -36,14 +50,7 @@ static void test_photograph(void **state)
     struct image im;
     assert_int_equal(image_init(&im, PX, PX, 3, NULL), STATUS_OK);
     for (uint32_t k = 0; k < ROUND; k++) {
-        const struct rng_key key = {.seed = 8, .iteration = k};
-        for (size_t i = 0; i < PX * PX; i++) {
-            struct rng r;
-            double z[2], sign = (i % PX / BOARD_SIDE + i / PX / BOARD_SIDE) % 2 == 0 ? 1.0 : -1.0;
-            rng_start(&r, &key, (uint32_t)i, 0);
-            rng_normal_pair(&r, z);
-            for (size_t c = 0; c < 3; c++) im.pixel[3 * i + c] = (float)(1.0 + 0.3 * sign + noise * z[0]);
-        }
+        draw(&im, &(struct rng_key){.seed = 8, .iteration = k}, 1, 0.3, noise, 3);
         assert_int_equal(image_contrast(&im, 1, BOARD_SIDE, &contrast, &se, NULL), STATUS_OK);
         assert_true(se > 0.0 && se < contrast);
         sum += contrast / ROUND;
@@ -78,14 +85,7 @@ static void test_photograph_error(void **state)
     struct image im;
     assert_int_equal(image_init(&im, PX, PX, 3, NULL), STATUS_OK);
     for (uint32_t k = 0; k < ROUND; k++) {
-        const struct rng_key key = {.seed = 9, .iteration = k};
-        for (size_t i = 0; i < PX * PX; i++) {
-            struct rng r;
-            double z[2];
-            rng_start(&r, &key, (uint32_t)(i / PX / 2 * BOARD_SIDE + i % PX / 2), 0); /* of its block */
-            rng_normal_pair(&r, z);
-            im.pixel[3 * i] = im.pixel[3 * i + 1] = (float)(1.0 + 0.2 * z[0]);
-        }
+        draw(&im, &(struct rng_key){.seed = 9, .iteration = k}, 2, 0.0, 0.2, 2);
         assert_int_equal(image_contrast(&im, 0, BOARD_SIDE, &contrast, &se, NULL), STATUS_OK);
         sum += contrast / ROUND;
         sum2 += contrast * contrast / ROUND;

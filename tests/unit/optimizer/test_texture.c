@@ -92,79 +92,121 @@ static void test_same_bits(void **state)
     }
 }
 
-/* A real cloth: the contrast of its estimate is that of the pixels of a picture with as many pixels as cells. */
-static void test_against_picture(void **state)
-{
-    (void)state;
-    struct fiber_set f;
-    struct scene *scene = NULL;
-    struct thread_pool *pool = NULL;
+/* A real cloth seen through one camera. */
+struct woven {
+    struct fiber_set fiber;
+    struct scene *scene;
+    struct thread_pool *pool;
     struct configuration configuration[16];
-    const struct scattering_model *model = scattering_find("isotropic.v1");
-    double param[SCATTERING_MAX_PARAM];
-    const size_t n_path = 60000;
-    struct estimate e;
-    struct image im = {0};
-    for (size_t p = 0; p < model->n_param; p++) param[p] = model->param[p].start;
-    hand_weave_small(&f);
-    orbit_configurations_16(configuration);
-    configuration[0].crop_m = 0.0011;
-    assert_int_equal(scene_new(&f, &(struct scene_option){true}, &scene, NULL), STATUS_OK);
-    assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
+    const struct scattering_model *model;
     struct appearance appearance;
-    struct render_request picture = {.input = trace_input_surface(scene, model, param, &appearance),
-                                     .configuration = configuration,
+    double param[SCATTERING_MAX_PARAM];
+};
+
+static void woven_init(struct woven *w)
+{
+    *w = (struct woven){.model = scattering_find("isotropic.v1")};
+    for (size_t p = 0; p < w->model->n_param; p++) w->param[p] = w->model->param[p].start;
+    hand_weave_small(&w->fiber);
+    orbit_configurations_16(w->configuration);
+    w->configuration[0].crop_m = 0.0011;
+    assert_int_equal(scene_new(&w->fiber, &(struct scene_option){true}, &w->scene, NULL), STATUS_OK);
+    assert_int_equal(thread_pool_new(2, &w->pool, NULL), STATUS_OK);
+}
+
+static void woven_release(struct woven *w)
+{
+    thread_pool_free(w->pool);
+    scene_free(w->scene);
+    fiber_set_release(&w->fiber);
+}
+
+static struct estimate_request woven_request(struct woven *w, const size_t *n_path)
+{
+    struct estimate_request q = {.input = trace_input_surface(w->scene, w->model, w->param, &w->appearance),
+                                 .configuration = w->configuration,
+                                 .n_configuration = 1,
+                                 .n_path = n_path,
+                                 .seed = 4};
+    q.input.want_derivative = true;
+    return q;
+}
+
+static void woven_picture(struct woven *w, struct image *im)
+{
+    const struct render_request q = {.input = trace_input_surface(w->scene, w->model, w->param, &w->appearance),
+                                     .configuration = w->configuration,
                                      .width = BOARD_SIDE,
                                      .height = BOARD_SIDE,
                                      .n_sample = 1000,
                                      .seed = 3};
-    assert_int_equal(render_run(&picture, pool, NULL, &im, NULL), STATUS_OK);
-    configuration[0].contrast_cells = BOARD_SIDE;
-    struct estimate_request q = {.input = trace_input_surface(scene, model, param, &appearance),
-                                 .configuration = configuration,
-                                 .n_configuration = 1,
-                                 .n_path = &n_path,
-                                 .seed = 4};
-    q.input.want_derivative = true;
-    assert_int_equal(estimate_run(&q, pool, NULL, &e, NULL), STATUS_OK);
+    assert_int_equal(render_run(&q, w->pool, NULL, im, NULL), STATUS_OK);
+}
+
+/* Contrast of one channel of a rendered picture, its pixels' noise taken out, and its standard error. */
+static double picture_contrast(const struct image *im, size_t c, double *se)
+{
+    double mean = 0.0, sum = 0.0, noise = 0.0, var = 0.0;
+    for (size_t i = 0; i < BOARD_CELL; i++) mean += (double)im->pixel[i * im->n_channel + c] / BOARD_CELL;
+    for (size_t i = 0; i < BOARD_CELL; i++) {
+        double d = (double)im->pixel[i * im->n_channel + c] / mean - 1.0;
+        double own = (double)im->pixel[i * im->n_channel + 3 + c] / (mean * mean);
+        sum += d * d;
+        noise += own;
+        var += 4.0 * d * d * own + 2.0 * own * own;
+    }
+    *se = sqrt(var) / (BOARD_CELL - 1.0);
+    return (sum - noise * (BOARD_CELL - 1.0) / BOARD_CELL) / (BOARD_CELL - 1.0);
+}
+
+/* The contrast of the cloth's estimate is that of the pixels of a picture with as many pixels as cells. */
+static void test_against_picture(void **state)
+{
+    (void)state;
+    struct woven w;
+    struct estimate e;
+    struct image im = {0};
+    const size_t n_path = 60000;
+    woven_init(&w);
+    woven_picture(&w, &im);
+    w.configuration[0].contrast_cells = BOARD_SIDE;
+    const struct estimate_request q = woven_request(&w, &n_path);
+    assert_int_equal(estimate_run(&q, w.pool, NULL, &e, NULL), STATUS_OK);
     for (size_t c = 0; c < 3; c++) {
-        double mean = 0.0, sum = 0.0, noise = 0.0, var = 0.0;
-        for (size_t i = 0; i < BOARD_CELL; i++) mean += (double)im.pixel[i * im.n_channel + c] / BOARD_CELL;
-        for (size_t i = 0; i < BOARD_CELL; i++) {
-            double d = (double)im.pixel[i * im.n_channel + c] / mean - 1.0;
-            double own = (double)im.pixel[i * im.n_channel + 3 + c] / (mean * mean);
-            sum += d * d;
-            noise += own;
-            var += 4.0 * d * d * own + 2.0 * own * own;
-        }
-        double contrast = (sum - noise * (BOARD_CELL - 1.0) / BOARD_CELL) / (BOARD_CELL - 1.0),
-               se = sqrt(var) / (BOARD_CELL - 1.0);
+        double se, contrast = picture_contrast(&im, c, &se);
         assert_true(contrast > 0.01); /* there is a texture */
         assert_true(fabs(e.mean[c] - contrast) < 4.0 * hypot(se, sqrt(e.var[c])));
         assert_true(4.0 * hypot(se, sqrt(e.var[c])) < 0.5 * contrast);
     }
-    const size_t few = 256;
-    q.n_path = &few;
-    q.share_camera_paths = true;
-    assert_int_equal(estimate_run(&q, pool, NULL, &e, NULL), STATUS_INVALID);
-    q.share_camera_paths = false;
-    configuration[0].contrast_cells = 1;
-    assert_int_equal(estimate_run(&q, pool, NULL, &e, NULL), STATUS_INVALID);
-    configuration[0].contrast_cells = CONFIGURATION_MAX_CELLS + 1;
-    assert_int_equal(estimate_run(&q, pool, NULL, &e, NULL), STATUS_INVALID);
     image_release(&im);
-    thread_pool_free(pool);
-    scene_free(scene);
-    fiber_set_release(&f);
+    woven_release(&w);
+}
+
+static void test_refused_requests(void **state)
+{
+    (void)state;
+    struct woven w;
+    struct estimate e;
+    const size_t n_path = 256;
+    woven_init(&w);
+    w.configuration[0].contrast_cells = BOARD_SIDE;
+    struct estimate_request q = woven_request(&w, &n_path);
+    q.share_camera_paths = true;
+    assert_int_equal(estimate_run(&q, w.pool, NULL, &e, NULL), STATUS_INVALID);
+    q.share_camera_paths = false;
+    w.configuration[0].contrast_cells = 1;
+    assert_int_equal(estimate_run(&q, w.pool, NULL, &e, NULL), STATUS_INVALID);
+    w.configuration[0].contrast_cells = CONFIGURATION_MAX_CELLS + 1;
+    assert_int_equal(estimate_run(&q, w.pool, NULL, &e, NULL), STATUS_INVALID);
+    woven_release(&w);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_unbiased),
-        cmocka_unit_test(test_derivative),
-        cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_against_picture),
+        cmocka_unit_test(test_unbiased),         cmocka_unit_test(test_derivative),
+        cmocka_unit_test(test_same_bits),        cmocka_unit_test(test_against_picture),
+        cmocka_unit_test(test_refused_requests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
