@@ -37,8 +37,12 @@ def exists(path):
 
 
 def make_targets():
-    with open(os.path.join(ROOT, "Makefile"), encoding="utf-8") as f:
-        return set(re.findall(r"^([a-z][a-z-]*):", f.read(), re.MULTILINE))
+    found = set()
+    for path in tracked("Makefile", "*.mk"):
+        with open(os.path.join(ROOT, path), encoding="utf-8") as f:
+            for names in re.findall(r"^([a-z][a-z -]*):(?!=)", f.read(), re.MULTILINE):
+                found.update(names.split())
+    return found
 
 
 def test_links_lead_somewhere():

@@ -63,7 +63,7 @@ static void models_are_sound(void **unused)
         }
         check_slots(m);
     }
-    assert_int_equal(n, 8);
+    assert_true(n >= 8);
     assert_null(model_catalogue_find("no_such_model.v1"));
 }
 
