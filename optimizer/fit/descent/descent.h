@@ -8,6 +8,7 @@
 #define SELVEDGE_OPTIMIZER_DESCENT_H
 
 #include "base/catalogue/method_catalogue.h"
+#include "base/catalogue/stop_reason.h"
 #include "optimizer/fit/descent/estimator.h"
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/objective/fit_layout.h"
@@ -66,7 +67,8 @@ struct fit_problem {
 struct fit_result {
     double param[SCATTERING_MAX_PARAM];
     bool converged;
-    char reason[240];
+    enum stop_reason stop;
+    char reason[240]; /* the same as a sentence, with numbers */
     size_t n_step;
     uint64_t n_path;
     double wall_s;

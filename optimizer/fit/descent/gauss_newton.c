@@ -323,6 +323,7 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
 {
     char *text = result->reason;
     size_t n = sizeof result->reason;
+    result->stop = precise ? STOP_ARRIVED : STOP_ARRIVED_WITHIN_PHOTOGRAPHS;
     if (precise)
         snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %g %%", f, se,
                  promised_percent(g));
@@ -335,11 +336,14 @@ static void explain_end(const struct gauss_newton *g, bool precise, double f, do
 }
 
 /* Why a fit whose budget or iterations are used up has converged or not. */
-static void explain_early_end(const struct gauss_newton *g, const char *used, bool arrived, bool failed, double f,
-                              double se, struct fit_result *result)
+static void explain_early_end(const struct gauss_newton *g, enum stop_reason used_up, bool arrived, bool failed,
+                              double f, double se, struct fit_result *result)
 {
+    const char *used = used_up == STOP_ITERATIONS ? "the iterations" : "the path budget";
     char *text = result->reason;
     size_t n = sizeof result->reason;
+    bool explained = result->converged || !(failed || arrived);
+    result->stop = explained ? used_up : failed ? STOP_STEP_TAKEN_BACK : STOP_TOO_FEW_STEPS;
     if (result->converged)
         snprintf(text, n,
                  "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %g %%; "
@@ -401,7 +405,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         if (result->converged && precise) g->pulls = false; /* arrived with it: on without */
         bool paths_left = plan_paths(g, clear, problem->observation->n);
         if (g->run.n_step < max_iteration && paths_left) continue;
-        explain_early_end(g, paths_left ? "the iterations" : "the path budget", small, failed, f, se, result);
+        explain_early_end(g, paths_left ? STOP_ITERATIONS : STOP_PATH_BUDGET, small, failed, f, se, result);
         return STATUS_OK;
     }
 }

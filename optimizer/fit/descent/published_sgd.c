@@ -164,7 +164,12 @@ static status settle(struct sgd *g, const struct winner *best, struct error *err
 static void judge(const struct winner *best, struct fit_result *result)
 {
     bool at_end = best->i_run == 0 || best->i_run == N_RUN - 1, enough = best->n_compared >= N_EXTRA;
-    result->converged = enough && best->turn <= turn_limit && !at_end;
+    bool at_rest = best->turn <= turn_limit;
+    result->converged = enough && at_rest && !at_end;
+    result->stop = !enough    ? STOP_TOO_FEW_STEPS
+                   : at_end   ? STOP_END_OF_BRACKET
+                   : !at_rest ? STOP_STILL_MOVING
+                              : STOP_SCHEDULE;
     int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest objective%s; ",
                      best->i_run + 1, N_RUN, at_end ? ", which is at the end of the bracket" : "");
     if (enough)

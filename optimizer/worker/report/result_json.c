@@ -115,6 +115,7 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
         n_path += m->validation.replica[0][i].n_path + m->validation.replica[1][i].n_path;
     json_object_set_new(json, "converged", json_boolean(m->fit.converged));
     json_object_set_new(json, "reason", json_string(m->fit.reason));
+    json_object_set_new(json, "reason_code", json_string(stop_reason_info(m->fit.stop)->id));
     json_object_set_new(json, "parameters", parameters_json(m));
     json_object_set_new(json, "correlation", correlation_json(m));
     json_object_set_new(json, "objective", json_number(m->validation.fit.value));

@@ -1,6 +1,6 @@
 /* results/result.json, and results/summary.txt for people.
  *
- * {"format":1, "sample", "model", "method", "seed", "converged":bool, "reason",
+ * {"format":1, "sample", "model", "method", "seed", "converged":bool, "reason", "reason_code" (stop_reason.h),
  *  "parameters":[{"name":"C_R.r","unit":""|"deg","value","standard_error","lower","upper","start","at_bound":null|"lower"|"upper","determined":bool,
  *                 "fixed":bool,"tied_to":null|name,"ratio":null|number,"prior":null|{"mean","se"}}],                     file units; standard_error includes photograph noise, Monte-Carlo
  * noise and misfit "correlation":[[...]],                             in fit coordinates; 0 for parameters that are

@@ -1,6 +1,7 @@
 /* The catalogue of models and methods against itself and against the registries: what a new row must satisfy. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/model_catalogue.h"
+#include "base/catalogue/stop_reason.h"
 #include "optimizer/fit/descent/descent.h"
 #include "renderer/scattering/appearance.h"
 
@@ -108,6 +109,17 @@ static void methods_are_sound(void **unused)
     assert_null(method_catalogue_taking(1u << METHOD_N_ABILITY));
 }
 
+static void stop_reasons_are_sound(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < STOP_N_REASON; i++) {
+        const struct stop_reason_info *r = stop_reason_info((enum stop_reason)i);
+        assert_true(r->id != NULL && r->id[0] != '\0' && r->id[strspn(r->id, "abcdefghijklmnopqrstuvwxyz_")] == '\0');
+        assert_true(strlen(r->meaning) > 10 && r->meaning[strlen(r->meaning) - 1] == '.');
+        for (int k = 0; k < i; k++) assert_string_not_equal(r->id, stop_reason_info((enum stop_reason)k)->id);
+    }
+}
+
 static void units_convert(void **unused)
 {
     (void)unused;
@@ -124,10 +136,9 @@ static void units_convert(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(models_are_sound),
-        cmocka_unit_test(registries_follow_the_catalogue),
-        cmocka_unit_test(methods_are_sound),
-        cmocka_unit_test(units_convert),
+        cmocka_unit_test(models_are_sound),       cmocka_unit_test(registries_follow_the_catalogue),
+        cmocka_unit_test(methods_are_sound),      cmocka_unit_test(units_convert),
+        cmocka_unit_test(stop_reasons_are_sound),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -76,7 +76,7 @@ static void test_recovery_and_errors(void **state)
             mean += error[seed - 1] / SEEDS;
             worst = fmax(worst, error[seed - 1]);
             assert_true(r.n_path <= 6600000);
-            assert_non_null(strstr(r.reason, "path budget")); /* the noise never is 0.07 % of all rows by then */
+            assert_int_equal(r.stop, STOP_PATH_BUDGET); /* the noise never is 0.07 % of all rows by then */
             for (size_t p = 0; p < FAKE_N_PARAM; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
                 n_judged++;
@@ -109,7 +109,7 @@ static void test_ends_at_the_noise_of_the_photographs(void **state)
         for (uint64_t seed = 1; seed <= SEEDS; seed++) {
             fit(cloth[k], seed, 0, 1.0, 0.02, truth, &f, &r);
             n_fit++;
-            n_early += r.converged && strstr(r.reason, "photographs' own variance") != NULL && r.n_path < 5800000;
+            n_early += r.converged && r.stop == STOP_ARRIVED_WITHIN_PHOTOGRAPHS && r.n_path < 5800000;
             for (size_t p = 0; p < FAKE_N_PARAM; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
                 n_judged++;
@@ -186,6 +186,7 @@ static void test_says_when_it_has_not_converged(void **state)
     double truth[FAKE_N_PARAM];
     fit(cloth[2], 1, 70000, 1.0, 0.005, truth, &f, &r);
     assert_false(r.converged);
+    assert_int_equal(r.stop, STOP_PATH_BUDGET);
     assert_non_null(strstr(r.reason, "path budget ended"));
     const char *share = strstr(r.reason, "by about "); /* first-order promises can be more than there is: not told so */
     assert_non_null(share);
