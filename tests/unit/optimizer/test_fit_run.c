@@ -263,9 +263,32 @@ static void test_too_many_unknowns(void **state)
     assert_string_equal(err.field, OPTION_NUISANCE);
 }
 
+/* A method that takes priors is drawn to one; any other gives the same numbers as without. */
+static void test_methods_take_priors_as_they_declare(void **state)
+{
+    (void)state;
+    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+        struct fit_fixture x;
+        struct fit_result with, without;
+        fit_fixture_init(&x, fit_fixture_mid_range, 1, false, 0.01);
+        x.problem.max_iteration = 3;
+        assert_int_equal(fit_run(*m, &x.problem, &x.option, &without, NULL), STATUS_OK);
+        x.n_reported = 0;
+        x.option.prior_mean[6] = fake_param[6].lower;
+        x.option.prior_se[6] = 0.01 * fake_param[6].lower;
+        assert_int_equal(fit_run(*m, &x.problem, &x.option, &with, NULL), STATUS_OK);
+        if (((*m)->info->takes & METHOD_TAKES_PRIORS) != 0)
+            assert_true(with.prior_penalty > 0.0 && with.param[6] < without.param[6]);
+        else
+            assert_true(with.prior_penalty == 0.0 && with.param[6] == without.param[6]);
+        fit_fixture_release(&x);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_methods_take_priors_as_they_declare),
         cmocka_unit_test(test_layout_derivatives),
         cmocka_unit_test(test_plain),
         cmocka_unit_test(test_tied),

@@ -433,6 +433,37 @@ static void test_damage(void **state)
     assert_int_equal(job_document_parse(text, (size_t)JOB_MAX_DOCUMENT_BYTES + 1, &doc, &err), STATUS_TOO_LARGE);
 }
 
+/* A term is refused for the methods that do not take it, and only for those; the error names one that does. */
+static void test_methods_get_what_they_take(void **state)
+{
+    static const struct {
+        unsigned ability;
+        const char *field, *term;
+    } wanted[METHOD_N_ABILITY + 1] = {
+        {METHOD_TAKES_PRIORS, "fit.priors", "\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}}"},
+        {METHOD_TAKES_NUISANCE, "fit.nuisance", "\"nuisance\":{\"gain\":\"global\"}"},
+        {METHOD_TAKES_NUISANCE, "fit.nuisance", "\"nuisance\":{\"stray_light\":true}"},
+        {METHOD_TAKES_TEXTURE, "fit.texture", "\"texture\":{\"block_mm\":1}"},
+    };
+    (void)state;
+    const struct method_info *m;
+    for (size_t i = 0; (m = method_catalogue_at(i)) != NULL; i++) {
+        char text[1000];
+        for (size_t k = 0; k < sizeof wanted / sizeof *wanted; k++) {
+            snprintf(text, sizeof text, FIT_OF("{\"method\":\"%s\",%s}"), m->id, wanted[k].term);
+            if ((m->takes & wanted[k].ability) != 0)
+                job_document_free(parse(text));
+            else
+                check_error(text, wanted[k].field, method_catalogue_taking(wanted[k].ability)->id);
+        }
+        const char *const starts = FIT_OF("{\"method\":\"%s\",\"starts\":2,\"max_iterations\":%zu}");
+        snprintf(text, sizeof text, starts, m->id, m->max_iteration_of_starts);
+        job_document_free(parse(text));
+        snprintf(text, sizeof text, starts, m->id, m->max_iteration_of_starts + 1);
+        check_error(text, "fit.max_iterations", "several starts");
+    }
+}
+
 static void test_stage_weights(void **state)
 {
     (void)state;
@@ -499,6 +530,7 @@ int main(void)
         cmocka_unit_test(test_bounds_are_values),
         cmocka_unit_test(test_file_names),
         cmocka_unit_test(test_damage),
+        cmocka_unit_test(test_methods_get_what_they_take),
         cmocka_unit_test(test_stage_weights),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
