@@ -48,7 +48,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all generate deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
+.PHONY: all generate deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-models docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -167,6 +167,9 @@ docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (m
 	@mkdir -p docs/images
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
+
+docs-models: $(BUILD)/bin/selvedge-worker ## write the tables of parameters in docs/model.md anew, from the catalogue of models
+	@/usr/bin/python3 tests/support/model_tables.py --build $(BUILD) --write
 
 layers:            ## includes go one way, the daemon holds no symbol of the computing parts, headers say their purpose
 	@/usr/bin/python3 tests/check_layers.py --build $(BUILD)

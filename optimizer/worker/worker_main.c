@@ -1,6 +1,7 @@
 /* selvedge-worker JOBDIR: one job from its folder to its results. Layout of the folder: optimizer/job/job_folder.h. */
 #include "base/log.h"
 #include "base/thread_pool.h"
+#include "optimizer/job/catalogue_json.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/result_json.h"
@@ -26,6 +27,8 @@ static const char usage[] =
     "fiber\n"
     "                     files see coarser voxels (with a warning) where a quarter of it does not hold finer ones\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
+    "  --catalogue        print the scattering models with their parameters, the descent methods and the codes that\n"
+    "                     explain why a fit ended, as JSON\n"
     "  --version, --help\n"
     "\n"
     "Exit status: 0 succeeded, 1 failed (JOBDIR/status.json says why), 2 usage, 3 cancelled by SIGTERM, 4 another "
@@ -47,13 +50,24 @@ static bool parse_count(const char *text, size_t upper, size_t *out)
     return true;
 }
 
+static int print_catalogue(void)
+{
+    json_t *json = catalogue_json();
+    bool ok = json != NULL && json_dumpf(json, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12)) == 0;
+    json_decref(json);
+    return ok && putchar('\n') != EOF ? WORKER_SUCCEEDED : WORKER_FAILED;
+}
+
 /* -1: go on; otherwise the exit status. */
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option option[] = {
-        {"threads", required_argument, NULL, 't'}, {"memory-mib", required_argument, NULL, 'm'},
-        {"quiet", no_argument, NULL, 'q'},         {"help", no_argument, NULL, 'h'},
-        {"version", no_argument, NULL, 'v'},       {NULL, 0, NULL, 0}};
+    static const struct option option[] = {{"threads", required_argument, NULL, 't'},
+                                           {"memory-mib", required_argument, NULL, 'm'},
+                                           {"quiet", no_argument, NULL, 'q'},
+                                           {"help", no_argument, NULL, 'h'},
+                                           {"version", no_argument, NULL, 'v'},
+                                           {"catalogue", no_argument, NULL, 'c'},
+                                           {NULL, 0, NULL, 0}};
     *a = (struct arguments){.memory_mib = 2048};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         bool ok = true;
@@ -70,6 +84,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
         case 'h':
             fputs(usage, stdout);
             return 0;
+        case 'c':
+            return print_catalogue();
         case 'v':
             puts(RESULT_PROGRAM);
             return 0;

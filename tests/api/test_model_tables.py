@@ -1,0 +1,42 @@
+"""Documents against the catalogue of models, methods and stop reasons that selvedge-worker --catalogue prints."""
+import os
+
+import model_tables
+import pytest
+from daemon_under_test import BUILD, ROOT
+
+CATALOGUE = model_tables.read_catalogue(BUILD)
+
+
+def read(*path):
+    with open(os.path.join(ROOT, *path), encoding="utf-8") as file:
+        return file.read()
+
+
+def test_tables_of_parameters():
+    text = read("docs", "model.md")
+    assert text == model_tables.with_tables(text, CATALOGUE), "run make docs-models"
+
+
+def test_a_stale_table_is_noticed():
+    stale = read("docs", "model.md").replace("0.001..0.999", "0.001..0.998", 1)
+    assert stale != model_tables.with_tables(stale, CATALOGUE)
+
+
+def test_every_model_is_in_a_table():
+    """two_lobe_balanced.v1 has the parameters of two_lobe.v1, as the document says."""
+    parameters = {model["id"]: model["parameters"] for model in CATALOGUE["models"]}
+    assert parameters["two_lobe_balanced.v1"] == parameters["two_lobe.v1"]
+    assert sorted(model_tables.models_of(read("docs", "model.md")) + ["two_lobe_balanced.v1"]) == sorted(parameters)
+
+
+@pytest.mark.parametrize("reason", [reason["id"] for reason in CATALOGUE["stop_reasons"]])
+def test_stop_reasons_are_documented(reason):
+    assert f"`{reason}`" in read("docs", "file-formats.md")
+
+
+@pytest.mark.parametrize("kind", ["models", "methods"])
+def test_ids_are_documented(kind):
+    """The ids that a job document may name stand in the guide to jobs."""
+    guide = read("docs", "sample-preparation.md")
+    assert not [entry["id"] for entry in CATALOGUE[kind] if entry["id"] not in guide]

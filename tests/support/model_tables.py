@@ -1,0 +1,76 @@
+"""The tables of parameters in docs/model.md follow from the catalogue of models (base/catalogue/models.def).
+
+Between a line "<!-- parameters: ID ID ... -->" and the next "<!-- end -->" stands one table of these models. With --write
+the tables are written anew; without, exit status 1 says that they are not what the catalogue says.
+"""
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+DOCUMENT = os.path.join(ROOT, "docs", "model.md")
+MARKS = re.compile(r"(<!-- parameters: ([^\n]*?) -->\n).*?(<!-- end -->)", flags=re.S)
+HEAD = ["model", "parameter", "meaning", "unit in files", "range", "start", "fitted in"]
+COORDINATE = {"linear": "p", "log": "ln p", "logit": "ln(p / (1 - p))"}
+
+
+def read_catalogue(build):
+    """What selvedge-worker --catalogue prints."""
+    worker = os.path.join(build, "bin", "selvedge-worker")
+    return json.loads(subprocess.run([worker, "--catalogue"], check=True, capture_output=True, text=True).stdout)
+
+
+def line(cells, several):
+    """One line of a table; the first cell, the model, only where the table has several."""
+    return "| " + " | ".join(cells if several else cells[1:]).replace("|  |", "| |") + " |\n"
+
+
+def cells_of(model, parameter):
+    name = f"`{parameter['symbol']}`" + (" r, g, b" if parameter["channel"] is not None else "")
+    span = f"{parameter['lower']:g}..{parameter['upper']:.10g}"
+    return [model, name, parameter["meaning"], parameter["unit"], span, f"{parameter['start']:g}",
+            COORDINATE[parameter["coordinate"]]]
+
+
+def table(catalogue, ids):
+    """One row for each group of parameters; the density multiplier, which all volume models have, once at the end."""
+    rows, shared = [], []
+    for model in catalogue["models"]:
+        for parameter in model["parameters"] if model["id"] in ids else []:
+            if parameter["kind"] == "density":
+                shared = [cells_of("each of them", parameter)]
+            elif parameter["channel"] in (None, 0):
+                rows.append(cells_of(model["id"], parameter))
+    several = len(ids) > 1
+    rule = "|" + "---|" * (len(HEAD) if several else len(HEAD) - 1) + "\n"
+    return line(HEAD, several) + rule + "".join(line(cells, several) for cells in rows + shared)
+
+
+def with_tables(text, catalogue):
+    """The document with its tables as the catalogue has them."""
+    return MARKS.sub(lambda match: match.group(1) + table(catalogue, match.group(2).split()) + match.group(3), text)
+
+
+def models_of(text):
+    return [model for match in MARKS.finditer(text) for model in match.group(2).split()]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default=os.path.join(ROOT, "build"))
+    parser.add_argument("--write", action="store_true")
+    arguments = parser.parse_args()
+    with open(DOCUMENT, encoding="utf-8") as file:
+        before = file.read()
+    after = with_tables(before, read_catalogue(arguments.build))
+    if arguments.write:
+        with open(DOCUMENT, "w", encoding="utf-8") as file:
+            file.write(after)
+    return 0 if arguments.write or before == after else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
