@@ -1,5 +1,6 @@
 // Drag and drop of a job document (*.json) and the files that it names. Files are uploaded by tus; uploads continue
 // after a broken connection.
+import { documentEditor } from "./document_editor.js";
 import { el, size } from "./page_parts.js";
 import { getJson, raw, sendJson } from "./server_link.js";
 
@@ -82,14 +83,19 @@ export function submitPanel() {
     if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
     else if (doc) say("Ready.");
   };
+  const use = (now) => {
+    if (now !== source) { key = newKey(); sent = new Map(); }
+    source = now;
+    doc = null; // when it is no JSON
+    doc = JSON.parse(source);
+  };
+  const editor = documentEditor((now) => { use(now); show(); });
   const take = async (files) => {
     for (const file of files) {
       dropped.set(file.name, file);
       if (!file.name.endsWith(".json")) continue;
       const now = await file.text();
-      if (now !== source) { key = newKey(); sent = new Map(); }
-      source = now;
-      try { doc = JSON.parse(source); } catch (error) { doc = null; say(`${file.name}: ${error.message}`, true); return; }
+      try { use(now); } catch (error) { say(`${file.name}: ${error.message}`, true); return; } finally { editor.show(now); }
     }
     if (!doc) say("Drop the job document (.json) as well.");
     show();
@@ -123,9 +129,10 @@ export function submitPanel() {
       location.hash = job.id;
     } catch (error) {
       say(error.message, true);
+      if (error.body?.field) editor.mark(error.body.field, error.message);
     }
     busy = false;
     allow();
   });
-  return el("section", { class: "card", id: "submit" }, el("h2", {}, "New job"), drop);
+  return el("section", { class: "card", id: "submit" }, el("h2", {}, "New job"), drop, editor.node);
 }

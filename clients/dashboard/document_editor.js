@@ -1,0 +1,54 @@
+// The job document of the submit panel: a form made from the server's table of options, and the document as text.
+import { optionForm } from "./option_form.js";
+import { el } from "./page_parts.js";
+import { getJson } from "./server_link.js";
+
+// Whole numbers above 2^53 (a seed may be one) would be rounded when they are written again.
+function holdsLargeNumber(value) {
+  if (typeof value === "number") return Number.isInteger(value) && !Number.isSafeInteger(value);
+  return typeof value === "object" && value !== null && Object.values(value).some(holdsLargeNumber);
+}
+
+// changed(text): the form has changed the document.
+export function documentEditor(changed) {
+  const text = el("pre", { class: "log", id: "document" }), body = el("div"), note = el("p", { class: "hint" });
+  let source = "", options = null, form = null;
+  const build = (doc) => {
+    const write = () => {
+      source = JSON.stringify(doc, null, 2);
+      text.textContent = source;
+      changed(source);
+    };
+    form = optionForm(options, doc, write);
+    body.replaceChildren(form.node);
+  };
+  const render = () => {
+    text.textContent = source;
+    if (options === null) return;
+    let doc = {};
+    try { if (source !== "") doc = JSON.parse(source); } catch { doc = null; } // the panel says what is wrong
+    const editable = doc !== null && !holdsLargeNumber(doc);
+    note.textContent = editable ? "An option is in the document when its box is ticked; the grey text says what holds without it."
+      : "The form cannot edit this document: it is not valid JSON, or holds a whole number above 2^53. Edit the file and drop it again.";
+    form = null;
+    body.replaceChildren();
+    if (editable) build(doc);
+  };
+  const open = async () => {
+    if (options === null) {
+      try { options = (await getJson("/v1/options")).options; } catch (error) { note.textContent = error.message; return; }
+    }
+    if (form === null) render();
+  };
+  const node = el("details", { id: "editor", ontoggle: () => { if (node.open) open(); } },
+    el("summary", {}, "Write or edit the job document"), note, el("div", { class: "columns editor" }, body, text));
+  return {
+    node,
+    show(now) { source = now; render(); }, // a document from a file
+    async mark(field, message) {
+      node.open = true;
+      await open();
+      form?.mark(field, message);
+    },
+  };
+}
