@@ -1,42 +1,9 @@
-/* The job document (JSON): parsed and checked once, by the same code in daemon and worker.
+/* The job document: what a job is to do, as JSON text and as a struct. Read and checked by the same code in daemon and
+ * worker.
  *
- * {
- *   "sample": "blue twill, batch 7",                     required, 1..200 characters
- *   "volume": {                                           required unless "fibers" is given
- *     "files": ["scan.tif"],                              names of input files (one, or TIFF slices in order, or .mhd +
- * its data file) "voxel_size_um": 2.0 | [2.0, 2.0, 2.5],             required unless the file states it "raw":
- * {"shape": [nx,ny,nz], "type": "uint16", "endian": "little", "header_bytes": 0}, only for files without a header
- *     "axes": "xyz",  "matrix": [9 numbers],  "crop_voxel": [x0,y0,z0,x1,y1,z1],
- *     "align": "none"|"auto",  "crop": "none"|"auto",  "crop_keep": 0.5,  "join_seams": true,
- *     "density_low": v, "density_high": v,
- *     "filter": {"s":, "t":, "h":, "eps_d":, "eps_J":},   all optional: chosen from the data
- *     "link_sigma_voxel":, "min_vertices":, "radius_um": v, "radius_per_axis": bool
- *   },
- *   "fibers": {"file": "cloth.hair", "tile_mm": [x, y],   instead of "volume"
- *              "voxel_um": v},                            of the density that volume models see; default: half a radius
- *   "lamp": {"side_cm": 10, "distance_cm": 61},           optional
- *   "camera": {"distance_cm": 100, "crop_cm": 1},         optional
- *   "black_sheet": true,                                  optional
- *   "measurements": {"file": "blue.csv"}                  this ...
- *   "photographs": [                                      ... or this
- *     {"file":"p00.exr","set":"fit"|"held-out","light_theta_deg":,"light_phi_deg":,"camera_theta_deg":,"camera_phi_deg":,
- *      "cloth_rotation_deg":, "scale": 1.0, "weight": 1.0, "crop_px": [x0,y0,x1,y1], "transfer": "linear"|"srgb"}],
- *   "fit": {"model": "two_lobe.v1" or "models": ["two_lobe.v1", "phase_two_lobe.v1", ...],   ids of models.def; several
- *                                                         are fitted one after the other and compared
- *           "method": "gauss_newton.v1"|"published_sgd.v1", "seed": 1,
- *           "max_iterations": n, "path_budget": n,        of each model
- *           "fixed": {"beta_R": 5.0}, "start": {"C_TT": [r,g,b] | v},   for every model that has the parameter
- *           "density_multiplier_per_cm": 4000, "fit_density": false,    volume models only
- *           "fit_radius": true | {"lower_um": v, "upper_um": v},         one mean radius of all fibers; default: half to
- *                                                                        twice the one that the cloth has
- *           "candidates": [{"light_theta_deg":, ...}] | {"grid": true}, which photograph to take next
- *           "texture": {"block_mm": 0.5, "weight": 1},                  contrast of photographs (model.md); weight 0: only
- *                                                                        reported
- *           "tied", "bounds", "priors", "starts", "nuisance":           see job_fit_option.h
- *           "render_px": 96, "render_samples": 16}
- * }
- * Unknown keys are errors (a misspelt option must not be ignored). Errors: STATUS_INVALID with err->field a JSON path
- * such as "photographs[3].light_theta_deg" and a text that says what is allowed. Limits: see job_limits.
+ * The keys, with type, unit, range, default and meaning, are the rows of optimizer/job/options (for people:
+ * docs/sample-preparation.md, section 4). Unknown keys are errors, so that a misspelt option is not ignored. Errors:
+ * STATUS_INVALID with err->field a key such as "photographs[3].light_theta_deg" and a text that says what is allowed.
  */
 #ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H

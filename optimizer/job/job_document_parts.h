@@ -12,6 +12,8 @@ void job_fit_option_init(struct job_fit_option *o);
  * of the section is read before. model: those of the document, in its order. */
 status job_parse_fit_options(const struct json_field *f, const struct model_info *const *model,
                              struct job_document *doc, struct error *err);
+/* True when parameter p leads others or follows one. */
+bool job_parameter_is_tied(const struct job_fit_option *o, size_t n_param, size_t p);
 /* "unknown parameter": says what the models have. */
 status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,
                              struct error *err);
