@@ -54,7 +54,7 @@ struct configuration {
     enum configuration_light light;
     enum configuration_camera camera;
     uint32_t contrast_cells; /* 0: estimates are of the crop's mean radiance; 2 or more: of the contrast between so many
-                                equal parts of the crop a side (transport/contrast_blocks.h) */
+                                equal parts of the crop a side (transport/estimate/contrast_blocks.h) */
     uint32_t n_rotation; /* 0 or 1: the cloth lies at cloth_rotation_rad; more: estimates are of the mean over so many
                                 rotations, equally spaced from there on (rotation_mean.h; pictures show the first) */
 };

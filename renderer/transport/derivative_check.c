@@ -1,6 +1,6 @@
 #include "renderer/transport/derivative_check.h"
 
-#include "renderer/transport/estimate_blocks.h"
+#include "renderer/transport/estimate/estimate_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>

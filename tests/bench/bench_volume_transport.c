@@ -5,7 +5,7 @@
  *   transport.volume.memory_over_stored                bytes of the scene over the stored bytes of its volume
  * Arguments: paths a configuration (4096), voxels along an edge (500).
  */
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

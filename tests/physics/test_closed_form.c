@@ -2,7 +2,7 @@
  * scattering does not show, so far apart that they neither shade nor light each other.
  */
 #include "base/angle.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 #include "tests/support/tracer/trace_input.h"

@@ -1,7 +1,7 @@
 /* Lights and cameras beside the square lamp and the perspective camera: against closed forms, quadrature, or each
  * other. Tolerances are standard errors (4, over several dozen comparisons) plus the stated remainders.
  */
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

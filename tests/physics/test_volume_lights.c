@@ -3,7 +3,7 @@
  * and cameras; pictures against constants; lights that add up. Tolerances are standard errors, with what a closed form
  * leaves out beside them. */
 #include "base/angle.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -5,7 +5,7 @@
 #define SELVEDGE_OPTIMIZER_ESTIMATOR_H
 
 #include "base/progress.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 
 /* Which replica numbers (rng.h) are used for what: streams of different uses never meet. */
 enum estimator_replica {

@@ -24,7 +24,7 @@
  */
 #include "base/small_matrix.h"
 #include "optimizer/fit/descent/descent_methods.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 
 #include <math.h>
 #include <stdio.h>

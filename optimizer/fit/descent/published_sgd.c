@@ -13,7 +13,7 @@
  */
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/rescale.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 
 #include <math.h>
 #include <stdio.h>

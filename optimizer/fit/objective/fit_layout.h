@@ -18,7 +18,7 @@
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/objective/linear_model.h"
 #include "optimizer/fit/objective/nuisance.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 
 /* One parameter of a fit, internal units. Bounds lie inside the model's. A fixed one keeps `start`. */
 struct fit_parameter {

@@ -18,7 +18,7 @@
 
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/photographs/observation.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 
 /* Of one unknown, in its fit coordinate. precision 1 / sd^2; 0: none. */
 struct gaussian_prior {

@@ -2,7 +2,7 @@
  * themselves. */
 #include "renderer/scattering/appearance.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/cloth/hand_volume.h"

@@ -1,6 +1,6 @@
 /* estimate_run: the same bits for any number of threads, honest variances, cancellation, bad requests. */
 #include "base/clock.h"
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -1,5 +1,5 @@
 /* render_run: agrees with estimate_run, the same bits for any number of threads, layers and names, back light. */
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -1,6 +1,6 @@
 /* render_run for volumes: agrees with estimate_run, the same bits for any number of threads, layers and names, files,
  * progress and cancellation. */
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/scratch_folder.h"

@@ -1,4 +1,4 @@
-#include "renderer/transport/path_groups.h"
+#include "renderer/transport/estimate/path_groups.h"
 
 #include <stdbool.h>
 #include <stdlib.h>

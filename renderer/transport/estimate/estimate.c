@@ -1,7 +1,7 @@
-#include "renderer/transport/estimate.h"
+#include "renderer/transport/estimate/estimate.h"
 
-#include "renderer/transport/estimate_blocks.h"
-#include "renderer/transport/rotation_mean.h"
+#include "renderer/transport/estimate/estimate_blocks.h"
+#include "renderer/transport/estimate/rotation_mean.h"
 
 static status numeric_error(const struct estimate_request *q, const struct estimate_fault *f, struct error *err)
 {
