@@ -33,8 +33,8 @@ static void test_guide(void **state)
         float u[2] = {rng_float(&r), 0}, d[3], local[3];
         u[1] = rng_float(&r);
         lamp_guide_sample(towards, u, d);
-        assert_true(fabsf(dot(d, d) - 1) < 1e-5f);
-        to_local(&f, d, local);
+        assert_true(fabsf(fiber_frame_dot(d, d) - 1) < 1e-5f);
+        fiber_frame_to_local(&f, d, local);
         double inner = exp(LAMP_GUIDE_KAPPA * ((double)local[0] - 1)),
                angle = atan2((double)local[2], (double)local[1]);
         int ring = (int)(inner * RING), quarter = (int)((angle + M_PI) / (2 * M_PI) * 4);
@@ -47,7 +47,7 @@ static void test_guide(void **state)
     for (int i = 0; i < STEP; i++) {
         double c = -1 + 2 * (i + 0.5) / STEP, s = sqrt(1 - c * c);
         float local[3] = {(float)c, (float)s, 0}, d[3];
-        to_world(&f, local, d);
+        fiber_frame_to_world(&f, local, d);
         sum += 2 * M_PI * 2 / STEP * (double)lamp_guide_pdf(towards, d);
     }
     assert_true(fabs(sum - 1) < 1e-3);

@@ -12,9 +12,9 @@ void lamp_guide_energy_of(const struct scattering_model *m, const struct scatter
         m->sample(s, wo, NULL, u, wi);
         float pdf = m->eval_pdf(s, wi, wo, NULL, rgb, NULL);
         for (int c = 0; c < 3 && pdf > 0; c++) {
-            float energy = rgb[c] * cos_theta(wi) / pdf / N;
+            float energy = rgb[c] * fiber_frame_cos_theta(wi) / pdf / N;
             e->all[c] += energy;
-            if (-dot(wi, wo) > near) e->forward[c] += energy;
+            if (-fiber_frame_dot(wi, wo) > near) e->forward[c] += energy;
         }
     }
 }

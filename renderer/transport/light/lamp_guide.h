@@ -30,14 +30,14 @@ static inline void lamp_guide_towards(const struct lamp *lamp, const float posit
         return;
     }
     for (int a = 0; a < 3; a++) towards[a] = lamp->centre_mm[a] - position_mm[a];
-    float inv = 1 / sqrtf(dot(towards, towards));
+    float inv = 1 / sqrtf(fiber_frame_dot(towards, towards));
     for (int a = 0; a < 3; a++) towards[a] *= inv;
 }
 
 /* Density per steradian of a unit direction. */
 static inline float lamp_guide_pdf(const float towards[3], const float direction[3])
 {
-    return LAMP_GUIDE_KAPPA * (float)(0.5 / M_PI) * expf(LAMP_GUIDE_KAPPA * (dot(towards, direction) - 1));
+    return LAMP_GUIDE_KAPPA * (float)(0.5 / M_PI) * expf(LAMP_GUIDE_KAPPA * (fiber_frame_dot(towards, direction) - 1));
 }
 
 /* u in [0, 1). */
@@ -51,7 +51,7 @@ static inline void lamp_guide_sample(const float towards[3], const float u[2], f
     local[0] = c;
     local[1] = s * cosf(angle);
     local[2] = s * sinf(angle);
-    to_world(&f, local, direction);
+    fiber_frame_to_world(&f, local, direction);
 }
 
 #endif

@@ -23,22 +23,28 @@ static inline void fiber_frame_from(struct fiber_frame *f, const float u[3])
     f->w[2] = -u[1];
 }
 
-static inline float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static inline void to_local(const struct fiber_frame *f, const float d[3], float out[3])
+static inline float fiber_frame_dot(const float a[3], const float b[3])
 {
-    out[0] = dot(f->u, d);
-    out[1] = dot(f->v, d);
-    out[2] = dot(f->w, d);
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static inline void to_world(const struct fiber_frame *f, const float d[3], float out[3])
+static inline void fiber_frame_to_local(const struct fiber_frame *f, const float d[3], float out[3])
+{
+    out[0] = fiber_frame_dot(f->u, d);
+    out[1] = fiber_frame_dot(f->v, d);
+    out[2] = fiber_frame_dot(f->w, d);
+}
+
+static inline void fiber_frame_to_world(const struct fiber_frame *f, const float d[3], float out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = d[0] * f->u[a] + d[1] * f->v[a] + d[2] * f->w[a];
-    float inv = 1 / sqrtf(dot(out, out));
+    float inv = 1 / sqrtf(fiber_frame_dot(out, out));
     for (int a = 0; a < 3; a++) out[a] *= inv;
 }
 
-static inline float cos_theta(const float local[3]) { return sqrtf(local[1] * local[1] + local[2] * local[2]); }
+static inline float fiber_frame_cos_theta(const float local[3])
+{
+    return sqrtf(local[1] * local[1] + local[2] * local[2]);
+}
 
 #endif

@@ -93,9 +93,10 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float share, 
     u[1] = rng_float(w->rng);
     if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return 0;
-    to_local(f, direction, wi);
+    fiber_frame_to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float light = share * lamp->radiance * cos_theta(wi) / pdf_lamp * lights_power_heuristic(pdf_lamp, pdf), value[3];
+    float light = share * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * lights_power_heuristic(pdf_lamp, pdf),
+          value[3];
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
     float most = path_value_largest(value), survival;
     if (!(most > 0)) {
@@ -124,9 +125,9 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
     u[1] = rng_float(w->rng);
     if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
-    to_local(f, direction, wi);
+    fiber_frame_to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float weight = cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
+    float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
     for (int c = 0; c < 3; c++) {
         radiance[c] *= weight;
         value[c] = w->throughput[c] * s_rgb[c] * radiance[c];
@@ -201,7 +202,7 @@ static void probe_ahead(struct walk *w, size_t i_lamp, const struct scene_hit *f
     scene_ray_leave(from, offset_mm, direction, &ray);
     if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond is the walk's */
     fiber_frame_from(&f, hit.tangent);
-    to_local(&f, back, wo);
+    fiber_frame_to_local(&f, back, wo);
     enter_fiber(w, &hit);
     float light = connect_lamp(w, &w->lamp[i_lamp], 1, &ray, &hit, &f, wo, wi);
     if (w->step == NULL || light == 0) return;
@@ -222,9 +223,9 @@ static void probe(struct walk *w, size_t i_lamp, const struct scene_ray *ray, co
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     lamp_guide_sample(w->towards[i_lamp], u, direction);
-    to_local(f, direction, wi);
+    fiber_frame_to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float weight = cos_theta(wi) / (pdf + w->p_probe * lamp_guide_pdf(w->towards[i_lamp], direction));
+    float weight = fiber_frame_cos_theta(wi) / (pdf + w->p_probe * lamp_guide_pdf(w->towards[i_lamp], direction));
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
     if (!(most > 0)) {
@@ -295,7 +296,7 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
     s->model->sample(w->state, wo, w->throughput, u, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     if (pdf == 0) return false; /* rounded to a direction along the fiber, where nothing is scattered to */
-    float weight = cos_theta(wi) / pdf, next[3];
+    float weight = fiber_frame_cos_theta(wi) / pdf, next[3];
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
     if (!(most > 0)) {
@@ -309,7 +310,7 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
         memcpy(w->step->wi, wi, sizeof wi);
         w->step->weight = weight / survival;
     }
-    to_world(f, wi, direction);
+    fiber_frame_to_world(f, wi, direction);
     for (size_t k = 0; k < w->n_lamp && s->probes; k++)
         w->share[k] = pdf / (pdf + w->p_probe * lamp_guide_pdf(w->towards[k], direction));
     double offset[2] = {ray->offset_mm[0], ray->offset_mm[1]};
@@ -362,7 +363,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         struct fiber_frame f;
         fiber_frame_from(&f, hit.tangent);
         float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
-        to_local(&f, back, wo);
+        fiber_frame_to_local(&f, back, wo);
         enter_fiber(w, &hit);
         if (w->step != NULL) {
             memcpy(w->step->wo, wo, sizeof wo);

@@ -9,7 +9,7 @@
 
 /* -ln of 1 - u, for u from rng_float: within 2e-7 of the larger of 1 and its value. Exponent and mantissa apart, the
  * mantissa between sqrt(1/2) and sqrt(2) through ln((1 + x) / (1 - x)) = 2 (x + x^3 / 3 + ...). No call, no branch. */
-static inline float minus_log_rest(float u)
+static inline float volume_flight_minus_log(float u)
 {
     union {
         float f;
@@ -24,7 +24,7 @@ static inline float minus_log_rest(float u)
 }
 
 /* Moves along the ray. False: out of the slab. */
-static inline bool advance(const struct volume_scene *v, float step_mm, struct volume_ray *ray)
+static inline bool volume_flight_advance(const struct volume_scene *v, float step_mm, struct volume_ray *ray)
 {
     for (int a = 0; a < 3; a++) ray->at[a] += step_mm * ray->per_mm[a];
     for (int a = 0; a < 2; a++)
@@ -37,14 +37,15 @@ static inline bool advance(const struct volume_scene *v, float step_mm, struct v
     return ray->at[2] >= v->low && ray->at[2] < v->high;
 }
 
-static inline const int32_t *brick_at(const struct volume_scene *v, const struct volume_ray *ray)
+static inline const int32_t *volume_flight_brick(const struct volume_scene *v, const struct volume_ray *ray)
 {
     int32_t i = (int32_t)ray->at[0] >> VOLUME_BRICK_SHIFT, j = (int32_t)ray->at[1] >> VOLUME_BRICK_SHIFT,
             k = (int32_t)ray->at[2] >> VOLUME_BRICK_SHIFT;
     return v->brick + (size_t)(k * v->n_brick[1] + j) * (size_t)v->n_brick[0] + i;
 }
 
-static inline const uint32_t *voxel_at(const struct volume_scene *v, int32_t brick, const struct volume_ray *ray)
+static inline const uint32_t *volume_flight_voxel(const struct volume_scene *v, int32_t brick,
+                                                  const struct volume_ray *ray)
 {
     const int32_t mask = VOLUME_BRICK_EDGE - 1;
     int32_t place = ((int32_t)ray->at[2] & mask) << 2 * VOLUME_BRICK_SHIFT |
@@ -53,7 +54,7 @@ static inline const uint32_t *voxel_at(const struct volume_scene *v, int32_t bri
 }
 
 /* How far it is out of the cube of empty bricks around the ray's, or out of the tile. Nothing can happen before. */
-static inline float empty_mm(const struct volume_scene *v, const struct volume_ray *ray, int32_t n_empty)
+static inline float volume_flight_empty_mm(const struct volume_scene *v, const struct volume_ray *ray, int32_t n_empty)
 {
     const float most[3] = {v->n_voxel[0], v->n_voxel[1], v->high};
     const float least[3] = {0, 0, v->low};
@@ -71,17 +72,17 @@ static inline float empty_mm(const struct volume_scene *v, const struct volume_r
 
 /* What a voxel that is not empty does to a ray of direction w: extinction over the majorant, and its derivative by the
  * parameter of s(w). inv_majorant_density: of the density times s at which extinction would equal the majorant. */
-struct lookup {
+struct volume_lookup {
     float ratio, d_ratio, density, sine;
 };
 
-static inline struct lookup look_up(const struct phase_extinction *e, float inv_majorant_density, uint32_t voxel,
-                                    const float w[3])
+static inline struct volume_lookup volume_flight_look_up(const struct phase_extinction *e, float inv_majorant_density,
+                                                         uint32_t voxel, const float w[3])
 {
-    struct lookup l = {.density = volume_voxel_density(voxel)};
+    struct volume_lookup l = {.density = volume_voxel_density(voxel)};
     float along[3], d_value = 0;
     volume_voxel_along(voxel, along);
-    float c = dot(along, w), rest = 1 - c * c / dot(along, along);
+    float c = fiber_frame_dot(along, w), rest = 1 - c * c / fiber_frame_dot(along, along);
     l.sine = sqrtf(rest > 0 ? rest : 0);
     float scale = l.density * inv_majorant_density, value = phase_extinction_at(e, l.sine, &d_value);
     l.ratio = scale * value;

@@ -75,7 +75,7 @@ static struct volume_event *note(struct lane *l, int kind)
     return e;
 }
 
-static void note_lookup(struct lane *l, int kind, const struct lookup *k)
+static void note_lookup(struct lane *l, int kind, const struct volume_lookup *k)
 {
     struct volume_event *e = note(l, kind);
     if (e == NULL) return;
@@ -154,9 +154,9 @@ static inline bool move_on(const struct volume_setting *s, struct lane *l, float
     l->voxel = NULL;
     l->out->n_lookup++;
     bool lost = ++l->n_lookup > VOLUME_MAX_LOOKUP;
-    float step_mm = minus_log_rest(rng_float(&l->rng)) * s->mean_step_mm;
-    if (lost || !advance(s->scene, skip_mm + step_mm, &l->ray)) return leave(s, l, lost);
-    l->brick = brick_at(s->scene, &l->ray);
+    float step_mm = volume_flight_minus_log(rng_float(&l->rng)) * s->mean_step_mm;
+    if (lost || !volume_flight_advance(s->scene, skip_mm + step_mm, &l->ray)) return leave(s, l, lost);
+    l->brick = volume_flight_brick(s->scene, &l->ray);
     __builtin_prefetch(l->brick);
     return true;
 }
@@ -189,7 +189,7 @@ static bool scatter(const struct volume_setting *s, struct lane *l)
     for (int c = 0; c < 3; c++) l->throughput[c] = next[c] / survival;
     for (size_t p = 0; s->want_jacobian && p < 3 * s->model->n_param; p++) l->h[p] += score[p];
     note_light(l, VOLUME_SCATTER, wi, (float[3]){1 / (l->pdf * survival), 0, 0});
-    to_world(&l->frame, wi, direction);
+    fiber_frame_to_world(&l->frame, wi, direction);
     volume_ray_position_mm(s->scene, &l->vertex, l->origin_mm);
     return send(s, l, FLIGHT, direction);
 }
@@ -216,7 +216,7 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
         if (!(to == LAMP ? s->lights.has_lamp : s->lights.image != NULL)) continue;
         if (!sample_light(s, l, to, direction, radiance, &pdf_light)) continue;
         if (direction[2] <= 0 && s->scene->black_sheet) continue;
-        to_local(&l->frame, direction, l->light_wi);
+        fiber_frame_to_local(&l->frame, direction, l->light_wi);
         float pdf = s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, NULL);
         float heuristic = lights_power_heuristic(pdf_light, pdf) / pdf_light;
         for (int c = 0; c < 3; c++) {
@@ -241,7 +241,7 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
 }
 
 /* A real collision: the path's next vertex. */
-static bool collide(const struct volume_setting *s, struct lane *l, uint32_t voxel, const struct lookup *k)
+static bool collide(const struct volume_setting *s, struct lane *l, uint32_t voxel, const struct volume_lookup *k)
 {
     float tangent[3];
     l->flight.ln_d += 1;
@@ -251,13 +251,13 @@ static bool collide(const struct volume_setting *s, struct lane *l, uint32_t vox
     float back[3] = {-l->ray.direction[0], -l->ray.direction[1], -l->ray.direction[2]};
     volume_voxel_direction(voxel, tangent);
     fiber_frame_from(&l->frame, tangent);
-    to_local(&l->frame, back, l->wo);
+    fiber_frame_to_local(&l->frame, back, l->wo);
     l->vertex = l->ray;
     return connect(s, l, LAMP);
 }
 
 /* A tentative collision on the way to a light: ratio tracking. */
-static bool pass(const struct volume_setting *s, struct lane *l, const struct lookup *k)
+static bool pass(const struct volume_setting *s, struct lane *l, const struct volume_lookup *k)
 {
     float inv = 1 / (1 - k->ratio);
     l->passed *= 1 - k->ratio;
@@ -278,14 +278,14 @@ static inline bool step(const struct volume_setting *s, struct lane *l)
 {
     if (l->voxel == NULL) {
         int32_t brick = *l->brick;
-        if (brick < 0) return move_on(s, l, empty_mm(s->scene, &l->ray, -brick));
-        l->voxel = voxel_at(s->scene, brick, &l->ray);
+        if (brick < 0) return move_on(s, l, volume_flight_empty_mm(s->scene, &l->ray, -brick));
+        l->voxel = volume_flight_voxel(s->scene, brick, &l->ray);
         __builtin_prefetch(l->voxel);
         return true;
     }
     uint32_t voxel = *l->voxel;
     if (voxel >> 24 == 0) return move_on(s, l, 0);
-    struct lookup k = look_up(s->extinction, s->inv_majorant_density, voxel, l->ray.direction);
+    struct volume_lookup k = volume_flight_look_up(s->extinction, s->inv_majorant_density, voxel, l->ray.direction);
     if (l->purpose != FLIGHT) return pass(s, l, &k);
     if (rng_float(&l->rng) < k.ratio) return collide(s, l, voxel, &k);
     float inv = 1 / (1 - k.ratio);
