@@ -205,7 +205,7 @@ static double trace(const struct bench *b, const double param[9], size_t n_path,
  * standard errors are added. */
 static void print_times(const char *set, const struct estimate e[N_CONFIGURATION], double per_path)
 {
-    double s_mean = 0, s_derivative = 0, sd = 0, vertex = 0;
+    double s_mean = 0, s_derivative = 0, sd = 0, bounce = 0;
     for (int i = 0; i < N_CONFIGURATION; i++) {
         double n_path = (double)e[i].n_path, mean = 0, se = 0, jac = 0, jac_se = 0;
         for (size_t ch = 0; ch < 3; ch++) {
@@ -218,13 +218,13 @@ static void print_times(const char *set, const struct estimate e[N_CONFIGURATION
         sd += rel / N_CONFIGURATION;
         s_mean += rel * rel / 1e-4 * per_path / N_CONFIGURATION;
         s_derivative += rel_jac * rel_jac / 25e-4 * per_path / N_CONFIGURATION;
-        vertex += (double)e[i].n_vertex / n_path / N_CONFIGURATION;
+        bounce += (double)e[i].n_bounce / n_path / N_CONFIGURATION;
     }
     print(set, "paths_per_s_core", 1 / per_path, "1/s", "higher");
     print(set, "s_to_1pct_mean", s_mean, "s", "lower");
     print(set, "s_to_5pct_derivative", s_derivative, "s", "lower");
     print(set, "relative_sd_per_path", sd, "", "lower");
-    print(set, "vertices_per_path", vertex, "", "lower");
+    print(set, "bounces_per_path", bounce, "", "lower");
 }
 
 static void bench_set(const struct bench *b, const char *set, const double param[9])

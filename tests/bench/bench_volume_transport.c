@@ -1,7 +1,7 @@
 /* Paths per second and core through a volume, with all derivatives (12 parameters and d). One JSON object a line.
  *   transport.volume.mfp{67,25,6}um.paths_per_s_core   500^3 voxels of 2 um, 28 % of them occupied, mean over 16
  *                                                      configurations; mean free path at the mean occupied density
- *   transport.volume.{mfp...}.vertices_per_path, s_to_1pct_mean
+ *   transport.volume.{mfp...}.bounces_per_path, s_to_1pct_mean
  *   transport.volume.memory_over_stored                bytes of the scene over the stored bytes of its volume
  * Arguments: paths a configuration (4096), voxels along an edge (500).
  */
@@ -87,7 +87,7 @@ int main(int argc, char **argv)
             }
             q.n_path = n;
         }
-        double per_path = (processor_s() - t0) / (16.0 * (double)n_path), s_mean = 0, vertex = 0;
+        double per_path = (processor_s() - t0) / (16.0 * (double)n_path), s_mean = 0, bounce = 0;
         for (int i = 0; i < 16; i++) {
             double mean = 0, se = 0;
             for (int ch = 0; ch < 3; ch++) { /* channels are correlated: add standard errors */
@@ -95,11 +95,11 @@ int main(int argc, char **argv)
                 se += sqrt(e[i].var[ch]);
             }
             s_mean += se * se / (mean * mean) * (double)n_path / 1e-4 * per_path / 16;
-            vertex += (double)e[i].n_vertex / (double)e[i].n_path / 16;
+            bounce += (double)e[i].n_bounce / (double)e[i].n_path / 16;
         }
         print(set, ".paths_per_s_core", 1 / per_path, "1/s", "higher");
         print(set, ".s_to_1pct_mean", s_mean, "s", "lower");
-        print(set, ".vertices_per_path", vertex, "", "lower");
+        print(set, ".bounces_per_path", bounce, "", "lower");
     }
     thread_pool_free(pool);
     volume_scene_release(&scene);

@@ -66,11 +66,12 @@ static void evaluate(const struct scattering_model *m, const double *param, cons
                 m->eval(s, p->light_wi, p->wo, rgb, NULL);
                 for (int c = 0; c < 3; c++) out[c] += t[c] * (double)rgb[c] * (double)p->light;
             }
-            if (p->probe_light > 0) {
+            if (p->guided_light > 0) {
                 float ahead[3];
-                m->eval(s, p->probe_wi, p->wo, rgb, NULL);
-                m->eval(s, p->probe_light_wi, p->probe_wo, ahead, NULL);
-                for (int c = 0; c < 3; c++) out[c] += t[c] * (double)rgb[c] * (double)ahead[c] * (double)p->probe_light;
+                m->eval(s, p->guided_wi, p->wo, rgb, NULL);
+                m->eval(s, p->guided_light_wi, p->guided_wo, ahead, NULL);
+                for (int c = 0; c < 3; c++)
+                    out[c] += t[c] * (double)rgb[c] * (double)ahead[c] * (double)p->guided_light;
             }
             m->eval(s, p->wi, p->wo, rgb, NULL);
             for (int c = 0; c < 3; c++) {

@@ -176,11 +176,12 @@ static void evaluate(const double param[2][N_PARAM], const struct path_record *r
                 m->eval(s[p->i_group], p->image_wi, p->wo, rgb, NULL);
                 for (int c = 0; c < 3; c++) out[c] += t[c] * (double)rgb[c] * (double)p->image[c];
             }
-            if (p->probe_light > 0) {
+            if (p->guided_light > 0) {
                 float ahead[3];
-                m->eval(s[p->i_group], p->probe_wi, p->wo, rgb, NULL);
-                m->eval(s[p->i_probe_group], p->probe_light_wi, p->probe_wo, ahead, NULL);
-                for (int c = 0; c < 3; c++) out[c] += t[c] * (double)rgb[c] * (double)ahead[c] * (double)p->probe_light;
+                m->eval(s[p->i_group], p->guided_wi, p->wo, rgb, NULL);
+                m->eval(s[p->i_guided_group], p->guided_light_wi, p->guided_wo, ahead, NULL);
+                for (int c = 0; c < 3; c++)
+                    out[c] += t[c] * (double)rgb[c] * (double)ahead[c] * (double)p->guided_light;
             }
             m->eval(s[p->i_group], p->wi, p->wo, rgb, NULL);
             for (int c = 0; c < 3; c++) {

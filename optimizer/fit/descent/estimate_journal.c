@@ -82,7 +82,7 @@ static void put_estimates(const struct estimate_journal *j, const struct estimat
         put(&to, out[i].jac, n_jac);
         put(&to, out[i].jac_var, n_jac);
         put(&to, &out[i].n_path, sizeof out[i].n_path);
-        put(&to, &out[i].n_vertex, sizeof out[i].n_vertex);
+        put(&to, &out[i].n_bounce, sizeof out[i].n_bounce);
     }
 }
 
@@ -96,7 +96,7 @@ static void get_estimates(const struct estimate_journal *j, const uint8_t *from,
         get(&from, out[i].jac, n_jac);
         get(&from, out[i].jac_var, n_jac);
         get(&from, &out[i].n_path, sizeof out[i].n_path);
-        get(&from, &out[i].n_vertex, sizeof out[i].n_vertex);
+        get(&from, &out[i].n_bounce, sizeof out[i].n_bounce);
     }
 }
 

@@ -168,7 +168,7 @@ void fit_layout_estimate(const struct fit_layout *l, const double *unknown, bool
     double gain = l->i_gain != SIZE_MAX ? unknown[l->i_gain] : 1.0;
     double stray = l->i_stray != SIZE_MAX ? unknown[l->i_stray] : 0.0;
     out->n_path = from.n_path;
-    out->n_vertex = from.n_vertex;
+    out->n_bounce = from.n_bounce;
     for (size_t c = 0; c < 3; c++) {
         out->mean[c] = gain * from.mean[c] + stray;
         out->var[c] = gain * gain * from.var[c];

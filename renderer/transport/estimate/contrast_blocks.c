@@ -64,7 +64,7 @@ uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contr
     size_t n_value = 3 + c->n_jac, first = i_task * c->cells_per_task, per_cell = 2 * c->n_half;
     size_t n_cell = c->n_cell - first < c->cells_per_task ? c->n_cell - first : c->cells_per_task;
     size_t n_path = n_cell * per_cell, i_cell[BLOCK_PATHS];
-    uint64_t n_vertex = 0;
+    uint64_t n_bounce = 0;
     struct rng rng[BLOCK_PATHS];
     double xy[BLOCK_PATHS][2];
     key.configuration = (uint32_t)i_group;
@@ -72,10 +72,10 @@ uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contr
         size_t n = n_path - done < BLOCK_PATHS ? n_path - done : BLOCK_PATHS;
         for (size_t i = 0; i < n; i++) i_cell[i] = first + (done + i) / per_cell;
         start_paths(c, &key, (uint32_t)(i_task * c->blocks_per_task + done / BLOCK_PATHS), n, i_cell, rng, xy);
-        n_vertex += estimate_trace(b, i_group, n, xy, rng, value);
+        n_bounce += estimate_trace(b, i_group, n, xy, rng, value);
         for (size_t i = 0; i < n; i++) add_path(c, value + i * n_value, sums_of(c, i_cell[i], (done + i) % 2));
     }
-    return n_vertex;
+    return n_bounce;
 }
 
 /* ---- from sums to the contrast ---- */

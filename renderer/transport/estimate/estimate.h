@@ -28,7 +28,7 @@ struct estimate {
     double jac[3 * SCATTERING_MAX_FLAT]; /* d mean[c] / d flat param p at [c * n_flat + p], by internal unit, with
                                             n_flat = n_param of the model * number of sets */
     double jac_var[3 * SCATTERING_MAX_FLAT];
-    uint64_t n_path, n_vertex;
+    uint64_t n_path, n_bounce;
 };
 
 /* out: n_configuration estimates. STATUS_INVALID (a configuration, a parameter, fewer sets than groups, a cloth without

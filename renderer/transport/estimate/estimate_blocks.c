@@ -8,7 +8,7 @@ enum { BLOCK_PATHS = RADIANCE_BLOCK_PATHS, TASKS_PER_GROUP = 1024, N_VALUE = 3 +
 
 /* Sums over the paths of one task, in path order: n_value sums and as many sums of squares. */
 struct task_sum {
-    uint64_t n_path, n_vertex;
+    uint64_t n_path, n_bounce;
     double *x, *x2;
 };
 
@@ -56,7 +56,7 @@ static void trace_block(const struct estimate_blocks *b, uint32_t i_group, uint3
         rng_start(&rng[i], &key, i_block, i);
         for (int a = 0; a < 2; a++) xy[i][a] = rng_double(&rng[i]);
     }
-    sum->n_vertex += estimate_trace(b, i_group, BLOCK_PATHS, xy, rng, value);
+    sum->n_bounce += estimate_trace(b, i_group, BLOCK_PATHS, xy, rng, value);
     sum->n_path += BLOCK_PATHS;
     for (size_t i = 0; i < BLOCK_PATHS; i++)
         for (size_t k = 0; k < n_value; k++) {
@@ -74,7 +74,7 @@ static void run_task(void *context, size_t i_task, size_t i_thread)
     float value[BLOCK_PATHS * N_VALUE];
     const struct contrast_plan *contrast = &r->contrast[t->i_group];
     if (contrast->n_cell > 0) {
-        r->sum[i_task].n_vertex = contrast_trace_task(r->b, contrast, t->i_group, t->first_block, value);
+        r->sum[i_task].n_bounce = contrast_trace_task(r->b, contrast, t->i_group, t->first_block, value);
         return;
     }
     for (uint32_t b = 0; b < t->n_block && !progress_cancelled(r->b->progress); b++)
@@ -164,7 +164,7 @@ static bool member_estimate(const struct task_sum *sum, size_t n_jac, struct est
 {
     double n = (double)sum->n_path;
     e->n_path = sum->n_path;
-    e->n_vertex = sum->n_vertex;
+    e->n_bounce = sum->n_bounce;
     for (size_t k = 0; k < 3 + n_jac && sum->n_path > 0; k++) {
         *bad_value = k;
         if (!isfinite(sum->x2[k])) return false;
@@ -190,12 +190,12 @@ static status group_estimates(const struct run *r, size_t i_group, const struct 
         struct estimate *e = &out[groups->member[g->first]];
         if (!contrast_reduce(&r->contrast[i_group], e, &bad_value))
             return not_finite(groups->member[g->first], bad_value, fault, err);
-        e->n_vertex = total->n_vertex;
+        e->n_bounce = total->n_bounce;
         return STATUS_OK;
     }
     for (size_t k = 0; k < g->n; k++) {
         size_t i = groups->member[g->first + k], at = k * (3 + n_jac);
-        const struct task_sum own = {total->n_path, total->n_vertex, total->x + at, total->x2 + at};
+        const struct task_sum own = {total->n_path, total->n_bounce, total->x + at, total->x2 + at};
         if (!member_estimate(&own, n_jac, &out[i], &bad_value)) return not_finite(i, bad_value, fault, err);
     }
     return STATUS_OK;
@@ -216,7 +216,7 @@ static status reduce(const struct run *r, struct estimate *out, struct estimate_
                 total.x2[k] += s->x2[k];
             }
             total.n_path += s->n_path;
-            total.n_vertex += s->n_vertex;
+            total.n_bounce += s->n_bounce;
         }
         st = group_estimates(r, i, &total, out, fault, err);
     }

@@ -54,7 +54,7 @@ static void add(struct estimate *sum, const struct estimate *e, double share)
         sum->jac_var[k] += share * share * e->jac_var[k];
     }
     sum->n_path += e->n_path;
-    sum->n_vertex += e->n_vertex;
+    sum->n_bounce += e->n_bounce;
 }
 
 void rotation_mean_take(const struct rotation_mean *m, struct estimate *out)

@@ -18,11 +18,11 @@ static double step_light(const struct parameter_sets *sets, const struct path_st
         eval(sets, s->i_group, s->image_wi, s->wo, rgb);
         for (int c = 0; c < 3; c++) sum += t[c] * (double)rgb[c] * (double)s->image[c];
     }
-    if (s->probe_light > 0) {
+    if (s->guided_light > 0) {
         float ahead[3];
-        eval(sets, s->i_group, s->probe_wi, s->wo, rgb);
-        eval(sets, s->i_probe_group, s->probe_light_wi, s->probe_wo, ahead);
-        for (int c = 0; c < 3; c++) sum += t[c] * (double)rgb[c] * (double)ahead[c] * (double)s->probe_light;
+        eval(sets, s->i_group, s->guided_wi, s->wo, rgb);
+        eval(sets, s->i_guided_group, s->guided_light_wi, s->guided_wo, ahead);
+        for (int c = 0; c < 3; c++) sum += t[c] * (double)rgb[c] * (double)ahead[c] * (double)s->guided_light;
     }
     return sum;
 }

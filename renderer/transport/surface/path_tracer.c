@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define PROBE_SCALE 1.5f
+#define GUIDED_PATH_SCALE 1.5f
 
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
                        const struct scattering_state *state, const struct configuration *c, bool want_jacobian)
@@ -17,9 +17,9 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     s->state[0] = state;
     s->n_set = 1;
     lights_init(&s->lights, c);
-    s->probes = s->lights.has_lamp;
+    s->guided_paths = s->lights.has_lamp;
     s->roulette_below = PATH_SURFACE_ROULETTE_BELOW;
-    if (s->probes) lamp_guide_energy_of(model, state, &s->energy[0]);
+    if (s->guided_paths) light_guide_energy_of(model, state, &s->energy[0]);
     s->want_jacobian = want_jacobian;
 }
 
@@ -30,7 +30,7 @@ void path_setting_init_sets(struct path_setting *s, const struct scene *scene, c
     s->n_set = sets->n;
     for (size_t i = 0; i < sets->n; i++) {
         s->state[i] = sets->state[i];
-        if (s->probes && i > 0) lamp_guide_energy_of(s->model, s->state[i], &s->energy[i]);
+        if (s->guided_paths && i > 0) light_guide_energy_of(s->model, s->state[i], &s->energy[i]);
     }
 }
 
@@ -55,7 +55,7 @@ struct walk {
     size_t i_set;                         /* its parameter set */
     float throughput[3];
     float towards[PATH_MAX_LAMP][3]; /* the lamps, from the present vertex: where its probes go */
-    float p_probe;                   /* probability of a probe there */
+    float p_guided;                  /* probability of a probe there */
     float share[PATH_MAX_LAMP]; /* of lamp connections at the present vertex: the rest is its predecessor's probes' */
     float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
     float h[PATH_N_DERIVATIVE];            /* running score sums, laid out as path_result's derivatives */
@@ -192,8 +192,8 @@ static void enter_fiber(struct walk *w, const struct scene_hit *hit)
 }
 
 /* The probe's ray from the present vertex, whose throughput and scores the walk has taken. */
-static void probe_ahead(struct walk *w, size_t i_lamp, const struct scene_hit *from, const double offset_mm[2],
-                        const float direction[3], float weight)
+static void follow_guided_path(struct walk *w, size_t i_lamp, const struct scene_hit *from, const double offset_mm[2],
+                               const float direction[3], float weight)
 {
     struct scene_ray ray;
     struct scene_hit hit;
@@ -206,34 +206,34 @@ static void probe_ahead(struct walk *w, size_t i_lamp, const struct scene_hit *f
     enter_fiber(w, &hit);
     float light = connect_lamp(w, &w->lamp[i_lamp], 1, &ray, &hit, &f, wo, wi);
     if (w->step == NULL || light == 0) return;
-    memcpy(w->step->probe_wo, wo, sizeof wo);
-    memcpy(w->step->probe_light_wi, wi, sizeof wi);
-    w->step->probe_light = light * weight;
-    w->step->i_probe_group = scene_group_of(w->s->scene, hit.i_segment);
+    memcpy(w->step->guided_wo, wo, sizeof wo);
+    memcpy(w->step->guided_light_wi, wi, sizeof wi);
+    w->step->guided_light = light * weight;
+    w->step->i_guided_group = scene_group_of(w->s->scene, hit.i_segment);
 }
 
-/* One more way to the light of a lamp by one other fiber: a ray near the lamp's direction (lamp_guide.h), a connection from
+/* One more way to the light of a lamp by one other fiber: a ray near the lamp's direction (light_guide.h), a connection from
  * what it hits, and nothing further. Such paths have two densities, of S and of the guide; each kind counts with its share of
  * their sum, the walk's own by walk.share. A walk that itself turned towards the lamp would pay for it with its weight. */
-static void probe(struct walk *w, size_t i_lamp, const struct scene_ray *ray, const struct scene_hit *hit,
-                  const struct fiber_frame *f, const float wo[3])
+static void trace_guided_path(struct walk *w, size_t i_lamp, const struct scene_ray *ray, const struct scene_hit *hit,
+                              const struct fiber_frame *f, const float wo[3])
 {
     const struct path_setting *s = w->s;
     float u[2], direction[3], wi[3], s_rgb[3], next[3], survival;
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
-    lamp_guide_sample(w->towards[i_lamp], u, direction);
+    light_guide_sample(w->towards[i_lamp], u, direction);
     fiber_frame_to_local(f, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float weight = fiber_frame_cos_theta(wi) / (pdf + w->p_probe * lamp_guide_pdf(w->towards[i_lamp], direction));
+    float weight = fiber_frame_cos_theta(wi) / (pdf + w->p_guided * light_guide_pdf(w->towards[i_lamp], direction));
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
     if (!(most > 0)) {
         path_value_keep_nan(w->out->radiance, next);
         return;
     }
-    if (most < PATH_SURFACE_PROBE_BELOW) {
-        if (!path_value_survives(most, PATH_SURFACE_PROBE_BELOW, w->rng, &survival)) return;
+    if (most < PATH_SURFACE_GUIDED_BELOW) {
+        if (!path_value_survives(most, PATH_SURFACE_GUIDED_BELOW, w->rng, &survival)) return;
         weight /= survival;
         for (int c = 0; c < 3; c++) next[c] /= survival;
     }
@@ -244,8 +244,8 @@ static void probe(struct walk *w, size_t i_lamp, const struct scene_ray *ray, co
     memcpy(h, w->h, n_flat * sizeof *h);
     memcpy(w->throughput, next, sizeof next);
     if (s->want_jacobian) add_scores(w);
-    if (w->step != NULL) memcpy(w->step->probe_wi, wi, sizeof wi);
-    probe_ahead(w, i_lamp, hit, ray->offset_mm, direction, weight);
+    if (w->step != NULL) memcpy(w->step->guided_wi, wi, sizeof wi);
+    follow_guided_path(w, i_lamp, hit, ray->offset_mm, direction, weight);
     w->state = state;
     w->i_set = i_set;
     memcpy(w->throughput, throughput, sizeof throughput);
@@ -253,15 +253,15 @@ static void probe(struct walk *w, size_t i_lamp, const struct scene_ray *ray, co
 }
 
 /* As large as the part of the light that fibers like this one hand on forwards. */
-static float probe_probability(const struct walk *w)
+static float guided_path_probability(const struct walk *w)
 {
-    const struct lamp_guide_energy *e = &w->s->energy[w->i_set];
+    const struct light_guide_energy *e = &w->s->energy[w->i_set];
     float forward = 0, all = 0;
     for (int c = 0; c < 3; c++) {
         forward += w->throughput[c] * e->forward[c];
         all += w->throughput[c] * e->all[c];
     }
-    float p = PROBE_SCALE * forward / all;
+    float p = GUIDED_PATH_SCALE * forward / all;
     return p < 1 ? p : 1;
 }
 
@@ -271,7 +271,7 @@ static void connect_lamps(struct walk *w, const struct scene_ray *ray, const str
 {
     float wi[3], position[3];
     unwrapped(hit->position_mm, ray->offset_mm, position);
-    if (w->s->probes) w->p_probe = probe_probability(w);
+    if (w->s->guided_paths) w->p_guided = guided_path_probability(w);
     for (size_t k = 0; k < w->n_lamp; k++) {
         w->out = w->first_out + k;
         float light = connect_lamp(w, &w->lamp[k], w->share[k], ray, hit, f, wo, wi);
@@ -279,10 +279,10 @@ static void connect_lamps(struct walk *w, const struct scene_ray *ray, const str
             memcpy(w->step->light_wi, wi, sizeof wi);
             w->step->light = light;
         }
-        if (!w->s->probes) continue;
-        lamp_guide_towards(&w->lamp[k], position, w->towards[k]);
+        if (!w->s->guided_paths) continue;
+        light_guide_towards(&w->lamp[k], position, w->towards[k]);
         bool sees = w->towards[k][2] > 0 || !scene_has_black_sheet(w->s->scene);
-        if (sees && (w->p_probe >= 1 || rng_float(w->rng) < w->p_probe)) probe(w, k, ray, hit, f, wo);
+        if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, k, ray, hit, f, wo);
     }
 }
 
@@ -311,8 +311,8 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
         w->step->weight = weight / survival;
     }
     fiber_frame_to_world(f, wi, direction);
-    for (size_t k = 0; k < w->n_lamp && s->probes; k++)
-        w->share[k] = pdf / (pdf + w->p_probe * lamp_guide_pdf(w->towards[k], direction));
+    for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++)
+        w->share[k] = pdf / (pdf + w->p_guided * light_guide_pdf(w->towards[k], direction));
     double offset[2] = {ray->offset_mm[0], ray->offset_mm[1]};
     scene_ray_leave(hit, offset, direction, ray);
     *pdf_out = pdf;
@@ -344,7 +344,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, struct rng 
     for (size_t i = 0; i < w->n_out; i++) {
         memset(out[i].radiance, 0, sizeof out[i].radiance);
         memset(out[i].jac, 0, n_flat * sizeof *out[i].jac);
-        out[i].n_vertex = 0;
+        out[i].n_bounce = 0;
     }
 }
 
@@ -352,13 +352,13 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
 {
     const struct path_setting *s = w->s;
     float pdf = 0;
-    for (uint32_t i = 0; i < PATH_MAX_VERTEX; i++) {
+    for (uint32_t i = 0; i < PATH_MAX_BOUNCE; i++) {
         struct scene_hit hit;
         if (!scene_trace(s->scene, ray, &hit)) {
             add_beyond(w, ray, pdf);
             return;
         }
-        w->first_out->n_vertex++;
+        w->first_out->n_bounce++;
         w->step = next_step(record);
         struct fiber_frame f;
         fiber_frame_from(&f, hit.tangent);

@@ -9,11 +9,11 @@
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scene/scene_ray.h"
-#include "renderer/transport/light/lamp_guide.h"
+#include "renderer/transport/light/light_guide.h"
 #include "renderer/transport/light/lights.h"
 #include "renderer/transport/surface/parameter_sets.h"
 
-enum { PATH_MAX_VERTEX = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT, PATH_MAX_LAMP = 16 };
+enum { PATH_MAX_BOUNCE = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT, PATH_MAX_LAMP = 16 };
 
 struct path_setting {
     const struct scene *scene;
@@ -22,8 +22,8 @@ struct path_setting {
     size_t n_set;                                             /* 1: the first serves all groups */
     struct lights lights;
     bool
-        probes; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
-    struct lamp_guide_energy
+        guided_paths; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
+    struct light_guide_energy
         energy[SCATTERING_MAX_SET]; /* by material group: probes are as frequent as light goes on forwards */
     float roulette_below;           /* throughput under which paths are ended at random; 0: never */
     bool want_jacobian;
@@ -41,22 +41,22 @@ void path_setting_init_sets(struct path_setting *s, const struct scene *scene, c
 struct path_result {
     float radiance[3];
     float jac[PATH_N_DERIVATIVE]; /* [c * n_set * n_param + i_set * n_param + p] */
-    uint32_t n_vertex;
+    uint32_t n_bounce;
 };
 
 /* All that a path's value depends on besides S: value = sum over steps of
- * T (S(light_wi, wo) light + S(image_wi, wo) image + S(probe_wi, wo) S'(probe_light_wi, probe_wo) probe_light) + T' escape
+ * T (S(light_wi, wo) light + S(image_wi, wo) image + S(guided_wi, wo) S'(guided_light_wi, guided_wo) guided_light) + T' escape
  * with T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
 struct path_step {
     float wo[3], wi[3];
     float weight; /* cos th_i / (density * survival) */
     float light_wi[3];
     float light; /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
-    float image_wi[3], image[3];                       /* the same for a sample of the image environment, rgb */
-    float probe_wi[3], probe_wo[3], probe_light_wi[3]; /* the last two at the fiber that the probe met */
-    float probe_light;                                 /* with all weights of the probe; 0: no light found */
-    uint32_t i_probe_group;                            /* material group of that fiber: S' is that group's */
-    uint32_t i_group;                                  /* material group: S is that group's */
+    float image_wi[3], image[3];                          /* the same for a sample of the image environment, rgb */
+    float guided_wi[3], guided_wo[3], guided_light_wi[3]; /* the last two at the fiber that the probe met */
+    float guided_light;                                   /* with all weights of the probe; 0: no light found */
+    uint32_t i_guided_group;                              /* material group of that fiber: S' is that group's */
+    uint32_t i_group;                                     /* material group: S is that group's */
     float escape[3]; /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
 };
 

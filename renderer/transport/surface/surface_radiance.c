@@ -42,7 +42,7 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     s->n_jac = in->want_derivative ? 3 * s->sets.n * m->n_param : 0;
     for (size_t i = 0; i < n_configuration; i++) {
         path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
-        if (in->plain_paths) s->setting[i].probes = false;
+        if (in->plain_paths) s->setting[i].guided_paths = false;
         camera_init(&s->camera[i], &c[i]);
     }
     *state = s;
@@ -64,7 +64,7 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
         if (progress_cancelled(b->progress)) break; /* a block of white cloth takes longer than a caller will wait */
         if (!camera_ray(camera, s->scene, b->xy[i], &ray)) continue; /* sees nothing: adds 0 */
         path_trace_lamps(setting, lamp, n_lamp, &ray, &b->rng[i], path);
-        n_bounce += path[0].n_vertex;
+        n_bounce += path[0].n_bounce;
         for (size_t k = 0; k < b->n_member; k++) {
             float *v = value + (i * b->n_member + k) * n_value;
             memcpy(v, path[k].radiance, sizeof path[k].radiance);

@@ -89,7 +89,7 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
         float *v = value + place[i] * (3 + s->n_jac);
         memcpy(v, path[i].radiance, sizeof path[i].radiance);
         memcpy(v + 3, path[i].jac, s->n_jac * sizeof *v);
-        n_bounce += path[i].n_vertex;
+        n_bounce += path[i].n_bounce;
     }
     return n_bounce;
 }

@@ -4,7 +4,7 @@
 #include "renderer/transport/volume/volume_flight.h"
 
 #define VOLUME_HEADROOM 1.25f
-enum { VOLUME_MAX_LOOKUP = 200000, N_LANE = 16 };
+enum { VOLUME_MAX_LOOKUP = 200000, N_AT_ONCE = 16 };
 
 float volume_majorant_density(const struct volume_scene *scene, const struct volume_parameters *p)
 {
@@ -39,7 +39,7 @@ enum connection { FLIGHT, LAMP, IMAGE }; /* what a ray is for: to scatter again,
 
 /* One path under way. Its ray waits at a point whose place in the table of bricks, or whose voxel, has been asked for
  * but not yet looked at. */
-struct lane {
+struct volume_path {
     struct volume_ray ray;
     const int32_t *brick;
     const uint32_t *voxel; /* NULL: the brick comes first */
@@ -52,20 +52,20 @@ struct lane {
     float origin_mm[3];
     struct flight_score flight;
 
-    struct volume_ray vertex; /* the last one */
+    struct volume_ray bounce; /* the last one */
     struct fiber_frame frame;
     float wo[3];
 
-    float light_wi[3], light[3], worth; /* what the connection brings if nothing is in its way; the most of that */
-    float passed;                       /* share of it that got through so far, for the rays thinned out as well */
-    float ratios;                       /* of a recorded path: the share without those */
+    float light_wi[3], light[3], light_max; /* what the connection brings if nothing is in its way; the most of that */
+    float passed;                           /* share of it that got through so far, for the rays thinned out as well */
+    float ratios;                           /* of a recorded path: the share without those */
     struct flight_score shadow;
 
     float h[VOLUME_N_DERIVATIVE]; /* running score sums of the phase function, [c * n_param + p] */
 };
 
 /* The next event of the record; NULL: none is kept, or it is full. */
-static struct volume_event *note(struct lane *l, int kind)
+static struct volume_event *note(struct volume_path *l, int kind)
 {
     struct volume_record *r = l->record;
     if (r == NULL || r->n_event++ >= r->capacity) return NULL;
@@ -75,7 +75,7 @@ static struct volume_event *note(struct lane *l, int kind)
     return e;
 }
 
-static void note_lookup(struct lane *l, int kind, const struct volume_lookup *k)
+static void note_lookup(struct volume_path *l, int kind, const struct volume_lookup *k)
 {
     struct volume_event *e = note(l, kind);
     if (e == NULL) return;
@@ -83,7 +83,7 @@ static void note_lookup(struct lane *l, int kind, const struct volume_lookup *k)
     e->sine = k->sine;
 }
 
-static void note_light(struct lane *l, int kind, const float *wi, const float weight[3])
+static void note_light(struct volume_path *l, int kind, const float *wi, const float weight[3])
 {
     struct volume_event *e = note(l, kind);
     if (e == NULL) return;
@@ -94,7 +94,7 @@ static void note_light(struct lane *l, int kind, const float *wi, const float we
 }
 
 /* Adds value * (1, H + scores) to the result; score NULL: the last step's are in H already. */
-static void add_light(const struct volume_setting *s, struct lane *l, const float value[3], const float *score,
+static void add_light(const struct volume_setting *s, struct volume_path *l, const float value[3], const float *score,
                       const struct flight_score *shadow)
 {
     for (int c = 0; c < 3; c++) l->out->radiance[c] += value[c];
@@ -112,7 +112,7 @@ static void add_light(const struct volume_setting *s, struct lane *l, const floa
 }
 
 /* Radiance that the path's ray meets beyond the cloth. */
-static void add_beyond(const struct volume_setting *s, struct lane *l)
+static void add_beyond(const struct volume_setting *s, struct volume_path *l)
 {
     const float *direction = l->ray.direction;
     if (direction[2] < 0 && s->scene->black_sheet) return;
@@ -128,10 +128,10 @@ static void add_beyond(const struct volume_setting *s, struct lane *l)
     note_light(l, VOLUME_BEYOND, NULL, beyond);
 }
 
-static bool connect(const struct volume_setting *s, struct lane *l, enum connection to);
+static bool connect(const struct volume_setting *s, struct volume_path *l, enum connection to);
 
 /* The ray is out of the cloth, or lost in it (VOLUME_MAX_LOOKUP steps: no light can be said to have come through). False: so ends the path. */
-static bool leave(const struct volume_setting *s, struct lane *l, bool lost)
+static bool leave(const struct volume_setting *s, struct volume_path *l, bool lost)
 {
     if (l->purpose == FLIGHT) {
         if (!lost) add_beyond(s, l);
@@ -149,7 +149,7 @@ static bool leave(const struct volume_setting *s, struct lane *l, bool lost)
 }
 
 /* On by at least skip_mm to the next tentative collision. False: the path has ended. */
-static inline bool move_on(const struct volume_setting *s, struct lane *l, float skip_mm)
+static inline bool move_on(const struct volume_setting *s, struct volume_path *l, float skip_mm)
 {
     l->voxel = NULL;
     l->out->n_lookup++;
@@ -162,17 +162,18 @@ static inline bool move_on(const struct volume_setting *s, struct lane *l, float
 }
 
 /* Sends a ray from the vertex. */
-static bool send(const struct volume_setting *s, struct lane *l, enum connection purpose, const float direction[3])
+static bool send(const struct volume_setting *s, struct volume_path *l, enum connection purpose,
+                 const float direction[3])
 {
     l->purpose = purpose;
     l->n_lookup = 0;
-    l->ray = l->vertex;
+    l->ray = l->bounce;
     volume_ray_turn(s->scene, direction, &l->ray);
     return move_on(s, l, 0);
 }
 
 /* Scatters the path at its vertex. False: roulette ends it. */
-static bool scatter(const struct volume_setting *s, struct lane *l)
+static bool scatter(const struct volume_setting *s, struct volume_path *l)
 {
     float u[3], wi[3], f_rgb[3], score[VOLUME_N_DERIVATIVE], direction[3], next[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(&l->rng);
@@ -190,17 +191,17 @@ static bool scatter(const struct volume_setting *s, struct lane *l)
     for (size_t p = 0; s->want_jacobian && p < 3 * s->model->n_param; p++) l->h[p] += score[p];
     note_light(l, VOLUME_SCATTER, wi, (float[3]){1 / (l->pdf * survival), 0, 0});
     fiber_frame_to_world(&l->frame, wi, direction);
-    volume_ray_position_mm(s->scene, &l->vertex, l->origin_mm);
+    volume_ray_position_mm(s->scene, &l->bounce, l->origin_mm);
     return send(s, l, FLIGHT, direction);
 }
 
 /* A direction of the lamp or the image, its radiance over its density, and that density. */
-static bool sample_light(const struct volume_setting *s, struct lane *l, enum connection to, float direction[3],
+static bool sample_light(const struct volume_setting *s, struct volume_path *l, enum connection to, float direction[3],
                          float radiance[3], float *pdf)
 {
     float u[2] = {rng_float(&l->rng), rng_float(&l->rng)}, position_mm[3];
     if (to == LAMP) {
-        volume_ray_position_mm(s->scene, &l->vertex, position_mm);
+        volume_ray_position_mm(s->scene, &l->bounce, position_mm);
         if (!lamp_sample(&s->lights.lamp, position_mm, u, direction, pdf)) return false;
         for (int c = 0; c < 3; c++) radiance[c] = s->lights.lamp.radiance;
         return true;
@@ -209,7 +210,7 @@ static bool sample_light(const struct volume_setting *s, struct lane *l, enum co
 }
 
 /* Next-event estimation: a ray to the lamp, one to the image, then the path goes on. False: it ends here. */
-static bool connect(const struct volume_setting *s, struct lane *l, enum connection to)
+static bool connect(const struct volume_setting *s, struct volume_path *l, enum connection to)
 {
     for (; to <= IMAGE; to++) {
         float direction[3], radiance[3], pdf_light, f_rgb[3];
@@ -223,14 +224,14 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
             radiance[c] *= heuristic;
             l->light[c] = l->throughput[c] * f_rgb[c] * radiance[c];
         }
-        l->worth = path_value_largest(l->light);
-        if (!(l->worth > 0)) {
+        l->light_max = path_value_largest(l->light);
+        if (!(l->light_max > 0)) {
             path_value_keep_nan(l->out->radiance, l->light);
             continue;
         }
         l->passed = l->ratios = 1;
-        if (l->worth < s->shadow_below) { /* hardly any light: follow few of these rays, for more each */
-            l->passed = s->shadow_below / l->worth;
+        if (l->light_max < s->shadow_below) { /* hardly any light: follow few of these rays, for more each */
+            l->passed = s->shadow_below / l->light_max;
             if (rng_float(&l->rng) * l->passed >= 1) continue;
         }
         note_light(l, VOLUME_CONNECT, l->light_wi, radiance);
@@ -241,23 +242,24 @@ static bool connect(const struct volume_setting *s, struct lane *l, enum connect
 }
 
 /* A real collision: the path's next vertex. */
-static bool collide(const struct volume_setting *s, struct lane *l, uint32_t voxel, const struct volume_lookup *k)
+static bool collide(const struct volume_setting *s, struct volume_path *l, uint32_t voxel,
+                    const struct volume_lookup *k)
 {
     float tangent[3];
     l->flight.ln_d += 1;
     l->flight.param += k->d_ratio / k->ratio;
     note_lookup(l, VOLUME_REAL, k);
-    if (++l->out->n_vertex >= VOLUME_MAX_VERTEX) return false;
+    if (++l->out->n_bounce >= VOLUME_MAX_BOUNCE) return false;
     float back[3] = {-l->ray.direction[0], -l->ray.direction[1], -l->ray.direction[2]};
     volume_voxel_direction(voxel, tangent);
     fiber_frame_from(&l->frame, tangent);
     fiber_frame_to_local(&l->frame, back, l->wo);
-    l->vertex = l->ray;
+    l->bounce = l->ray;
     return connect(s, l, LAMP);
 }
 
 /* A tentative collision on the way to a light: ratio tracking. */
-static bool pass(const struct volume_setting *s, struct lane *l, const struct volume_lookup *k)
+static bool pass(const struct volume_setting *s, struct volume_path *l, const struct volume_lookup *k)
 {
     float inv = 1 / (1 - k->ratio);
     l->passed *= 1 - k->ratio;
@@ -265,16 +267,16 @@ static bool pass(const struct volume_setting *s, struct lane *l, const struct vo
     l->shadow.param -= k->d_ratio * inv;
     if (l->record != NULL) l->ratios *= 1 - k->ratio;
     note_lookup(l, VOLUME_PASSED, k);
-    float worth = l->passed * l->worth;
-    if (worth < s->shadow_below) {
-        if (rng_float(&l->rng) * s->shadow_below >= worth) return connect(s, l, l->purpose + 1);
-        l->passed = s->shadow_below / l->worth;
+    float most = l->passed * l->light_max;
+    if (most < s->shadow_below) {
+        if (rng_float(&l->rng) * s->shadow_below >= most) return connect(s, l, l->purpose + 1);
+        l->passed = s->shadow_below / l->light_max;
     }
     return move_on(s, l, 0);
 }
 
 /* One look at memory. False: the path has ended. */
-static inline bool step(const struct volume_setting *s, struct lane *l)
+static inline bool step(const struct volume_setting *s, struct volume_path *l)
 {
     if (l->voxel == NULL) {
         int32_t brick = *l->brick;
@@ -296,8 +298,8 @@ static inline bool step(const struct volume_setting *s, struct lane *l)
 }
 
 /* False: the path ends at once. */
-static bool start(const struct volume_setting *s, struct lane *l, const struct volume_ray *ray, const struct rng *rng,
-                  struct volume_result *out, struct volume_record *record)
+static bool start(const struct volume_setting *s, struct volume_path *l, const struct volume_ray *ray,
+                  const struct rng *rng, struct volume_result *out, struct volume_record *record)
 {
     size_t n = s->want_jacobian ? s->model->n_param : 0;
     l->ray = *ray;
@@ -313,14 +315,14 @@ static bool start(const struct volume_setting *s, struct lane *l, const struct v
     memset(l->h, 0, 3 * n * sizeof *l->h);
     memset(out->radiance, 0, sizeof out->radiance);
     memset(out->jac, 0, 3 * (n + 1) * sizeof *out->jac);
-    out->n_vertex = out->n_lookup = 0;
+    out->n_bounce = out->n_lookup = 0;
     return move_on(s, l, 0);
 }
 
 void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out,
                   struct volume_record *record)
 {
-    struct lane l;
+    struct volume_path l;
     if (start(s, &l, ray, rng, out, record))
         while (step(s, &l)) continue;
     *ray = l.ray;
@@ -330,17 +332,17 @@ void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct
 void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
                        struct volume_result *out)
 {
-    struct lane lane[N_LANE];
-    bool busy[N_LANE] = {false};
+    struct volume_path path[N_AT_ONCE];
+    bool busy[N_AT_ONCE] = {false};
     size_t next = 0, n_busy = 0;
     do {
-        for (size_t i = 0; i < N_LANE; i++) {
+        for (size_t i = 0; i < N_AT_ONCE; i++) {
             if (busy[i]) {
-                busy[i] = step(s, &lane[i]);
+                busy[i] = step(s, &path[i]);
                 n_busy -= !busy[i];
             }
             while (!busy[i] && next < n) {
-                busy[i] = start(s, &lane[i], &ray[next], &rng[next], &out[next], NULL);
+                busy[i] = start(s, &path[i], &ray[next], &rng[next], &out[next], NULL);
                 n_busy += busy[i];
                 next++;
             }

@@ -25,7 +25,7 @@
 #include "renderer/transport/light/lights.h"
 #include "renderer/transport/volume/volume_scene.h"
 
-enum { VOLUME_MAX_VERTEX = 10000, VOLUME_N_DERIVATIVE = 3 * SCATTERING_MAX_PARAM };
+enum { VOLUME_MAX_BOUNCE = 10000, VOLUME_N_DERIVATIVE = 3 * SCATTERING_MAX_PARAM };
 
 /* The model at given parameter values. */
 struct volume_parameters {
@@ -58,7 +58,7 @@ float volume_majorant_density(const struct volume_scene *scene, const struct vol
 struct volume_result {
     float radiance[3];
     float jac[VOLUME_N_DERIVATIVE]; /* [c * (model->n_param + 1) + p], last by d */
-    uint32_t n_vertex, n_lookup;
+    uint32_t n_bounce, n_lookup;
 };
 
 /* All that a path's value depends on besides the phase function and the extinction, in order. With r = sigma_t over the

@@ -160,7 +160,7 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
         }
     }
     e->n_path = call->n_path[i];
-    e->n_vertex = 10 * e->n_path;
+    e->n_bounce = 10 * e->n_path;
 }
 
 static status run(void *context, const struct estimator_call *call, const struct progress *progress,

@@ -97,7 +97,7 @@ static void one_row_release(struct one_row *r)
 /* The radiance is 1 + x / 2 + x^2. */
 static void append_parabola(struct linear_history *h, double x, uint64_t n_path)
 {
-    struct estimate e = {.n_path = n_path, .n_vertex = n_path};
+    struct estimate e = {.n_path = n_path, .n_bounce = n_path};
     for (size_t c = 0; c < 3; c++) {
         e.mean[c] = 1.0 + 0.5 * x + x * x;
         e.var[c] = 1.0 / (double)n_path;

@@ -72,7 +72,7 @@ static void same_bits_for_any_threads(void **state)
     run(&q, 1, one);
     assert_int_equal(one[0].n_path, 1024);
     assert_int_equal(one[2].n_path, 0);
-    assert_true(one[2].mean[0] == 0 && one[0].mean[0] > 0 && one[0].n_vertex > 1024);
+    assert_true(one[2].mean[0] == 0 && one[0].mean[0] > 0 && one[0].n_bounce > 1024);
     for (size_t t = 2; t <= 3; t++) {
         run(&q, t, more);
         assert_memory_equal(one, more, sizeof one);

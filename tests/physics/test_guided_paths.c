@@ -5,7 +5,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/light/lamp_guide.h"
+#include "renderer/transport/light/light_guide.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/trace_input.h"
@@ -32,10 +32,10 @@ static void test_guide(void **state)
     for (int i = 0; i < N; i++) {
         float u[2] = {rng_float(&r), 0}, d[3], local[3];
         u[1] = rng_float(&r);
-        lamp_guide_sample(towards, u, d);
+        light_guide_sample(towards, u, d);
         assert_true(fabsf(fiber_frame_dot(d, d) - 1) < 1e-5f);
         fiber_frame_to_local(&f, d, local);
-        double inner = exp(LAMP_GUIDE_KAPPA * ((double)local[0] - 1)),
+        double inner = exp(LIGHT_GUIDE_KAPPA * ((double)local[0] - 1)),
                angle = atan2((double)local[2], (double)local[1]);
         int ring = (int)(inner * RING), quarter = (int)((angle + M_PI) / (2 * M_PI) * 4);
         count[4 * (ring < RING ? ring : RING - 1) + (quarter < 4 ? quarter : 3)]++;
@@ -48,7 +48,7 @@ static void test_guide(void **state)
         double c = -1 + 2 * (i + 0.5) / STEP, s = sqrt(1 - c * c);
         float local[3] = {(float)c, (float)s, 0}, d[3];
         fiber_frame_to_world(&f, local, d);
-        sum += 2 * M_PI * 2 / STEP * (double)lamp_guide_pdf(towards, d);
+        sum += 2 * M_PI * 2 / STEP * (double)light_guide_pdf(towards, d);
     }
     assert_true(fabs(sum - 1) < 1e-3);
 }

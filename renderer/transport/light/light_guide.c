@@ -1,12 +1,12 @@
-#include "renderer/transport/light/lamp_guide.h"
+#include "renderer/transport/light/light_guide.h"
 
 /* Samples of the model itself: a rank-1 lattice, the same for everybody. */
-void lamp_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
-                          struct lamp_guide_energy *e)
+void light_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
+                           struct light_guide_energy *e)
 {
     enum { N = 256 };
     const float wo[3] = {0, 1, 0}, near = 0.819f; /* cosine of 35 degrees */
-    *e = (struct lamp_guide_energy){{0}, {0}};
+    *e = (struct light_guide_energy){{0}, {0}};
     for (int i = 0; i < N; i++) {
         float u[3] = {((float)i + 0.5f) / N, (float)(i * 75 % N) / N, (float)(i * 181 % N) / N}, wi[3], rgb[3];
         m->sample(s, wo, NULL, u, wi);

@@ -4,26 +4,26 @@
  *
  * kappa 20 is 13 degrees a side, between the widths of usual TT lobes; 10 and 40 cost up to 10 % more time to the same error.
  */
-#ifndef SELVEDGE_RENDERER_LAMP_GUIDE_H
-#define SELVEDGE_RENDERER_LAMP_GUIDE_H
+#ifndef SELVEDGE_RENDERER_LIGHT_GUIDE_H
+#define SELVEDGE_RENDERER_LIGHT_GUIDE_H
 
 #include "renderer/scattering/scattering.h"
 #include "renderer/transport/light/lamp.h"
 #include "renderer/transport/surface/fiber_frame.h"
 
-#define LAMP_GUIDE_KAPPA 20.0f
+#define LIGHT_GUIDE_KAPPA 20.0f
 
 /* What a fiber scatters of light that comes across it: within 35 degrees of straight on, and in all; rgb. Fibers that hand
  * little light on are not worth looking for. */
-struct lamp_guide_energy {
+struct light_guide_energy {
     float forward[3], all[3];
 };
 
-void lamp_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
-                          struct lamp_guide_energy *e);
+void light_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
+                           struct light_guide_energy *e);
 
 /* Unit direction from position_mm (unwrapped) to the lamp's centre. */
-static inline void lamp_guide_towards(const struct lamp *lamp, const float position_mm[3], float towards[3])
+static inline void light_guide_towards(const struct lamp *lamp, const float position_mm[3], float towards[3])
 {
     if (lamp->directional) {
         for (int a = 0; a < 3; a++) towards[a] = -lamp->normal[a];
@@ -35,17 +35,18 @@ static inline void lamp_guide_towards(const struct lamp *lamp, const float posit
 }
 
 /* Density per steradian of a unit direction. */
-static inline float lamp_guide_pdf(const float towards[3], const float direction[3])
+static inline float light_guide_pdf(const float towards[3], const float direction[3])
 {
-    return LAMP_GUIDE_KAPPA * (float)(0.5 / M_PI) * expf(LAMP_GUIDE_KAPPA * (fiber_frame_dot(towards, direction) - 1));
+    return LIGHT_GUIDE_KAPPA * (float)(0.5 / M_PI) *
+           expf(LIGHT_GUIDE_KAPPA * (fiber_frame_dot(towards, direction) - 1));
 }
 
 /* u in [0, 1). */
-static inline void lamp_guide_sample(const float towards[3], const float u[2], float direction[3])
+static inline void light_guide_sample(const float towards[3], const float u[2], float direction[3])
 {
     struct fiber_frame f;
     fiber_frame_from(&f, towards);
-    float c = 1 + logf(1 - u[0]) / LAMP_GUIDE_KAPPA, local[3];
+    float c = 1 + logf(1 - u[0]) / LIGHT_GUIDE_KAPPA, local[3];
     c = c > -1 ? c : -1; /* one in exp(2 kappa) */
     float s = sqrtf(1 - c * c), angle = (float)(2 * M_PI) * u[1];
     local[0] = c;
