@@ -1,26 +1,19 @@
 #include "renderer/scattering/appearance.h"
 
-static struct appearance describe(const struct model_info *row)
-{
-    return (struct appearance){
-        .kind = row->kind,
-        .id = row->id,
-        .title = row->title,
-        .n_param = row->n_param,
-        .param = row->param,
-    };
-}
-
 void appearance_from_surface(const struct scattering_model *m, struct appearance *a)
 {
-    *a = describe(model_catalogue_find(m->id));
-    a->surface = m;
+    *a = (struct appearance){
+        .kind = MODEL_SURFACE, .id = m->id, .title = m->title, .n_param = m->n_param, .param = m->param, .surface = m};
 }
 
 void appearance_from_volume(const struct phase_model *m, struct appearance *a)
 {
-    *a = describe(model_catalogue_find(m->id));
-    a->volume = m;
+    *a = (struct appearance){.kind = MODEL_VOLUME,
+                             .id = m->id,
+                             .title = m->title,
+                             .n_param = m->n_param + 1, /* the density multiplier is last in the row's list */
+                             .param = m->param,
+                             .volume = m};
 }
 
 static bool from_row(const struct model_info *row, struct appearance *a)

@@ -14,7 +14,7 @@
 
 struct appearance {
     enum model_kind kind;
-    const char *id, *title; /* these four: the model's row of the catalogue */
+    const char *id, *title;
     size_t n_param;
     const struct param_info *param;
     const struct scattering_model *surface; /* MODEL_SURFACE, otherwise NULL */

@@ -29,9 +29,9 @@ struct phase_extinction {
 struct phase_state;
 
 struct phase_model {
-    const char *id, *title; /* these four: VOLUME_MODEL_ROW of the catalogue */
-    size_t n_param;         /* at most PHASE_MAX_PARAM */
-    const struct param_info *param;
+    const char *id, *title;         /* these four: VOLUME_MODEL_ROW of the catalogue */
+    size_t n_param;                 /* at most PHASE_MAX_PARAM */
+    const struct param_info *param; /* n_param, and then the density multiplier */
 
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
     status (*prepare)(const double *param, struct phase_state **state, struct error *err);

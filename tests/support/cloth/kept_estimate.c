@@ -86,7 +86,7 @@ static void merge(struct estimate *sum, const struct estimate *part, double shar
         sum->jac_var[k] += share * share * part->jac_var[k];
     }
     sum->n_path += part->n_path;
-    sum->n_vertex += part->n_vertex;
+    sum->n_bounce += part->n_bounce;
 }
 
 size_t kept_n_chunks(size_t n_path) { return (n_path + FIT_CHUNK - 1) / FIT_CHUNK; }

@@ -52,7 +52,7 @@ static status wide_run(void *context, const struct estimator_call *call, const s
     memset(out, 0, e->n_configuration * sizeof *out);
     for (size_t i = 0; i < e->n_configuration; i++) {
         wide_radiance(e->n_param, i, call->param, &out[i]);
-        out[i].n_path = out[i].n_vertex = call->n_path[i];
+        out[i].n_path = out[i].n_bounce = call->n_path[i];
     }
     return STATUS_OK;
 }
