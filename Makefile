@@ -48,7 +48,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all generate deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-models docs-pictures fuzz fuzz-programs
+.PHONY: all generate deps deps-test build-tests test check bench demo clean help layers format format-check asan asan-physics bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures fuzz fuzz-programs
 all: $(PROGRAMS)   ## build the programs into build/bin
 
 help:              ## list the targets
@@ -90,8 +90,9 @@ PRINT_OPTIONS := $(BUILD)/tools/print-options
 $(PRINT_OPTIONS): $(BUILD)/obj/optimizer/job/options/print_options_main.c.o $(L)job.a $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
-generate: $(PRINT_OPTIONS) ## write what follows from the table of job options: config/openapi.json, docs/sample-preparation.md
+generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows from the tables of options and models: config/openapi.json, tables in docs/
 	@/usr/bin/python3 config/generate_options.py $(PRINT_OPTIONS)
+	@/usr/bin/python3 config/generate_model_tables.py $(BUILD)/bin/selvedge-worker
 
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
@@ -167,9 +168,6 @@ docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (m
 	@mkdir -p docs/images
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
-
-docs-models: $(BUILD)/bin/selvedge-worker ## write the tables of parameters in docs/model.md anew, from the catalogue of models
-	@/usr/bin/python3 tests/support/model_tables.py --build $(BUILD) --write
 
 layers:            ## includes go one way, the daemon holds no symbol of the computing parts, headers say their purpose
 	@/usr/bin/python3 tests/check_layers.py --build $(BUILD)

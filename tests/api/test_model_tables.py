@@ -1,11 +1,14 @@
 """Documents against the catalogue of models, methods and stop reasons that selvedge-worker --catalogue prints."""
 import os
+import sys
 
-import model_tables
 import pytest
-from daemon_under_test import BUILD, ROOT
+from daemon_under_test import ROOT, program
 
-CATALOGUE = model_tables.read_catalogue(BUILD)
+sys.path.insert(0, os.path.join(ROOT, "config"))
+import generate_model_tables as model_tables  # noqa: E402
+
+CATALOGUE = model_tables.read_catalogue(program("selvedge-worker"))
 
 
 def read(*path):
@@ -15,7 +18,7 @@ def read(*path):
 
 def test_tables_of_parameters():
     text = read("docs", "model.md")
-    assert text == model_tables.with_tables(text, CATALOGUE), "run make docs-models"
+    assert text == model_tables.with_tables(text, CATALOGUE), "run make generate"
 
 
 def test_a_stale_table_is_noticed():

@@ -1,8 +1,10 @@
-"""The tables of parameters in docs/model.md follow from the catalogue of models (base/catalogue/models.def).
+#!/usr/bin/python3
+"""Writes the tables of parameters in docs/model.md, which follow from the catalogue of models (base/catalogue/models.def).
 
-Between a line "<!-- parameters: ID ID ... -->" and the next "<!-- end -->" stands one table of these models. With --write
-the tables are written anew; without, exit status 1 says that they are not what the catalogue says.
-"""
+    config/generate_model_tables.py [--check] SELVEDGE-WORKER
+
+Between a line "<!-- parameters: ID ID ... -->" and the next "<!-- end -->" stands one table of these models. With --check
+nothing is written and the exit status is 1 when a table is out of date."""
 import argparse
 import json
 import os
@@ -10,16 +12,15 @@ import re
 import subprocess
 import sys
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 DOCUMENT = os.path.join(ROOT, "docs", "model.md")
 MARKS = re.compile(r"(<!-- parameters: ([^\n]*?) -->\n).*?(<!-- end -->)", flags=re.S)
 HEAD = ["model", "parameter", "meaning", "unit in files", "range", "start", "fitted in"]
 COORDINATE = {"linear": "p", "log": "ln p", "logit": "ln(p / (1 - p))"}
 
 
-def read_catalogue(build):
+def read_catalogue(worker):
     """What selvedge-worker --catalogue prints."""
-    worker = os.path.join(build, "bin", "selvedge-worker")
     return json.loads(subprocess.run([worker, "--catalogue"], check=True, capture_output=True, text=True).stdout)
 
 
@@ -60,16 +61,16 @@ def models_of(text):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", default=os.path.join(ROOT, "build"))
-    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("worker", metavar="SELVEDGE-WORKER")
     arguments = parser.parse_args()
     with open(DOCUMENT, encoding="utf-8") as file:
         before = file.read()
-    after = with_tables(before, read_catalogue(arguments.build))
-    if arguments.write:
+    after = with_tables(before, read_catalogue(arguments.worker))
+    if not arguments.check and before != after:
         with open(DOCUMENT, "w", encoding="utf-8") as file:
             file.write(after)
-    return 0 if arguments.write or before == after else 1
+    return 1 if arguments.check and before != after else 0
 
 
 if __name__ == "__main__":
