@@ -232,6 +232,11 @@ def option(browser, path):
     return browser.find_element(By.CSS_SELECTOR, f'#editor .option[data-path="{path}"]')
 
 
+def click(browser, element):
+    """Clicks an element wherever it is scrolled to: the header of the page may cover it."""
+    browser.execute_script("arguments[0].click()", element)
+
+
 def fill_in(browser, path, text):
     """Sets an option in the form; sections on the way there are opened."""
     for i in (i for i, letter in enumerate(path) if letter in ".["):
@@ -239,7 +244,7 @@ def fill_in(browser, path, text):
     wait_for(browser, f"document.querySelector(`#editor .option[data-path='{path}']`)")
     boxes = option(browser, path).find_elements(By.CSS_SELECTOR, "input[type=checkbox]")
     if boxes and not boxes[0].is_selected():
-        boxes[0].click()
+        click(browser, boxes[0])
     browser.execute_script("""
         const input = document.querySelector(`#editor .option[data-path='${arguments[0]}'] > input, #editor .option[data-path='${arguments[0]}'] > select,
                                               #editor .option[data-path='${arguments[0]}'] > textarea`);
@@ -256,13 +261,13 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
     for name, data in (("cloth.hair", b"hair"), ("p0.exr", b"a"), ("p1.exr", b"b")):
         (tmp_path / name).write_bytes(data)
     browser.get(url + "/")
-    browser.find_element(By.CSS_SELECTOR, "#editor > summary").click()
+    click(browser, browser.find_element(By.CSS_SELECTOR, "#editor > summary"))
     wait_for(browser, "document.querySelectorAll('#editor .options > *').length >= 9")
     for path, text in (("sample", "written twill"), ("fibers.file", "cloth.hair"), ("fibers.tile_mm", "0.8, 0.9"), ("lamp.side_cm", "12.5"),
                        ("black_sheet", "false"), ("fit.model", "microflake.v1"), ("fit.texture.block_mm", "0.5"), ("fit.fixed", '{"gamma": 0.3}')):
         fill_in(browser, path, text)
     fill_in(browser, "fit.seed", "7")
-    option(browser, "fit.seed").find_element(By.CSS_SELECTOR, "input[type=checkbox]").click()  # and not set again
+    click(browser, option(browser, "fit.seed").find_element(By.CSS_SELECTOR, "input[type=checkbox]"))  # and not set again
     browser.execute_script("document.querySelector(`#editor details[data-path='photographs']`).open = true")
     wait_for(browser, "document.querySelector('#editor button.add')")
     angles = {"light_theta_deg": 20, "light_phi_deg": 0, "camera_theta_deg": 30, "camera_phi_deg": 180}
@@ -279,12 +284,12 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
     drop_in(browser, *(tmp_path / n for n in ("cloth.hair", "p0.exr", "p1.exr")))
     # the server refuses a value: its row is marked, and the corrected document is another one
     fill_in(browser, "lamp.side_cm", "5000")
-    browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+    click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
     wait_for(browser, "document.querySelector(`#editor .option.bad[data-path='lamp.side_cm'] .problem`)?.textContent.includes('0.01 to 1000')")
     keep(browser, "form-refused")
     fill_in(browser, "lamp.side_cm", "12.5")
     assert "bad" not in option(browser, "lamp.side_cm").get_attribute("class")
-    browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+    click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert selvedge.Server(url).job(browser.execute_script("return location.hash.slice(1)")).state()["document"] == document
@@ -297,7 +302,7 @@ def test_form_edits_a_dropped_document(stub, browser):
     browser.get(url + "/")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
     before = json.loads((sample / "job.json").read_text())
-    browser.find_element(By.CSS_SELECTOR, "#editor > summary").click()
+    click(browser, browser.find_element(By.CSS_SELECTOR, "#editor > summary"))
     wait_for(browser, "document.querySelector(`#editor .option[data-path='volume.voxel_size_um']`)")  # sections that are given are open
     assert written(browser) == before and option(browser, "volume.voxel_size_um").find_element(By.CSS_SELECTOR, "input[type=text]").get_attribute("value") == "2"
     fill_in(browser, "volume.voxel_size_um", "2 2 2.5")
