@@ -59,6 +59,7 @@ def test_idempotency_key(daemon):
     assert first.json()["id"] == again.json()["id"]
     assert "Idempotent-Replay" not in first.headers and again.headers["Idempotent-Replay"] == "true"
     problem(daemon.post("/v1/jobs", json=document("other"), headers={"Idempotency-Key": "k1"}), 422, "idempotency_key_reused")
+    assert daemon.post("/v1/jobs", json=DOCUMENT, headers={"Idempotency-Key": "k" * 128}).status_code == 201
     problem(daemon.post("/v1/jobs", json=DOCUMENT, headers={"Idempotency-Key": "k" * 129}), 422, "invalid", "Idempotency-Key")
     daemon.delete(f"/v1/jobs/{first.json()['id']}")
     wait_until(lambda: daemon.post("/v1/jobs", json=DOCUMENT, headers={"Idempotency-Key": "k1"}).json().get("id")

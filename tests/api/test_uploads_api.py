@@ -79,6 +79,14 @@ def test_pieces_offsets_and_the_finished_file(daemon):
     assert daemon.offset(url) == len(data)
 
 
+def test_sha256_may_be_declared_in_capitals(daemon):
+    job, data = daemon.create(), b"all of a scan"
+    r = daemon.post(f"/v1/jobs/{job}/files", json=declaration(size=len(data), sha256=sha256(data).upper()))
+    assert r.status_code == 201 and r.json()["sha256"] == sha256(data)
+    assert daemon.patch(r.json()["upload_url"], 0, data).status_code == 204
+    assert daemon.job(job)["files"][0]["state"] == "complete"
+
+
 def test_sha256_is_computed_when_not_declared(daemon):
     job = daemon.create()
     url = daemon.declare(job, "scan.tif", b"abc", checked=False)["upload_url"]
