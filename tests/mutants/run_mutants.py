@@ -121,13 +121,25 @@ class Selection:
     def __init__(self, tests):
         self.tests = tests
         self.contents = {t.program: objects_in(t.program) for t in tests if t.program}
-        self.of_programs = set().union(*(objects_in(f"build/bin/{p}") for p in PROGRAMS))
+        self.of_program = {p: objects_in(f"build/bin/{p}") for p in PROGRAMS}
         self.source = {t.name: self.read_source(t) for t in tests}
+        for t in tests:
+            if t.program is None:
+                self.contents[t.name] = set().union(*(self.of_program[p] for p in self.programs_of(t)))
 
     @staticmethod
     def read_source(test):
         paths = [TREE / "tests" / (test.name + ending) for ending in (".c", ".py")]
         return next(p.read_text() for p in paths if p.exists())
+
+    def programs_of(self, test):
+        """The programs that a Python test runs, by the names in it and in the modules of tests/support that it uses; all when none is named."""
+        text = self.source[test.name]
+        for module in ("small_cloth", "real_jobs"):
+            if module in text:
+                text += next(p for p in (TREE / "tests").rglob(module + ".py")).read_text()
+        named = {p for p in PROGRAMS if f'"{p}"' in text or p in ("selvedge-worker", "selvedge-phantom") and p in text}
+        return named | ({"selvedged"} if "aemon" in text else set()) or set(PROGRAMS)
 
     def affected(self, path):
         name = pathlib.Path(path).name
@@ -135,7 +147,7 @@ class Selection:
             return [t for t in self.tests if t.name.startswith("browser/")]
         if path.endswith(".py"):
             return [t for t in self.tests if "clients/python" in self.source[t.name] or pathlib.Path(path).name in self.source[t.name]]
-        return [t for t in self.tests if (name + ".o" in self.contents[t.program] if t.program else name + ".o" in self.of_programs)]
+        return [t for t in self.tests if name + ".o" in self.contents[t.program or t.name]]
 
     def likeliness(self, test, path):
         p = pathlib.Path(path)

@@ -115,75 +115,110 @@ static void write_carpet(const char *path)
     fiber_set_release(&f);
 }
 
-static void test_what_is_written(void **state)
-{
-    static const char table[] = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg\n"
-                                "fit,45,0,45,180,0\nheld-out,30,0,10,90,90\nfit,60,0,0,0,45\n";
+#define TABLE_HEADER "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg\n"
+
+/* A carpet, a table of its views and a request for small photographs of them. */
+struct request {
     char fibers[1024], csv[1024], folder[1024];
     struct phantom_photograph_option o;
-    struct error err = {0};
-    snprintf(fibers, sizeof fibers, "%s", scratch_path(state, "carpet.hair"));
-    snprintf(csv, sizeof csv, "%s", scratch_path(state, "views.csv"));
-    snprintf(folder, sizeof folder, "%s", scratch_path(state, "photographs"));
-    write_carpet(fibers);
-    scratch_write(csv, table, sizeof table - 1);
-    phantom_photograph_option_default(&o);
-    o.fiber_file = fibers;
-    o.table_file = csv;
-    o.folder = folder;
-    o.model = scattering_find("two_lobe.v1");
-    for (size_t i = 0; i < o.model->n_param; i++) o.param[i] = o.model->param[i].start;
-    o.px = 8;
-    o.n_path = 64 * 20;
-    o.noise = 0.01;
-    if (phantom_photographs_make(&o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
-    assert_int_equal(scratch_count_entries(folder), 5);
-    json_t *list = json_load_file(scratch_path(state, "photographs/photographs.json"), 0, NULL);
+};
+
+static void request_init(void **state, const char *views, struct request *q)
+{
+    snprintf(q->fibers, sizeof q->fibers, "%s", scratch_path(state, "carpet.hair"));
+    snprintf(q->csv, sizeof q->csv, "%s", scratch_path(state, "views.csv"));
+    snprintf(q->folder, sizeof q->folder, "%s", scratch_path(state, "photographs"));
+    write_carpet(q->fibers);
+    scratch_write(q->csv, views, strlen(views));
+    phantom_photograph_option_default(&q->o);
+    q->o.fiber_file = q->fibers;
+    q->o.table_file = q->csv;
+    q->o.folder = q->folder;
+    q->o.model = scattering_find("two_lobe.v1");
+    for (size_t i = 0; i < q->o.model->n_param; i++) q->o.param[i] = q->o.model->param[i].start;
+    q->o.px = 8;
+    q->o.n_path = 64 * 20;
+    q->o.noise = 0.01;
+}
+
+static json_t *truth_of(void **state)
+{
     json_t *truth = json_load_file(scratch_path(state, "photographs/truth.json"), 0, NULL);
+    assert_non_null(truth);
+    return truth;
+}
+
+/* The means of a picture are the stated ones times the stated gains. */
+static void check_picture(const char *folder, const json_t *row)
+{
+    char path[2048];
+    struct image im;
+    struct error err = {0};
+    snprintf(path, sizeof path, "%s/%s", folder, json_string_value(json_object_get(row, "file")));
+    assert_int_equal(image_read_exr(&im, path, 1000, &err), STATUS_OK);
+    assert_true(im.width == 8 && im.height == 8);
+    for (size_t c = 0; c < 3; c++) {
+        double mean = 0, stated = json_real_value(json_array_get(json_object_get(row, "mean_rgb"), c));
+        double gain = json_real_value(json_array_get(json_object_get(row, "gain_rgb"), c));
+        for (size_t k = 0; k < 64; k++) mean += (double)im.pixel[3 * k + c] / 64.0;
+        assert_true(stated > 0.0 && fabs(gain - 1.0) < 0.06 && gain != 1.0);
+        assert_true(fabs(mean - stated * gain) < 1e-5 * stated);
+    }
+    image_release(&im);
+}
+
+static void test_what_is_written(void **state)
+{
+    struct request q;
+    struct error err = {0};
+    request_init(state, TABLE_HEADER "fit,45,0,45,180,0\nheld-out,30,0,10,90,90\nfit,60,0,0,0,45\n", &q);
+    if (phantom_photographs_make(&q.o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(scratch_count_entries(q.folder), 5);
+    json_t *list = json_load_file(scratch_path(state, "photographs/photographs.json"), 0, NULL);
+    json_t *truth = truth_of(state);
     assert_int_equal(json_array_size(list), 3);
     assert_string_equal(json_string_value(json_object_get(json_array_get(list, 2), "file")), "fit-01.exr");
-    for (size_t i = 0; i < 3; i++) { /* the pictures' means are the told ones with the told error */
-        const json_t *row = json_array_get(json_object_get(truth, "photographs"), i);
-        const char *file = json_string_value(json_object_get(row, "file"));
-        char path[2048];
-        struct image im;
-        snprintf(path, sizeof path, "%s/%s", folder, file);
-        assert_int_equal(image_read_exr(&im, path, 1000, &err), STATUS_OK);
-        assert_true(im.width == 8 && im.height == 8);
-        for (size_t c = 0; c < 3; c++) {
-            double mean = 0, told = json_real_value(json_array_get(json_object_get(row, "mean_rgb"), c));
-            double gain = json_real_value(json_array_get(json_object_get(row, "gain_rgb"), c));
-            for (size_t k = 0; k < 64; k++) mean += (double)im.pixel[3 * k + c] / 64.0;
-            assert_true(told > 0.0 && fabs(gain - 1.0) < 0.06 && gain != 1.0);
-            assert_true(fabs(mean - told * gain) < 1e-5 * told);
-        }
-        image_release(&im);
-    }
+    for (size_t i = 0; i < 3; i++) check_picture(q.folder, json_array_get(json_object_get(truth, "photographs"), i));
     json_decref(list);
     json_decref(truth);
-    o.px = 0;
-    assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
-    o.px = 8;
-    static const char *const bad[][2] = {{"fit,45,0,95,180,0\n", "fit-00.exr' makes no sense"},
-                                         {"fit,45,0,45,180,0\nfit,120,0,0,0,0\n", "fit-01.exr' would be black"}};
-    for (size_t i = 0; i < 3; i++) {
-        char text[300];
-        snprintf(text, sizeof text, "%.*s%s", (int)(strchr(table, '\n') + 1 - table), table,
-                 i < 2 ? bad[i][0] : "fit,45,0,45,180,0\n");
-        scratch_write(csv, text, strlen(text));
-        o.crop_cm = i < 2 ? 1.0 : -1.0;
-        assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_INVALID);
-        assert_non_null(strstr(err.text, i < 2 ? bad[i][1] : "fit-00.exr' makes no sense"));
+}
+
+static void test_refused_requests(void **state)
+{
+    static const struct {
+        const char *views, *part;
+        double crop_cm;
+    } bad[] = {{TABLE_HEADER "fit,45,0,95,180,0\n", "fit-00.exr' makes no sense", 1.0},
+               {TABLE_HEADER "fit,45,0,45,180,0\nfit,120,0,0,0,0\n", "fit-01.exr' would be black", 1.0},
+               {TABLE_HEADER "fit,45,0,45,180,0\n", "fit-00.exr' makes no sense", -1.0}};
+    struct request q;
+    struct error err = {0};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        request_init(state, bad[i].views, &q);
+        q.o.crop_cm = bad[i].crop_cm;
+        assert_int_equal(phantom_photographs_make(&q.o, NULL, NULL, &err), STATUS_INVALID);
+        assert_non_null(strstr(err.text, bad[i].part));
     }
-    o.crop_cm = 1.0;
-    o.n_path = 1; /* one path a pixel at most, and an error all the same */
-    if (phantom_photographs_make(&o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
-    truth = json_load_file(scratch_path(state, "photographs/truth.json"), 0, NULL);
+    request_init(state, TABLE_HEADER "fit,45,0,45,180,0\n", &q);
+    q.o.px = 0;
+    assert_int_equal(phantom_photographs_make(&q.o, NULL, NULL, &err), STATUS_INVALID);
+    q.o.px = 8;
+    q.o.fiber_file = "absent.hair";
+    assert_int_equal(phantom_photographs_make(&q.o, NULL, NULL, &err), STATUS_NOT_FOUND);
+}
+
+/* One path a pixel at most, and an error all the same. */
+static void test_fewest_paths(void **state)
+{
+    struct request q;
+    struct error err = {0};
+    request_init(state, TABLE_HEADER "fit,45,0,45,180,0\n", &q);
+    q.o.n_path = 1;
+    if (phantom_photographs_make(&q.o, NULL, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
+    json_t *truth = truth_of(state);
     const json_t *first = json_array_get(json_object_get(truth, "photographs"), 0);
     assert_true(json_real_value(json_array_get(json_object_get(first, "mean_rgb_se"), 0)) > 0.0);
     json_decref(truth);
-    o.fiber_file = "absent.hair";
-    assert_int_equal(phantom_photographs_make(&o, NULL, NULL, &err), STATUS_NOT_FOUND);
 }
 
 int main(void)
@@ -191,7 +226,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_builtin_views),   cmocka_unit_test(test_builtin_views_are_those_of_the_measurements),
         cmocka_unit_test(test_bad_tables),      cmocka_unit_test(test_parameters),
-        cmocka_unit_test(test_what_is_written),
+        cmocka_unit_test(test_what_is_written), cmocka_unit_test(test_refused_requests),
+        cmocka_unit_test(test_fewest_paths),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
