@@ -119,7 +119,7 @@ static void test_search_agrees_with_brute_force(void **state)
             }
     print_message("%zu of %zu ridges within 1 degree of the brute-force minimum\n", n_near, n_place);
     assert_true(n_place >= 30);
-    assert_true(2 * n_near > n_place);
+    assert_true(5 * n_near > 4 * n_place); /* 62 of 72 */
     free(scratch);
     line_filter_free(f);
     direction_set_release(&dense);
@@ -157,7 +157,8 @@ static void test_straight_fibers(void **state)
                       r.fiber_diameter_voxel);
         assert_true(count > 1500.0);
         assert_true(sum / count < 2.0);
-        assert_true(fabs(r.fiber_diameter_voxel - 7.0) < 2.0);
+        /* a single fiber in noise is measured as 8.3 to 8.4 voxels; fibers side by side are not (below) */
+        assert_true(r.fiber_diameter_voxel > 7.0 && r.fiber_diameter_voxel < 8.6);
         volume_release(&v);
         direction_volume_release(&d);
     }
@@ -186,8 +187,8 @@ static void test_diameter_in_strong_noise(void **state)
             volume_release(&v);
         }
         print_message("diameter %g: measured %.2f, in strong noise %.2f\n", diameter[k], measured[0], measured[1]);
-        assert_true(fabs(measured[0] / diameter[k] - 1.0) < 0.2);
-        assert_true(fabs(measured[1] / measured[0] - 1.0) < 0.1);
+        assert_true(fabs(measured[0] / diameter[k] - 1.0) < 0.1);
+        assert_true(fabs(measured[1] / measured[0] - 1.0) < 0.02);
     }
 }
 
