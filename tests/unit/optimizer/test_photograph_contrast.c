@@ -1,5 +1,6 @@
 /* Contrasts of photographs: those of a chess board behind noise, their stated errors, parts whose edges cut through pixels. */
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/chess_board.h"
@@ -7,6 +8,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -104,11 +106,50 @@ static void test_photograph_error(void **state)
     assert_true(observation_of_contrast(&o, 3.0).weight == 6.0);
 }
 
+static void count_warning(void *context, const char *option, const char *text)
+{
+    size_t *n = context;
+    (void)option;
+    assert_non_null(strstr(text, "'black-red.exr' is black in one of its channels"));
+    ++*n;
+}
+
+/* A channel that is black has no texture to compare; that is worth a warning when the fit uses textures. */
+static void test_warning_of_a_black_channel(void **state)
+{
+    struct job_photograph photograph = {.file = "black-red.exr", .scale = 1.0, .weight = 1.0};
+    const char *path = scratch_path(state, photograph.file);
+    char folder[1024];
+    snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
+    for (int black = 0; black < 2; black++)
+        for (int used = 0; used < 2; used++) {
+            struct job_document doc = {.photograph = &photograph, .n_photograph = 1, .texture_block_mm = 1.0};
+            struct observation_set o;
+            struct image im;
+            struct error err = {0};
+            size_t n_warning = 0;
+            doc.crop_cm = 1.0;
+            doc.texture_weight = used;
+            assert_int_equal(image_init(&im, 40, 40, 3, NULL), STATUS_OK);
+            draw(&im, &(struct rng_key){.seed = 3}, 1, 0.0, 0.05, 3);
+            for (size_t i = 0; black && i < 40 * 40; i++) im.pixel[3 * i] = 0.0f;
+            assert_int_equal(image_write_exr(&im, path, NULL), STATUS_OK);
+            image_release(&im);
+            observation_set_init(&o);
+            if (observation_set_load(&doc, folder, &(struct warning_sink){count_warning, &n_warning}, &o, &err) !=
+                STATUS_OK)
+                fail_msg("%s", err.text);
+            assert_int_equal(n_warning, black && used);
+            observation_set_release(&o);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_photograph),
         cmocka_unit_test(test_photograph_error),
+        cmocka_unit_test(test_warning_of_a_black_channel),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
