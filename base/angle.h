@@ -1,5 +1,5 @@
-/* Degrees exist at the edges only (files, JSON, tables of constants); everything else is in radians. These are the one
- * place that converts between the two. */
+/* Conversion between degrees and radians. Degrees occur only in files, JSON and tables of constants; everything else is
+ * in radians. */
 #ifndef SELVEDGE_BASE_ANGLE_H
 #define SELVEDGE_BASE_ANGLE_H
 

@@ -1,5 +1,5 @@
 /* Ids of job options, for errors and warnings of code that does not know the job document. Such code puts an id into
- * err->field, or gives it to a warning; the pipeline replaces it by the key of the document (optimizer/job/option_key.h).
+ * err->field or into a warning, and the pipeline replaces it by the key of the document (optimizer/job/option_key.h).
  * An element of a list has its index after the id: "photograph_file[3]".
  */
 #ifndef SELVEDGE_BASE_OPTION_ID_H

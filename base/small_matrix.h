@@ -1,8 +1,9 @@
 /* Dense and banded linear algebra of small symmetric matrices, row-major.
  *
- * LAPACK is not used for it. A result must have the same bits on every machine and with any number of threads; OpenBLAS
- * selects its kernels by processor, and which BLAS a Debian system runs is the administrator's choice. The matrices have
- * 3 to 16 rows (a few thousand in a band of 7), where plain loops in a fixed order cost nothing that can be measured.
+ * LAPACK is not used for it. A result must have the same bits on every machine and with any number of threads;
+ * OpenBLAS selects its kernels by processor, and which BLAS a Debian system runs is the administrator's choice. The
+ * matrices have 3 to 16 rows (a few thousand in a band of 7), where plain loops in a fixed order cost nothing that
+ * can be measured.
  */
 #ifndef SELVEDGE_BASE_SMALL_MATRIX_H
 #define SELVEDGE_BASE_SMALL_MATRIX_H
@@ -18,8 +19,9 @@ enum { SMALL_MATRIX_MAX = 16 };
 bool small_factor(double *m, size_t n, double least_pivot);
 /* Solves L L^T x = b with the factor of small_factor. Element i of b, and then of x, is x[i * stride]. */
 void small_solve(const double *factor, size_t n, double *x, size_t stride);
-/* Solves m x = b for a symmetric positive definite m of n rows and band width n_band: m[i * n_band + k] is the element
- * (i, i - k), k < n_band. m is destroyed and x replaces b. Returns false, with x undefined, when a pivot is not positive. */
+/* Solves m x = b for a symmetric positive definite m of n rows and band width n_band: m[i * n_band + k] is the
+ * element (i, i - k), k < n_band. m is destroyed and x replaces b. Returns false, with x undefined, when a pivot is
+ * not positive. */
 bool small_solve_banded(double *m, size_t n, size_t n_band, double *x);
 /* Inverse of a symmetric positive definite a; false when a pivot is not positive. */
 bool small_invert(const double *a, size_t n, double *inverse);

@@ -50,7 +50,7 @@ static void warn_alignment(const struct warning_sink *warn, const struct reconst
         if (o->crop && r->tile.mismatch[a] > TILE_MOST_MISMATCH)
             warning_send(warn, OPTION_CROP,
                          "no two places of the scan match across %c (mismatch %.2f, 0 is a repeat and 1 is "
-                         "chance): nothing was cut, the tile has a seam",
+                         "chance), so nothing was cropped and the tile has a seam",
                          "xy"[a], r -> tile.mismatch[a]);
 }
 

@@ -1,4 +1,4 @@
-/* The catalogue of descent methods: which there are, what they can take and what their defaults are. Pure data out of
+/* The catalogue of descent methods: their ids, the terms that they support and their defaults. It is pure data from
  * methods.def, so that a program can check a job document without linking the methods. A new method is a row there and
  * a file in optimizer/fit/descent; the registry of methods follows from the same rows.
  */

@@ -1,6 +1,6 @@
-/* The catalogue of models: which there are, and what their parameters are. Pure data out of models.def, so that a program
- * can check a job document without linking the renderer. A new model is a row there and a file below
- * renderer/scattering; the registries of the renderer follow from the same rows.
+/* The catalogue of models: their ids and parameters. It is pure data from models.def, so that a program can check
+ * a job document without linking the renderer. A new model is a row there and a file below renderer/scattering; the
+ * registries of the renderer follow from the same rows.
  */
 #ifndef SELVEDGE_BASE_MODEL_CATALOGUE_H
 #define SELVEDGE_BASE_MODEL_CATALOGUE_H

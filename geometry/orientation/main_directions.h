@@ -16,8 +16,9 @@
 #include "geometry/volume/volume.h"
 
 struct main_directions {
-    size_t n; /* 0: none stands out; 1: one system of fibers; 2: weft and warp */
-    /* Unit vectors, by lengths in metres: [0] is nearer to x (weft), [1] to y (warp). With n = 1 one of them is zero. */
+    size_t n; /* 0: no clear direction; 1: one system of fibers; 2: weft and warp */
+    /* Unit vectors, by lengths in metres: [0] is nearer to x (weft), [1] to y (warp). With n = 1 one of them is
+     * zero. */
     double direction[2][3];
     /* Standard errors of each within the plane of x and y, and out of it (jackknife over columns of bricks). */
     double se_deg[2], tilt_se_deg[2];

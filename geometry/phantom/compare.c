@@ -10,12 +10,12 @@
 
 static const double along_limit = 0.86602540378443865; /* cosine of 30 degrees */
 
-/* One voxel of a fiber, and what it met in the other set. */
+/* One voxel of a fiber, and the place that it matches in the other set. */
 struct sample {
-    uint32_t fiber;              /* own */
-    uint32_t other;              /* fiber met, NONE when unmatched */
-    uint32_t voxel;              /* place met on the other fiber, in voxels from its start */
-    uint32_t piece, other_piece; /* parts between faces, of own and other */
+    uint32_t fiber;              /* number of its own fiber */
+    uint32_t other;              /* number of the matched fiber; NONE if unmatched */
+    uint32_t voxel;              /* matched place on the other fiber, in voxels from its start */
+    uint32_t piece, other_piece; /* parts between faces, of its own and the other fiber */
     float distance_m, cosine;
 };
 
@@ -34,7 +34,7 @@ struct job {
     const double *tile_m;
     const struct compare_option *o;
     const double *arc_m;                 /* arc length at the vertices of the other set */
-    const uint32_t *piece, *other_piece; /* per vertex */
+    const uint32_t *piece, *other_piece; /* one per vertex */
     bool own_is_truth;
     double limit_m;
 };
@@ -69,7 +69,7 @@ static void add_sample(const struct job *j, size_t i_fiber, size_t i_vertex, con
     w->sample[w->n++] = s;
 }
 
-/* Samples sit in the middle of each voxel of arc length. */
+/* A sample lies in the middle of each voxel of arc length. */
 static void walk_fiber(const struct job *j, size_t i, struct walk *w)
 {
     const struct fiber_set *f = j->own;
@@ -115,15 +115,15 @@ static bool in_tile(const float p[3], const double corner[2], const double tile_
     return true;
 }
 
-/* The scan is one tile and ends at its faces: a fiber that leaves it by more than its radius is cut at the face. Numbers the pieces of
- * every fiber, per vertex; *n_piece of them. */
+/* The scan is one tile and ends at its faces, so a fiber that leaves it by more than its radius is cut at the face.
+ * Returns the number of the piece for each vertex; *n_piece is the number of pieces. */
 static uint32_t *cut_at_faces(const struct fiber_set *f, const double tile_m[2], size_t *n_piece)
 {
     uint32_t *piece = malloc((f->n_vertex + 1) * sizeof *piece);
     *n_piece = 0;
     for (size_t i = 0; i < f->n_fiber && piece != NULL; i++) {
-        double corner[2] = {NAN, NAN};       /* of the tile that the fiber is in */
-        size_t outside = f->first_vertex[i]; /* the first vertex since the fiber was last seen in it */
+        double corner[2] = {NAN, NAN};       /* of the tile in which the fiber is */
+        size_t outside = f->first_vertex[i]; /* the first vertex since the fiber left that tile */
         for (size_t v = f->first_vertex[i]; v < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v;
             if (!in_tile(p, corner, tile_m, (double)f->radius_m[i])) {
@@ -178,7 +178,7 @@ static int by_float(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* Smallest value that 95 % of the values do not exceed. Sorts. */
+/* Smallest value that 95 % of the values do not exceed. Sorts the values. */
 static double percentile_95(float *value, size_t n)
 {
     if (n == 0) return NAN;
@@ -187,7 +187,7 @@ static double percentile_95(float *value, size_t n)
     return (double)value[at > 0 ? at - 1 : 0];
 }
 
-/* True fiber, place, distance, found fiber: so that the nearest hit of a voxel comes first. */
+/* Sorts by true fiber, place, distance and found fiber, so that the nearest match of a voxel comes first. */
 static int by_place(const void *a, const void *b)
 {
     const struct sample *x = a, *y = b;
@@ -205,7 +205,7 @@ static int by_pair(const void *a, const void *b)
     return x->other_piece < y->other_piece ? -1 : x->other_piece > y->other_piece;
 }
 
-/* What found samples tell. Changes their order. */
+/* Computes the figures of the found samples. Changes their order. */
 static status from_found(const struct fiber_set *truth, const struct fiber_set *found, double voxel_size_m,
                          struct walk *w, struct compare_report *r, struct error *err)
 {
@@ -277,7 +277,7 @@ static status count_fragments(const struct walk *of_truth, struct walk *w, size_
     return STATUS_OK;
 }
 
-/* What true samples tell; they are still in order along their fibers. */
+/* Computes the figures of the true samples, which are still in order along their fibers. */
 static void from_truth(const struct walk *w, struct compare_report *r)
 {
     size_t n_match = 0, n_along = 0, n_gap = 0, n_fiber = 0;
@@ -326,7 +326,7 @@ status compare_fibers(const struct fiber_set *truth, const struct fiber_set *fou
         return error_set(err, STATUS_INVALID, "the voxel size must be positive and the margin not negative");
     status st = fiber_set_validate(truth, err);
     if (st != STATUS_OK) return error_prefix(err, st, "true fibers");
-    struct fiber_set tiled = *found; /* shares the arrays */
+    struct fiber_set tiled = *found; /* shares the arrays of found */
     memcpy(tiled.tile_size_m, truth->tile_size_m, sizeof tiled.tile_size_m);
     st = fiber_set_validate(&tiled, err);
     if (st != STATUS_OK) return error_prefix(err, st, "found fibers");

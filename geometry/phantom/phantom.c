@@ -57,11 +57,11 @@ void phantom_option_default(struct phantom_option *o, enum phantom_weave weave)
 static status check_range(const char *field, double value, double lower, double upper, struct error *err)
 {
     if (value >= lower && value <= upper) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, field, "phantom option '%s' is %g, it must lie between %g and %g",
+    return error_set_field(err, STATUS_INVALID, field, "phantom option '%s' is %g, but must be between %g and %g",
                            field, value, lower, upper);
 }
 
-/* Fill in what was left open and check the rest. */
+/* Sets the defaults of open options and checks the others. */
 static status check(struct phantom_option *o, struct error *err)
 {
     if ((unsigned)o->weave >= PHANTOM_WEAVE_COUNT)
@@ -71,11 +71,11 @@ static status check(struct phantom_option *o, struct error *err)
         if (o->n_yarn[k] == 0) o->n_yarn[k] = o->weave == PHANTOM_KNIT ? 2 : repeat;
         if (o->n_yarn[k] % repeat != 0 || o->n_yarn[k] > 1000)
             return error_set_field(err, STATUS_INVALID, "n_yarn",
-                                   "%zu yarns a tile: a %s wants a multiple of %zu, at most 1000", o->n_yarn[k],
+                                   "%zu yarns per tile: a %s needs a multiple of %zu, at most 1000", o->n_yarn[k],
                                    weave_info[o->weave].name, repeat);
     }
     if (o->yarn.n_ply > 0 && (o->weave == PHANTOM_FELT || o->weave == PHANTOM_VELVET))
-        return error_set_field(err, STATUS_INVALID, "yarn", "a %s takes no plied yarn", weave_info[o->weave].name);
+        return error_set_field(err, STATUS_INVALID, "yarn", "a %s cannot have a plied yarn", weave_info[o->weave].name);
     if (o->vertex_spacing_m == 0.0) o->vertex_spacing_m = 1.5 * o->voxel_size_m;
     if (o->margin_m == 0.0) o->margin_m = 4.0 * o->voxel_size_m;
     const struct {
@@ -163,8 +163,8 @@ status phantom_pad(struct fiber_set *f, struct phantom_report *report, double vo
 {
     size_t *n = &report->n_voxel[2];
     if (n_slice < *n || n_slice > 1000000)
-        return error_set_field(err, STATUS_INVALID, "voxels_z", "the cloth needs %zu slices, %zu are asked for", *n,
-                               n_slice);
+        return error_set_field(err, STATUS_INVALID, "voxels_z", "the cloth needs %zu slices, but %zu were requested",
+                               *n, n_slice);
     float rise_m = (float)((double)((n_slice - *n) / 2) * voxel_size_m);
     for (size_t i = 0; i < f->n_vertex; i++) f->position_m[3 * i + 2] += rise_m;
     *n = n_slice;

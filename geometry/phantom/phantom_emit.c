@@ -1,18 +1,19 @@
-/* From strands to fibers: a smooth curve through the nodes, cut where it leaves the tile, moved to its height. */
+/* Converts strands to fibers: a smooth curve through the nodes, cut where it leaves the tile, and moved to its
+ * height. */
 #include "geometry/phantom/phantom_strand.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* Fibers as they grow: two passes over the same code, the first with NULL arrays only counts. */
+/* Collects fibers in two passes over the same code; the first, with f == NULL, only counts. */
 struct emitter {
     double tile_m[2];
     double z_shift_m;
     const struct strand *strand;
     struct fiber_set *f; /* NULL: count */
     size_t n_fiber, n_vertex;
-    size_t n_here; /* vertices of the piece under way */
-    long cell[2];  /* tile that the piece under way is in */
+    size_t n_here; /* vertices of the present piece */
+    long cell[2];  /* tile of the present piece */
 };
 
 static void put_vertex(struct emitter *e, const double p[3])
@@ -47,7 +48,7 @@ static long cell_of(const struct emitter *e, const double p[3], int axis)
     return (long)floor(p[axis] / e->tile_m[axis]);
 }
 
-/* Go on from a to b, cutting at every face of the mask between. Returns true when something was cut. */
+/* Continues from a to b, and cuts at every face of the mask between them. Returns true if it has cut. */
 static bool advance(struct emitter *e, const double a[3], const double b[3])
 {
     double from[3] = {a[0], a[1], a[2]};
@@ -77,7 +78,7 @@ static bool advance(struct emitter *e, const double a[3], const double b[3])
     }
 }
 
-/* Point w between nodes i and i + 1 of a strand, i may run beyond a closed strand's end. Catmull-Rom. */
+/* Point at w between nodes i and i + 1 of a strand (Catmull-Rom); i may exceed the end of a closed strand. */
 static void curve_point(const struct strand_set *s, const struct strand *t, size_t i, double w, double out[3])
 {
     double q[4][3];
@@ -121,11 +122,11 @@ static void emit_strand(struct emitter *e, const struct strand_set *s, const str
     bool faces = t->n_period > 0 && (t->cut & CUT_FACE_XY) != 0, started = !faces;
     double a[3], b[3];
     curve_point(s, t, from, 0.0, a);
-    /* one node outside a face belongs to the tile before; open strands stay whole in the tile of their first node */
+    /* a node outside of a face belongs to the previous tile; open strands stay whole in the tile of their first node */
     for (int k = 0; k < 2; k++)
         e->cell[k] = faces && (t->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 ? 0 : cell_of(e, a, k);
     if (started) put_vertex(e, a);
-    /* with faces, once round and then to the first cut again */
+    /* with faces, once around and then to the first cut again */
     for (size_t i = 0; i < n_interval + (faces ? 1 : 0); i++) {
         for (size_t k = 1; k <= n_sub; k++) {
             curve_point(s, t, from + i, (double)k / (double)n_sub, b);
@@ -153,7 +154,7 @@ static void emit_all(struct emitter *e, const struct strand_set *s, double spaci
     for (size_t i = 0; i < s->n_strand; i++) emit_strand(e, s, &s->strand[i], spacing_m);
 }
 
-/* Weave fibers wander sideways over the tile's other face without being cut; put each into the tile where most of it is. */
+/* Fibers of a weave may leave the tile sideways without being cut; each is put into the tile that has most of it. */
 static void recentre(struct fiber_set *f)
 {
     for (size_t i = 0; i < f->n_fiber; i++)

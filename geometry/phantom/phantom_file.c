@@ -17,12 +17,13 @@ void phantom_file_option_default(struct phantom_file_option *o)
 static status check(const struct phantom_file_option *o, const char *path, struct error *err)
 {
     if (o->bits != 8 && o->bits != 16)
-        return error_set_field(err, STATUS_INVALID, "bits", "cannot write '%s': %d bits a voxel, it must be 8 or 16",
-                               path, o->bits);
+        return error_set_field(err, STATUS_INVALID, "bits",
+                               "cannot write '%s': %d bits per voxel, but it must be 8 or 16", path, o->bits);
     return STATUS_OK;
 }
 
-/* n voxels in the machine's byte order, which libtiff knows and is little-endian, as the .mhd says, on all that this is built for. */
+/* n voxels in the byte order of the machine. libtiff handles it, and it is little-endian, as the .mhd states, on all
+ * supported machines. */
 static void encode(const float *from, size_t n, const struct phantom_file_option *o, uint8_t *to)
 {
     double top = o->bits == 8 ? 255.0 : 65535.0;
@@ -36,7 +37,7 @@ static void encode(const float *from, size_t n, const struct phantom_file_option
     }
 }
 
-/* Keeps libtiff from printing; its first words are the cause, what follows from it is not. */
+/* Keeps libtiff from printing. Its first message is the cause, and later ones follow from it. */
 static int keep_message(TIFF *t, void *context, const char *module, const char *format, va_list args)
 {
     struct error *err = context;
@@ -107,7 +108,7 @@ out:
     return st;
 }
 
-/* Slice by slice under a temporary name. */
+/* Writes slice by slice to a temporary file. */
 static status write_raw(const struct volume *v, const struct phantom_file_option *o, const char *path,
                         struct error *err)
 {

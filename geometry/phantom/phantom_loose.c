@@ -1,4 +1,4 @@
-/* Fibers without yarns: felt, and the pile of a velvet. */
+/* Fibers without yarns: felt and the pile of a velvet. */
 #include "base/rng.h"
 #include "geometry/phantom/phantom_strand.h"
 
@@ -7,7 +7,7 @@
 
 enum { PILE_TUFT = 13, N_WINDING = 8 };
 
-/* How often a felt fiber goes round the tile in x and y before it closes: eight directions of the plane. */
+/* Number of times that a felt fiber goes around the tile in x and y before it closes: eight directions in the plane. */
 static const int winding[N_WINDING][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}, {2, 1}, {1, 2}, {2, -1}, {1, -2}};
 
 static status add_felt_fiber(struct strand_set *s, const struct phantom_option *o, size_t i, struct error *err)
@@ -52,7 +52,8 @@ status felt_make(struct strand_set *s, const struct phantom_option *o, struct er
     return STATUS_OK;
 }
 
-/* One tuft in each gap between four ground yarns; its fibers spread and lean towards +y as they rise, and are cut at the top. */
+/* Places one tuft in each gap between four ground yarns. Its fibers spread and lean towards +y as they rise, and are
+ * cut at the top. */
 static status add_tuft(struct strand_set *s, const struct phantom_option *o, const double root[2], uint32_t number,
                        double ground_z_m, struct error *err)
 {

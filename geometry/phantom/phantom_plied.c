@@ -1,8 +1,9 @@
-/* Yarns of several twisted plies, by the measured laws of Zhao et al. 2016 ("Fitting procedural yarn models for realistic cloth
- * rendering"): plies wind about the yarn, fibers about their ply in an elliptic section whose short axis points to the yarn's centre
- * (section 3.1); fibers lie by the radial density p(R) = (1 - 2 eps) ((e - e^R) / (e - 1))^beta + eps (section 3.2) and wander between
- * rho_min R and rho_max R (3.3); hairs and loops stand out (3.4). Ours: twists are rounded so that the tile closes, fibers keep
- * their distance where the density allows, and the yarn may be scaled to the wanted packing. */
+/* Yarns of several twisted plies, by the measured laws of Zhao et al. 2016 ("Fitting procedural yarn models for
+ * realistic cloth rendering"): plies wind about the yarn, and fibers about their ply in an elliptic section whose
+ * short axis points to the centre of the yarn (section 3.1). Fibers are distributed with the radial density p(R) =
+ * (1 - 2 eps) ((e - e^R) / (e - 1))^beta + eps (section 3.2), and their R varies between rho_min R and rho_max R
+ * (3.3). Hairs and loops stand out (3.4). Differences: twists are rounded so that the tile closes, fibers keep their
+ * distance where the density allows, and the yarn may be scaled to the requested packing. */
 #include "base/rng.h"
 #include "geometry/phantom/phantom_strand.h"
 
@@ -28,13 +29,13 @@ double plied_section_radius_m(const struct phantom_option *o, double fiber_radiu
     return scale * fmax(corner, y->ply_distance_m + y->ellipse_m[1]) + fiber_radius_m;
 }
 
-/* A yarn laid out on its tile: metres, scaled. */
+/* A yarn scaled to its tile; lengths in metres. */
 struct plied {
     const struct phantom_option *o;
     const struct yarn *path;
     struct yarn_section section;
-    double scale, distance_m, ellipse_m[2], ply_turns, fiber_turns; /* a tile */
-    size_t n_period;                                                /* tiles until a ply meets itself */
+    double scale, distance_m, ellipse_m[2], ply_turns, fiber_turns; /* ply_turns and fiber_turns per tile */
+    size_t n_period;                                                /* tiles after which a ply meets itself */
 };
 
 static void lay_out(struct plied *p, const struct phantom_option *o, const struct yarn *path)
@@ -45,14 +46,14 @@ static void lay_out(struct plied *p, const struct phantom_option *o, const struc
         .wide = sqrt(o->flatness), .high = 1.0 / sqrt(o->flatness), .length_m = yarn_length_m(path)};
     for (int k = 0; k < 2; k++) p->ellipse_m[k] = p->scale * y->ellipse_m[k];
     p->distance_m = y->n_ply > 1 ? p->scale * y->ply_distance_m : 0.0;
-    double tile = p->section.length_m / p->scale;                        /* in the file's lengths */
-    long long steps = llround(tile / y->ply_pitch_m * (double)y->n_ply); /* of one ply to the next */
+    double tile = p->section.length_m / p->scale;                        /* in the lengths of the file */
+    long long steps = llround(tile / y->ply_pitch_m * (double)y->n_ply); /* from one ply to the next */
     p->ply_turns = (double)steps / (double)y->n_ply;
     p->n_period = y->n_ply / greatest_divisor(y->n_ply, (size_t)llabs(steps));
     p->fiber_turns = round(tile / y->fiber_pitch_m * (double)p->n_period) / (double)p->n_period;
 }
 
-/* Point at distance (R, angle) from the centre of ply i, R relative to the ellipse, s tiles along. */
+/* Point at distance (R, angle) from the centre of ply i, with R relative to the ellipse, s tiles along the yarn. */
 static void ply_point(const struct plied *p, size_t i_ply, double s, double relative, double angle, double out[3])
 {
     double ply = 2.0 * M_PI * ((double)i_ply / (double)p->o->yarn.n_ply + p->ply_turns * s);
@@ -69,7 +70,7 @@ static double density(const struct phantom_yarn_law *y, double r)
     return (1.0 - 2.0 * y->epsilon) * pow(fmax(0.0, (M_E - exp(r)) / (M_E - 1.0)), y->beta) + y->epsilon;
 }
 
-/* Uniform in the disc, kept with the probability of the law. */
+/* Draws a point uniformly in the disc, and accepts it with the probability of the law. */
 static void draw_place(const struct phantom_yarn_law *y, struct rng *rng, double place[2])
 {
     for (int i = 0; i < MAX_TRY; i++) {
@@ -79,7 +80,7 @@ static void draw_place(const struct phantom_yarn_law *y, struct rng *rng, double
     }
 }
 
-/* Of some draws the first that keeps a diameter from the others, or else the one that keeps most. */
+/* Of several draws, takes the first that is a diameter away from all others, or else the one farthest from them. */
 static void draw_apart(const struct plied *p, double (*place)[2], size_t n, struct rng *rng)
 {
     double best = -1.0, want = 2.0 * p->path->radius_m;
@@ -98,8 +99,8 @@ static void draw_apart(const struct plied *p, double (*place)[2], size_t n, stru
     }
 }
 
-/* A fiber of plies i, i + steps, ...: R wanders with a whole number of waves over its period. loop_m > 0: it stands out to that
- * distance once, over a quarter of a turn. */
+/* Adds a fiber of plies i, i + steps, ...: R varies with a whole number of waves over its period. loop_m > 0: it
+ * stands out to that distance once, over a quarter of a turn. */
 static status add_fiber(struct strand_set *s, const struct plied *p, size_t i_ply, const double place[2], double loop_m,
                         struct rng *rng, struct error *err)
 {
@@ -133,7 +134,7 @@ static double normal_of(struct rng *rng, const double mean_sd[2])
     return mean_sd[0] + mean_sd[1] * z[0];
 }
 
-/* A hair begins at a distance r0 from its ply and ends r0 + re away, ze along the yarn and pe around it. */
+/* A hair starts at distance r0 from its ply and ends r0 + re away, ze along the yarn and pe around it. */
 static status add_hair(struct strand_set *s, const struct plied *p, struct rng *rng, struct error *err)
 {
     const struct phantom_yarn_law *y = &p->o->yarn;
@@ -159,7 +160,7 @@ static status add_hair(struct strand_set *s, const struct plied *p, struct rng *
     return STATUS_OK;
 }
 
-/* Counts follow the file's density a ply, scaled with the yarn. */
+/* The counts follow the densities per ply in the file, scaled with the yarn. */
 static size_t count_of(const struct plied *p, double per_m)
 {
     return (size_t)llround(per_m * p->section.length_m / p->scale * (double)p->o->yarn.n_ply);
@@ -184,7 +185,7 @@ status plied_yarn_add(struct strand_set *s, const struct phantom_option *o, cons
     for (size_t i = 0; i < n_start && st == STATUS_OK; i++)
         for (size_t k = 0; k < y->n_fiber && st == STATUS_OK; k++) {
             double loop_m = 0.0;
-            size_t i_strand = i * y->n_fiber + k; /* loops are spread over the strands, one a strand at most */
+            size_t i_strand = i * y->n_fiber + k; /* loops are spread over the strands, at most one per strand */
             draw_apart(&p, place, k, &rng);
             if ((i_strand + 1) * n_loop / n_strand > i_strand * n_loop / n_strand) {
                 loop_m = p.scale * fmax(0.0, normal_of(&rng, y->loop_radius_m));

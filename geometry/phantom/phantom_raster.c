@@ -1,13 +1,14 @@
-/* From fibers to a CT-like volume.
+/* Makes a CT-like volume from fibers.
  *
- * A voxel's share inside one fiber is taken as clamp(1/2 + (r' - d) / w), d the distance of its centre to the axis, w its width. A
- * ramp of width w has the second moment of a box of width w in any direction, and r'^2 = r^2 - w^2/12 keeps the area of the section:
- * integral of 2 pi d clamp(...) = pi (r'^2 + w^2/12), as long as the ramp ends before the axis (r' >= w/2, r >= 0.58 w). Thinner fibers
- * are cones 3 r^2 / w^2 (1 - d/w), which have their area, too. Shares of different fibers add, up to 1.
+ * A voxel's share inside one fiber is clamp(1/2 + (r' - d) / w), where d is the distance of its centre from the axis
+ * and w its width. A ramp of width w has the second moment of a box of width w in any direction, and r'^2 = r^2 -
+ * w^2/12 preserves the area of the section: the integral of 2 pi d clamp(...) is pi (r'^2 + w^2/12), if the ramp
+ * ends before the axis (r' >= w/2, r >= 0.58 w). Thinner fibers are cones 3 r^2 / w^2 (1 - d/w), which preserve the
+ * area too. Shares of different fibers add, up to 1.
  *
- * Slices are drawn, blurred along x and y, and kept in a ring until the blur along z has passed; only the result is as large as the
- * volume. Noise is a function of the voxel's index. So nothing depends on how many slices are worked on together.
- */
+ * Slices are drawn, blurred along x and y, and kept in a ring buffer until the blur along z has passed, so only the
+ * result is as large as the volume. Noise is a function of the index of the voxel. So the result does not depend on
+ * how many slices are processed together. */
 #include "base/rng.h"
 #include "geometry/phantom/phantom_strand.h"
 
@@ -26,12 +27,12 @@ struct scan {
     const struct fiber_set *f;
     const struct phantom_scan_option *o;
     struct volume *v;
-    size_t n_slab;         /* slices worked on together */
+    size_t n_slab;         /* number of slices processed together */
     size_t first, n_drawn; /* slices of the slab */
-    float *drawn;          /* of the slab: shares of all fibers */
-    uint32_t *owner;       /* of the slab: fiber that last touched a voxel, + 1 */
-    float *share;          /* and its share */
-    float *blurred;        /* along x and y; slice k at k % n_held */
+    float *drawn;          /* of the slab: sums of the shares of all fibers */
+    uint32_t *owner;       /* of the slab: number + 1 of the fiber that last touched a voxel */
+    float *share;          /* of the slab: share of that fiber */
+    float *blurred;        /* blurred along x and y; slice k at k % n_held */
     size_t n_held;
     float *kernel;
     long reach;  /* of the blur */
@@ -42,9 +43,8 @@ struct scan {
 struct capsule {
     double a[3], d[3], length2; /* voxels */
     double r, r_ramp, scale;    /* scale: below 1 for fibers thinner than the ramp */
-    double end[2][3],
-        outward[2]
-               [3]; /* of the fiber: its ends are flat, so that what goes on in the next tile joins without a bulge */
+    /* The ends of a fiber are flat, so that it joins its continuation in the next tile without a bulge. */
+    double end[2][3], outward[2][3];
 };
 
 static double axis_distance(const struct capsule *c, const double p[3])
@@ -150,7 +150,7 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     for (; at < end; at++) s->drawn[at] = fminf(s->drawn[at], 1.0f);
 }
 
-/* One slice blurred along x and y (periodic) into `blurred`. */
+/* Blurs one slice along x and y (periodic) into `blurred`. */
 static void blur_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct scan *s = context;
@@ -203,7 +203,7 @@ static double disturb(const struct scan *s, double value, size_t at, size_t i, s
     return value;
 }
 
-/* Blur along z (void outside) and everything that goes wrong in a scanner. */
+/* Blurs along z (void outside) and adds the errors of a scanner. */
 static void finish_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct scan *s = context;
@@ -273,7 +273,7 @@ static status check(const struct phantom_scan_option *o, struct error *err)
     return STATUS_OK;
 }
 
-/* Slices from the end of the last slab on: drawn and blurred until those up to `wanted` are held. */
+/* Draws and blurs slices from the end of the last slab on, until those up to `wanted` are held. */
 static status hold_slices(struct scan *s, size_t *ready, size_t wanted, struct thread_pool *pool,
                           const struct progress *quiet)
 {

@@ -1,20 +1,23 @@
-/* Pushing fibers apart: overlapping nodes of different fibers each give way by half, across their fibers; then displacements
- * (not positions, so that crimp and twist stay) are smoothed along each strand, and bends that would break a fiber are opened. Jacobi
- * rounds: every node looks, then every node moves. */
+/* Pushes fibers apart. Overlapping nodes of different fibers each move by half of the overlap, across their fibers.
+ * Then the displacements are smoothed along each strand (not the positions, so crimp and twist stay), and bends that
+ * would break a fiber are straightened. These are Jacobi rounds: all nodes are evaluated before any node moves. */
 #include "geometry/phantom/phantom_strand.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { NODES_PER_TASK = 2048, N_UNBEND = 6 }; /* the second: steps a round */
+enum { NODES_PER_TASK = 2048, N_UNBEND = 6 }; /* N_UNBEND: steps per round */
 
-/* Share of a node's last step that it takes again (heavy ball): a stack of fibers opens in a sixth of the rounds. */
+/* Share of its last step by which a node moves again (heavy-ball momentum). A stack of fibers then separates in a
+ * sixth of the rounds. */
 static const double momentum = 0.8;
-/* The surface of a bent fiber is strained by its radius over the radius of the bend. Textile fibers break at 3 % (flax) to some 40 % (wool,
- * polyester), so none bends more sharply than this: radius of curvature two diameters. */
+/* The surface of a bent fiber is strained by its radius over the radius of the bend. Textile fibers break at 3 %
+ * (flax) to about 40 % (wool, polyester), so no fiber bends more sharply than this, which is a radius of curvature
+ * of two diameters. */
 static const double MAX_STRAIN = 0.25;
-static const double UNBEND = 0.5; /* share of a correction taken at once: corrections of neighbouring bends add up */
+/* share of a correction applied at once, because the corrections of neighbouring bends add up */
+static const double UNBEND = 0.5;
 
 struct relax {
     struct strand_set *s;
@@ -100,7 +103,7 @@ static void sort_into_cells(struct relax *r)
     for (size_t k = 0; k < s->n_node; k++) r->cell_node[r->cell_first[r->cell_of[k] + 1]++] = (uint32_t)k;
 }
 
-/* Position of node k + step along its strand; false behind an open end. */
+/* Finds node k + step along its strand. Returns false beyond an open end. */
 static bool neighbour(const struct strand *t, size_t k, long step, double (*from)[3], double out[3])
 {
     long i = (long)(k - t->first) + step, n = (long)t->n;
@@ -113,14 +116,14 @@ static bool neighbour(const struct strand *t, size_t k, long step, double (*from
     return true;
 }
 
-/* Nodes of one strand that are near each other along it are one fiber, not two. */
+/* Nodes that are near each other along one strand belong to one fiber and do not push each other apart. */
 static bool same_fiber(const struct strand_set *s, const uint32_t *strand_of, size_t i, size_t j)
 {
     if (strand_of[i] != strand_of[j]) return false;
     const struct strand *t = &s->strand[strand_of[i]];
     size_t gap = i > j ? i - j : j - i;
     if (t->n_period > 0 && t->n - gap < gap) gap = t->n - gap;
-    return gap < 8; /* nodes are a radius apart: beyond a half circle of radius 2 r */
+    return gap < 8; /* nodes are a radius apart: longer than a half circle of radius 2 r */
 }
 
 struct push {
@@ -217,7 +220,8 @@ static void smooth(struct relax *r, double amount)
     }
 }
 
-/* The bend at node i + step of a strand: second difference of the positions, and half of the chord squared. false behind open ends. */
+/* Computes the bend at node i + step of a strand: the second difference of the positions, and half of the squared
+ * chord. Returns false beyond open ends. */
 static bool bend_at(const struct strand_set *s, const struct strand *t, size_t i, long step, double bend[3],
                     double *bend_m, double *chord2)
 {
@@ -235,8 +239,8 @@ static bool bend_at(const struct strand_set *s, const struct strand *t, size_t i
     return true;
 }
 
-/* Where a strand bends more sharply than fibers can, three nodes give way towards a straight line until the bend is as allowed: what the bends
- * at node i and at its two neighbours ask of node i. */
+/* Where a strand bends more sharply than fibers can, three nodes move towards a straight line until the bend is
+ * allowed. Computes the sum of the moves of node i for the bends at node i and its two neighbours. */
 static void unbend_at(struct relax *r, size_t i)
 {
     const struct strand *t = &r->s->strand[r->strand_of[i]];
@@ -265,7 +269,7 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What 95 % of the nodes' strains stay below. Overwrites the depths. */
+/* Strain that 95 % of the nodes stay below. Overwrites the depths. */
 static double strain_p95(struct relax *r)
 {
     size_t n = 0;
@@ -299,7 +303,7 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
                 r.step[k][a] = r.move[k][a] + momentum * r.step[k][a];
                 s->p[k][a] += r.step[k][a];
             }
-        /* ever less smoothing, so that the last rounds only separate */
+        /* smoothing decreases, so that the last rounds only separate */
         smooth(&r, 1.0 - 0.9 * (double)i_round / (double)n_round);
         for (int k = 0; k < N_UNBEND && st == STATUS_OK; k++) {
             st = thread_pool_run(pool, n_task, unbend, &r, &quiet);

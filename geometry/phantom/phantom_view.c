@@ -3,7 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Height of the topmost fiber surface over each pixel of the tile (periodic); height is left as it is where there is none. */
+/* Computes the height of the topmost fiber surface over each pixel of the tile (periodic). Pixels without a fiber
+ * keep their height. */
 static void draw(const struct fiber_set *f, double pixel_size_m, const size_t n[2], float *height)
 {
     for (size_t i = 0; i < f->n_fiber; i++) {

@@ -1,4 +1,4 @@
-/* Yarn paths: woven interlacings with crimp, and the jersey loop. */
+/* Paths of yarns: woven interlacings with crimp, and the jersey loop. */
 #include "geometry/phantom/phantom_strand.h"
 
 #include <math.h>
@@ -6,7 +6,7 @@
 
 enum { POINTS_PER_CROSSING = 32, POINTS_PER_LOOP = 160 };
 
-/* Does weft i lie above warp j? */
+/* Returns whether weft i lies above warp j. */
 static bool weft_over(enum phantom_weave w, size_t i, size_t j)
 {
     switch (w) {
@@ -37,7 +37,8 @@ struct weave {
     size_t n_yarn[2];    /* wefts, warps */
 };
 
-/* Yarn number i of class 0 (weft, along x) or 1 (warp, along y): level at each crossing, half a cosine between. */
+/* Makes yarn number i of class 0 (weft, along x) or 1 (warp, along y): level at each crossing, and half a cosine
+ * between. */
 static status add_woven_yarn(struct strand_set *s, const struct weave *w, int class, size_t i, struct error *err)
 {
     size_t n_cross = w->n_yarn[1 - class];
@@ -71,7 +72,7 @@ static status add_woven_yarn(struct strand_set *s, const struct weave *w, int cl
 status weave_make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
 {
     struct weave w = {.o = o, .n_yarn = {o->n_yarn[0], o->n_yarn[1]}};
-    /* the pile of a velvet rises between ground yarns, which leave it room */
+    /* the pile of a velvet rises between ground yarns, which need gaps for it */
     double cover = o->weave == PHANTOM_VELVET ? 0.7 * o->cover : o->cover, height_m = 0.0;
     for (int class = 0; class < 2; class ++) {
         double section_m = yarn_section_radius_m(o, o->fiber_radius_m[class]);
@@ -95,8 +96,8 @@ status weave_make(struct strand_set *s, const struct phantom_option *o, struct p
     return pile_add(s, o, 2.0 * w.amplitude_m, err);
 }
 
-/* Jersey: x = t + a sin 2t, y = h cos t, z = d cos 2t in units of a wale's width / 2 pi. Heads and feet come to one side, legs to the
- * other; courses 5 units apart hang each head over the legs of the next. */
+/* Jersey: x = t + a sin 2t, y = h cos t, z = d cos 2t, in units of a wale's width / 2 pi. Heads and feet are on one
+ * side, legs on the other. Courses are 5 units apart, so each head hangs over the legs of the next course. */
 status knit_make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
 {
     static const double a = 1.5, h = 4.0, d = 1.0, course = 5.0, yarn = 0.8;

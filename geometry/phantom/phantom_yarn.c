@@ -1,4 +1,5 @@
-/* Fibers of one yarn: hexagonal lattice in a flattened section, twisted about the path, migrating; and fly-aways. */
+/* Fibers of one yarn, on a hexagonal lattice in a flattened section, twisted about the path and migrating; and its
+ * fly-aways. */
 #include "base/rng.h"
 #include "geometry/phantom/phantom_strand.h"
 
@@ -22,8 +23,9 @@ static int by_distance(const void *a, const void *b)
     return ax < ay ? -1 : ax > ay;
 }
 
-/* The n orbits nearest to the centre of the lattice with spacing 1, one representative in the sector 0 <= angle < 60 degrees each.
- * The others follow by turning. Returns the number found (n unless n is enormous). */
+/* Finds the n orbits nearest to the centre of the lattice with spacing 1, with one representative of each in the
+ * sector 0 <= angle < 60 degrees; the others follow by rotation. Returns the number found (n unless n is extremely
+ * large). */
 static size_t lattice_orbits(struct orbit *orbit, size_t n)
 {
     static const double half_sqrt3 = 0.86602540378443865;
@@ -58,7 +60,7 @@ double yarn_section_radius_m(const struct phantom_option *o, double fiber_radius
     return fiber_radius_m * (1.0 + rho * lattice_spacing(o->packing));
 }
 
-/* A point at lattice position (rho_m, angle) of the section, s tiles along the yarn. */
+/* Point at lattice position (rho_m, angle) of the section, s tiles along the yarn. */
 static void section_point(const struct yarn *y, const struct yarn_section *c, double s, double rho_m, double angle,
                           double out[3])
 {
@@ -66,7 +68,8 @@ static void section_point(const struct yarn *y, const struct yarn_section *c, do
     yarn_point(y, c, s, rho_m * cos(turned), rho_m * sin(turned), out);
 }
 
-/* The strands that one orbit of lattice points makes: turning by k sixths a tile, a fiber meets itself after 6 / gcd(k, 6) tiles. */
+/* Adds the strands of one orbit of lattice points. With a rotation by k sixths per tile a fiber meets itself after 6
+ * / gcd(k, 6) tiles. */
 static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y,
                         const struct yarn_section *c, double rho_m, double angle, struct rng *rng, struct error *err)
 {
@@ -94,8 +97,8 @@ static status add_orbit(struct strand_set *s, const struct phantom_option *o, co
     return STATUS_OK;
 }
 
-/* A hair that leaves the yarn's surface and bends away from it. Lengths relative to the yarn after the fits in Zhao et al. 2016:
- * reach about half a yarn radius, with wide scatter. */
+/* Adds a hair that leaves the surface of the yarn and bends away from it. Its lengths relative to the yarn follow
+ * the fits in Zhao et al. 2016: its reach is about half a yarn radius, with a wide spread. */
 static status add_flyaway(struct strand_set *s, const struct yarn *y, const struct yarn_section *c,
                           double section_radius_m, struct rng *rng, struct error *err)
 {

@@ -1,5 +1,6 @@
-/* Parameter files of real yarns: "key: value" lines, lengths in centimetres. The layout is that of the generator published with
- * Zhao et al. 2016; keys that only steer that generator (its box and step sizes) are read over. */
+/* Reads parameter files of real yarns: "key: value" lines, lengths in centimetres. The layout is that of the
+ * generator published with Zhao et al. 2016. Keys that only control that generator (its box and step sizes) are
+ * skipped. */
 #include "geometry/phantom/phantom.h"
 
 #include <math.h>

@@ -18,7 +18,7 @@ struct cell_range {
     long low[3], high[3];
 };
 
-/* Cells touched by a box; x and y may run beyond the tile (wrapped later), at most once around. */
+/* Cells touched by a box. x and y may exceed the tile by at most one period; they are wrapped later. */
 static struct cell_range range_of(const struct segment_grid *g, const double low[3], const double high[3])
 {
     struct cell_range r;
@@ -39,7 +39,7 @@ static size_t cell_index(const struct segment_grid *g, long i, long j, long k)
     return (size_t)((k * g->n[1] + y) * g->n[0] + x);
 }
 
-/* Pass 0 counts, pass 1 fills. */
+/* Pass 0 counts, and pass 1 fills. */
 static void enter_segments(struct segment_grid *g, int pass)
 {
     const struct fiber_set *f = g->f;
@@ -121,7 +121,7 @@ static void look_at(const struct segment_grid *g, size_t v, const double p[3], s
     }
     double t = length2 > 0.0 ? fmax(0.0, fmin(1.0, dot / length2)) : 0.0, distance2 = 0.0;
     for (int k = 0; k < 3; k++) distance2 += (q[k] - t * d[k]) * (q[k] - t * d[k]);
-    /* ties go to the lower number, whatever the order of the cells */
+    /* of equal distances the lower number wins, whatever the order of the cells */
     if (distance2 > *best2 || (distance2 == *best2 && v >= best->i_vertex)) return;
     *best2 = distance2;
     best->i_vertex = v;

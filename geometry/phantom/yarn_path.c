@@ -1,16 +1,16 @@
-/* The path of a yarn: its length, and points of space from points of the yarn's section. */
+/* The path of a yarn: its length, and the map from points of its section to space. */
 #include "geometry/phantom/phantom_strand.h"
 
 #include <math.h>
 
-/* Path point and frame at parameter s in [0, 1): tangent t, b in the cloth's plane, n = t x b upwards. */
+/* Point and frame of the path at parameter s in [0, 1): tangent t, b in the plane of the cloth, n = t x b upwards. */
 static void path_at(const struct yarn *y, double s, double point[3], double b[3], double n[3])
 {
     double at = s * (double)y->n;
     size_t i = (size_t)at % y->n;
     double w = at - floor(at);
     double q[4][3];
-    for (int k = 0; k < 4; k++) { /* four points around, wrapped with the shift */
+    for (int k = 0; k < 4; k++) { /* four points around s, wrapped with the shift */
         long j = (long)i + k - 1, m = (long)y->n;
         long turn = j < 0 ? -1 : j >= m ? 1 : 0;
         for (int a = 0; a < 3; a++) q[k][a] = y->point[j - turn * m][a] + (a < 2 ? (double)turn * y->shift[a] : 0.0);

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Solid is not the mode of the material but what 90 % of it stay below: of two yarns the denser one must keep its texture. */
+/* Solid material is not the mode of the material but its 90 % quantile: if there are two yarns, the denser one must
+ * keep its texture. */
 static const double DENSE_SHARE = 0.9;
 
 enum { N_BIN = 1024, N_SAMPLE = 1 << 22 };
@@ -54,7 +55,7 @@ static status check_values(const struct volume *v, float *least, float *most, st
     return STATUS_OK;
 }
 
-/* Places are a lattice with the stride that gives at most N_SAMPLE of them. */
+/* Stride of a lattice with at most N_SAMPLE places. */
 static size_t lattice_stride(const size_t n[3])
 {
     size_t stride = 1;
@@ -80,7 +81,7 @@ static double collect(const struct volume *v, struct histogram *h)
     return total;
 }
 
-/* Narrow the range to what 99.99 % of the values need, so that single hot voxels do not eat the bins. */
+/* Narrows the range to 99.99 % of the values, so that single extreme voxels do not take most of the bins. */
 static void trim_range(struct histogram *h, double total)
 {
     double below = 0.0, above = 0.0;
@@ -145,7 +146,7 @@ static double mean_bin(const struct histogram *h, size_t from, size_t to)
     return w > 0.0 ? s / w : 0.5 * (double)(from + to);
 }
 
-/* Bin below which `share` of the counts from..to-1 lie. */
+/* Bin below which `share` of the counts of from..to-1 lie. */
 static size_t quantile_bin(const struct histogram *h, size_t from, size_t to, double share)
 {
     double total = 0.0, sum = 0.0;
@@ -169,7 +170,8 @@ status density_modes_find(const struct volume *v, struct density_modes *m, struc
     collect(v, &h);
     size_t threshold = otsu(&h, &m->separability), dense = quantile_bin(&h, threshold, N_BIN, DENSE_SHARE);
     smooth_histogram(&h, 8.0);
-    /* A peak next to the threshold is the other side's tail: then that side has no mode of its own and its mean must do. */
+    /* A peak next to the threshold is the tail of the other side. That side then has no mode of its own, so its mean
+     * is used. */
     size_t low = peak(&h, 0, threshold), high = peak(&h, threshold, N_BIN);
     double low_bin = low + 2 < threshold ? (double)low : mean_bin(&h, 0, threshold);
     double high_bin = high > threshold + 2 ? (double)high : mean_bin(&h, threshold, N_BIN);
@@ -223,12 +225,12 @@ double density_noise_sd(const struct volume *v)
         for (size_t j = 1; j + 1 < v->n[1]; j += step)
             for (size_t i = 1; i + 2 < v->n[0] && n < MAX_VALUE; i += step) {
                 float mean = mean27(v, i, j, k), x = v->density[volume_index(v->n, i, j, k)];
-                /* What is clamped at 0 or 1 has lost its noise; the other half is a half-normal distribution. */
+                /* A value clamped at 0 or 1 has lost its noise. The others have a half-normal distribution. */
                 if ((mean < 0.15f || mean > 0.85f) && x > 0.0f && x < 1.0f) value[n++] = fminf(x, 1.0f - x);
             }
     }
     double sd = 0.0;
-    if (n > 100) { /* its median is 0.6745 sd */
+    if (n > 100) { /* whose median is 0.6745 standard deviations */
         qsort(value, n, sizeof *value, compare_float);
         sd = (double)value[n / 2] / 0.6745;
     }

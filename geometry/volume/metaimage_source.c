@@ -1,6 +1,6 @@
-/* MetaImage: a text header "Key = value" (.mhd) with the data in a file beside it, or header and data
- * in one file (.mha, ElementDataFile = LOCAL). Lengths are in DistanceUnits, else millimetres. Compressed data is zlib's.
- * Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
+/* The MetaImage format: a text header "Key = value" (.mhd) with the data in a file beside it, or header and data in
+ * one file (.mha, ElementDataFile = LOCAL). Lengths are in DistanceUnits, by default millimetres. Compressed data is
+ * zlib's. Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
 #include "base/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/volume_reader.h"
@@ -16,10 +16,10 @@
 enum { MAX_HEADER_BYTES = 65536 };
 
 struct metaimage {
-    char *name; /* of the header, for errors */
+    char *name; /* of the header file, for errors */
     char *data_path;
     struct voxel_layout layout;
-    double spacing[3], unit_m; /* of one unit of spacing */
+    double spacing[3], unit_m; /* metres per unit of spacing */
     bool is_local, has_type, has_size, has_data;
     struct voxel_stream *stream;
 };
@@ -79,7 +79,7 @@ static status parse_spacing(struct metaimage *m, const char *value, struct error
     return STATUS_OK;
 }
 
-/* MetaIO knows these four; "?" is its default. */
+/* MetaIO has these four units; "?" is its default. */
 static status parse_unit(struct metaimage *m, const char *value, struct error *err)
 {
     static const struct {
@@ -105,7 +105,7 @@ static status parse_data_file(struct metaimage *m, const char *header_path, cons
     if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
         return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': data in a list of files is not supported", m->name);
-    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not reach outside its own folder */
+    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not refer to files outside its own folder */
         return bad(m, err, "ElementDataFile must be a file beside the header, not", value);
     m->data_path = voxel_stream_beside(header_path, value);
     return m->data_path != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
@@ -139,13 +139,13 @@ static status parse_line(struct metaimage *m, const char *header_path, const cha
         char *end;
         m->layout.offset_bytes = strtoll(value, &end, 10);
         return end != value && m->layout.offset_bytes >= -1 ? STATUS_OK
-                                                            : bad(m, err, "HeaderSize makes no sense:", value);
+                                                            : bad(m, err, "HeaderSize is not valid:", value);
     }
     if (strcmp(key, "ElementDataFile") == 0) return parse_data_file(m, header_path, value, err);
-    return STATUS_OK; /* everything else says nothing about the voxels */
+    return STATUS_OK; /* other keys do not concern the voxels */
 }
 
-/* Header lines up to ElementDataFile, which is the last by definition. */
+/* Reads header lines up to ElementDataFile, which is the last by definition. */
 static status parse_header(struct metaimage *m, const char *path, FILE *file, struct error *err)
 {
     char line[4096];
@@ -199,7 +199,7 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
     if (s == STATUS_OK && m->is_local) m->layout.offset_bytes = ftell(header);
     if (m->layout.compressed && m->layout.offset_bytes < 0) m->layout.offset_bytes = 0;
     fclose(header);
-    if (s == STATUS_OK && n_path > 1) /* uploads name the data file, too; nothing else makes sense */
+    if (s == STATUS_OK && n_path > 1) /* uploads name the data file as well; other files are an error */
         for (size_t i = 1; i < n_path && s == STATUS_OK; i++)
             if (strcmp(path[i], m->data_path) != 0)
                 s = bad(m, err, "its ElementDataFile is not", path_file_name(path[i]));

@@ -1,6 +1,6 @@
-/* NRRD: a text header "field: value" that an empty line ends, with the data after it (.nrrd) or in a file beside it (.nhdr).
- * Read: three dimensions of scalars, encodings raw and gzip, lengths from "spacings" or from the lengths of "space directions"
- * in the stated unit (millimetres when none is stated).
+/* The NRRD format: a text header "field: value" that ends with an empty line, with the data after it (.nrrd) or in a
+ * file beside it (.nhdr). Supported are three dimensions of scalars and the encodings raw and gzip. Lengths come
+ * from "spacings" or from the lengths of "space directions", in the stated unit or by default in millimetres.
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
 #include "base/durable.h"
 #include "base/option_id.h"
@@ -17,7 +17,7 @@
 enum { MAX_HEADER_BYTES = 65536 };
 
 struct nrrd {
-    char *name;      /* of the header, for errors */
+    char *name;      /* of the header file, for errors */
     char *data_path; /* detached data, or NULL */
     struct voxel_layout layout;
     double spacing[3], direction_length[3], unit_m[3];
@@ -100,7 +100,7 @@ static status parse_sizes(struct nrrd *m, const char *value, struct error *err)
     return STATUS_OK;
 }
 
-/* Left NaN where the file says "nan" or "none": unknown, to be given by the job. */
+/* Leaves NaN if the file says "nan" or "none": the size is unknown, and the job must give it. */
 static status parse_spacings(struct nrrd *m, const char *value, struct error *err)
 {
     const char *p = value;
@@ -115,7 +115,7 @@ static status parse_spacings(struct nrrd *m, const char *value, struct error *er
     return STATUS_OK;
 }
 
-/* "(0.002,0,0) (0,0.002,0) (0,0,0.002)": a voxel's edges in space; their lengths are the spacings. */
+/* "(0.002,0,0) (0,0.002,0) (0,0,0.002)": the edges of a voxel in space. Their lengths are the spacings. */
 static status parse_directions(struct nrrd *m, const char *value, struct error *err)
 {
     const char *p = value;
@@ -139,7 +139,7 @@ static status parse_directions(struct nrrd *m, const char *value, struct error *
     return STATUS_OK;
 }
 
-/* "\"mm\" \"mm\" \"mm\"" */
+/* For example "\"mm\" \"mm\" \"mm\"". */
 static status parse_units(struct nrrd *m, const char *value, struct error *err)
 {
     static const struct {
@@ -178,7 +178,7 @@ static status parse_encoding(struct nrrd *m, const char *value, struct error *er
     m->layout.compressed = strcasecmp(value, "gzip") == 0 || strcasecmp(value, "gz") == 0;
     if (m->layout.compressed || strcasecmp(value, "raw") == 0) return STATUS_OK;
     return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
-                           "cannot read volume '%s': encoding '%.40s' is not supported: save it as raw or gzip",
+                           "cannot read volume '%s': encoding '%.40s' is not supported; save it as raw or gzip",
                            m->name, value);
 }
 
@@ -196,7 +196,7 @@ static status parse_data_file(struct nrrd *m, const char *path, const char *valu
         return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                                "cannot read volume '%s': data in a list of files is not supported", m->name);
     if (strncmp(value, "./", 2) == 0) value += 2;
-    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not reach outside its own folder */
+    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not refer to files outside its own folder */
         return bad(m, err, "the data file must be beside the header, not", value);
     free(m->data_path);
     m->data_path = voxel_stream_beside(path, value);
@@ -209,7 +209,7 @@ static status parse_skip(struct nrrd *m, const char *value, long long least, lon
     errno = 0;
     *skip = strtoll(value, &end, 10);
     if (end == value || *end != '\0' || errno != 0 || *skip < least || *skip > 1LL << 40)
-        return bad(m, err, "a skip makes no sense:", value);
+        return bad(m, err, "a skip is not valid:", value);
     return STATUS_OK;
 }
 
@@ -229,7 +229,7 @@ static status parse_field(struct nrrd *m, const char *path, const char *key, con
         return parse_skip(m, value, 0, &m->line_skip, err);
     if (strcasecmp(key, "byte skip") == 0 || strcasecmp(key, "byteskip") == 0)
         return parse_skip(m, value, -1, &m->byte_skip, err);
-    return STATUS_OK; /* everything else says nothing about the voxels */
+    return STATUS_OK; /* other fields do not concern the voxels */
 }
 
 static status check_complete(const struct nrrd *m, struct error *err)
@@ -245,7 +245,7 @@ static status check_complete(const struct nrrd *m, struct error *err)
     return STATUS_OK;
 }
 
-/* Header lines up to the empty one, or to the end of a detached header. */
+/* Reads header lines up to the empty one, or to the end of a detached header. */
 static status parse_header(struct nrrd *m, const char *path, FILE *file, struct error *err)
 {
     char line[4096];
@@ -269,12 +269,12 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
     return check_complete(m, err);
 }
 
-/* Where the data begin, "line skip" lines later. */
+/* Finds the offset of the data, after "line skip" lines. */
 static status find_data(struct nrrd *m, FILE *header, struct error *err)
 {
     FILE *file = header;
     if (m->data_path != NULL) file = fopen(m->data_path, "rbe");
-    if (file == NULL) return STATUS_OK; /* voxel_stream_open says why */
+    if (file == NULL) return STATUS_OK; /* voxel_stream_open reports the error */
     for (long long i = 0; i < m->line_skip; i++) {
         int c;
         do c = fgetc(file);
@@ -304,7 +304,7 @@ static void nrrd_close(void *handle)
 static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path, struct error *err)
 {
     const char *data = m->data_path != NULL ? m->data_path : path[0];
-    for (size_t i = 1; i < n_path; i++) /* uploads name the data file, too; nothing else makes sense */
+    for (size_t i = 1; i < n_path; i++) /* uploads name the data file as well; other files are an error */
         if (strcmp(path[i], data) != 0) return bad(m, err, "its data file is not", path_file_name(path[i]));
     m->layout.swap = m->big_endian != (BYTE_ORDER == BIG_ENDIAN);
     status s = voxel_stream_open(m->name, data, &m->layout, &m->stream, err);

@@ -26,19 +26,19 @@ status raw_source_open(const char *const *path, size_t n_path, const struct volu
     struct voxel_stream *stream = NULL;
     if (n_path != 1)
         return error_set_field(err, STATUS_INVALID, OPTION_RAW,
-                               "cannot read the volume: 'raw' describes one file, %zu are given", n_path);
+                               "cannot read the volume: 'raw' describes one file, but %zu are given", n_path);
     if (!sample_type_of_name(d->type, &layout.sample))
         return error_set_field(err, STATUS_INVALID, OPTION_RAW_TYPE,
                                "cannot read volume '%s': unknown sample type '%s'", path_file_name(path[0]), d->type);
     for (int a = 0; a < 3; a++)
         if (d->n[a] == 0 || d->n[a] > VOXEL_STREAM_MAX_EDGE)
             return error_set_field(err, STATUS_INVALID, OPTION_RAW_SHAPE,
-                                   "cannot read volume '%s': a shape of %zu x %zu x %zu voxels makes no sense",
+                                   "cannot read volume '%s': a shape of %zu x %zu x %zu voxels is not possible",
                                    path_file_name(path[0]), d->n[0], d->n[1], d->n[2]);
-    if (d->header_bytes > LLONG_MAX) /* a negative offset would mean something else */
+    if (d->header_bytes > LLONG_MAX) /* as an offset it would be negative */
         return error_set_field(err, STATUS_INVALID, OPTION_RAW_HEADER,
-                               "cannot read volume '%s': a header of %zu bytes makes no sense", path_file_name(path[0]),
-                               d->header_bytes);
+                               "cannot read volume '%s': a header of %zu bytes is not possible",
+                               path_file_name(path[0]), d->header_bytes);
     memcpy(layout.n, d->n, sizeof layout.n);
     layout.swap = d->big_endian != (BYTE_ORDER == BIG_ENDIAN);
     status s = voxel_stream_open(path_file_name(path[0]), path[0], &layout, &stream, err);

@@ -21,8 +21,8 @@ enum sample_type {
 size_t sample_bytes(enum sample_type t);
 /* "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64". */
 const char *sample_name(enum sample_type t);
-/* Converts n samples of type t at data, which need not be aligned, to value[n]. swap: they have the byte order opposite to
- * the machine's; their bytes are then reversed in place. */
+/* Converts n samples of type t at data, which need not be aligned, to value[n]. swap: they have the byte order
+ * opposite to the machine's; their bytes are then reversed in place. */
 void sample_to_float(enum sample_type t, bool swap, size_t n, void *data, float *value);
 
 #endif

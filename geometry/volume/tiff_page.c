@@ -23,8 +23,9 @@ static bool page_sample(uint16_t bits, uint16_t format, enum sample_type *t)
     return false;
 }
 
-/* How many bytes one stored byte can stand for. Constant slices come near: 1032 with deflate, 7000 with LZMA, 32768 with zstd
- * (blocks of 128 KiB in four bytes); LERC stores one block of 90 bytes whatever the slice's size. The others stay far below. */
+/* Upper bound on the decoded bytes per stored byte. Constant slices come near it: 1032 with deflate, 7000 with LZMA,
+ * 32768 with zstd (blocks of 128 KiB in four bytes). LERC stores one block of 90 bytes whatever the size of the
+ * slice. The others stay far below. */
 static uint64_t most_expansion(uint16_t compression)
 {
     switch (compression) {
@@ -66,9 +67,10 @@ status tiff_page_read(TIFF *tiff, const char *name, size_t page, struct tiff_pag
         return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': page %zu has no pixels",
                                name, page);
     if (p->width > MAX_EDGE || p->height > MAX_EDGE)
-        return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu has %u x %u pixels, the limit is %d an edge", name,
-                               page, p->width, p->height, MAX_EDGE);
+        return error_set_field(
+            err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
+            "cannot read volume '%s': page %zu has %u x %u pixels, but the limit is %d along each edge", name, page,
+            p->width, p->height, MAX_EDGE);
     if (k.per_pixel != 1 || k.photometric == PHOTOMETRIC_PALETTE)
         return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu is a color image", name, page);

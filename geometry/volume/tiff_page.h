@@ -1,4 +1,4 @@
-/* One page of a TIFF volume: what its tags say, and whether a volume can have such a page. */
+/* One page of a TIFF volume: reads its tags, and checks whether a volume can have such a page. */
 #ifndef SELVEDGE_GEOMETRY_TIFF_PAGE_H
 #define SELVEDGE_GEOMETRY_TIFF_PAGE_H
 
@@ -14,16 +14,16 @@ struct tiff_page {
     uint16_t bits, compression; /* values of the tags, as libtiff names them */
 };
 
-/* Reads the tags of the current page. name: of the file, page: its number from 1, both for errors. STATUS_FORMAT (no pixels,
- * a color image), STATUS_TOO_LARGE, STATUS_UNSUPPORTED (white is zero, an unknown kind of samples). */
+/* Reads the tags of the current page. name: of the file, page: its number from 1, both for errors. STATUS_FORMAT (no
+ * pixels, a color image), STATUS_TOO_LARGE, STATUS_UNSUPPORTED (white is zero, an unknown kind of samples). */
 status tiff_page_read(TIFF *tiff, const char *name, size_t page, struct tiff_page *p, struct error *err);
 /* STATUS_FORMAT unless p has the edges and the sample type of the volume's first page. */
 status tiff_page_compare(const struct tiff_page *p, const struct tiff_page *first, const char *name, size_t page,
                          struct error *err);
-/* Bytes of the page's samples, decoded. */
+/* Bytes of the decoded samples of the page. */
 uint64_t tiff_page_bytes(const struct tiff_page *p);
-/* Whether the stored bytes of the current page lie in its file of file_bytes bytes and can be enough for what its tags
- * promise. To be asked before memory is allocated for the page. */
+/* Returns whether the stored bytes of the current page lie in its file of file_bytes bytes and can suffice for what
+ * its tags state. To be called before memory is allocated for the page. */
 bool tiff_page_fits(TIFF *tiff, const struct tiff_page *p, uint64_t file_bytes);
 
 #endif

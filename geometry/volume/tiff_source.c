@@ -1,5 +1,6 @@
-/* TIFF volumes: one multi-page file, or several files in order. libtiff decodes, so any compression it knows is read.
- * Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our error text. */
+/* TIFF volumes: one multi-page file, or several files in order. libtiff decodes them, so all its compressions are
+ * supported. Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our
+ * error texts. */
 #include "base/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/tiff_page.h"
@@ -24,15 +25,16 @@ struct tiff_handle {
     size_t n_path;
     struct page *page;
     size_t n_page;
-    struct tiff_page first; /* all others are like it */
-    TIFF *tiff;             /* the file open now */
+    struct tiff_page first; /* all other pages have the same tags */
+    TIFF *tiff;             /* the file that is open at present */
     size_t i_open;
     void *block; /* one strip or tile */
     size_t block_bytes;
-    char message[256]; /* libtiff's first words since the last clear */
+    char message[256]; /* libtiff's first message since the last reset */
 };
 
-/* libtiff begins some texts with "path: "; the user knows the file by its name, and folders of the server are no business of his. */
+/* Removes "path: ", with which libtiff starts some texts: users know the file by its name, and must not see folders
+ * of the server. */
 static void drop_path(struct tiff_handle *h)
 {
     size_t n = strlen(h->path[h->i_open]);
@@ -51,7 +53,7 @@ static int keep_message(TIFF *tiff, void *user, const char *module, const char *
         if (n > 0 && h->message[n - 1] == '.') h->message[n - 1] = '\0';
         drop_path(h);
     }
-    return 1; /* handled: libtiff's global handlers, which print, are not called */
+    return 1; /* handled: libtiff does not call its global handlers, which print */
 }
 
 static int drop_message(TIFF *tiff, void *user, const char *module, const char *format, va_list argument)
@@ -84,15 +86,16 @@ static status open_file(struct tiff_handle *h, size_t i_path, struct error *err)
     TIFFOpenOptionsSetErrorHandlerExtR(option, keep_message, h);
     TIFFOpenOptionsSetWarningHandlerExtR(option, drop_message, h);
     h->i_open = i_path;
-    h->tiff = TIFFOpenExt(h->path[i_path], "rm", option); /* m: no memory map, a file cut short must not be a SIGBUS */
+    /* m: no memory map, because a file that is too short would raise SIGBUS */
+    h->tiff = TIFFOpenExt(h->path[i_path], "rm", option);
     TIFFOpenOptionsFree(option);
     if (h->tiff == NULL)
         return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s", name, cause(h));
     return STATUS_OK;
 }
 
-/* Checks the current page, number i_page from 0: it can be read, is like the first one, and the file, which has file_bytes
- * bytes, is long enough for it. STATUS_FORMAT, STATUS_TOO_LARGE, STATUS_UNSUPPORTED. */
+/* Checks the current page, number i_page from 0: it can be read, has the same tags as the first one, and the file of
+ * file_bytes bytes is long enough for it. STATUS_FORMAT, STATUS_TOO_LARGE, STATUS_UNSUPPORTED. */
 static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_bytes, struct error *err)
 {
     const char *name = path_file_name(h->path[h->i_open]);
@@ -109,7 +112,7 @@ static status check_page(struct tiff_handle *h, size_t i_page, uint64_t file_byt
     if (!tiff_page_fits(h->tiff, &p, file_bytes))
         return error_set_field(
             err, STATUS_FORMAT, OPTION_SCAN_FILES,
-            "cannot read volume '%s': page %zu promises %u x %u pixels, the file is too short for them", name,
+            "cannot read volume '%s': page %zu states %u x %u pixels, but the file is too short for them", name,
             i_page + 1, p.width, p.height);
     return STATUS_OK;
 }
@@ -181,7 +184,8 @@ static status tiff_open(const char *const *path, size_t n_path, void **handle, s
         if (s != STATUS_OK) goto fail;
     }
     *info = (struct volume_source_info){.n = {h->first.width, h->first.height, h->n_page},
-                                        .voxel_size_m = {NAN, NAN, NAN}, /* TIFF resolution tags are rarely meant */
+                                        /* TIFF resolution tags are rarely meaningful */
+                                        .voxel_size_m = {NAN, NAN, NAN},
                                         .sample = sample_name(h->first.sample)};
     *handle = h;
     return STATUS_OK;

@@ -13,15 +13,15 @@ enum { N_BLOCK = 64, REACH = 4 };
 
 static const double SIZE_PENALTY = 0.05;
 
-/* What remains of the volume for the search: for axis a (0 x, 1 y) every slice in blocks of the two other axes. */
+/* The volume reduced for the search: for axis a (0 x, 1 y) every slice, averaged over blocks of the two other axes. */
 struct profile {
     const struct volume *v;
     float material, void_value;
-    size_t block[3], n_block[3]; /* voxels a block, blocks along an axis */
-    size_t z_low, z_high;        /* where the material is: 99 % of it */
+    size_t block[3], n_block[3]; /* voxels per block; number of blocks along an axis */
+    size_t z_low, z_high;        /* range that holds 99 % of the material */
     double *n_material;          /* per z */
     float *mean[2];              /* [axis]: slice x block of the other in-plane axis x block of z */
-    _Atomic uint8_t *outside;    /* nx x ny: 1 where a cell of the column lies outside */
+    _Atomic uint8_t *outside;    /* nx x ny: 1 if a voxel of the column lies outside */
 };
 
 static void count_slice(void *context, size_t k, size_t i_thread)
@@ -50,7 +50,7 @@ static status find_z_range(struct profile *p, struct error *err)
     return STATUS_OK;
 }
 
-/* Slices of one block of z, added up in order. */
+/* Adds the slices of one block of z in order. */
 static void add_block(void *context, size_t bz, size_t i_thread)
 {
     (void)i_thread;
@@ -105,14 +105,16 @@ static status make_profile(struct profile *p, struct thread_pool *pool, const st
     return s == STATUS_OK ? s : error_set(err, s, "cropping the volume was cancelled");
 }
 
-/* Size of a rectangle of columns: its area times the smaller of its shares of the edges, so that it is not a strip. */
+/* Size of a rectangle of columns: its area times the smaller of its shares of the edges, so that narrow strips count
+ * little. */
 static double rectangle_size(const size_t n[3], size_t width, size_t height)
 {
     double share[2] = {(double)width / (double)n[0], (double)height / (double)n[1]};
     return share[0] * share[1] * fmin(share[0], share[1]);
 }
 
-/* Largest rectangle of columns that lie in the scan: for every row the widths under heights of runs above it. */
+/* Finds the largest rectangle of columns that lie in the scan: in every row the widest run under each height of
+ * columns above it. */
 static status find_valid(const struct profile *p, size_t valid[4], struct error *err)
 {
     const size_t *n = p->v->n;
@@ -124,7 +126,7 @@ static status find_valid(const struct profile *p, size_t valid[4], struct error 
         return error_set(err, STATUS_NO_MEMORY, "cannot crop the volume: out of memory");
     }
     for (size_t j = 0; j < n[1]; j++) {
-        size_t n_open = 0; /* start[]: stack of columns with rising heights */
+        size_t n_open = 0; /* start[] is a stack of columns with ascending heights */
         for (size_t i = 0; i < n[0]; i++) height[i] = p->outside[j * n[0] + i] ? 0 : height[i] + 1;
         for (size_t i = 0; i <= n[0]; i++) {
             size_t h = i < n[0] ? height[i] : 0;
@@ -153,14 +155,14 @@ struct search {
     const struct profile *p;
     int axis;
     size_t low, high;  /* slices that may be used */
-    size_t from, to;   /* entries of a slice that count */
-    size_t n_entry;    /* of a whole slice */
-    size_t least;      /* slices to keep */
+    size_t from, to;   /* entries of a slice that are compared */
+    size_t n_entry;    /* entries of a whole slice */
+    size_t least;      /* least number of slices to keep */
     float *difference; /* n x n, n = high - low */
     struct candidate {
         double cost, mismatch;
         size_t x0, x1;
-    } * best; /* per first slice */
+    } * best; /* one per first slice */
     double unrelated;
 };
 
@@ -213,7 +215,7 @@ static void find_unrelated(struct search *s)
     s->unrelated = count > 0 ? sum / (double)count : 0.0;
 }
 
-/* box: x0 y0 x1 y1; the part of `axis` is replaced, the rest says which entries count. */
+/* box: x0 y0 x1 y1. The part of `axis` is replaced; the rest selects the entries that are compared. */
 static status search_axis(const struct profile *p, int axis, const size_t valid[4], double keep,
                           struct thread_pool *pool, size_t box[4], double *least_mismatch, struct error *err)
 {
@@ -259,7 +261,7 @@ status tile_crop_find(const struct volume *v, double material, double void_value
     size_t box[4];
     memcpy(box, crop->valid, sizeof box);
     for (int round = 0; round < 2 && s == STATUS_OK && keep < 1.0;
-         round++) /* again, with the other axis as it will be */
+         round++) /* again with the result for the other axis */
         for (int axis = 0; axis < 2 && s == STATUS_OK; axis++)
             s = search_axis(&p, axis, crop->valid, keep, pool, box, &crop->mismatch[axis], err);
     for (int a = 0; a < 2; a++) {
@@ -276,7 +278,7 @@ void volume_crop(struct volume *v, const size_t box[6])
 {
     size_t n[3], at = 0;
     for (int a = 0; a < 3; a++) n[a] = box[3 + a] - box[a];
-    for (size_t k = box[2]; k < box[5]; k++) { /* to the front: nothing is overwritten before it is moved */
+    for (size_t k = box[2]; k < box[5]; k++) { /* towards the front, so nothing is overwritten before it is moved */
         scratch_keep_within(v->space);
         for (size_t j = box[1]; j < box[4]; j++, at += n[0])
             memmove(v->density + at, v->density + volume_index(v->n, box[0], j, k), n[0] * sizeof *v->density);

@@ -23,7 +23,7 @@ void vol_quantise_direction(const float d[3], uint8_t b[2])
     float theta = acosf(fminf(1.0f, sign * d[2] / length)), phi = atan2f(sign * d[1], sign * d[0]);
     if (phi < 0.0f) phi += 2.0f * (float)M_PI;
     long i_phi = lrintf(phi * 255.0f / (2.0f * (float)M_PI));
-    b[0] = (uint8_t)lrintf(theta * 255.0f / (float)M_PI); /* theta <= pi/2: never 255 */
+    b[0] = (uint8_t)lrintf(theta * 255.0f / (float)M_PI); /* theta <= pi/2, so it is never 255 */
     b[1] = (uint8_t)(i_phi >= 255 ? 0 : i_phi);
 }
 
@@ -78,7 +78,7 @@ static void fill_header(uint8_t h[HEADER_BYTES], enum vol_encoding encoding, con
     }
 }
 
-/* A file under a temporary name beside path until it is complete. */
+/* A file that has a temporary name beside path until it is complete. */
 struct vol_writer {
     const char *path;
     char temporary[4096];
@@ -114,7 +114,7 @@ static status writer_close(struct vol_writer *w, status s, struct error *err)
     return s;
 }
 
-/* Voxels of a slice as bytes of the file. */
+/* Encodes voxels of a slice as bytes of the file. */
 typedef void (*encode_slice)(const void *volume, size_t first_voxel, size_t n_voxel, uint8_t *out);
 
 static void encode_density_f32(const void *volume, size_t first, size_t n, uint8_t *out)
@@ -214,7 +214,7 @@ status vol_read_header(FILE *file, const char *name, struct vol_header *h, struc
     struct stat st;
     *h = (struct vol_header){0};
     if (fseeko(file, 0, SEEK_SET) != 0 || fread(b, 1, sizeof b, file) != sizeof b)
-        return bad_header(name, err, "the header is cut short");
+        return bad_header(name, err, "the header is incomplete");
     if (memcmp(b, "VOL\3", 4) != 0) return bad_header(name, err, "not a .vol file of version 3");
     uint32_t encoding = get_u32(b + 4), n_channel = get_u32(b + 20);
     uint64_t n_voxel = 1;
@@ -238,9 +238,10 @@ status vol_read_header(FILE *file, const char *name, struct vol_header *h, struc
     if (fstat(fileno(file), &st) != 0)
         return error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", name);
     uint64_t have = (uint64_t)st.st_size - HEADER_BYTES, want = n_voxel * h->bytes_per_voxel;
-    if (have < want || have - want >= h->n[0] * h->bytes_per_voxel) /* longer by a row: the header is of another file */
+    /* longer by a row: the header belongs to another file */
+    if (have < want || have - want >= h->n[0] * h->bytes_per_voxel)
         return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': %zu x %zu x %zu voxels need %llu bytes, the file has %lld",
+                               "cannot read volume '%s': %zu x %zu x %zu voxels need %llu bytes, but the file has %lld",
                                name, h->n[0], h->n[1], h->n[2], (unsigned long long)(want + HEADER_BYTES),
                                (long long)st.st_size);
     return STATUS_OK;
@@ -275,7 +276,8 @@ static status vol_source_open(const char *const *path, size_t n_path, void **han
     }
     h->file = fopen(path[0], "rbe");
     if (h->file == NULL) s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", h->name);
-    if (s == STATUS_OK && n_path > 1) s = bad_header(h->name, err, "one .vol file is a whole volume, more are given");
+    if (s == STATUS_OK && n_path > 1)
+        s = bad_header(h->name, err, "one .vol file is a whole volume, but more files are given");
     if (s == STATUS_OK) s = vol_read_header(h->file, h->name, &h->header, err);
     if (s == STATUS_OK && h->header.n_channel != 1) s = bad_header(h->name, err, "it holds directions, not densities");
     if (s != STATUS_OK) {

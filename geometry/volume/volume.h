@@ -1,11 +1,10 @@
 /* A regular grid of X-ray densities in memory, and the direction volume computed from it.
  *
- * Frame: the cloth frame. x along the weft, y along the warp, z out of the cloth towards camera and lamp. The centre of
- * voxel (i, j, k) is at (i + 1/2, j + 1/2, k + 1/2) * voxel_size_m; the grid's corner is the origin.
- * Index of voxel (i, j, k): (k * n[1] + j) * n[0] + i.
- * Ownership: init/release for the struct in the caller's memory; the arrays are owned and come from the scratch space (which may hold
- * them in files, base/scratch_space.h), or from malloc where space is NULL.
- */
+ * Frame: the cloth frame, with x along the weft, y along the warp, and z out of the cloth towards camera and light.
+ * The centre of voxel (i, j, k) is at (i + 1/2, j + 1/2, k + 1/2) * voxel_size_m; the corner of the grid is the
+ * origin. The index of voxel (i, j, k) is (k * n[1] + j) * n[0] + i. The caller initialises and releases the
+ * structs, which own their arrays. The arrays come from the scratch space, which may keep them in files
+ * (base/scratch_space.h), or from malloc if space is NULL. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_H
 #define SELVEDGE_GEOMETRY_VOLUME_H
 
@@ -17,11 +16,11 @@
 struct volume {
     size_t n[3];
     double voxel_size_m[3];
-    float *density; /* n[0]*n[1]*n[2]; mapped to [0, 1] after density_map_apply, raw scanner values before */
+    float *density;              /* n[0]*n[1]*n[2]; in [0, 1] after density_map_apply, raw scanner values before */
     struct scratch_space *space; /* not owned */
 };
 
-/* Voxels 0. STATUS_INVALID, STATUS_TOO_LARGE, STATUS_NO_MEMORY; with a space also STATUS_DISK_FULL. */
+/* Makes a volume of zeros. STATUS_INVALID, STATUS_TOO_LARGE, STATUS_NO_MEMORY; with a space also STATUS_DISK_FULL. */
 status volume_init(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct error *err);
 status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space,
                       struct error *err);
@@ -30,8 +29,8 @@ void volume_release(struct volume *v);
 static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
 static inline size_t volume_index(const size_t n[3], size_t i, size_t j, size_t k) { return (k * n[1] + j) * n[0] + i; }
 
-/* Density in [0, 1] as a byte (0 = emptied) and a unit direction as two 16-bit octahedral coordinates: 5 bytes a voxel.
- * A direction and its opposite mean the same fiber. */
+/* Density in [0, 1] as a byte (0: emptied), and a unit direction as two 16-bit octahedral coordinates: 5 bytes per
+ * voxel. A direction and its opposite stand for the same fiber. */
 struct direction_volume {
     size_t n[3];
     double voxel_size_m[3];
@@ -45,7 +44,8 @@ status direction_volume_init(struct direction_volume *v, const size_t n[3], cons
 status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                                 struct scratch_space *space, struct error *err);
 void direction_volume_release(struct direction_volume *v);
-/* Unit direction of a voxel; only meaningful where density > 0. Decoding error below 0.005 degrees. What is set may have any length but 0. */
+/* The direction of a voxel is only meaningful where density > 0. The direction that is set may have any length
+ * except 0; that returned is a unit vector with an error below 0.005 degrees. */
 void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3]);
 void direction_volume_set(struct direction_volume *v, size_t i_voxel, const float d[3]);
 

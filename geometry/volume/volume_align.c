@@ -18,7 +18,7 @@ status axis_map_parse(const char *text, struct axis_map *map, struct error *err)
     }
     if (*p == '\0' && used[0] && used[1] && used[2]) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, OPTION_AXES,
-                           "cannot use axes '%.16s': x, y and z are wanted once each, with '-' before a reversed one",
+                           "cannot use axes '%.16s': x, y and z are needed once each, with '-' before a reversed axis",
                            text);
 }
 
@@ -33,8 +33,8 @@ void volume_resampled_shape(const size_t n_in[3], const double voxel_size_m[3], 
 struct resample {
     const struct volume *in;
     struct volume *out;
-    double column[3][3]; /* step in voxels of in for one voxel of out along each axis */
-    double start[3];     /* voxel coordinate (centres at whole numbers) of out's voxel 0, 0, 0 */
+    double column[3][3]; /* step in voxels of `in` for one voxel of `out` along each axis */
+    double start[3];     /* voxel coordinate in `in` (centres at whole numbers) of voxel 0, 0, 0 of `out` */
 };
 
 static float trilinear(const struct volume *v, const double x[3])
@@ -101,9 +101,9 @@ status volume_resample(const struct volume *in, const double matrix[9], double v
     status s = volume_init_in(out, n, (double[3]){voxel_m, voxel_m, voxel_m}, in->space, err);
     if (s != STATUS_OK) return s;
     struct resample r = {.in = in, .out = out};
-    for (int a = 0; a < 3; a++) { /* a: axis of in */
+    for (int a = 0; a < 3; a++) { /* a: axis of `in` */
         double first = 0.0;
-        for (int b = 0; b < 3; b++) { /* b: axis of out; cells are centred at (i + 1/2) voxel_m */
+        for (int b = 0; b < 3; b++) { /* b: axis of `out`; voxel centres are at (i + 1/2) voxel_m */
             r.column[b][a] = inverse[3 * a + b] * voxel_m / in->voxel_size_m[a];
             first += r.column[b][a] * ((double)box[b] + 0.5 - 0.5 * (double)n_all[b]);
         }

@@ -1,32 +1,32 @@
-/* Bringing a scan into the cloth frame: axis permutation and flips, a 3x3 matrix, a crop box, cubic voxels.
- * (fabric thesis, section 5.7.1: samples were rotated, Silk was sheared, all were cropped to tile.)
- */
+/* Transforms a scan to the cloth frame: axis permutation and flips, a 3x3 matrix, a crop box, cubic voxels. (Fabric
+ * thesis, section 5.7.1: samples were rotated, Silk was sheared, and all were cropped to tile.) */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_ALIGN_H
 #define SELVEDGE_GEOMETRY_VOLUME_ALIGN_H
 
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
-/* Which axis of the file becomes cloth x, y, z, and whether it is reversed. */
+/* The axis of the file that becomes each of cloth x, y, z, and whether it is reversed. */
 struct axis_map {
     int source[3];
     bool flip[3];
 };
 
-/* "xyz", "xzy", "-zx-y": three different letters, each with an optional sign. STATUS_INVALID, field OPTION_AXES. */
+/* Parses "xyz", "xzy", "-zx-y": three different letters, each with an optional sign. STATUS_INVALID, field
+ * OPTION_AXES. */
 status axis_map_parse(const char *text, struct axis_map *map, struct error *err);
 
-/* Value of cells that the matrix brings in from outside of the scan: below every density. */
+/* Value of voxels that the matrix brings in from outside of the scan. It is below every density. */
 #define VOLUME_OUTSIDE (-INFINITY)
 
-/* out(x) = in(c + M^-1 (x - c)) by trilinear interpolation, c the centre of the volume, lengths in metres; out has the
- * voxels of the box (x0 y0 z0 x1 y1 z1) of a grid of the same size as in, with cubic voxels of edge voxel_m (equal to the
- * smallest spacing of in). STATUS_INVALID, field OPTION_MATRIX, for a matrix that cannot be inverted; STATUS_CANCELLED,
- * and as volume_init_in, whose scratch space is that of in. */
+/* Computes out(x) = in(c + M^-1 (x - c)) by trilinear interpolation, where c is the centre of the volume and lengths
+ * are in metres. `out` has the voxels of the box (x0 y0 z0 x1 y1 z1) of a grid of the extent of `in`, with cubic
+ * voxels of edge voxel_m (the smallest spacing of `in`). It uses the scratch space of `in`. STATUS_INVALID, field
+ * OPTION_MATRIX, for a matrix that cannot be inverted; STATUS_CANCELLED, and as volume_init_in. */
 status volume_resample(const struct volume *in, const double matrix[9], double voxel_m, const size_t box[6],
                        struct thread_pool *pool, const struct progress *progress, struct volume *out,
                        struct error *err);
-/* Shape of the whole resampled grid: extents of in over voxel_m, rounded. */
+/* Computes the shape of the whole resampled grid: extents of `in` over voxel_m, rounded. */
 void volume_resampled_shape(const size_t n_in[3], const double voxel_size_m[3], double voxel_m, size_t n_out[3]);
 
 #endif

@@ -10,17 +10,19 @@
 
 typedef struct volume_reader {
     const char *id; /* "tiff.v1" */
-    /* Does this reader take the files? Decided by the first 16 bytes of the first file (zero-padded) and its name. */
+    /* Returns whether this reader can read the files, from the first 16 bytes of the first file (padded with zeros)
+     * and its name. */
     bool (*recognise)(const uint8_t first_byte[16], const char *path);
-    /* On success *handle is closed by close; info is complete but for reader_id. Errors as volume_source_open says. */
+    /* On success the caller closes *handle with close; info is complete except for reader_id. Errors as in
+     * volume_source_open. */
     status (*open)(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
                    struct error *err);
-    /* Slices i_slice .. i_slice + n_slice - 1, which exist, into value[n_slice][rows][columns]. */
+    /* Reads slices i_slice .. i_slice + n_slice - 1, which exist, to value[n_slice][rows][columns]. */
     status (*read)(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);
     void (*close)(void *handle);
 } volume_reader;
 
-/* All formats that a file's beginning or name tells, in the order in which they are asked. */
+/* All formats that can be recognised by the start or the name of a file, in the order in which they are tried. */
 #define VOLUME_READERS(READER) READER(tiff_reader) READER(metaimage_reader) READER(nrrd_reader) READER(vol_reader)
 
 #define VOLUME_READER_DECLARATION(name) extern const volume_reader name;

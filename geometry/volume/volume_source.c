@@ -11,7 +11,7 @@
 
 #define READER_ADDRESS(name) &name,
 static const volume_reader *const reader[] = {VOLUME_READERS(READER_ADDRESS)};
-/* Not in the table: nothing in the file tells that it is this one's. Opened by raw_source_open with a declaration. */
+/* Not in the table, because raw files cannot be recognised. Opened by raw_source_open with a declaration. */
 static const volume_reader raw_reader = {.id = "raw.v1", .read = raw_source_read, .close = raw_source_close};
 
 struct volume_source {

@@ -1,9 +1,8 @@
-/* Scans on disk behind one interface: read slab by slab, whatever the file format.
+/* Scans on disk behind one interface: they are read slab by slab, whatever the file format.
  *
- * A source gives raw scanner values as floats, slices (file's z) in order. The registry of readers is a table of const
- * structs (volume_reader.h); nothing else names a format.
- * Threads: one thread per source. Ownership: open/close.
- */
+ * A source returns raw scanner values as floats, in the order of the file's slices (z). The readers are a table of
+ * const structs (volume_reader.h); no other code names a format. A source may be used by one thread at a time; the
+ * caller opens and closes it. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_SOURCE_H
 #define SELVEDGE_GEOMETRY_VOLUME_SOURCE_H
 
@@ -14,30 +13,32 @@
 
 struct volume_source;
 
-/* What a file without a header holds. n[0] == 0: nothing is declared, the file says itself. */
+/* The content of a file without a header. n[0] == 0: nothing is declared, and the file has a header. */
 struct volume_raw_declaration {
     size_t n[3];  /* columns, rows, slices; x runs fastest */
     char type[8]; /* "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64" */
     bool big_endian;
-    size_t header_bytes; /* to skip at the start of the file */
+    size_t header_bytes; /* bytes to skip at the start of the file */
 };
 
 struct volume_source_info {
     size_t n[3];            /* columns, rows, slices */
-    double voxel_size_m[3]; /* NaN where the file does not say */
+    double voxel_size_m[3]; /* NaN where the file does not state it */
     const char *reader_id;  /* "tiff.v1" */
     const char *sample;     /* "uint8", "uint16", "int16", "float32" */
 };
 
-/* path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, or TIFF slices in order. The field of errors is OPTION_SCAN_FILES.
- * STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files that are not what they claim to be; STATUS_UNSUPPORTED. */
+/* Opens a scan. path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, or
+ * TIFF slices in order. The field of errors is OPTION_SCAN_FILES. STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for
+ * files that do not have their stated format; STATUS_UNSUPPORTED. */
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err);
-/* The same; with a declaration (n[0] > 0) the one file at path is raw samples. Fields OPTION_RAW, OPTION_SCAN_FILES. */
+/* The same; with a declaration (n[0] > 0) the only file at path has raw samples. Fields OPTION_RAW,
+ * OPTION_SCAN_FILES. */
 status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
                                    struct volume_source **source, struct error *err);
 void volume_source_close(struct volume_source *source);
 const struct volume_source_info *volume_source_describe(const struct volume_source *source);
-/* Slices i_slice .. i_slice + n_slice - 1 into value[n_slice][rows][columns]. */
+/* Reads slices i_slice .. i_slice + n_slice - 1 to value[n_slice][rows][columns]. */
 status volume_source_read(struct volume_source *source, size_t i_slice, size_t n_slice, float *value,
                           struct error *err);
 

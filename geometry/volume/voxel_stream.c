@@ -21,7 +21,7 @@ struct voxel_stream {
     uint8_t *in, *slice;
     z_stream inflate;
     bool inflating;
-    size_t next_slice; /* that the inflating stream will give */
+    size_t next_slice; /* next slice of the inflated stream */
 };
 
 static status no_memory(const char *name, struct error *err)
@@ -52,7 +52,7 @@ void voxel_stream_close(struct voxel_stream *v)
     free(v);
 }
 
-/* ", which fits uint8, int8" for the types that would explain the file's length exactly, else "". */
+/* Returns ", which fits uint8, int8" for the types that would give exactly the file's length, else "". */
 static const char *types_that_fit(const struct voxel_layout *l, uint64_t have, char *text, size_t n_text)
 {
     uint64_t n_voxel = (uint64_t)l->n[0] * l->n[1] * l->n[2];
@@ -73,7 +73,7 @@ static status check_size(struct voxel_stream *v, uint64_t size, struct error *er
     uint64_t want = (uint64_t)l->n[0] * l->n[1] * l->n[2] * sample_bytes(l->sample), skip = (uint64_t)l->skip_bytes;
     if (l->offset_bytes == -1) l->offset_bytes = want <= size ? (long long)(size - want) : 0;
     uint64_t offset = (uint64_t)l->offset_bytes, have = size > offset ? size - offset : 0;
-    if (l->compressed) { /* deflate cannot do better than 1 : 1032 */
+    if (l->compressed) { /* the best ratio of deflate is 1032 */
         if (have <= UINT64_MAX / 1100 && (skip > have * 1100 || want > have * 1100 - skip)) goto too_short;
         return STATUS_OK;
     }
@@ -153,7 +153,7 @@ static status short_data(const struct voxel_stream *v, size_t i_slice, struct er
                            path_file_name(v->data_path), i_slice + 1);
 }
 
-/* The next n_byte inflated bytes; gzip members that follow each other are one stream. */
+/* Reads the next n_byte inflated bytes. Consecutive gzip members form one stream. */
 static status inflate_bytes(struct voxel_stream *v, size_t i_slice, uint8_t *out, size_t n_byte, struct error *err)
 {
     v->inflate.next_out = out;
@@ -197,22 +197,23 @@ static status next_inflated(struct voxel_stream *v, size_t i_slice, struct error
         s = inflate_bytes(v, v->next_slice, v->slice, v->slice_bytes, err);
         v->next_slice++;
     }
-    if (s != STATUS_OK && v->inflating) { /* a broken stream starts over next time */
+    if (s != STATUS_OK && v->inflating) { /* after an error the stream starts again at the next read */
         inflateEnd(&v->inflate);
         v->inflating = false;
     }
     return s;
 }
 
-/* After the last slice, with which v->slice is done: compressed data has no length that could be compared before. Another row
- * is more than a writer's padding; that the stream ends, or what follows is none, is as it should be. */
+/* Checks for surplus data after the last slice; v->slice is used as buffer. The length of compressed data cannot be
+ * checked earlier. Another row is more than the padding of a writer, so it is an error; the end of the stream, or
+ * trailing data that cannot be inflated, is not. */
 static status check_end(struct voxel_stream *v, struct error *err)
 {
     const struct voxel_layout *l = &v->layout;
     size_t row_bytes = l->n[0] * sample_bytes(l->sample);
     if (inflate_bytes(v, l->n[2], v->slice, row_bytes, NULL) != STATUS_OK) return STATUS_OK;
     return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                           "cannot read volume '%s': '%s' goes on behind the %zu x %zu x %zu %s voxels of its header",
+                           "cannot read volume '%s': '%s' continues after the %zu x %zu x %zu %s voxels of its header",
                            v->name, path_file_name(v->data_path), l->n[0], l->n[1], l->n[2], sample_name(l->sample));
 }
 
@@ -272,8 +273,8 @@ status voxel_stream_check_order(struct voxel_stream *v, struct error *err)
     if (correlation[0] < 0.1 && correlation[1] > 0.5)
         return error_set_field(
             err, STATUS_FORMAT, OPTION_SCAN_FILES,
-            "cannot read volume '%s': its %s values are noise in the stated byte order and a picture in the other: the "
-            "endianness is stated wrongly",
+            "cannot read volume '%s': its %s values are noise in the stated byte order and a picture in the other; the "
+            "stated byte order is wrong",
             v->name, sample_name(l->sample));
     return STATUS_OK;
 }

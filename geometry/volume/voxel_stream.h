@@ -1,7 +1,6 @@
-/* The voxels of a header-and-data format: plain or deflated (gzip, zlib) samples in a file, from some offset on, read slice by
- * slice. Deflated data are inflated while reading forwards; reading backwards starts over.
- * Threads: one thread a stream. Errors have the field OPTION_SCAN_FILES.
- */
+/* The voxels of a format with header and data: plain or deflated (gzip, zlib) samples in a file from some offset on,
+ * read slice by slice. Deflated data is inflated while it is read forwards; reading backwards starts again. A stream
+ * may be used by one thread at a time. Errors have the field OPTION_SCAN_FILES. */
 #ifndef SELVEDGE_GEOMETRY_VOXEL_STREAM_H
 #define SELVEDGE_GEOMETRY_VOXEL_STREAM_H
 
@@ -11,29 +10,29 @@
 struct voxel_layout {
     size_t n[3]; /* 1 .. VOXEL_STREAM_MAX_EDGE each */
     enum sample_type sample;
-    bool swap; /* byte order opposite to the machine's */
+    bool swap; /* the byte order is opposite to the machine's */
     bool compressed;
-    long long offset_bytes; /* of the data in the file; -1: plain data at the file's end */
-    long long skip_bytes;   /* before the first voxel, counted after inflating */
+    long long offset_bytes; /* of the data in the file; -1: plain data at the end of the file */
+    long long skip_bytes;   /* bytes before the first voxel, after inflating */
 };
 
 enum { VOXEL_STREAM_MAX_EDGE = 1 << 20 };
 
 struct voxel_stream;
 
-/* name: of the header, for errors. Compares the promised size with what is there: STATUS_FORMAT when the file is too short, or
- * longer by a row or more (both mean a wrong shape or type; the text names the types that would fit). STATUS_NOT_FOUND,
- * STATUS_IO, STATUS_TOO_LARGE (a slice over 4 GiB). */
+/* name: of the header, for errors. Compares the stated size with that of the file: STATUS_FORMAT if the file is too
+ * short, or longer by a row or more. Both mean a wrong shape or type, and the text names the types that would fit.
+ * STATUS_NOT_FOUND, STATUS_IO, STATUS_TOO_LARGE (a slice over 4 GiB). */
 status voxel_stream_open(const char *name, const char *data_path, const struct voxel_layout *layout,
                          struct voxel_stream **stream, struct error *err);
 void voxel_stream_close(struct voxel_stream *stream);
-/* Slices i_slice .. i_slice + n_slice - 1 into value[n_slice][rows][columns]. */
+/* Reads slices i_slice .. i_slice + n_slice - 1 to value[n_slice][rows][columns]. */
 status voxel_stream_read(struct voxel_stream *stream, size_t i_slice, size_t n_slice, float *value, struct error *err);
-/* STATUS_FORMAT when the middle slice is noise in the stated byte order (correlation of neighbours below 0.1) and a picture in
- * the other (above 0.5). Deflated data, and slices too small to tell, pass. */
+/* STATUS_FORMAT if the middle slice is noise in the stated byte order (correlation of neighbours below 0.1) and a
+ * picture in the other (above 0.5). Deflated data, and slices too small for this test, pass. */
 status voxel_stream_check_order(struct voxel_stream *stream, struct error *err);
 
-/* file beside the header at header_path, malloc'ed; NULL without memory. */
+/* Returns the path of `file` in the folder of header_path; the caller frees it. NULL if memory is out. */
 char *voxel_stream_beside(const char *header_path, const char *file);
 
 #endif

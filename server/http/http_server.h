@@ -47,15 +47,16 @@ struct http_route {
     void (*begin)(struct http_request *request);
 };
 
-/* Finds the route of a request and the values of its path's parameters. NULL and *allow "": there is no such path; NULL and
- * *allow "GET, POST": the path has only these methods. */
+/* Finds the route of a request and the values of its path's parameters. NULL and *allow "": there is no such path;
+ * NULL and *allow "GET, POST": the path has only these methods. */
 typedef const struct http_route *http_route_finder(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES],
                                                    char *allow, size_t n_allow);
 /* That of the service's endpoints, by the table in http_route.c. */
 http_route_finder http_route_find;
 
-/* Starts the threads that answer requests, each by the route that find_route gives for it. Address and port come from the settings; *port is the port in use. files:
- * see static_files.h. STATUS_INVALID (listen address), STATUS_IO, STATUS_NO_MEMORY. */
+/* Starts the threads that answer requests, each by the route that find_route gives for it. Address and port come
+ * from the settings; *port is the port in use. files: see static_files.h. STATUS_INVALID (listen address),
+ * STATUS_IO, STATUS_NO_MEMORY. */
 status http_server_start(struct job_service *service, http_route_finder *find_route, const struct static_files *files,
                          struct http_server **server, unsigned *port, struct error *err);
 /* Ends all connections and frees the server. What unfinished uploads have received is kept. */

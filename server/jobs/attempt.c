@@ -27,7 +27,7 @@ json_t *attempt_read_status(const struct job_service *v, const char *job_id)
     return NULL;
 }
 
-/* Results and checkpoints of the input as it was before an edit. */
+/* Removes the results and checkpoints that belong to the input before an edit. */
 static status clear_folder(struct job_service *v, const char *job_id, struct error *err)
 {
     static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES, JOB_FILE_LOG, JOB_FOLDER_WORK,
@@ -84,16 +84,16 @@ status attempt_prepare(struct job_service *v, const char *job_id, struct error *
     return s;
 }
 
-bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish)
+bool attempt_read_request(struct job_service *v, const char *job_id, struct attempt_request *request)
 {
     struct job_row row;
-    *wish = (struct attempt_wish){0};
+    *request = (struct attempt_request){0};
     if (store_job_look(v->store, job_id, &row, NULL) != STATUS_OK) return false;
-    wish->cancel = row.cancel_requested;
-    wish->deleted = row.deleted;
+    request->cancel = row.cancel_requested;
+    request->deleted = row.deleted;
     json_t *j = attempt_read_status(v, job_id);
     if (json_integer_value(json_object_get(j, "attempt")) == row.attempt)
-        wish->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
+        request->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
     json_decref(j);
     job_row_release(&row);
     return true;
@@ -106,7 +106,7 @@ static void set_error(struct job_row *row, const char *code, const char *field, 
     snprintf(row->error_text, sizeof row->error_text, "%s", text);
 }
 
-/* The last words of a worker that died without saying why in status.json. */
+/* Copies the end of the console output of a worker that died without an error in status.json. */
 static void console_tail(struct job_service *v, const char *job_id, char *out, size_t n_out)
 {
     char path[PATH_BYTES], *text = NULL;
@@ -135,8 +135,8 @@ static void failed(struct job_service *v, struct job_row *row)
         set_error(row, code == NULL ? "internal" : code, field == NULL ? "" : field, text);
     else {
         console_tail(v, row->id, tail, sizeof tail);
-        snprintf(made, sizeof made, "the worker failed without saying why%s%s", tail[0] ? "; its last words: " : "",
-                 tail);
+        snprintf(made, sizeof made, "the worker failed without an error message%s%s",
+                 tail[0] ? "; its last output: " : "", tail);
         set_error(row, "internal", "", made);
     }
     json_decref(j);
@@ -148,9 +148,9 @@ static void describe_end(struct job_service *v, const struct job_row *row, const
     char tail[300], how[120];
     console_tail(v, row->id, tail, sizeof tail);
     if (stop == STOP_SILENT)
-        snprintf(how, sizeof how, "the worker gave no sign of life and was killed");
+        snprintf(how, sizeof how, "the worker sent no heartbeat and was killed");
     else if (end->by_signal && end->code == SIGKILL)
-        snprintf(how, sizeof how, "the worker was killed (signal 9): out of memory or killed");
+        snprintf(how, sizeof how, "the worker was killed (signal 9), perhaps because memory was out");
     else if (end->by_signal)
         snprintf(how, sizeof how, "the worker crashed with signal %d (%s)", end->code, strsignal(end->code));
     else if (end->code == 127)
@@ -158,11 +158,11 @@ static void describe_end(struct job_service *v, const struct job_row *row, const
     else
         snprintf(how, sizeof how, "the worker ended with the unknown code %d", end->code);
     snprintf(out, n_out, "%s; peak memory %.1f MB%s%s", how, (double)end->peak_rss_bytes / 1e6,
-             tail[0] ? "; its last words: " : "", tail);
+             tail[0] ? "; its last output: " : "", tail);
 }
 
 static void lost(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
-                 struct attempt_verdict *verdict)
+                 struct attempt_outcome *outcome)
 {
     char how[512], text[640];
     describe_end(v, row, end, stop, how, sizeof how);
@@ -171,16 +171,16 @@ static void lost(struct job_service *v, struct job_row *row, const struct worker
     log_warning(v->log, "job %s: attempt %lld was lost: %s", row->id, (long long)row->attempt, how);
     if (row->lost_attempts >= v->settings->max_lost_attempts) {
         row->state = JOB_FAILED;
-        snprintf(text, sizeof text, "%lld attempts were lost, the last one so: %s", (long long)row->lost_attempts, how);
+        snprintf(text, sizeof text, "%lld attempts were lost; the last one: %s", (long long)row->lost_attempts, how);
         set_error(row, "worker_lost", "", text);
         return;
     }
     row->state = JOB_QUEUED;
-    verdict->delay_s = 0.5 * (double)row->lost_attempts;
+    outcome->delay_s = 0.5 * (double)row->lost_attempts;
 }
 
 static void judge(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
-                  struct attempt_verdict *verdict)
+                  struct attempt_outcome *outcome)
 {
     bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
     if (!end->by_signal && end->code == WORKER_SUCCEEDED)
@@ -195,20 +195,20 @@ static void judge(struct job_service *v, struct job_row *row, const struct worke
         failed(v, row);
     else if (!end->by_signal && end->code == WORKER_STALE) {
         row->state = JOB_QUEUED;
-        verdict->busy = true;
-        verdict->delay_s = 1;
+        outcome->busy = true;
+        outcome->delay_s = 1;
     } else
-        lost(v, row, end, stop, verdict);
+        lost(v, row, end, stop, outcome);
 }
 
-status attempt_settle(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
-                      struct attempt_verdict *verdict, struct error *err)
+status attempt_finish(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
+                      struct attempt_outcome *outcome, struct error *err)
 {
     struct job_row row;
     pthread_mutex_lock(&v->change);
     status s = store_job_look(v->store, job_id, &row, err);
     if (s != STATUS_OK) goto out;
-    judge(v, &row, end, stop, verdict);
+    judge(v, &row, end, stop, outcome);
     if (end->peak_rss_bytes > row.peak_rss_bytes) row.peak_rss_bytes = end->peak_rss_bytes;
     bool over = row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED;
     if (over) row.finished_unix_s = clock_wall_s();
@@ -224,7 +224,7 @@ out:
     return s == STATUS_NOT_FOUND ? STATUS_OK : s;
 }
 
-status attempt_give_up(struct job_service *v, const char *job_id, const char *why, struct error *err)
+status attempt_fail(struct job_service *v, const char *job_id, const char *why, struct error *err)
 {
     struct job_row row;
     pthread_mutex_lock(&v->change);

@@ -1,38 +1,39 @@
-/* One attempt at a job: what is written before its worker starts, and what the worker's end means for the job. */
+/* One attempt at a job: writes what its worker needs before it starts, and updates the job when the worker has
+ * ended. */
 #ifndef SELVEDGE_SERVER_ATTEMPT_H
 #define SELVEDGE_SERVER_ATTEMPT_H
 
 #include "server/jobs/job_service.h"
 #include "server/jobs/worker_process.h"
 
-/* Why the daemon asked a worker to stop, strongest first. */
+/* Reasons for which the daemon stops a worker. A reason has precedence over those after it. */
 enum attempt_stop { STOP_NONE, STOP_CANCEL, STOP_SHUTDOWN, STOP_PAUSE, STOP_SILENT };
 
-struct attempt_verdict {
-    double delay_s; /* before the job may start again */
-    bool busy;      /* the folder was locked by another process */
+struct attempt_outcome {
+    double delay_s; /* time before the job may start again */
+    bool busy;      /* another process has locked the folder */
 };
 
-struct attempt_wish {
+struct attempt_request {
     bool cancel, deleted;
-    double heartbeat_unix_s; /* the worker's own clock; 0: no heartbeat of this attempt, or it cannot be read */
+    double heartbeat_unix_s; /* by the clock of the worker; 0: none of this attempt, or it cannot be read */
 };
 
-/* queued -> running: new number and token, job.json, attempt.json, and a clean folder after an edit.
- * STATUS_CONFLICT when the job is not queued any more. */
+/* Changes a job from queued to running: sets a new attempt number and token, writes job.json and attempt.json, and
+ * clears the folder after an edit. STATUS_CONFLICT when the job is no longer queued. */
 status attempt_prepare(struct job_service *v, const char *job_id, struct error *err);
-/* What the running job's owner wants by now, and whether its worker lives. False when the database cannot be read: then
- * nothing is known, and nothing is wished for. */
-bool attempt_look(struct job_service *v, const char *job_id, struct attempt_wish *wish);
-/* running -> succeeded, failed, cancelled, paused or queued. */
-status attempt_settle(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
-                      struct attempt_verdict *verdict, struct error *err);
-/* queued -> failed */
-status attempt_give_up(struct job_service *v, const char *job_id, const char *why, struct error *err);
-/* paused -> queued, all of them */
+/* Reads what users have requested for a running job, and the last heartbeat of its worker. Returns false, with no
+ * request, when the database cannot be read. */
+bool attempt_read_request(struct job_service *v, const char *job_id, struct attempt_request *request);
+/* Changes a job whose worker has ended from running to succeeded, failed, cancelled, paused or queued. */
+status attempt_finish(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
+                      struct attempt_outcome *outcome, struct error *err);
+/* Changes a job from queued to failed. */
+status attempt_fail(struct job_service *v, const char *job_id, const char *why, struct error *err);
+/* Queues all paused jobs. */
 void attempt_resume_paused(struct job_service *v);
 
-/* status.json of a job, or NULL when there is none (or it is damaged). The caller owns the object. */
+/* Returns status.json of a job, owned by the caller, or NULL if there is none or it is damaged. */
 json_t *attempt_read_status(const struct job_service *v, const char *job_id);
 
 #endif

@@ -50,7 +50,7 @@ bool job_active(const struct job_row *row)
 status job_check_editable(const struct job_row *row, struct error *err)
 {
     if (!job_active(row)) return STATUS_OK;
-    return error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s: cancel it first",
+    return error_set(err, STATUS_CONFLICT, "cannot edit the job while it is %s; cancel it first",
                      job_state_name(row->state));
 }
 

@@ -1,5 +1,5 @@
-/* Inside jobs/: how the functions that change a job check its row and write it back. Who writes a row holds the service's lock
- * `change` from reading it to writing it. */
+/* Helpers of this folder: how the functions that change a job check its row and write it back. A function that
+ * writes a row holds the service's lock `change` from reading the row to writing it. */
 #ifndef SELVEDGE_SERVER_JOB_ACCESS_H
 #define SELVEDGE_SERVER_JOB_ACCESS_H
 
@@ -11,10 +11,11 @@ void job_new_id(char out[STORE_ID_BYTES]);
 bool job_active(const struct job_row *row);
 /* STATUS_CONFLICT while the job is active: its document and files must not change then. */
 status job_check_editable(const struct job_row *row, struct error *err);
-/* Makes the row that of a job whose document or files were edited: back to draft, and its next start begins afresh. The
- * caller writes the row together with the edit, so that a job whose edit fails is unchanged. */
+/* Marks the row of a job whose document or files were edited: the job becomes a draft, and its next start discards
+ * earlier progress. The caller writes the row together with the edit, so that a job whose edit fails is unchanged. */
 void job_mark_edited(struct job_row *row);
-/* store_job_update for changes that free space or end work: when the disk is full, the ballast is released for them. */
+/* store_job_update for changes that free space or end work: if the disk is full, the ballast file is released for
+ * them. */
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);
 
 #endif

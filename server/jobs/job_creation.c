@@ -1,4 +1,4 @@
-/* New jobs, and new documents for jobs that exist. */
+/* Creates jobs, and replaces the documents of existing jobs. */
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job/job_document.h"
@@ -69,7 +69,7 @@ static status create_locked(struct job_service *v, struct job_row *row, const ch
     for (int i = 0; i < JOB_N_STATE; i++) n += count[i];
     if (n >= v->settings->max_jobs) {
         refusal->code = "too_many";
-        return error_set(err, STATUS_TOO_LARGE, "cannot keep more than %lld jobs: delete some",
+        return error_set(err, STATUS_TOO_LARGE, "cannot keep more than %lld jobs; delete some",
                          (long long)v->settings->max_jobs);
     }
     job_new_id(row->id);

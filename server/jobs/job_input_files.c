@@ -1,4 +1,4 @@
-/* The input files of a job: which of them its document names and are missing, declarations, deletion. */
+/* The input files of a job: which files its document names are missing, declarations, and deletion. */
 #include "optimizer/job/job_document.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
@@ -62,11 +62,11 @@ static status check_declaration(struct job_service *v, struct file_row *row, str
                                row->role);
     if (row->size_bytes < 1)
         return error_set_field(err, STATUS_INVALID, "size",
-                               "file '%s' is declared with %lld bytes: empty files are of no use", row->name,
+                               "file '%s' is declared with %lld bytes, but must not be empty", row->name,
                                (long long)row->size_bytes);
     if (row->size_bytes > v->settings->max_file_bytes)
         return error_set_field(err, STATUS_TOO_LARGE, "size",
-                               "file '%s' is declared with %lld bytes, the limit is %lld", row->name,
+                               "file '%s' is declared with %lld bytes, but the limit is %lld", row->name,
                                (long long)row->size_bytes, (long long)v->settings->max_file_bytes);
     size_t n = strlen(row->sha256);
     for (size_t i = 0; i < n; i++) {
@@ -93,7 +93,7 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
         bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
                     (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
         if (!same)
-            s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first",
+            s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently; delete it first",
                                 row->name);
         else if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
             s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
@@ -106,7 +106,7 @@ static status declare_locked(struct job_service *v, const char *id, struct file_
     if (s != STATUS_OK) goto out;
     if ((int64_t)n >= v->settings->max_files_per_job) {
         refusal->code = "too_many";
-        s = error_set(err, STATUS_TOO_LARGE, "a job takes at most %lld files",
+        s = error_set(err, STATUS_TOO_LARGE, "a job may have at most %lld files",
                       (long long)v->settings->max_files_per_job);
         goto out;
     }
@@ -147,7 +147,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     if (s == STATUS_OK) s = job_check_editable(&job, err);
     if (s != STATUS_OK) goto out;
     job_mark_edited(&job);
-    /* the row first: bytes without a row are swept away, a row without bytes would be a lie */
+    /* the row first: bytes without a row are removed at the next start, but a row must not refer to missing bytes */
     s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_OK) upload_discard(v->upload, &file);

@@ -34,7 +34,7 @@ static int remove_entry(int folder_fd, const char *name, int depth)
     return unlinkat(folder_fd, name, AT_REMOVEDIR) == 0 || errno == ENOENT ? 0 : errno;
 }
 
-/* Takes over folder_fd. */
+/* Takes ownership of folder_fd. */
 static int remove_entries(int folder_fd, int depth)
 {
     DIR *d = fdopendir(folder_fd);
@@ -63,7 +63,7 @@ status path_remove_tree(const char *path, struct error *err)
 status path_free_bytes(const char *path, long long *free_bytes, struct error *err)
 {
     struct statvfs fs;
-    if (statvfs(path, &fs) != 0) return error_set_errno(err, "cannot look at '%s'", path);
+    if (statvfs(path, &fs) != 0) return error_set_errno(err, "cannot examine '%s'", path);
     *free_bytes = (long long)fs.f_bavail * (long long)fs.f_frsize;
     return STATUS_OK;
 }

@@ -1,6 +1,6 @@
-/* Opening and closing the service: what a stopped or killed daemon left behind is brought into a known state.
- * An entry that resists is told in the log and left alone: one bad folder must not keep all other jobs from their
- * users. */
+/* Opens and closes the service. Opening brings what a stopped or killed daemon left behind into a consistent state.
+ * An entry that cannot be processed is logged and skipped, because one bad folder must not make all other jobs
+ * unavailable. */
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job/job_folder.h"
@@ -14,7 +14,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* An entry of jobs/ that the database does not know is kept, but out of the way. */
+/* Moves an entry of jobs/ that the database does not know to the quarantine folder. */
 static status quarantine(struct job_service *v, const char *name, struct error *err)
 {
     char from[PATH_BYTES], to[PATH_BYTES], label[400];
@@ -22,11 +22,11 @@ static status quarantine(struct job_service *v, const char *name, struct error *
     path_join(from, v->settings->data, "jobs", name, NULL);
     path_join(to, v->settings->data, "quarantine", label, NULL);
     if (rename(from, to) != 0) return error_set_errno(err, "cannot move unknown '%s' to quarantine", from);
-    log_warning(v->log, "'jobs/%s' belongs to no job: moved to 'quarantine/%s'", name, label);
+    log_warning(v->log, "'jobs/%s' belongs to no job, so it was moved to 'quarantine/%s'", name, label);
     return STATUS_OK;
 }
 
-static status sweep_unknown(struct job_service *v, struct error *err)
+static status quarantine_unknown(struct job_service *v, struct error *err)
 {
     char path[PATH_BYTES];
     path_join(path, v->settings->data, "jobs", NULL);
@@ -45,8 +45,8 @@ static status sweep_unknown(struct job_service *v, struct error *err)
     return STATUS_OK;
 }
 
-/* Tombstones whose folder is still there. */
-static status bury(struct job_service *v, struct error *err)
+/* Removes tombstones whose folder still exists. */
+static status remove_deleted(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
     size_t n = 0;
@@ -59,13 +59,13 @@ static status bury(struct job_service *v, struct error *err)
         status removed = path_remove_tree(path, &why);
         if (removed == STATUS_OK) removed = store_job_erase(v->store, row[i].id, &why);
         if (removed != STATUS_OK)
-            log_warning(v->log, "job %s is deleted, but not all of it is gone: %s", row[i].id, why.text);
+            log_warning(v->log, "job %s is deleted, but a part of it could not be removed: %s", row[i].id, why.text);
     }
     job_rows_free(row, n);
     return s;
 }
 
-/* Workers die with the daemon, so a job that the database calls running has none. */
+/* Workers die with the daemon, so a job that is running in the database has no worker. */
 static status requeue(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
@@ -78,14 +78,15 @@ static status requeue(struct job_service *v, struct error *err)
         row[i].cancel_requested = false;
         s = store_job_update(v->store, &row[i], err);
         if (s == STATUS_OK)
-            log_info(v->log, "job %s was running when the daemon stopped: %s", row[i].id, job_state_name(row[i].state));
+            log_info(v->log, "job %s was running when the daemon stopped; it is now %s", row[i].id,
+                     job_state_name(row[i].state));
     }
     job_rows_free(row, n);
     return s;
 }
 
-/* Removes bytes of uploads that have no row any more. */
-static void sweep_parts(struct job_service *v, const char *job_id)
+/* Removes bytes of uploads that no longer have a row. */
+static void remove_unknown_parts(struct job_service *v, const char *job_id)
 {
     char path[PATH_BYTES], part[PATH_BYTES];
     path_join(path, v->settings->data, "jobs", job_id, "upload", NULL);
@@ -100,7 +101,7 @@ static void sweep_parts(struct job_service *v, const char *job_id)
     closedir(d);
 }
 
-/* Every job has its folders; a job whose folder is gone keeps its row and says so. */
+/* Makes the missing folders of every job. A job whose folder was lost keeps its row, with an error. */
 static status restore_folders(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
@@ -115,7 +116,7 @@ static status restore_folders(struct job_service *v, struct error *err)
             path_join(path, v->settings->data, "jobs", row[i].id, part[k], NULL);
             if (durable_make_folder(path, &why) != STATUS_OK) log_warning(v->log, "job %s: %s", row[i].id, why.text);
         }
-        sweep_parts(v, row[i].id);
+        remove_unknown_parts(v, row[i].id);
     }
     job_rows_free(row, n);
     return s;
@@ -146,8 +147,8 @@ status job_service_open(const struct settings *settings, struct log *log, struct
     path_join(path, settings->data, "selvedge.db", NULL);
     if (s == STATUS_OK) s = store_open(path, &v->store, err);
     if (s == STATUS_OK) s = upload_set_new(v->store, settings->data, settings->commit_bytes, log, &v->upload, err);
-    if (s == STATUS_OK) s = bury(v, err);
-    if (s == STATUS_OK) s = sweep_unknown(v, err);
+    if (s == STATUS_OK) s = remove_deleted(v, err);
+    if (s == STATUS_OK) s = quarantine_unknown(v, err);
     if (s == STATUS_OK) s = requeue(v, err);
     if (s == STATUS_OK) s = restore_folders(v, err);
     if (s == STATUS_OK) s = upload_recover(v->upload, err);

@@ -1,4 +1,4 @@
-/* What users make of a job's state: start, retry, cancel, delete. */
+/* What users can do with a job: start, retry, cancel, delete. */
 #include "server/jobs/job_service.h"
 #include "base/clock.h"
 #include "server/jobs/job_access.h"
@@ -22,7 +22,7 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     if (n > 0) {
         refusal->code = "files_missing";
         refusal->missing_files = missing;
-        return error_set(err, STATUS_CONFLICT, "cannot start: %zu input file%s not complete, the first is '%s'", n,
+        return error_set(err, STATUS_CONFLICT, "cannot start: %zu input file%s not complete; the first is '%s'", n,
                          n == 1 ? " is" : "s are", json_string_value(json_array_get(missing, 0)));
     }
     json_decref(missing);
@@ -46,11 +46,12 @@ static status begin(struct job_service *v, const char *id, bool retry, bool *cha
     if (job_active(&row)) {
         if (row.cancel_requested)
             s = error_set(err, STATUS_CONFLICT,
-                          "cannot start the job while it is being cancelled: wait until it has stopped");
+                          "cannot start the job while it is being cancelled; wait until it has stopped");
         goto out;
     }
     if (retry && row.state != JOB_FAILED && row.state != JOB_CANCELLED) {
-        s = error_set(err, STATUS_CONFLICT, "cannot retry a job that is %s: only failed and cancelled jobs",
+        s = error_set(err, STATUS_CONFLICT,
+                      "cannot retry a job that is %s; only failed and cancelled jobs can be retried",
                       job_state_name(row.state));
         goto out;
     }
@@ -92,7 +93,7 @@ status job_cancel(struct job_service *v, const char *id, bool *changed, struct e
         atomic_fetch_add(&v->n_finished_total[JOB_CANCELLED], 1);
     }
     s = job_update_surely(v, &row, err);
-    if (s == STATUS_OK) log_info(v->log, "job %s: cancel requested", row.id);
+    if (s == STATUS_OK) log_info(v->log, "job %s: cancellation requested", row.id);
 out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);

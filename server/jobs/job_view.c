@@ -16,7 +16,7 @@ static json_t *time_or_null(double t) { return t > 0 ? json_real(t) : json_null(
 
 static bool has_run(const struct job_row *row) { return row->attempt > 0 && !row->dirty; }
 
-/* Copies member `key` of the worker's status, or gives the fallback (stolen). */
+/* Copies member `name` of the worker's status, or sets the fallback (owned by the callee). */
 static void put(json_t *out, const char *key, const json_t *from, const char *name, json_type type, json_t *fallback)
 {
     json_t *x = json_object_get(from, name);
@@ -103,7 +103,7 @@ status job_view_files(struct job_service *v, const struct job_row *row, json_t *
     if (s != STATUS_OK) goto out;
     s = job_missing_files(v, row, &missing, err);
     if (s == STATUS_INVALID || s == STATUS_TOO_LARGE) {
-        /* a document that was taken when the rules were laxer: its job can still be seen, only not be started again */
+        /* a document that was valid under earlier rules: its job can be read, but not started again */
         missing = json_array();
         s = STATUS_OK;
     }

@@ -1,4 +1,4 @@
-/* JSON of jobs, files and result listings, as docs/api.md describes them. */
+/* The JSON of jobs, files and result listings, as docs/api.md describes it. */
 #ifndef SELVEDGE_SERVER_JOB_VIEW_H
 #define SELVEDGE_SERVER_JOB_VIEW_H
 
@@ -6,25 +6,26 @@
 
 enum { RESULT_MAX_FILE = 20000, RESULT_MAX_DEPTH = 6, RESULT_PATH_BYTES = 512 };
 
-/* full: with document, files, missing files, parameters and result. heartbeat_age_s is null: the caller sets it after
- * computing the tag, see job_view_heartbeat_age. */
+/* full: with document, files, missing files, parameters and result. heartbeat_age_s is null; the caller sets it with
+ * job_view_heartbeat_age after computing the tag. */
 status job_view(struct job_service *v, const struct job_row *row, bool full, json_t **view, struct error *err);
-/* Seconds since the last heartbeat of the present attempt, or JSON null. */
+/* Returns the seconds since the last heartbeat of the present attempt, or JSON null. */
 json_t *job_view_heartbeat_age(struct job_service *v, const struct job_row *row);
 json_t *file_view(const struct file_row *row);
 /* {"files":[...],"missing_files":[...]} */
 status job_view_files(struct job_service *v, const struct job_row *row, json_t **view, struct error *err);
 
 struct result_file {
-    char path[RESULT_PATH_BYTES]; /* relative to results/, components of [A-Za-z0-9._-] not starting with a dot */
+    char path[RESULT_PATH_BYTES]; /* relative to results/; components of [A-Za-z0-9._-] that do not start with a dot */
     long long size_bytes;
     double modified_unix_s;
 };
-/* Regular files under results/, sorted by path; links and odd names are left out. free(*file). */
+/* Lists the regular files under results/, sorted by path, without links and files whose names have other characters.
+ * The caller frees *file. */
 status result_list(struct job_service *v, const char *job_id, struct result_file **file, size_t *n, struct error *err);
-/* Opens one of the listed files without following links: STATUS_NOT_FOUND for anything else. */
+/* Opens a listed file without following links. STATUS_NOT_FOUND for anything else. */
 status result_open(struct job_service *v, const char *job_id, const char *path, int *fd, struct error *err);
-/* By the name's ending; "application/octet-stream" when unknown. */
+/* Returns the content type for the ending of a name, by default "application/octet-stream". */
 const char *content_type_of(const char *name);
 
 #endif

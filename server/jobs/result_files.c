@@ -1,4 +1,4 @@
-/* The files under results/: listing and opening, always relative to an open folder and never through a link. */
+/* Lists and opens the files under results/, always relative to an open folder and never through a link. */
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
@@ -17,7 +17,7 @@ struct listing {
     size_t n, capacity;
 };
 
-/* One component of a result's path. Temporary files of durable_replace ("x.tmp-AbCdEf") are not results. */
+/* Checks one component of a result's path. Temporary files of durable_replace ("x.tmp-AbCdEf") are not results. */
 static bool component_valid(const char *name, size_t n)
 {
     if (n == 0 || name[0] == '.') return false;
@@ -49,7 +49,7 @@ static status add(struct listing *l, const char *path, const struct stat *st, st
     return STATUS_OK;
 }
 
-/* Takes over folder_fd. */
+/* Takes ownership of folder_fd. */
 static status walk(int folder_fd, const char *prefix, int depth, struct listing *l, struct error *err)
 {
     DIR *d = fdopendir(folder_fd);

@@ -1,6 +1,6 @@
-/* Records of a series are in the order of their steps, and of their models, a search for the radius first: what is asked
- * for is found by bisection (record_seek), counted, and merged while it is read. So an incremental request costs what it
- * answers, not what the file holds, and memory is that of the points. */
+/* Records of a series are sorted by steps; those of a search for the radius come first, then those of the models in
+ * order. The records requested are found by bisection (record_seek), counted, and merged while they are read. So the
+ * cost of a request depends on the size of its reply and not of the file, and memory holds only the points. */
 #include "server/jobs/series_view.h"
 #include "base/durable.h"
 #include "optimizer/job/job_document.h"
@@ -12,10 +12,10 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Of a reply with the renderings of all points: fewer points beyond. */
+/* Limit on the size of a reply with the renderings of all points; beyond it there are fewer points. */
 enum { ALL_RENDERED_BYTES = 8 << 20, KEY_RADIUS = -1 };
 
-/* The worker writes "step" first; false for a record without a whole step. */
+/* Reads "step", which the worker writes first. Returns false for a record without a whole step. */
 static bool read_step(const char *json, size_t n, json_int_t *step)
 {
     static const char begin[] = "{\"step\":";
@@ -33,19 +33,19 @@ static bool read_step(const char *json, size_t n, json_int_t *step)
 
 static json_int_t model_of(const json_t *record) { return json_integer_value(json_object_get(record, "i_model")); }
 
-/* Rises along the file: the search for the radius, whatever model it used, then the models. */
+/* Sort key of the records: first the search for the radius, whatever model it used, then the models. */
 static json_int_t key_of(const json_t *record)
 {
     const char *phase = json_string_value(json_object_get(record, "phase"));
     return phase != NULL && strcmp(phase, "radius") == 0 ? KEY_RADIUS : model_of(record);
 }
 
-/* ---- which records ---- */
+/* ---- selection of records ---- */
 
 struct counting {
     long long after_step;
     json_int_t last_step;
-    size_t n, n_bytes; /* of those behind after_step */
+    size_t n, n_bytes; /* of the records after after_step */
 };
 
 static bool is_seen(void *context, const char *json, size_t n)
@@ -67,11 +67,11 @@ static bool count(void *context, const char *json, size_t n)
     return true;
 }
 
-/* ---- what the numbers are ---- */
+/* ---- description of the numbers ---- */
 
 struct description {
     json_int_t i_model;
-    json_t *model; /* [{"id", "parameters"}], of the models before */
+    json_t *model; /* [{"id", "parameters"}] of the preceding models */
 };
 
 static bool is_of_earlier_model(void *context, const char *json, size_t n)
@@ -83,7 +83,8 @@ static bool is_of_earlier_model(void *context, const char *json, size_t n)
     return earlier;
 }
 
-/* The first record of a model describes its parameters; so does the first of a search before the fit, of its model. */
+/* The first record of a model describes its parameters. So does the first record of a search before the fit, for the
+ * model that it uses. */
 static bool take_description(void *context, const char *json, size_t n)
 {
     struct description *d = context;
@@ -111,7 +112,7 @@ static bool always(void *context, const char *json, size_t n)
     return true;
 }
 
-/* Of all models that the fit has begun. */
+/* Describes all models whose fit has started. */
 static status describe_models(const char *path, json_t *model, struct error *err)
 {
     uint64_t from = 0;
@@ -121,7 +122,7 @@ static status describe_models(const char *path, json_t *model, struct error *err
     for (json_int_t i = 0; s == STATUS_OK && i <= last && json_array_size(model) == (size_t)i; i++) {
         struct description d = {i, model};
         s = record_seek(path, is_of_earlier_model, &d, &from, err);
-        if (s == STATUS_OK && i == 0) from = 0; /* where the search describes it */
+        if (s == STATUS_OK && i == 0) from = 0; /* the search may have described the model */
         if (s == STATUS_OK) s = record_read(path, from, take_description, &d, NULL, err);
     }
     return s;
@@ -129,7 +130,7 @@ static status describe_models(const char *path, json_t *model, struct error *err
 
 /* ---- points ---- */
 
-/* Records that become one point: the last one with the extremes of all. */
+/* Records that are merged to one point: the last record with the extremes of all. */
 struct group {
     json_t *last;
     size_t n, n_parameter;
@@ -161,7 +162,8 @@ static void restart_group(struct group *g, size_t n_parameter)
     }
 }
 
-/* Takes over the record. Those of an earlier model, or of other parameters, are not merged with it: they are left out. */
+/* Takes ownership of the record. A record of an earlier model or with other parameters cannot be merged, so it is
+ * left out. */
 static void add_to_group(struct group *g, json_t *record)
 {
     const json_t *parameter = json_object_get(record, "parameter");
@@ -229,7 +231,7 @@ static status read_series(const char *path, struct counting *c, struct merging *
     m->n = c->n;
     m->n_point = c->n < max_points ? c->n : max_points;
     s = record_read(path, from, merge, m, NULL, err);
-    if (m->group.n > 0) close_group(m); /* the series was cut meanwhile */
+    if (m->group.n > 0) close_group(m); /* the worker has shortened the series meanwhile */
     return s;
 }
 
@@ -244,7 +246,7 @@ status series_view(struct job_service *v, const struct job_row *row, long long a
     status s = STATUS_OK;
     if (row->attempt > 0 && !row->dirty && access(path, F_OK) == 0)
         s = read_series(path, &c, &m, model, max_points, err);
-    if (s == STATUS_NOT_FOUND) s = STATUS_OK; /* removed meanwhile */
+    if (s == STATUS_NOT_FOUND) s = STATUS_OK; /* the series was removed meanwhile */
     json_decref(m.group.last);
     if (s != STATUS_OK) {
         json_decref(m.point);

@@ -19,16 +19,17 @@ struct slot {
     bool used;
     char job_id[STORE_ID_BYTES];
     pid_t pid;
-    enum attempt_stop stop;     /* why it was asked to stop */
-    double beat_unix_s, beat_s; /* the last heartbeat seen, and when it was new (monotonic; at first the start) */
-    double asked_s;             /* monotonic; 0: not asked */
+    enum attempt_stop stop; /* reason for which it was told to stop */
+    double seen_heartbeat_unix_s,
+        heartbeat_seen_s; /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
+    double asked_s;       /* monotonic time of the request to stop; 0: none */
     bool killed, ended;
-    double settle_s; /* monotonic: not before this is its end written to the database again */
+    double retry_s; /* monotonic time of the next try to record its end in the database */
     struct worker_end end;
 };
 
-/* A job that is queued but must not start before a time (after a lost attempt, or while another process holds its
- * folder), or a deleted one whose folder could not be removed. */
+/* A queued job that must not start before a certain time, after a lost attempt or while another process has its
+ * folder; or a deleted job whose folder could not be removed. */
 struct waiting {
     char job_id[STORE_ID_BYTES];
     double until_s;
@@ -41,7 +42,7 @@ struct supervisor {
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    bool woken, stop; /* under lock */
+    bool woken, stop; /* guarded by lock */
     struct slot slot[MAX_WORKER];
     struct waiting waiting[MAX_WAITING];
     bool below_floor;
@@ -61,9 +62,9 @@ static struct waiting *waiting_of(struct supervisor *u, const char *job_id, bool
     return oldest;
 }
 
-static void ask_to_stop(struct slot *slot, enum attempt_stop why)
+static void request_stop(struct slot *slot, enum attempt_stop why)
 {
-    if (slot->ended) return; /* its end is known, and its number may be another process's by now */
+    if (slot->ended) return; /* the process has ended, so its id may belong to another process */
     if (slot->stop == STOP_NONE || why < slot->stop) slot->stop = why;
     if (slot->asked_s > 0) return;
     slot->asked_s = clock_monotonic_s();
@@ -78,25 +79,25 @@ static void kill_now(struct slot *slot, enum attempt_stop why)
     worker_signal(slot->pid, SIGKILL);
 }
 
-static void end_of(struct supervisor *u, struct slot *slot)
+static void record_end(struct supervisor *u, struct slot *slot)
 {
     struct error err = {0};
-    struct attempt_verdict verdict = {0};
-    if (attempt_settle(u->v, slot->job_id, &slot->end, slot->stop, &verdict, &err) != STATUS_OK) {
-        /* the row still says running: the database could not be written. Keep the slot and try again. */
+    struct attempt_outcome outcome = {0};
+    if (attempt_finish(u->v, slot->job_id, &slot->end, slot->stop, &outcome, &err) != STATUS_OK) {
+        /* the database could not be written, so the row still says running: keep the slot and try again */
         log_error(u->v->log, "job %s: %s", slot->job_id, err.text);
-        slot->settle_s = clock_monotonic_s() + 1;
+        slot->retry_s = clock_monotonic_s() + 1;
         return;
     }
     slot->used = false;
-    struct waiting *w = waiting_of(u, slot->job_id, verdict.delay_s > 0);
+    struct waiting *w = waiting_of(u, slot->job_id, outcome.delay_s > 0);
     if (w == NULL) return;
-    w->until_s = clock_monotonic_s() + verdict.delay_s;
-    if (!verdict.busy)
+    w->until_s = clock_monotonic_s() + outcome.delay_s;
+    if (!outcome.busy)
         w->n_busy = 0;
     else if (++w->n_busy >= 60) {
         w->n_busy = 0;
-        attempt_give_up(u->v, slot->job_id, "another process holds the job's folder", NULL);
+        attempt_fail(u->v, slot->job_id, "another process holds the job's folder", NULL);
     }
 }
 
@@ -105,25 +106,26 @@ static void watch(struct supervisor *u, struct slot *slot)
     if (!slot->ended) slot->ended = worker_ended(slot->pid, &slot->end);
     double now = clock_monotonic_s();
     if (slot->ended) {
-        if (now >= slot->settle_s) end_of(u, slot);
+        if (now >= slot->retry_s) record_end(u, slot);
         return;
     }
-    struct attempt_wish wish;
-    bool known = attempt_look(u->v, slot->job_id, &wish);
-    if (wish.deleted)
+    struct attempt_request request;
+    bool known = attempt_read_request(u->v, slot->job_id, &request);
+    if (request.deleted)
         kill_now(slot, STOP_CANCEL);
-    else if (wish.cancel)
-        ask_to_stop(slot, STOP_CANCEL);
+    else if (request.cancel)
+        request_stop(slot, STOP_CANCEL);
     else if (u->below_floor)
-        ask_to_stop(slot, STOP_PAUSE);
-    /* by our own clock, from beat to beat: the wall clock may be set meanwhile, and one failed read is no silence */
-    if (wish.heartbeat_unix_s > 0 && wish.heartbeat_unix_s != slot->beat_unix_s) {
-        slot->beat_unix_s = wish.heartbeat_unix_s;
-        slot->beat_s = now;
+        request_stop(slot, STOP_PAUSE);
+    /* measured with our own clock between heartbeats: the wall clock may be set meanwhile, and one failed read is
+     * not silence */
+    if (request.heartbeat_unix_s > 0 && request.heartbeat_unix_s != slot->seen_heartbeat_unix_s) {
+        slot->seen_heartbeat_unix_s = request.heartbeat_unix_s;
+        slot->heartbeat_seen_s = now;
     }
-    double silent_s = known ? now - slot->beat_s : 0;
+    double silent_s = known ? now - slot->heartbeat_seen_s : 0;
     if (silent_s > (double)u->v->settings->heartbeat_timeout_s && !slot->killed) {
-        log_warning(u->v->log, "job %s: the worker was silent for %.0f s and is killed", slot->job_id, silent_s);
+        log_warning(u->v->log, "job %s: the worker sent no heartbeat for %.0f s and is killed", slot->job_id, silent_s);
         kill_now(slot, STOP_SILENT);
     }
     if (slot->asked_s > 0 && !slot->killed && now - slot->asked_s > (double)u->v->settings->cancel_grace_s) {
@@ -155,13 +157,13 @@ static void launch(struct supervisor *u, const char *job_id)
     status s = attempt_prepare(u->v, job_id, &err);
     if (s == STATUS_CONFLICT) return; /* cancelled or deleted meanwhile */
     if (s != STATUS_OK) {
-        log_error(u->v->log, "job %s cannot be prepared, next try in 5 s: %s", job_id, err.text);
+        log_error(u->v->log, "job %s cannot be prepared; next try in 5 s: %s", job_id, err.text);
         waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 5;
         return;
     }
     struct slot *slot = u->slot;
     while (slot->used) slot++;
-    *slot = (struct slot){.used = true, .beat_s = clock_monotonic_s()};
+    *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes,
                                    u->v->settings->volume_memory_bytes};
@@ -170,11 +172,11 @@ static void launch(struct supervisor *u, const char *job_id)
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
         return;
     }
-    /* the row says running already: the slot stays, as an ended worker's, until the database has taken that back */
+    /* the row already says running, so the slot stays, as that of an ended worker, until the database is corrected */
     log_error(u->v->log, "job %s: %s", job_id, err.text);
     slot->ended = true;
     slot->end = (struct worker_end){.by_signal = false, .code = 127};
-    end_of(u, slot);
+    record_end(u, slot);
     waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
 }
 
@@ -195,7 +197,7 @@ static void fill_slots(struct supervisor *u)
     job_rows_free(row, n);
 }
 
-static void bury(struct supervisor *u)
+static void remove_deleted(struct supervisor *u)
 {
     struct job_row *row = NULL;
     size_t n = 0;
@@ -210,23 +212,23 @@ static void bury(struct supervisor *u)
         status s = path_remove_tree(path, &err);
         if (s == STATUS_OK) s = store_job_erase(u->v->store, row[i].id, &err);
         if (s == STATUS_OK) continue;
-        log_warning(u->v->log, "job %s is deleted, but not all of it is gone, next try in %d s: %s", row[i].id,
-                    BURY_AGAIN_S, err.text);
+        log_warning(u->v->log, "job %s is deleted, but a part of it could not be removed; next try in %d s: %s",
+                    row[i].id, BURY_AGAIN_S, err.text);
         waiting_of(u, row[i].id, true)->until_s = clock_monotonic_s() + BURY_AGAIN_S;
     }
     job_rows_free(row, n);
 }
 
-static void look_at_disk(struct supervisor *u)
+static void check_disk(struct supervisor *u)
 {
     long long free_bytes = 0;
     if (path_free_bytes(u->v->settings->data, &free_bytes, NULL) != STATUS_OK) return;
     int64_t floor_bytes = u->v->settings->floor_bytes;
     bool was = u->below_floor;
-    /* a little hysteresis, so that a job does not stop and go */
+    /* hysteresis, so that jobs do not pause and resume repeatedly */
     u->below_floor = free_bytes < (was ? floor_bytes + floor_bytes / 10 : floor_bytes);
     if (u->below_floor && !was)
-        log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve: running jobs pause", free_bytes,
+        log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve, so running jobs pause", free_bytes,
                     (long long)floor_bytes);
     if (!u->below_floor) attempt_resume_paused(u->v);
     if (!u->below_floor) ballast_keep(u->v->settings->data, u->v->settings->ballast_bytes);
@@ -237,18 +239,18 @@ static void tick(struct supervisor *u)
     double now = clock_monotonic_s();
     if (now - u->disk_seen_s > 2) {
         u->disk_seen_s = now;
-        look_at_disk(u);
+        check_disk(u);
     }
     for (size_t i = 0; i < MAX_WORKER; i++)
         if (u->slot[i].used) watch(u, &u->slot[i]);
-    bury(u);
+    remove_deleted(u);
     fill_slots(u);
 }
 
 static void stop_all(struct supervisor *u)
 {
     for (size_t i = 0; i < MAX_WORKER; i++)
-        if (u->slot[i].used) ask_to_stop(&u->slot[i], STOP_SHUTDOWN);
+        if (u->slot[i].used) request_stop(&u->slot[i], STOP_SHUTDOWN);
     double give_up_s = clock_monotonic_s() + (double)u->v->settings->cancel_grace_s + 10;
     while (n_running(u) > 0 && clock_monotonic_s() < give_up_s) {
         for (size_t i = 0; i < MAX_WORKER; i++)

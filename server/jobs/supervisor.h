@@ -1,16 +1,16 @@
-/* The thread that starts workers, watches them and decides what their end means. It also empties tombstoned jobs' folders and
- * pauses work while the disk is under its floor. */
+/* The thread that starts workers, watches them and records their end. It also removes the folders of deleted jobs,
+ * and pauses jobs while the free disk space is below the floor. */
 #ifndef SELVEDGE_SERVER_SUPERVISOR_H
 #define SELVEDGE_SERVER_SUPERVISOR_H
 
 #include "server/jobs/job_service.h"
 
-/* Sets service->supervisor. worker_program must be executable (checked here: STATUS_NOT_FOUND). */
+/* Sets service->supervisor. STATUS_NOT_FOUND or STATUS_IO if worker_program cannot be executed, STATUS_NO_MEMORY. */
 status supervisor_start(struct job_service *service, const char *worker_program, struct supervisor **supervisor,
                         struct error *err);
-/* Look now instead of at the next tick. */
+/* Makes the thread check at once instead of at its next tick. */
 void supervisor_wake(struct supervisor *supervisor);
-/* Workers get SIGTERM, the grace time, SIGKILL; their jobs go back to the queue. Joins the thread. */
+/* Stops all workers by SIGTERM and, after the grace time, SIGKILL; their jobs are queued. Joins the thread. */
 void supervisor_stop(struct supervisor *supervisor);
 
 #endif

@@ -18,12 +18,12 @@ _Static_assert(sizeof(crypto_hash_sha256_state) <= STORE_HASH_STATE_BYTES, "the 
 struct upload {
     struct upload_set *set;
     struct upload *next;
-    size_t n_holder; /* under set->lock */
+    size_t n_holder; /* guarded by set->lock */
     pthread_mutex_t lock;
     struct file_row row; /* as in the database */
     int64_t offset_bytes;
     crypto_hash_sha256_state hash;
-    atomic_int_least64_t offset_seen; /* offset_bytes for readers without the lock */
+    atomic_int_least64_t offset_seen; /* copy of offset_bytes for readers without the lock */
     uint64_t ticket;
     bool discarded;
     int fd;
@@ -86,13 +86,14 @@ status upload_reserve(struct upload_set *set, struct file_row *row, struct error
     status s = STATUS_OK;
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (fd < 0) return error_set_errno(err, "cannot make room for '%s'", row->name);
-    /* not posix_fallocate(): where the file system cannot reserve, it would write every block of a 100 GB file */
+    /* not posix_fallocate(), which writes every block of a file on file systems that cannot reserve space */
     if (fallocate(fd, 0, 0, (off_t)row->size_bytes) != 0 && errno != EOPNOTSUPP) {
-        s = errno == EFBIG ? error_set(err, STATUS_DISK_FULL,
-                                       "cannot make room for '%s': the file system does not take files of %lld bytes",
-                                       row->name, (long long)row->size_bytes)
-                           : error_set_errno(err, "cannot make room for the %lld bytes of '%s'",
-                                             (long long)row->size_bytes, row->name);
+        s = errno == EFBIG
+                ? error_set(err, STATUS_DISK_FULL,
+                            "cannot make room for '%s': the file system does not support files of %lld bytes",
+                            row->name, (long long)row->size_bytes)
+                : error_set_errno(err, "cannot make room for the %lld bytes of '%s'", (long long)row->size_bytes,
+                                  row->name);
         goto out;
     }
     if (fsync(fd) != 0) s = error_set_errno(err, "cannot make room for '%s'", row->name);
@@ -190,8 +191,8 @@ void upload_release(struct upload_set *set, struct upload *u)
     pthread_mutex_unlock(&set->lock);
 }
 
-/* Verified bytes go to their final name; repeated after a crash without harm. */
-static status settle(struct upload_set *set, struct file_row *row, struct error *err)
+/* Moves a verified file to its final name. May be repeated after a crash. */
+static status move_to_place(struct upload_set *set, struct file_row *row, struct error *err)
 {
     char from[PATH_BYTES], to[PATH_BYTES];
     part_path(set, row, from);
@@ -217,11 +218,11 @@ static status start_again(struct upload *u, const char *computed, struct error *
     if (s != STATUS_OK) return s;
     return error_set_field(
         err, STATUS_CHECKSUM, u->row.name,
-        "file '%s' has SHA-256 %s, declared was %s: send it again from offset 0, or delete it and declare it anew",
+        "file '%s' has SHA-256 %s, but %s was declared; send it again from offset 0, or delete it and declare it again",
         u->row.name, computed, declared);
 }
 
-/* u->lock is held and the bytes are durable. */
+/* Verifies a file that has all its bytes. u->lock is held and the bytes are on disk. */
 static status finish(struct upload *u, struct error *err)
 {
     crypto_hash_sha256_state last = u->hash;
@@ -233,15 +234,15 @@ static status finish(struct upload *u, struct error *err)
     snprintf(u->row.sha256, sizeof u->row.sha256, "%s", text);
     u->row.state = FILE_VERIFIED;
     status s = store_file_update(u->set->store, &u->row, err);
-    if (s == STATUS_OK) s = settle(u->set, &u->row, err);
+    if (s == STATUS_OK) s = move_to_place(u->set, &u->row, err);
     if (s == STATUS_OK)
         log_info(u->set->log, "file '%s' of job %s is complete, %lld bytes", u->row.name, u->row.job_id,
                  (long long)u->row.size_bytes);
     return s;
 }
 
-/* After a failed sync the kernel may have dropped the pages and a second sync would claim success: what is not committed has to
- * come again. u->lock is held. */
+/* Returns to the last committed offset. After a failed sync the kernel may have dropped the pages, and a second sync
+ * would falsely succeed, so bytes that are not committed must be sent again. u->lock is held. */
 static status roll_back(struct upload *u, struct error *err)
 {
     status s = error_set_errno(err, "cannot write file '%s'", u->row.name);
@@ -253,7 +254,7 @@ static status roll_back(struct upload *u, struct error *err)
     return s;
 }
 
-/* u->lock is held. */
+/* Writes the received bytes to disk, then their offset to the database. u->lock is held. */
 static status commit(struct upload *u, struct error *err)
 {
     if (u->discarded) return error_set(err, STATUS_NOT_FOUND, "file '%s' was removed", u->row.name);
@@ -336,7 +337,7 @@ status upload_set_checksum(struct upload_set *set, const char *id, const char *s
                            struct error *err)
 {
     struct upload *u = NULL;
-    status s = upload_hold(set, id, &u, err); /* a writer that has it in memory writes its row later: it has to know */
+    status s = upload_hold(set, id, &u, err); /* held, so that a present writer of the upload learns of the checksum */
     if (s != STATUS_OK) return s;
     pthread_mutex_lock(&u->lock);
     if (u->row.state == FILE_UPLOADING && u->row.sha256[0] == '\0') {
@@ -344,7 +345,7 @@ status upload_set_checksum(struct upload_set *set, const char *id, const char *s
         s = store_file_update(set->store, &u->row, err);
         if (s != STATUS_OK) u->row.sha256[0] = '\0';
     } else if (strcmp(u->row.sha256, sha256) != 0)
-        s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently: delete it first",
+        s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently; delete it first",
                             u->row.name);
     *row = u->row;
     pthread_mutex_unlock(&u->lock);
@@ -367,15 +368,16 @@ static status recover_one(struct upload_set *set, struct file_row *row, struct e
     char part[PATH_BYTES], input[PATH_BYTES];
     struct stat st;
     bool verified = row->state == FILE_VERIFIED;
-    status s = verified ? settle(set, row, err) : STATUS_OK;
+    status s = verified ? move_to_place(set, row, err) : STATUS_OK;
     part_path(set, row, part);
     input_path(set, row, input);
     if (verified && s == STATUS_OK) return s;
-    /* only what is really gone begins anew: room made for a file that is there would one day replace it with zeros */
+    /* only an upload whose bytes are missing starts again: a new empty file could later replace an existing one with
+     * zeros */
     if (stat(part, &st) == 0) return s;
-    if (errno != ENOENT) return error_set_errno(err, "cannot look at its upload");
+    if (errno != ENOENT) return error_set_errno(err, "cannot examine its upload");
     if (verified && (stat(input, &st) == 0 || errno != ENOENT)) return s;
-    log_warning(set->log, "file '%s' of job %s has lost its bytes: it has to be sent again", row->name, row->job_id);
+    log_warning(set->log, "file '%s' of job %s has lost its bytes and must be sent again", row->name, row->job_id);
     s = upload_reserve(set, row, err);
     if (s == STATUS_OK) s = store_file_update(set->store, row, err);
     return s;

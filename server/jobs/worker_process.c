@@ -11,7 +11,7 @@
 
 enum { EXIT_CANNOT_EXECUTE = 127 };
 
-/* Between fork and exec of a threaded process: system calls only. */
+/* Runs between fork and exec of a threaded process, so it makes only system calls. */
 static _Noreturn void become_worker(const char *program, char *const argv[], int console_fd, int null_fd,
                                     const struct worker_limits *limits, pid_t parent)
 {
@@ -69,7 +69,7 @@ bool worker_ended(pid_t pid, struct worker_end *end)
     pid_t got = wait4(pid, &state, WNOHANG, &usage);
     if (got == 0 || (got < 0 && errno == EINTR)) return false;
     *end = (struct worker_end){0};
-    if (got < 0) { /* not our child any more: nothing is known */
+    if (got < 0) { /* no longer our child, so nothing is known of it */
         end->by_signal = true;
         end->code = SIGKILL;
         return true;
@@ -77,7 +77,7 @@ bool worker_ended(pid_t pid, struct worker_end *end)
     end->by_signal = WIFSIGNALED(state);
     end->code = end->by_signal ? WTERMSIG(state) : WEXITSTATUS(state);
     end->peak_rss_bytes = (int64_t)usage.ru_maxrss * 1024;
-    if (end->by_signal || end->code != 0) kill(-pid, SIGKILL); /* what it may have left in its group */
+    if (end->by_signal || end->code != 0) kill(-pid, SIGKILL); /* processes that it may have left in its group */
     return true;
 }
 

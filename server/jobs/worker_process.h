@@ -1,5 +1,5 @@
-/* One worker process: own session, lower priority, bounded memory, killed by the kernel when the daemon dies (PR_SET_PDEATHSIG),
- * so after any crash of the daemon no worker is left that could write beside a new one. */
+/* A worker process: it has its own session, a lower priority and limited memory. The kernel kills it when the daemon
+ * dies (PR_SET_PDEATHSIG), so after a crash of the daemon no worker is left that could write beside a new one. */
 #ifndef SELVEDGE_SERVER_WORKER_PROCESS_H
 #define SELVEDGE_SERVER_WORKER_PROCESS_H
 
@@ -11,8 +11,8 @@
 
 struct worker_limits {
     int nice;
-    int64_t memory_bytes;        /* address space; 0: not limited */
-    int64_t volume_memory_bytes; /* told to the worker as --memory-mib */
+    int64_t memory_bytes;        /* address space; 0: no limit */
+    int64_t volume_memory_bytes; /* passed to the worker as --memory-mib */
 };
 
 struct worker_end {
@@ -21,12 +21,13 @@ struct worker_end {
     int64_t peak_rss_bytes;
 };
 
-/* stdout and stderr go to console_path (made anew). Call from a thread that lives as long as the daemon. */
+/* Starts a worker. stdout and stderr go to console_path, which is made new. To be called from a thread that lives as
+ * long as the daemon. STATUS_IO, STATUS_NO_MEMORY. */
 status worker_launch(const char *program, const char *job_folder, const char *console_path,
                      const struct worker_limits *limits, pid_t *pid, struct error *err);
-/* false while it still runs */
+/* Returns false while the worker runs. */
 bool worker_ended(pid_t pid, struct worker_end *end);
-/* To the worker and everything that it started. */
+/* Sends a signal to the worker and all processes that it started. */
 void worker_signal(pid_t pid, int signal_number);
 
 #endif

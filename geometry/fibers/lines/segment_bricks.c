@@ -169,7 +169,8 @@ static bool lattice_range(const struct point_lattice *l, const struct segment *g
     return true;
 }
 
-/* Points of a lattice that follow each other along x: (x0 + i spacing, y, z) for i < n, relative to the segment's end a. */
+/* Points of a lattice that follow each other along x: (x0 + i spacing, y, z) for i < n, relative to the segment's
+ * end a. */
 struct lattice_row {
     float x0, spacing, y, z;
     size_t n;

@@ -188,7 +188,7 @@ static void test_wrong_order_and_depth(void **state)
     test_write_bytes(path, samples, N_VOXEL * 2);
     chain_init(&c);
     c.o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "uint16", .big_endian = true};
-    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, OPTION_SCAN_FILES, "endianness");
+    assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, OPTION_SCAN_FILES, "stated byte order is wrong");
     chain_release(&c);
     chain_init(&c); /* 16-bit samples taken for 8-bit ones: twice as many bytes as declared */
     c.o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "uint8"};

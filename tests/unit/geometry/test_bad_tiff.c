@@ -87,7 +87,7 @@ static void test_lying_header(void **state)
     size_t n = tiff_read_bytes(path, data, sizeof data);
     tiff_patch_tag(data, TIFFTAG_IMAGEWIDTH, 400000);
     test_write_bytes(path, data, n);
-    stack_expect_open_error(path, STATUS_FORMAT, "cannot read volume 'liar.tif': page 1 promises 400000 x 23 pixels");
+    stack_expect_open_error(path, STATUS_FORMAT, "cannot read volume 'liar.tif': page 1 states 400000 x 23 pixels");
 }
 
 /* Sums of rows of such a page wrap around. Little need be stored for it: deflate may shrink it a thousandfold. */

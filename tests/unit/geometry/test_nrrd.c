@@ -94,14 +94,14 @@ static void test_nrrd_gzip_and_skips(void **state)
             scan_expect_values(&path, 1, NULL, n, (const double[3]){0}, want);
         else
             scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES,
-                                "'z.nrrd' goes on behind the 2 x 1 x 2 uint8 voxels of its header");
+                                "'z.nrrd' continues after the 2 x 1 x 2 uint8 voxels of its header");
     }
     n_packed = scan_gzip(data + 2, 4, packed,
                          sizeof packed); /* a second member is part of the data, zeros behind the first are none */
     scratch_write(path, file,
                   scan_join_header(file, head, packed,
                                    n_packed + scan_gzip(data, 2, packed + n_packed, sizeof packed - n_packed)));
-    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "goes on behind");
+    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "continues after");
     memset(packed + n_packed, 0, 100);
     scratch_write(path, file, scan_join_header(file, head, packed, n_packed + 100));
     scan_expect_values(&path, 1, NULL, n, (const double[3]){0}, want);

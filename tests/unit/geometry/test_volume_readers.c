@@ -37,7 +37,7 @@ static void test_raw(void **state)
     snprintf(raw.type, sizeof raw.type, "uint8");
     scan_expect_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
     raw.header_bytes = SIZE_MAX; /* as an offset it would mean 'at the end of the file' */
-    scan_expect_refused(path, &raw, STATUS_INVALID, OPTION_RAW_HEADER, "makes no sense");
+    scan_expect_refused(path, &raw, STATUS_INVALID, OPTION_RAW_HEADER, "is not possible");
     raw.header_bytes = 2;
     raw.n[1] = 0;
     scan_expect_refused(path, &raw, STATUS_INVALID, OPTION_RAW_SHAPE, "2 x 0 x 2");
@@ -86,7 +86,7 @@ static void test_wrong_byte_order(void **state)
     const char *path = scratch_path(state, "o.raw");
     struct volume_source *source;
     scratch_write(path, picture, sizeof picture);
-    scan_expect_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "endianness is stated wrongly");
+    scan_expect_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "stated byte order is wrong");
     for (int i = 0; i < 5; i++) { /* the right order; noise and coarse values in both */
         raw.big_endian = i % 2 == 0;
         if (i > 0) scratch_write(path, i < 3 ? noise : coarse, sizeof noise);
@@ -118,7 +118,7 @@ static void test_metaimage(void **state)
     const uint8_t longer[12] = {1, 0, 0, 1, 255, 255, 2, 1};
     scratch_write(path, file,
                   scan_join_header(file, header, packed, scan_gzip(longer, sizeof longer, packed, sizeof packed)));
-    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "goes on behind");
+    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "continues after");
 }
 
 static void test_metaimage_units(void **state)
@@ -177,13 +177,13 @@ static void test_vol(void **state)
     assert_memory_equal(bytes, golden, n_byte);
     free(bytes);
     scratch_write(path, golden, sizeof golden - 1);
-    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "need 56 bytes, the file has 55");
+    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "need 56 bytes, but the file has 55");
     memset(longer, 0, sizeof longer);
     memcpy(longer, golden, sizeof golden);
     scratch_write(path, longer, sizeof golden + 7);
     scan_expect_values(&path, 1, NULL, n, mm, want);
     scratch_write(path, longer, sizeof golden + 8); /* a row more */
-    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "need 56 bytes, the file has 64");
+    scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "need 56 bytes, but the file has 64");
     memcpy(bad, golden, sizeof bad);
     bad[11] = 0x7f;
     scratch_write(path, bad, sizeof bad);
