@@ -169,8 +169,10 @@ docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (m
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
 
-layers:            ## includes go one way, the daemon holds no symbol of the computing parts, headers say their purpose
+layers:            ## includes and calls go one way, the daemon holds no symbol of the computing parts, headers say their purpose, functions and files are short
 	@/usr/bin/python3 tests/check_layers.py --build $(BUILD)
+	@/usr/bin/python3 tests/check_calls.py --build $(BUILD)
+	@/usr/bin/python3 tests/check_code.py
 
 asan: | deps-test ## unit and quick API tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests

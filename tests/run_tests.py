@@ -96,11 +96,13 @@ def main():
     wanted = lambda name: arguments.only is None or arguments.only in name
 
     def run_layers():
-        if not wanted("layers"):
-            return
-        code, output, seconds = run([sys.executable, "tests/check_layers.py", "--build", arguments.build], TIMEOUT_S,
-                                    environment)
-        totals.add_one("layers", code, output, seconds)
+        """The rules of `make layers`."""
+        for name, words in [("layers", ["tests/check_layers.py", "--build", arguments.build]),
+                            ("calls", ["tests/check_calls.py", "--build", arguments.build]),
+                            ("code", ["tests/check_code.py"])]:
+            if wanted(name):
+                code, output, seconds = run([sys.executable, *words], TIMEOUT_S, environment)
+                totals.add_one(name, code, output, seconds)
 
     def run_c(folder):
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:

@@ -43,3 +43,18 @@ int param_index(const struct param_info *info, size_t n_param, const char *name)
         if (strcmp(info[p].name, name) == 0) return (int)p;
     return -1;
 }
+
+status param_check(const struct param_info *info, size_t n_param, const char *model_id, const double *param,
+                   struct error *err)
+{
+    for (size_t i = 0; i < n_param; i++) {
+        const struct param_info *p = &info[i];
+        double slack = 1e-9 * (p->upper - p->lower);
+        if (!(param[i] >= p->lower - slack && param[i] <= p->upper + slack))
+            return error_set_field(err, STATUS_INVALID, p->name,
+                                   "cannot use scattering model '%s': parameter '%s' is %g %s, allowed are %g to %g",
+                                   model_id, p->name, param_to_file_unit(p, param[i]), param_unit_name(p->unit),
+                                   param_to_file_unit(p, p->lower), param_to_file_unit(p, p->upper));
+    }
+    return STATUS_OK;
+}

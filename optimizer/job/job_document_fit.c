@@ -66,44 +66,13 @@ static status parse_models(const struct json_field *f, struct job_document *doc,
     return parse_model_list(f, name, doc, err);
 }
 
-/* Parameters that "fixed" and "start" can name: the density multiplier, the last one of volume models, has keys of its
- * own. */
-static size_t n_named(const struct model_info *m) { return m->n_param - (m->kind == MODEL_VOLUME ? 1 : 0); }
-
-/* "C_R, beta_R, ...": each group once. */
-static void list_symbols(const struct model_info *m, char *text, size_t n_bytes)
-{
-    size_t used = 0;
-    text[0] = '\0';
-    for (size_t p = 0; p < n_named(m) && used < n_bytes; p++) {
-        if (p > 0 && strcmp(m->param[p].symbol, m->param[p - 1].symbol) == 0) continue;
-        int n = snprintf(text + used, n_bytes - used, "%s%s", p > 0 ? ", " : "", m->param[p].symbol);
-        if (n < 0) return;
-        used += (size_t)n;
-    }
-}
-
-status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,
-                             struct error *err)
-{
-    char list[300], text[1000];
-    size_t used = 0;
-    text[0] = '\0';
-    for (size_t i = 0; i < n_model && used < sizeof text; i++) {
-        list_symbols(model[i], list, sizeof list);
-        int n = snprintf(text + used, sizeof text - used, "%s model '%s' has %s", i > 0 ? ";" : "", model[i]->id, list);
-        used += n > 0 ? (size_t)n : 0;
-    }
-    return error_set_field(err, STATUS_INVALID, path, "unknown parameter '%.60s':%s", key, text);
-}
-
 /* One key of "fixed" or "start": a group ("C_TT": one number for all channels, or three) or one slot ("C_TT.r").
  * *known: set when the model has it. */
 static status parse_value(const struct json_field *f, const char *key, const json_t *value, const struct model_info *m,
                           double *out, bool *known, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM], n_slot = 0;
-    for (size_t p = 0; p < n_named(m); p++)
+    for (size_t p = 0; p < job_n_named_parameter(m); p++)
         if (strcmp(m->param[p].symbol, key) == 0 || strcmp(m->param[p].name, key) == 0) slot[n_slot++] = p;
     if (n_slot == 0) return STATUS_OK;
     *known = true;

@@ -14,7 +14,10 @@ status job_parse_fit_options(const struct json_field *f, const struct model_info
                              struct job_document *doc, struct error *err);
 /* True when parameter p leads others or follows one. */
 bool job_parameter_is_tied(const struct job_fit_option *o, size_t n_param, size_t p);
-/* "unknown parameter": says what the models have. */
+/* Number of the parameters that "fixed" and "start" can name: all but the density multiplier, the last one of volume models,
+ * which has keys of its own. */
+size_t job_n_named_parameter(const struct model_info *m);
+/* STATUS_INVALID at the key `path`, which names the parameter `key` that no model has; the text lists those they have. */
 status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,
                              struct error *err);
 

@@ -93,9 +93,9 @@ static size_t stated_member(const struct job_fit_option *o, size_t n_param, cons
     return p;
 }
 
-/* Of the member of the group that the document speaks of; lower and upper are the leader's. */
+/* Of the member of the group that the document speaks of; bound: lower and upper, of the leader. */
 static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o,
-                             size_t leader, const char *field, const double *given, double lower, double upper,
+                             size_t leader, const char *field, const double *given, const double bound[2],
                              struct error *err)
 {
     size_t p = stated_member(o, n_param, given, leader);
@@ -103,9 +103,9 @@ static status outside_bounds(const struct param_info *info, size_t n_param, cons
         return error_set_field(err, STATUS_INVALID, "fit.density_multiplier_per_cm",
                                "'fit.density_multiplier_per_cm' is %g%s: 'fit.bounds' has %g and %g", given[p],
                                strcmp(field, "fit.fixed") == 0 ? ", and held there without 'fit.fit_density'" : "",
-                               lower, upper);
+                               bound[0], bound[1]);
     return error_set_field(err, STATUS_INVALID, field, "'%s' has '%s' at %g: its bounds are %g and %g%s", field,
-                           info[p].name, given[p], lower * o->ratio[p], upper * o->ratio[p],
+                           info[p].name, given[p], bound[0] * o->ratio[p], bound[1] * o->ratio[p],
                            job_parameter_is_tied(o, n_param, p) ? ", with those of what 'fit.tied' ties it to" : "");
 }
 
@@ -137,7 +137,7 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
     double value = !isnan(held) ? held : begin;
     if (value < lower - slack || value > upper + slack)
         return outside_bounds(info, n_param, o, leader, !isnan(held) ? "fit.fixed" : "fit.start",
-                              !isnan(held) ? given->fixed : given->start, lower, upper, err);
+                              !isnan(held) ? given->fixed : given->start, (const double[2]){lower, upper}, err);
     if (isnan(value)) value = !isnan(prior) ? prior : param_to_file_unit(&info[leader], info[leader].start);
     value = fmin(fmax(value, lower), upper);
     for (size_t p = 0; p < n_param; p++) {

@@ -73,18 +73,47 @@ static status path_in(const char *folder, const char *name, char path[4096], str
                               : STATUS_OK;
 }
 
+/* Options whose values are not stored as they are given. */
+struct cloth_input {
+    const char *weave_name;
+    double voxel_um, diameter[3], pile_um, felt_um[2]; /* diameter: in voxels */
+    size_t bits;
+};
+
+/* Checks and converts them. */
+static status take_input(struct cloth *c, const struct cloth_input *in, struct error *err)
+{
+    if (c->out == NULL) return error_set(err, STATUS_INVALID, "--out is missing");
+    if (in->bits != 8 && in->bits != 16) return error_set(err, STATUS_INVALID, "option --bits takes 8 or 16");
+    c->file.bits = (int)in->bits;
+    if (in->bits == 8) {
+        c->file.void_value = 50.0;
+        c->file.fiber_value = 170.0;
+    }
+    c->phantom.voxel_size_m = c->scan.voxel_size_m = 1e-6 * in->voxel_um;
+    for (int k = 0; k < 3; k++) c->phantom.fiber_radius_m[k] = 0.5e-6 * in->diameter[k] * in->voxel_um;
+    c->phantom.pile_height_m = 1e-6 * in->pile_um;
+    c->phantom.felt_tile_m = 1e-6 * in->felt_um[0];
+    c->phantom.felt_thickness_m = 1e-6 * in->felt_um[1];
+    c->scan.seed = c->phantom.seed;
+    return STATUS_OK;
+}
+
 static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *err)
 {
-    const char *weave_name = "twill";
+    struct cloth_input in = {.weave_name = "twill",
+                             .voxel_um = 2.0,
+                             .diameter = {7.0, 7.0, 7.0},
+                             .pile_um = 200.0,
+                             .felt_um = {320.0, 120.0},
+                             .bits = 16};
     enum phantom_weave weave;
-    double voxel_um = 2.0, diameter[3] = {7.0, 7.0, 7.0}, pile_um = 200.0, felt_um[2] = {320.0, 120.0};
-    size_t bits = 16;
     c->memory_mib = 2048;
     const struct command_option option[] = {
         {.name = "out", .kind = OPTION_TEXT, .to = &c->out},
-        {.name = "weave", .kind = OPTION_TEXT, .to = &weave_name},
-        {.name = "voxel-um", .kind = OPTION_NUMBER, .to = &voxel_um},
-        {.name = "diameter-voxel", .kind = OPTION_NUMBER_LIST, .to = diameter, .n = 3},
+        {.name = "weave", .kind = OPTION_TEXT, .to = &in.weave_name},
+        {.name = "voxel-um", .kind = OPTION_NUMBER, .to = &in.voxel_um},
+        {.name = "diameter-voxel", .kind = OPTION_NUMBER_LIST, .to = in.diameter, .n = 3},
         {.name = "yarns", .kind = OPTION_COUNT, .to = c->phantom.n_yarn, .n = 2},
         {.name = "fibers-per-yarn", .kind = OPTION_COUNT, .to = &c->phantom.n_fiber_per_yarn},
         {.name = "packing", .kind = OPTION_NUMBER, .to = &c->phantom.packing},
@@ -95,15 +124,15 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "yarn", .kind = OPTION_TEXT, .to = &c->yarn},
         {.name = "yarn-true-size", .kind = OPTION_FLAG, .to = &c->phantom.yarn_true_size},
         {.name = "flyaways", .kind = OPTION_COUNT, .to = &c->phantom.n_flyaway_per_yarn},
-        {.name = "pile-um", .kind = OPTION_NUMBER, .to = &pile_um},
-        {.name = "felt-tile-um", .kind = OPTION_NUMBER, .to = &felt_um[0]},
-        {.name = "felt-thickness-um", .kind = OPTION_NUMBER, .to = &felt_um[1]},
+        {.name = "pile-um", .kind = OPTION_NUMBER, .to = &in.pile_um},
+        {.name = "felt-tile-um", .kind = OPTION_NUMBER, .to = &in.felt_um[0]},
+        {.name = "felt-thickness-um", .kind = OPTION_NUMBER, .to = &in.felt_um[1]},
         {.name = "snr", .kind = OPTION_NUMBER, .to = &c->scan.snr},
         {.name = "blur", .kind = OPTION_NUMBER, .to = &c->scan.blur_sd_voxel},
         {.name = "poisson", .kind = OPTION_NUMBER, .to = &c->scan.poisson_count},
         {.name = "rings", .kind = OPTION_NUMBER, .to = &c->scan.ring_amplitude},
         {.name = "gradient", .kind = OPTION_NUMBER, .to = &c->scan.gradient},
-        {.name = "bits", .kind = OPTION_COUNT, .to = &bits},
+        {.name = "bits", .kind = OPTION_COUNT, .to = &in.bits},
         {.name = "no-deflate", .kind = OPTION_FALSE, .to = &c->file.deflate},
         {.name = "metaimage", .kind = OPTION_FLAG, .to = &c->metaimage},
         {.name = "voxels-z", .kind = OPTION_COUNT, .to = &c->n_slice},
@@ -113,7 +142,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
     };
     /* read twice: weave and yarn set the defaults of the others */
     status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
-    if (st == STATUS_OK) st = phantom_weave_find(weave_name, &weave, err);
+    if (st == STATUS_OK) st = phantom_weave_find(in.weave_name, &weave, err);
     if (st != STATUS_OK) return st;
     phantom_option_default(&c->phantom, weave);
     if (c->yarn != NULL) {
@@ -125,20 +154,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
     st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st == STATUS_OK && c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
     if (st != STATUS_OK) return st;
-    if (c->out == NULL) return error_set(err, STATUS_INVALID, "--out is missing");
-    if (bits != 8 && bits != 16) return error_set(err, STATUS_INVALID, "option --bits takes 8 or 16");
-    c->file.bits = (int)bits;
-    if (bits == 8) {
-        c->file.void_value = 50.0;
-        c->file.fiber_value = 170.0;
-    }
-    c->phantom.voxel_size_m = c->scan.voxel_size_m = 1e-6 * voxel_um;
-    for (int k = 0; k < 3; k++) c->phantom.fiber_radius_m[k] = 0.5e-6 * diameter[k] * voxel_um;
-    c->phantom.pile_height_m = 1e-6 * pile_um;
-    c->phantom.felt_tile_m = 1e-6 * felt_um[0];
-    c->phantom.felt_thickness_m = 1e-6 * felt_um[1];
-    c->scan.seed = c->phantom.seed;
-    return STATUS_OK;
+    return take_input(c, &in, err);
 }
 
 static status write_png_grey(const uint8_t *grey, size_t width, size_t height, const char *path, struct error *err)

@@ -13,7 +13,8 @@ struct scattering_state {
 
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    status st = scattering_check_param(&scattering_isotropic, param, err);
+    status st =
+        param_check(scattering_isotropic.param, scattering_isotropic.n_param, scattering_isotropic.id, param, err);
     if (st != STATUS_OK) return st;
     struct scattering_state *s = malloc(sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");

@@ -87,7 +87,8 @@ static void fill_tables(struct scattering_state *s, const double *param)
 
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    status st = scattering_check_param(&scattering_marschner, param, err);
+    status st =
+        param_check(scattering_marschner.param, scattering_marschner.n_param, scattering_marschner.id, param, err);
     if (st != STATUS_OK) return st;
     struct scattering_state *s = malloc(sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");

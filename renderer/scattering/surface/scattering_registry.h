@@ -8,7 +8,4 @@
 #define VOLUME_MODEL(name, ...)
 #include "base/catalogue/models.def"
 
-/* STATUS_INVALID, field = parameter name, for NaN or a value outside its bounds. */
-status scattering_check_param(const struct scattering_model *m, const double *param, struct error *err);
-
 #endif

@@ -39,7 +39,7 @@ static void fill_energy(struct scattering_state *s)
 
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    status st = scattering_check_param(&scattering_two_lobe, param, err);
+    status st = param_check(scattering_two_lobe.param, scattering_two_lobe.n_param, scattering_two_lobe.id, param, err);
     if (st != STATUS_OK) return st;
     struct scattering_state *s = two_lobe_state_new(param);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");

@@ -180,7 +180,8 @@ static void fill_tables(const struct balance *b, struct scattering_state *s)
 
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    status st = scattering_check_param(&scattering_two_lobe_balanced, param, err);
+    status st = param_check(scattering_two_lobe_balanced.param, scattering_two_lobe_balanced.n_param,
+                            scattering_two_lobe_balanced.id, param, err);
     if (st != STATUS_OK) return st;
     struct scattering_state *s = two_lobe_state_new(param);
     struct balance *b = malloc(sizeof *b);

@@ -12,7 +12,7 @@ struct phase_state {
 
 static status prepare(const double *param, struct phase_state **state, struct error *err)
 {
-    status st = phase_check_param(&phase_isotropic, param, err);
+    status st = param_check(phase_isotropic.param, phase_isotropic.n_param, phase_isotropic.id, param, err);
     if (st != STATUS_OK) return st;
     struct phase_state *s = calloc(1, sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare phase function: out of memory");

@@ -57,7 +57,7 @@ static void fill_extinction(struct phase_state *s, double gamma, double k, doubl
 
 static status prepare(const double *param, struct phase_state **state, struct error *err)
 {
-    status st = phase_check_param(&phase_microflake, param, err);
+    status st = param_check(phase_microflake.param, phase_microflake.n_param, phase_microflake.id, param, err);
     if (st != STATUS_OK) return st;
     struct phase_state *s = calloc(1, sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare phase function: out of memory");

@@ -8,7 +8,4 @@
 #define VOLUME_MODEL(name, ...) extern const struct phase_model phase_##name;
 #include "base/catalogue/models.def"
 
-/* STATUS_INVALID, field = parameter name, for NaN or a value outside its bounds. */
-status phase_check_param(const struct phase_model *m, const double *param, struct error *err);
-
 #endif

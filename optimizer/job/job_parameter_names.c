@@ -1,0 +1,34 @@
+/* The names by which a document speaks of a model's parameters. */
+#include "optimizer/job/job_document_parts.h"
+
+#include <stdio.h>
+#include <string.h>
+
+size_t job_n_named_parameter(const struct model_info *m) { return m->n_param - (m->kind == MODEL_VOLUME ? 1 : 0); }
+
+/* "C_R, beta_R, ...": each group once. */
+static void list_symbols(const struct model_info *m, char *text, size_t n_bytes)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (size_t p = 0; p < job_n_named_parameter(m) && used < n_bytes; p++) {
+        if (p > 0 && strcmp(m->param[p].symbol, m->param[p - 1].symbol) == 0) continue;
+        int n = snprintf(text + used, n_bytes - used, "%s%s", p > 0 ? ", " : "", m->param[p].symbol);
+        if (n < 0) return;
+        used += (size_t)n;
+    }
+}
+
+status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,
+                             struct error *err)
+{
+    char list[300], text[1000];
+    size_t used = 0;
+    text[0] = '\0';
+    for (size_t i = 0; i < n_model && used < sizeof text; i++) {
+        list_symbols(model[i], list, sizeof list);
+        int n = snprintf(text + used, sizeof text - used, "%s model '%s' has %s", i > 0 ? ";" : "", model[i]->id, list);
+        used += n > 0 ? (size_t)n : 0;
+    }
+    return error_set_field(err, STATUS_INVALID, path, "unknown parameter '%.60s':%s", key, text);
+}
