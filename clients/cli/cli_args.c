@@ -37,18 +37,18 @@ static const struct cli_command {
          "1 when it failed, 3 when it was cancelled.\n",
          0},
     [CLI_LIST] = {"list", NULL, "list the jobs, newest first", "", OPT_JSON},
-    [CLI_CANCEL] = {"cancel", "ID", "stop a job; what it has computed so far is kept", "", 0},
+    [CLI_CANCEL] = {"cancel", "ID", "stop a job; its results so far are kept", "", 0},
     [CLI_RETRY] = {"retry", "ID", "start a failed or cancelled job again from its last checkpoint", "", 0},
     [CLI_RESULTS] =
         {"results", "ID", "download the results",
          "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
-         "files that are already whole are not fetched again.\n",
+         "complete files are not downloaded again.\n",
          OPT_OUT},
     [CLI_LOG] = {"log", "ID", "print the job's log", "", OPT_FOLLOW},
     [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "",
                     OPT_JSON},
-    [CLI_DELETE] = {"delete", "ID", "remove a job and its files", "A running job is stopped; nothing of it is kept.\n",
-                    0},
+    [CLI_DELETE] = {"delete", "ID", "remove a job and its files",
+                    "A running job is stopped first; its results are lost.\n", 0},
 };
 
 static const struct cli_option {
@@ -165,7 +165,7 @@ static void apply(struct cli_args *a, int bit, const char *value)
     }
 }
 
-/* Letters ("-": operands come in their place; ":": a missing value is told apart) and names for getopt_long. */
+/* Letters ("-": operands are returned in their place; ":": a missing value gives a code of its own) and names for getopt_long. */
 static void list_options(char letters[2 * N_OPTION + 3], struct option named[N_OPTION + 1])
 {
     size_t n = (size_t)snprintf(letters, 3, "-:");
@@ -302,6 +302,6 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     put(text, n_bytes, &at, "\noptions of every command:\n");
     put_options(OPT_EVERYWHERE | OPT_VERSION, text, n_bytes, &at);
     put(text, n_bytes, &at,
-        "\n`selvedge COMMAND --help` tells more. docs/sample-preparation.md describes the job document.\n"
+        "\n`selvedge COMMAND --help` describes a command. docs/sample-preparation.md describes the job document.\n"
         "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
 }

@@ -179,8 +179,8 @@ static void lost(struct job_service *v, struct job_row *row, const struct worker
     outcome->delay_s = 0.5 * (double)row->lost_attempts;
 }
 
-static void judge(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
-                  struct attempt_outcome *outcome)
+static void apply_end(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
+                      struct attempt_outcome *outcome)
 {
     bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
     if (!end->by_signal && end->code == WORKER_SUCCEEDED)
@@ -208,7 +208,7 @@ status attempt_finish(struct job_service *v, const char *job_id, const struct wo
     pthread_mutex_lock(&v->change);
     status s = store_job_look(v->store, job_id, &row, err);
     if (s != STATUS_OK) goto out;
-    judge(v, &row, end, stop, outcome);
+    apply_end(v, &row, end, stop, outcome);
     if (end->peak_rss_bytes > row.peak_rss_bytes) row.peak_rss_bytes = end->peak_rss_bytes;
     bool over = row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED;
     if (over) row.finished_unix_s = clock_wall_s();

@@ -19,7 +19,7 @@ struct slot {
     bool used;
     char job_id[STORE_ID_BYTES];
     pid_t pid;
-    enum attempt_stop stop; /* reason for which it was told to stop */
+    enum attempt_stop stop; /* reason for the request to stop */
     double seen_heartbeat_unix_s,
         heartbeat_seen_s; /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
     double asked_s;       /* monotonic time of the request to stop; 0: none */
