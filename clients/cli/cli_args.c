@@ -165,7 +165,8 @@ static void apply(struct cli_args *a, int bit, const char *value)
     }
 }
 
-/* Letters ("-": operands are returned in their place; ":": a missing value gives a code of its own) and names for getopt_long. */
+/* Letters ("-": operands are returned in their place; ":": a missing value gives a code of its own) and names for
+ * getopt_long. */
 static void list_options(char letters[2 * N_OPTION + 3], struct option named[N_OPTION + 1])
 {
     size_t n = (size_t)snprintf(letters, 3, "-:");
