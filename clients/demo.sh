@@ -22,7 +22,7 @@ demo=$(cd "$demo" && pwd)
 started=$(date +%s.%N)
 
 # Parameters that the sample is made with. The fit does not see them.
-truth=(--param C_R=0.06,0.05,0.08 --param C_TT=0.72,0.55,0.35 --param beta_R=4 --param beta_TT=20 --param gamma_TT=18)
+truth=(--param 'C_R=0.06,0.05,0.08' --param 'C_TT=0.72,0.55,0.35' --param beta_R=4 --param beta_TT=20 --param gamma_TT=18)
 title="twill phantom"
 
 say() { printf '\n== %s\n' "$*"; }
@@ -36,6 +36,7 @@ command -v python3 >/dev/null || fail "python3 is missing: run make deps"
 # ---- the daemon: one that an earlier demo left running, or a new one ----
 daemon_pid=
 keep_daemon=no
+# shellcheck disable=SC2317 # the trap calls it
 stop_daemon() {
     if [ -n "$daemon_pid" ] && [ "$keep_daemon" = no ]; then
         kill "$daemon_pid" 2>/dev/null || true

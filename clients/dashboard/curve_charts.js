@@ -48,7 +48,7 @@ export class CurveChart {
         x: { drawGrid: false, pixelsPerLabel: 50, axisLabelFormatter: (x) => (Number.isInteger(x) ? String(x) : "") },
         y: { axisLabelWidth: 46, pixelsPerLabel: 28, axisLabelFormatter: (y) => (y !== 0 && Math.abs(y) < 1e-3 ? y.toExponential(0) : String(Number(y.toPrecision(3)))) },
       },
-      highlightCallback: (event, x, points) => {
+      highlightCallback: (_event, x, points) => {
         const by = new Map(points.map((p) => [p.name, p.yval]));
         this.legend.textContent = `step ${x}: ${this.formatLegend(this.labels.map((l) => by.get(l) ?? null))}`;
       },

@@ -79,6 +79,7 @@ static status name_channels(const struct radiance_source *source, struct image *
 {
     static const char channel[] = "RGB";
     size_t n = im->n_channel;
+    // cppcheck-suppress pointerSize ; pointers and texts lie in one block
     char *block = calloc(n, sizeof(char *) + NAME_BYTES), flat[RADIANCE_NAME_BYTES];
     if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot render: out of memory");
     const char **name = (const char **)(void *)block;

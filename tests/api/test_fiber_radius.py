@@ -30,14 +30,17 @@ def test_radius_comes_back(tmp_path):
     sample, job = tmp_path / "sample", tmp_path / "job"
     (tmp_path / "views.csv").write_text(VIEWS)
     subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "12", "--out", str(sample)], check=True, capture_output=True)
-    subprocess.run([program("selvedge-phantom"), "photograph", "--fibers", str(sample / "truth.hair"), "--out", str(sample), "--table", str(tmp_path / "views.csv"),
-                    "--px", "32", "--paths", "60000", "--seed", "2", "--param", "C_TT=0.7,0.5,0.3", "--param", "beta_TT=15", "--param", "gamma_TT=20", "--quiet"], check=True)
+    subprocess.run([program("selvedge-phantom"), "photograph", "--fibers", str(sample / "truth.hair"), "--out", str(sample),
+                    "--table", str(tmp_path / "views.csv"),
+                    "--px", "32", "--paths", "60000", "--seed", "2",
+                    "--param", "C_TT=0.7,0.5,0.3", "--param", "beta_TT=15", "--param", "gamma_TT=20", "--quiet"], check=True)
     (job / "input").mkdir(parents=True)
     (job / "input" / "cloth.hair").write_bytes(thicker((sample / "truth.hair").read_bytes()))
     photographs = json.loads((sample / "photographs.json").read_text())
     for p in photographs:
         shutil.copy(sample / p["file"], job / "input")
-    fit = {"path_budget": 100000, "seed": 2, "fit_radius": True, "render_px": 8, "render_samples": 1, "fixed": {"C_R": 0.1, "beta_R": 5, "beta_TT": 15, "gamma_TT": 20}}
+    fit = {"path_budget": 100000, "seed": 2, "fit_radius": True, "render_px": 8, "render_samples": 1,
+           "fixed": {"C_R": 0.1, "beta_R": 5, "beta_TT": 15, "gamma_TT": 20}}
     (job / "job.json").write_text(json.dumps({"sample": "too thick", "fibers": {"file": "cloth.hair"}, "photographs": photographs, "fit": fit}))
     subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)], check=True)
     result = json.loads((job / "results" / "result.json").read_text())

@@ -47,8 +47,10 @@ def test_ambiguous_framing_is_refused_and_the_connection_closed(daemon, headers,
 
 
 @pytest.mark.parametrize("text", [
-    "\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n", "GET / HTTP/1.1\r\n\r\n", "\0\0\0\0\r\n\r\n", "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
-    "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5x\r\n\r\nabcde", "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999\r\n\r\n",
+    "\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n", "GET / HTTP/1.1\r\n\r\n", "\0\0\0\0\r\n\r\n",
+    "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
+    "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5x\r\n\r\nabcde",
+    "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999\r\n\r\n",
     "GET / HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n", "GET /" + "a" * 400000 + " HTTP/1.1\r\nHost: localhost\r\n\r\n",
     "GET / HTTP/1.1\r\nHost: localhost\r\n" + "X: y\r\n" * 50000 + "\r\n", "BREW /v1/jobs HTTP/1.1\r\nHost: localhost\r\n\r\n",
 ])
@@ -59,9 +61,11 @@ def test_nonsense_gets_an_error_and_does_no_harm(daemon, text):
 
 
 def test_expect_continue_is_answered_before_the_body(daemon):
-    answer, closed = raw(daemon, "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\nContent-Length: 5000\r\nExpect: 100-continue\r\n\r\n")
+    answer, closed = raw(daemon, "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\n"
+                         "Content-Length: 5000\r\nExpect: 100-continue\r\n\r\n")
     assert answer.startswith(b"HTTP/1.1 415 ") and closed
-    answer, _ = raw(daemon, "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 5000\r\nExpect: 100-continue\r\n\r\n", 2)
+    answer, _ = raw(daemon, "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                    "Content-Length: 5000\r\nExpect: 100-continue\r\n\r\n", 2)
     assert answer.startswith(b"HTTP/1.1 100 ")
 
 
@@ -204,7 +208,9 @@ def test_disk_floor(daemon_maker):
 
 
 def test_versions_and_options(tmp_path):
-    run = lambda *a: subprocess.run([program("selvedged"), *a], capture_output=True, text=True, timeout=30, cwd=tmp_path)
+
+    def run(*a):
+        return subprocess.run([program("selvedged"), *a], capture_output=True, text=True, timeout=30, cwd=tmp_path)
     assert run("--version").stdout.startswith("selvedged ")
     assert run("--help").returncode == 0
     for bad in (["--port", "x"], ["--port", "70000"], ["--set", "jobs.nothing=1"], ["--set", "x"], ["stray"], ["--config", "/nonexistent.conf"]):

@@ -82,10 +82,13 @@ def test_iterations_of_several_starts(daemon):
 
 EVERYTHING = {
     "sample": "everything", "lamp": {"side_cm": 5}, "camera": {"crop_cm": 2}, "black_sheet": False,
-    "volume": {"files": ["a.raw"], "raw": {"shape": [9, 9, 9], "type": "uint8"}, "filter": {"h": 5}, "voxel_size_um": [1, 1, 2], "matrix": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
+    "volume": {"files": ["a.raw"], "raw": {"shape": [9, 9, 9], "type": "uint8"}, "filter": {"h": 5},
+               "voxel_size_um": [1, 1, 2], "matrix": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
     "photographs": [{"file": "a.exr", "light_theta_deg": 120, "light_phi_deg": 0, "camera_theta_deg": 1, "camera_phi_deg": 0, "crop_px": [0, 0, 8, 8]}],
-    "fit": {"models": ["two_lobe.v1", "microflake.v1"], "fit_radius": {"lower_um": 3}, "tied": [["C_R"], {"beta_TT": 1, "gamma_TT": 2}], "bounds": {"beta_R": [2, 8]},
-            "priors": {"beta_R": {"mean": 5, "se": 1}}, "nuisance": {"gain": "global"}, "texture": {"block_mm": 1}, "fixed": {"C_TT": [0.1, 0.2, 0.3]}, "fit_density": True,
+    "fit": {"models": ["two_lobe.v1", "microflake.v1"], "fit_radius": {"lower_um": 3}, "tied": [["C_R"], {"beta_TT": 1, "gamma_TT": 2}],
+            "bounds": {"beta_R": [2, 8]},
+            "priors": {"beta_R": {"mean": 5, "se": 1}}, "nuisance": {"gain": "global"}, "texture": {"block_mm": 1}, "fixed": {"C_TT": [0.1, 0.2, 0.3]},
+            "fit_density": True,
             "start": {"C_R.g": 0.2}, "candidates": [{"light_theta_deg": 30, "light_phi_deg": 0, "camera_theta_deg": 1, "camera_phi_deg": 0}]}}
 
 
@@ -159,11 +162,13 @@ JSON = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_
                     lambda x: st.lists(x, max_size=4) | st.dictionaries(st.text(max_size=12), x, max_size=4), max_leaves=12)
 NEAR_JOB = st.fixed_dictionaries({}, optional={
     "sample": st.text(max_size=30) | JSON, "volume": st.fixed_dictionaries({}, optional={
-        "files": st.lists(st.sampled_from(["scan.tif", "../x", ""]), max_size=3) | JSON, "voxel_size_um": st.floats(-1, 5) | JSON, "axes": st.sampled_from(["xyz", "xxy"]) | JSON}),
+        "files": st.lists(st.sampled_from(["scan.tif", "../x", ""]), max_size=3) | JSON, "voxel_size_um": st.floats(-1, 5) | JSON,
+        "axes": st.sampled_from(["xyz", "xxy"]) | JSON}),
     "measurements": JSON, "photographs": JSON, "fit": JSON, "lamp": JSON, "camera": JSON, "fibers": JSON})
 NEAR_FILE = st.fixed_dictionaries({}, optional={"name": st.sampled_from(["a.tif", "../b", ""]) | JSON, "role": st.sampled_from(["volume", "poem"]) | JSON,
                                                 "size": st.integers(-1, 3000) | JSON, "sha256": st.just("0" * 64) | JSON})
-WORD = st.text(st.characters(min_codepoint=33, max_codepoint=126, blacklist_characters="#?/%\\"), min_size=1, max_size=40).filter(lambda w: w not in (".", ".."))
+WORD = st.text(st.characters(min_codepoint=33, max_codepoint=126, blacklist_characters="#?/%\\"), min_size=1, max_size=40).filter(
+    lambda w: w not in (".", ".."))
 
 
 @hypothesis.settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(hypothesis.HealthCheck))

@@ -158,7 +158,8 @@ BAD = {
     "pages of different size": ("scan.tif", lambda scan: tiff([(24, 24)] * 5 + [(24, 20)] + [(24, 24)] * 6), "page"),
     "empty volume": ("scan.tif", lambda scan: tiff(24), "every voxel"),
     "not a TIFF": ("scan.tif", lambda scan: b"nonsense" * 100, "scan.tif"),
-    "missing column": ("rows.csv", lambda scan: b"\n".join(b",".join(line.split(b",")[:4] + line.split(b",")[5:]) for line in TABLE.split(b"\n")), "camera_theta_deg"),
+    "missing column": ("rows.csv", lambda scan: b"\n".join(
+        b",".join(line.split(b",")[:4] + line.split(b",")[5:]) for line in TABLE.split(b"\n")), "camera_theta_deg"),
     "NaN radiance": ("rows.csv", lambda scan: row("fit,6,20,0,20,180,0,nan,0.1,0.1"), "rows.csv"),
     "negative radiance": ("rows.csv", lambda scan: row("fit,6,20,0,20,180,0,-3,0.1,0.1"), "rows.csv"),
     "camera angle beyond 90 degrees": ("rows.csv", lambda scan: row("fit,6,20,0,95,180,0,0.1,0.1,0.1"), "90"),

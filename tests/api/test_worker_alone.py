@@ -96,7 +96,8 @@ def test_texture_states_the_blocks_that_were_measured(tmp_path):
 
 def test_as_many_models_as_a_job_takes(tmp_path):
     """Also a run after an interruption in the validation: the finished part is loaded and not computed again."""
-    models = ["two_lobe.v1", "two_lobe_balanced.v1", "kajiya_kay.v1", "marschner.v1", "isotropic.v1", "phase_two_lobe.v1", "microflake.v1", "phase_isotropic.v1"]
+    models = ["two_lobe.v1", "two_lobe_balanced.v1", "kajiya_kay.v1", "marschner.v1", "isotropic.v1",
+              "phase_two_lobe.v1", "microflake.v1", "phase_isotropic.v1"]
     run(tmp_path, models=models, path_budget=20000)
     first = result(tmp_path)
     assert [m["id"] for m in first["models"]] == models and sum(m["best"] for m in first["models"]) == 1

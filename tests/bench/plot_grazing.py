@@ -59,7 +59,8 @@ def picture(curve):
         colour = COLOUR[name.split("_brightest")[0]] if name != "photograph" else "#222"
         text = SIGN.get(name, "") + TITLE[name]
         out.append(f'<text x="{LEFT + 12}" y="{TOP + 20 + 18 * i}" fill="{colour}">{text}</text>')
-    out.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 14}" text-anchor="middle">angle of lamp and camera from the normal, on opposite sides</text>'
+    out.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 14}" text-anchor="middle">'
+               f'angle of lamp and camera from the normal, on opposite sides</text>'
                f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" text-anchor="middle">radiance (white facing the lamp: 1)</text>')
     return "\n".join(out + ["</svg>", ""])
 

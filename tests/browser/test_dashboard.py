@@ -55,7 +55,11 @@ def real(tmp_path_factory):
                     "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
     photographs = json.loads((sample / "photographs.json").read_text())
     document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
-                "photographs": photographs[:9] + photographs[16:20], "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4, "texture": {"block_mm": 2.5, "weight": 0.01}, "candidates": [{"light_theta_deg": t, "light_phi_deg": 0, "camera_theta_deg": 60, "camera_phi_deg": 180} for t in (20, 65)]}}
+                "photographs": photographs[:9] + photographs[16:20],
+                "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 300000, "render_px": 24, "render_samples": 4,
+                        "texture": {"block_mm": 2.5, "weight": 0.01},
+                        "candidates": [{"light_theta_deg": t, "light_phi_deg": 0, "camera_theta_deg": 60, "camera_phi_deg": 180}
+                                       for t in (20, 65)]}}
     (sample / "job.json").write_text(json.dumps(document))
     process, url = start_daemon(folder / "data")
     yield url, selvedge.Server(url).submit(str(sample / "job.json"))
@@ -135,7 +139,9 @@ def test_real_job_live_and_finished(real, browser):
     wait_for(browser, "document.querySelector('.state.succeeded')", 400)
     wait_for(browser, "document.querySelector('#parameters')")
     # the curves of both models under their own names, and the table that compares them
-    titles = lambda: [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
+
+    def titles():
+        return [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
     wait_for(browser, "document.querySelectorAll('#models-shown button').length === 2")
     assert any(t.startswith("alpha") for t in titles()) and not any(t.startswith("C_TT") for t in titles())
     keep(browser, "second-model")
@@ -336,7 +342,9 @@ def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
 def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_path):
     url, folder = stub
     _, sample = submit(url, folder, "broken twill")
-    jobs = lambda: [j["id"] for j in selvedge.Server(url).jobs()]
+
+    def jobs():
+        return [j["id"] for j in selvedge.Server(url).jobs()]
     before = jobs()
     browser.get(url + "/")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))

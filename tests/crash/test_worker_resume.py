@@ -14,6 +14,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
 WORKER = os.path.join(BUILD, "bin", "selvedge-worker")
 
+
 def make_job(folder, **fit):
     os.makedirs(os.path.join(folder, "input"))
     document = {"sample": "resume", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},

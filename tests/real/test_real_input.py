@@ -5,7 +5,7 @@ import os
 import pytest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import real_jobs
+import real_jobs  # noqa: E402
 
 # Largest relative RMS errors over the fitted and the held-out rows, and the least factor by which the objective falls. The scanned cloth
 # is not the measured one, so neither error is small; with the budget below they are 0.344, 0.286 and 83 (fiber_ct) and

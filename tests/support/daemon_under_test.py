@@ -142,8 +142,8 @@ class Daemon:
         return r.json()["id"]
 
     def declare(self, job, name, data, role="volume", checked=True):
-        r = self.post(f"/v1/jobs/{job}/files", json={"name": name, "role": role, "size": len(data),
-                                                      "sha256": sha256(data) if checked else None})
+        declaration = {"name": name, "role": role, "size": len(data), "sha256": sha256(data) if checked else None}
+        r = self.post(f"/v1/jobs/{job}/files", json=declaration)
         assert r.status_code in (200, 201), r.text
         return r.json()
 

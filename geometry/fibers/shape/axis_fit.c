@@ -316,6 +316,7 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, const u
     for (size_t b = 0; job->sum != NULL && b < n_brick; b++) free(job->sum[b].pull);
     free(job->sum);
     job->sum = NULL;
+    job->bricks = NULL;
     segment_bricks_release(&bricks);
     return s;
 }

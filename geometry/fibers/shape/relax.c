@@ -139,6 +139,7 @@ static status one_round(struct relax_job *job, struct polyline_set *lines, float
     for (size_t b = 0; job->result != NULL && b < n_brick; b++) free(job->result[b].pull);
     free(job->result);
     job->result = NULL;
+    job->bricks = NULL;
     segment_bricks_release(&bricks);
     return s;
 }

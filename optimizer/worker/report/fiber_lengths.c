@@ -25,8 +25,9 @@ status fiber_lengths_measure(const struct fiber_set *f, struct fiber_lengths *l,
 {
     size_t n = f->n_fiber;
     *l = (struct fiber_lengths){.shortest_m = NAN};
-    double *length = malloc(2 * (n + 1) * sizeof *length), *sorted = length + n + 1;
+    double *length = malloc(2 * (n + 1) * sizeof *length);
     if (length == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fibers' lengths: out of memory");
+    double *sorted = length + n + 1;
     for (size_t i = 0; i < n; i++) {
         int class = f->axis_class[i] < 3 ? f->axis_class[i] : 2;
         sorted[i] = length[i] = one_length(f, i);

@@ -32,7 +32,8 @@ static void fill_energy(struct scattering_state *s)
     for (int i = 0; i <= TWO_LOBE_N_TABLE; i++) {
         int i0 = i / STRIDE * STRIDE;
         float t = (float)(i - i0) / STRIDE;
-        for (int k = 0; k < 3 && i != i0; k++)
+        for (int k = 0; k < 3 && i != i0; k++) /* i0 + STRIDE is in the table unless i == i0 */
+            // cppcheck-suppress arrayIndexOutOfBounds
             s->sampling[i].energy[k] = two_lobe_mix(s->sampling[i0].energy[k], s->sampling[i0 + STRIDE].energy[k], t);
     }
 }

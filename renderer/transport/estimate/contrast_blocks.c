@@ -110,6 +110,7 @@ static struct cell look_at(const struct contrast_plan *c, double mean[2][3 + N_J
         out.value[s] = x[channel] / n - mean[s][channel];
         out.var[s] = fmax(0.0, mean_covariance(x[channel], x[channel], x[n_value + channel], n));
         if (k < 3) continue;
+        // cppcheck-suppress arrayIndexOutOfBoundsCond ; k is at most 2 + N_JAC
         out.slope[s] = x[k] / n - mean[s][k];
         out.slope_var[s] = fmax(0.0, mean_covariance(x[k], x[k], x[n_value + k], n));
         out.covariance[s] = mean_covariance(x[channel], x[k], x[2 * n_value + k - 3], n);

@@ -65,7 +65,7 @@ struct volume_path {
 };
 
 /* The next event of the record; NULL: none is kept, or it is full. */
-static struct volume_event *note(struct volume_path *l, int kind)
+static struct volume_event *note(struct volume_path *l, enum volume_event_kind kind)
 {
     struct volume_record *r = l->record;
     if (r == NULL || r->n_event++ >= r->capacity) return NULL;
@@ -75,7 +75,7 @@ static struct volume_event *note(struct volume_path *l, int kind)
     return e;
 }
 
-static void note_lookup(struct volume_path *l, int kind, const struct volume_lookup *k)
+static void note_lookup(struct volume_path *l, enum volume_event_kind kind, const struct volume_lookup *k)
 {
     struct volume_event *e = note(l, kind);
     if (e == NULL) return;
@@ -83,7 +83,7 @@ static void note_lookup(struct volume_path *l, int kind, const struct volume_loo
     e->sine = k->sine;
 }
 
-static void note_light(struct volume_path *l, int kind, const float *wi, const float weight[3])
+static void note_light(struct volume_path *l, enum volume_event_kind kind, const float *wi, const float weight[3])
 {
     struct volume_event *e = note(l, kind);
     if (e == NULL) return;

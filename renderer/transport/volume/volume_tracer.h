@@ -70,7 +70,15 @@ struct volume_result {
  *   arrive     value += L weight[0]              beyond   value += T weight
  * (a connection that does not arrive adds nothing). */
 struct volume_event {
-    enum { VOLUME_NULL, VOLUME_REAL, VOLUME_SCATTER, VOLUME_CONNECT, VOLUME_PASSED, VOLUME_ARRIVE, VOLUME_BEYOND } kind;
+    enum volume_event_kind {
+        VOLUME_NULL,
+        VOLUME_REAL,
+        VOLUME_SCATTER,
+        VOLUME_CONNECT,
+        VOLUME_PASSED,
+        VOLUME_ARRIVE,
+        VOLUME_BEYOND
+    } kind;
     float density, sine; /* of a look-up: 0 to 1, and sine of the angle to the fiber */
     float wi[3], wo[3], weight[3];
 };
