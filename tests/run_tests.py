@@ -1,8 +1,9 @@
 """Run every test and end with "N passed, N failed[, N skipped]"; exit status 1 when one failed or none ran.
 
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
-hangs or writes no results counts as one failed test. --quick runs the unit tests, the layer rules and the quick API tests,
-C beside Python: one computes while the other waits for daemons.
+hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
+--quick runs the checks, the unit tests and the quick API tests, C beside Python: one computes while the other waits for
+daemons. --programs leaves out the checks of the sources, which neither sanitizers nor coverage change.
 """
 import argparse
 import concurrent.futures
@@ -16,6 +17,8 @@ import time
 import xml.etree.ElementTree as ElementTree
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+CHECKS = ["layers", "format-check", "lint-c", "lint-javascript", "lint-python", "lint-shell"]
+SLOW_CHECKS = ["clang"]
 TIMEOUT_S = 600
 PYTEST_TIMEOUT_S = 1500
 
@@ -88,21 +91,21 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", default="build")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--programs", action="store_true")
     parser.add_argument("--only", help="run only what has this in its name")
     arguments = parser.parse_args()
     environment = dict(os.environ, SELVEDGE_BUILD=os.path.join(ROOT, arguments.build), OPENBLAS_NUM_THREADS="1")
     environment.setdefault("SELVEDGE_DATA", os.path.join(ROOT, "..", "shared", "data"))
     totals = Totals()
-    wanted = lambda name: arguments.only is None or arguments.only in name
+    environment.pop("MAKEFLAGS", None)  # a make that a check starts is no part of the one that started us
 
-    def run_layers():
-        """The rules of `make layers`."""
-        for name, words in [("layers", ["tests/check_layers.py", "--build", arguments.build]),
-                            ("calls", ["tests/check_calls.py", "--build", arguments.build]),
-                            ("code", ["tests/check_code.py"])]:
+    def wanted(name):
+        return arguments.only is None or arguments.only in name
+
+    def run_checks():
+        for name in [] if arguments.programs else CHECKS if arguments.quick else CHECKS + SLOW_CHECKS:
             if wanted(name):
-                code, output, seconds = run([sys.executable, *words], TIMEOUT_S, environment)
-                totals.add_one(name, code, output, seconds)
+                totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], TIMEOUT_S, environment))
 
     def run_c(folder):
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
@@ -132,7 +135,7 @@ def main():
                 totals.add(f"{kind}/{name[:-3]}", junit, code, output, seconds)
 
     with tempfile.TemporaryDirectory() as folder:
-        run_layers()
+        run_checks()
         with concurrent.futures.ThreadPoolExecutor(max_workers=2 if arguments.quick else 1) as lanes:
             for lane in [lanes.submit(run_c, folder), lanes.submit(run_python, folder)]:
                 lane.result()

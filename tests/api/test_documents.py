@@ -36,13 +36,17 @@ def exists(path):
     return any(glob.glob(os.path.join(ROOT, path + ending)) for ending in ("", ".c", ".h"))
 
 
-def make_targets():
-    found = set()
+def makefiles():
+    """The text of the Makefile and of what it includes."""
+    text = ""
     for path in tracked("Makefile", "*.mk"):
         with open(os.path.join(ROOT, path), encoding="utf-8") as f:
-            for names in re.findall(r"^([a-z][a-z -]*):(?!=)", f.read(), re.MULTILINE):
-                found.update(names.split())
-    return found
+            text += f.read()
+    return text
+
+
+def make_targets():
+    return {name for names in re.findall(r"^([a-z][a-z -]*):(?!=)", makefiles(), re.MULTILINE) for name in names.split()}
 
 
 def test_links_lead_somewhere():
@@ -76,8 +80,7 @@ def test_make_targets_exist():
 
 
 def test_programs_exist():
-    with open(os.path.join(ROOT, "Makefile"), encoding="utf-8") as f:
-        makefile = f.read()
+    makefile = makefiles()
     missing = [f"{path}: {name}" for path, text in texts()
                for name in re.findall(r"build/(bin/[\w-]+|tests/bench/bench_\w+)", text)
                if f"$(BUILD)/{name}" not in makefile and not exists(name)]

@@ -1,0 +1,47 @@
+# Benchmarks, and pictures of the documentation that come from them.
+.PHONY: bench bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures
+BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
+# bench_fit is more than one file
+$(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
+
+##@ Benchmarks and pictures
+bench: | deps-test ## every figure, one JSON object a line
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(BENCH_BINS) >&2
+	@/usr/bin/python3 tests/bench/run_bench.py --build $(BUILD)
+
+bench-transport: | deps-test ## the renderer's figures (paths a second, time to a given standard error, memory)
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
+	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
+
+bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2
+	@for b in $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)); do $$b || exit 1; done
+
+# FIT: some of the figures only, such as FIT="gabardine seeds"
+bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing highlights, real tables (1 h 45 min on 2 quiet cores; photographs are kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
+
+# FABRIC: one of tests/support/cloth/fit_fabrics.c
+bench-published: FABRIC ?= microflake
+bench-published: | deps-test ## the published method with its own budget, 3.3e9 paths, on FABRIC (microflake: 80 minutes on 2 cores; gabardine: 8 hours; continues when stopped)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@nice -n 19 $(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit --fabric $(FABRIC) --journal $(BUILD)/bench-fit/published-$(FABRIC).journal published
+
+docs-fit-curve: | deps-test ## draw docs/images/fit-curve.svg anew: error against paths of both methods, analytic cloth (seconds)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@mkdir -p $(BUILD)/bench-fit docs/images
+	@$(BUILD)/tests/bench/bench_fit analytic > $(BUILD)/bench-fit/analytic.json
+	@/usr/bin/python3 tests/bench/plot_fit_curve.py $(BUILD)/bench-fit/analytic.json docs/images/fit-curve.svg
+
+docs-grazing: | deps-test ## draw docs/images/microflake-grazing.svg anew: what each model makes of grazing highlights (minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
+	@mkdir -p $(BUILD)/bench-fit docs/images
+	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit grazing > $(BUILD)/bench-fit/grazing.json
+	@/usr/bin/python3 tests/bench/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
+
+docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures
+	@mkdir -p docs/images
+	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
+	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png

@@ -1,0 +1,40 @@
+# Checks of the sources. `make test` and `make check` count each of them as a test.
+.PHONY: layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell
+# clang-format 14, that of Debian 12: other versions break lines elsewhere
+FORMATTED = $(shell find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp')
+SHELL_SCRIPTS = $(shell git ls-files '*.sh') config/install-dependencies .ci/run
+
+##@ Checks of the sources
+format:            ## format the C sources with clang-format 14
+	@clang-format-14 -i $(FORMATTED)
+
+format-check:      ## fails when a C source is not formatted as `make format` would
+	@clang-format-14 --dry-run -Werror $(FORMATTED) && echo "format ok"
+
+layers:            ## includes and calls go one way, the daemon holds no symbol of the computing parts, headers say their purpose, functions and files are short
+	@/usr/bin/python3 tests/check_layers.py --build $(BUILD)
+	@/usr/bin/python3 tests/check_calls.py --build $(BUILD)
+	@/usr/bin/python3 tests/check_code.py
+
+columns:           ## no line of a C source is longer than 120 columns, comments included
+	@/usr/bin/python3 tests/check_columns.py $(FORMATTED)
+
+clang:             ## clang builds every program and test without a warning (gcc does in every build)
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 all build-tests
+	@echo "clang ok"
+
+lint: lint-c lint-javascript lint-python lint-shell ## all of the next four
+
+# without tests: cppcheck does not know that cmocka's assertions end a test
+lint-c:            ## cppcheck; which checks: config/cppcheck.txt
+	@cppcheck --quiet -j$$(nproc) $$(grep -v '^#' config/cppcheck.txt) \
+		base geometry renderer optimizer server clients/cli && echo "cppcheck ok"
+
+lint-javascript:   ## the TypeScript compiler as a checker of the dashboard: config/javascript.json
+	@tsc --project config/javascript.json && echo "javascript ok"
+
+lint-python:       ## flake8: .flake8
+	@/usr/bin/python3 -m flake8 && echo "python ok"
+
+lint-shell:        ## shellcheck
+	@shellcheck $(SHELL_SCRIPTS) && echo "shell ok"

@@ -1,0 +1,76 @@
+# Tests: their programs, and the targets that run them. tests/README.md says what each one is.
+.PHONY: deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+# one test program per file tests/{unit,physics}/test_*.c
+TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
+TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
+PHYSICS_RENDERER := $(filter-out %reconstruct_phantom %reconstruct_real %fit_density,$(filter $(BUILD)/tests/physics/%,$(TEST_BINS)))
+TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
+$(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
+	@mkdir -p $(@D)
+	@echo "  LINK $@"
+	@$(CC) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lcmocka $(LINK_SERVER) $(LINK_OPTIMIZER)
+.SECONDARY:
+
+##@ Tests
+deps-test:         ## install what the tests need as well
+	@./config/install-dependencies test
+
+build-tests: $(TEST_BINS) $(PRINT_OPTIONS)
+
+check: | deps-test ## quick inner loop: checks of the sources, unit tests, quick API tests (< 2 minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
+	@/usr/bin/python3 tests/run_tests.py --quick --build $(BUILD)
+
+test: | deps-test  ## everything that continuous integration runs; ends with "N passed, N failed"
+	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
+	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
+
+# What takes too long for every commit. One part that fails does not keep the next from running.
+NIGHTLY := asan fuzz-smoke coverage test-long mutants
+nightly:           ## asan, fuzz-smoke, coverage, test-long and mutants: too long for every commit
+	@failed=""; for part in $(NIGHTLY); do \
+		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
+	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }
+
+asan: | deps-test  ## unit and quick API tests under the address and undefined-behaviour sanitizers
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
+	@/usr/bin/python3 tests/run_tests.py --quick --programs --build build/asan
+
+asan-physics: | deps-test ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \
+		$(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER))
+	@for t in $(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER)); do \
+		echo "$$t"; UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 $$t || exit 1; done
+
+# one libFuzzer program per file tests/fuzz/fuzz_*.c (fuzz_input.c is what they share)
+FUZZ_SECONDS ?= 600
+FUZZ ?=
+FUZZ_C := $(filter-out tests/fuzz/fuzz_input.c,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_BINS := $(patsubst %.c,$(BUILD)/%,$(FUZZ_C))
+FUZZ_LIBS := $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(FUZZ_BINS): $(BUILD)/%: $(BUILD)/obj/%.c.o $(BUILD)/obj/tests/fuzz/fuzz_input.c.o $(FUZZ_LIBS)
+	@mkdir -p $(@D)
+	@echo "  LINK $@"
+	@$(CC) $(LDFLAGS) -fsanitize=fuzzer -o $@ $^ $(LINK_OPTIMIZER)
+$(BUILD)/tests/fuzz/make_fuzz_seeds: $(BUILD)/obj/tests/fuzz/make_fuzz_seeds.c.o $(FUZZ_LIBS)
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
+fuzz-programs: $(FUZZ_BINS) $(BUILD)/tests/fuzz/make_fuzz_seeds
+
+fuzz: | deps       ## every parser under libFuzzer for FUZZ_SECONDS (600) each
+	@./config/install-dependencies fuzz
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/fuzz CC=clang CXX=clang++ WERROR=-w OPTIMIZE=-O1 \
+		SANITIZE=fuzzer-no-link,address,undefined,float-cast-overflow CFLAGS=-fno-sanitize-recover=all fuzz-programs
+	@tests/fuzz/run_fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ)
+
+fuzz-smoke:        ## the same for 5 seconds each
+	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=5
+
+# atomic counters: threads count together
+coverage: | deps-test ## lines that the unit and quick API tests reach: one JSON line, and a table of folders
+	@./config/install-dependencies coverage
+	@find build/coverage -name '*.gcda' -delete 2>/dev/null || true
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/coverage OPTIMIZE=-O2 LDFLAGS=--coverage \
+		CFLAGS='--coverage -fprofile-update=atomic' all build-tests
+	@/usr/bin/python3 tests/run_tests.py --quick --programs --build build/coverage
+	@/usr/bin/python3 tests/coverage_report.py build/coverage
