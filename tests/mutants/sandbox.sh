@@ -1,4 +1,4 @@
-#!/bin/sh
+#!/usr/bin/env bash
 # sandbox.sh FOLDER COMMAND...: run a command that may be out of its mind. It sees its own processes only, may write to
 # FOLDER (mounted on /mnt, the working folder is /mnt/tree) and to FOLDER/tmp (mounted on /tmp), and everything that it
 # started ends with it. Needs root or user namespaces.
