@@ -52,7 +52,8 @@ def test_a_crash_names_its_signal_and_last_words(daemon):
     assert "signal 11" in error["text"] and "a last word" in error["text"]
 
 
-@pytest.mark.parametrize("code, state, text", [(0, "succeeded", None), (2, "failed", "without an error message"), (17, "failed", "unknown code 17"), (127, "failed", "could not be started")])
+@pytest.mark.parametrize("code, state, text", [
+    (0, "succeeded", None), (2, "failed", "without an error message"), (17, "failed", "unknown code 17"), (127, "failed", "could not be started")])
 def test_exit_codes(daemon, code, state, text):
     job = daemon.wait_state(daemon.start_job(f"exit {code}"), "succeeded", "failed")
     assert job["state"] == state and (text is None or text in job["error"]["text"])

@@ -310,7 +310,8 @@ def test_form_edits_a_dropped_document(stub, browser):
     before = json.loads((sample / "job.json").read_text())
     click(browser, browser.find_element(By.CSS_SELECTOR, "#editor > summary"))
     wait_for(browser, "document.querySelector(`#editor .option[data-path='volume.voxel_size_um']`)")  # sections that are given are open
-    assert written(browser) == before and option(browser, "volume.voxel_size_um").find_element(By.CSS_SELECTOR, "input[type=text]").get_attribute("value") == "2"
+    size = option(browser, "volume.voxel_size_um").find_element(By.CSS_SELECTOR, "input[type=text]")
+    assert written(browser) == before and size.get_attribute("value") == "2"
     fill_in(browser, "volume.voxel_size_um", "2 2 2.5")
     fill_in(browser, "volume.filter.h", "11")
     assert written(browser) == {**before, "volume": {**before["volume"], "voxel_size_um": [2, 2, 2.5], "filter": {"h": 11}}}
