@@ -29,6 +29,7 @@ PARTS = {"base": 8, "geometry": 24, "renderer": 24, "optimizer": 26, "server": 1
 LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
 COMPILE = "WERROR=-Werror=incompatible-pointer-types -Werror=int-conversion"
 PROGRAMS = ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom"]
+LINK_S = 2.0  # what building one test costs beside running it
 SLOW_FACTOR, SLOW_S = 8.0, 20.0  # a test that takes SLOW_S seconds and SLOW_FACTOR times as long as usual hangs
 
 
@@ -155,14 +156,14 @@ class Selection:
         score = 2 * len(stem_words & test_words)
         score += 4 * (f'"{p.with_suffix(".h")}"' in self.source[test.name])
         score += 2 * (f'"{p.parent}/' in self.source[test.name])
-        score += p.parts[0] in test.name.split("/") or (p.parts[0] == "server" and test.name.startswith("api/")) or (
-            path.startswith("clients/cli") and "cli" in test_words)
+        score += 2 * (p.parts[0] in test.name.split("/") or (p.parts[0] == "server" and test.name.startswith("api/")) or (
+            path.startswith("clients/cli") and "cli" in test_words))
         return score
 
     def ordered(self, path):
         """Those of some likeliness by it, but quick ones before slow ones; the others by time."""
         def cost(t):
-            return t.seconds / (1 + self.likeliness(t, path)) ** 2
+            return (t.seconds + LINK_S) / (1 + self.likeliness(t, path)) ** 2
         return sorted(self.affected(path), key=cost)
 
 
