@@ -11,9 +11,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FOLDERS = ("base/", "geometry/", "renderer/", "optimizer/", "server/", "clients/")
 FUNCTION_LINES, FILE_LINES, FOLDER_FILES, PARAMETERS = 60, 400, 20, 8
 # longer files, and why they are one file
-LONG_FILES = {
-    "optimizer/fit/descent/gauss_newton.c": "one method of descent with its stop rules",
-}
+LONG_FILES = {}
 # longer parameter lists, and why
 LONG_LISTS = {
     "on_request": "the callback of libmicrohttpd has this signature",

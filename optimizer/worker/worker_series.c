@@ -122,7 +122,7 @@ static char *record_text(const struct fit_step *step, const struct worker_series
         json_object_set_new(json, "n_path_row", paths);
         json_object_set_new(json, "step_length", json_number(step->step_length));
         json_object_set_new(json, "step_limit", json_number(step->step_limit));
-        json_object_set_new(json, "gain", json_number(step->gain));
+        json_object_set_new(json, "gain", json_number(step->decrease));
     }
     if (json != NULL && step->nuisance != NULL) {
         json_t *nuisance = json_object();

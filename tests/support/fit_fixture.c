@@ -20,7 +20,7 @@ static status on_step(void *context, const struct fit_step *step, struct error *
     assert_int_equal(step->step, x->n_reported++);
     assert_int_equal(step->n_param, FAKE_N_PARAM);
     assert_true(step->step_length >= 0.0 && step->step_length <= 1.0 + 1e-9 && step->step_limit <= 1.0);
-    assert_true(isfinite(step->damping) && isfinite(step->noise) && isfinite(step->gain));
+    assert_true(isfinite(step->damping) && isfinite(step->noise) && isfinite(step->decrease));
     for (size_t p = 0; p < step->n_param; p++)
         assert_true(step->param[p] >= fake_param[p].lower && step->param[p] <= fake_param[p].upper);
     if (step->nuisance != NULL) x->last_gain = step->nuisance->value[0];

@@ -39,10 +39,10 @@ struct fit_step {
     const double *param;    /* where the objective was estimated */
     const double *param_se; /* NULL when unknown */
     const struct estimate *replica[2];
-    double step_length, step_limit, gain; /* of the step that led here, as damping is: the largest move and the limit
-                                             it had, in step limits (coordinate.h); the fall of f that it promised */
-    double damping,
-        noise; /* mean damping added to the diagonal; Monte-Carlo variance per residual of the pooled model */
+    /* Of the step that led here: its largest move and the limit that it had, both in step limits (coordinate.h), the decrease
+     * of the objective that it was predicted to bring, and the damping added to the diagonal. */
+    double step_length, step_limit, decrease, damping;
+    double noise; /* mean Monte-Carlo variance of a residual of the pooled model */
     const char *note;
     const struct fit_nuisance *nuisance; /* NULL: none */
 };

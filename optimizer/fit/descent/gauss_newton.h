@@ -1,0 +1,61 @@
+/* Inside descent/: the state of gauss_newton.v1, which its three files share: gauss_newton.c (iterations and paths),
+ * gauss_newton_step.c (the next step) and gauss_newton_stop.c (when the fit ends). f is the objective, sum of r^2. */
+#ifndef SELVEDGE_OPTIMIZER_GAUSS_NEWTON_H
+#define SELVEDGE_OPTIMIZER_GAUSS_NEWTON_H
+
+#include "optimizer/fit/descent/descent_methods.h"
+
+enum { N = SCATTERING_MAX_PARAM };
+
+struct gauss_newton {
+    struct descent_run run;
+    struct linear_history history;
+    struct linear_model model;
+    double x[N];            /* fit coordinates where the next estimate is made */
+    double best_x[N];       /* last point that was accepted */
+    double best_f, best_se; /* objective there, by the pooled model */
+    double limit_scale;     /* factor of the step limits, 1 or less */
+    double n_path_mean;     /* paths of a configuration and replica in the next iteration */
+    double predicted;       /* decrease of f by the last step, as the model predicted it */
+    /* Of gauss_newton_step: */
+    double decrease;     /* of f, by the step */
+    double far_decrease; /* of f, by several steps without damping */
+    double noise;        /* mean Monte-Carlo variance of a residual */
+    double damping;      /* added to the diagonal, per squared step limit */
+    double largest_step; /* largest move of a parameter, in step limits */
+    bool pulls;          /* whether there is a pull */
+    size_t n_free;       /* free parameters */
+};
+
+/* Finds the next step dx[n_param] in fit coordinates, and fills in the fields above. far_decrease distinguishes a fit
+ * that has arrived from one that moves along a valley in steps too short to show. STATUS_INTERNAL of
+ * bounded_quadratic. */
+status gauss_newton_step(struct gauss_newton *g, double *dx, struct error *err);
+/* What the pull adds to f at x; 0 without a pull. */
+double gauss_newton_pull_penalty(const struct gauss_newton *g, const double *x);
+
+/* Decrease of f that pure noise would predict. For f = r.r it is the noise variance of a residual for each free
+ * direction, one to three times that because the three channels of a configuration share their paths. */
+double gauss_newton_noise(const struct gauss_newton *g);
+/* Whether further steps could lower f by no more than noise, or by too little to be worth their paths. */
+bool gauss_newton_arrived(const struct gauss_newton *g);
+/* Whether the noise of f, which is f +- se, is good enough. */
+bool gauss_newton_precise(const struct gauss_newton *g, double f, double se);
+/* Whether the noise is small beside the photographs' own errors; false when the job states a budget. */
+bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g);
+
+/* Fills in stop and reason of a fit that ended because it had arrived. precise: gauss_newton_precise; otherwise it is
+ * as good as the photographs. */
+void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double f, double se,
+                              struct fit_result *result);
+/* The state of a fit whose paths or iterations are used up. */
+struct gauss_newton_end {
+    enum stop_reason used_up; /* STOP_ITERATIONS or STOP_PATH_BUDGET */
+    bool arrived, failed;     /* failed: the last step was taken back */
+    double objective, objective_se;
+};
+/* Fills in stop and reason of such a fit: why it has converged (result->converged) or not. */
+void gauss_newton_explain_early_end(const struct gauss_newton *g, const struct gauss_newton_end *end,
+                                    struct fit_result *result);
+
+#endif

@@ -1,0 +1,116 @@
+/* When gauss_newton.v1 ends.
+ *
+ * It has arrived when the decrease of the objective that several undamped steps could bring (far_decrease, by the
+ * curvature without the noise of J) is within the noise, or below arrived_share of the weighted objective, under
+ * which the curvature of the model does not determine it, or good enough: below target_share of that objective or
+ * target_rel_rms. One step would not do for that test: where a model does not fit, steps are short and each brings
+ * little, so such fits would end on their way.
+ *
+ * The fit ends when it has arrived, there is no pull any more, and the noise is good enough too: below target_share
+ * of the plain objective or target_rel_rms, or, where no budget was asked for, below photograph_share of the variance
+ * of a residual by the photographs' own errors. A fit whose paths or iterations are used up before that has converged
+ * if it had arrived. / */
+#include "optimizer/fit/descent/gauss_newton.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is, and
+ * the share of the objective that is. */
+static const double target_rel_rms = 0.0007, target_share = 0.002;
+/* Variance of a residual by tracing, in units of that by the photographs' stated errors, that ends a fit with the
+ * default budget: its errors are then sqrt(1 + photograph_share) times those of exact renderings. The pooled means
+ * must have least_effective paths each, because their derivatives are several times noisier than they are. */
+static const double photograph_share = 0.6, least_effective = 120000.0;
+/* Share of the objective below which the curvature of the model does not determine a predicted decrease. */
+static const double arrived_share = 0.02;
+
+double gauss_newton_noise(const struct gauss_newton *g) { return 2.0 * (double)g->n_free * g->noise; }
+
+/* Decrease of the objective f below which another step is not worth its paths. */
+static double good_enough(const struct gauss_newton *g, double f)
+{
+    return fmax(target_share * f, target_rel_rms * target_rel_rms * (double)g->model.n_row);
+}
+
+/* Uses the mean noise over all rows, because f weighs them equally. The rows that determine the fit are less noisy,
+ * so this test is conservative. */
+bool gauss_newton_precise(const struct gauss_newton *g, double f, double se)
+{
+    return 2.0 * (double)g->n_free * linear_model_mean_noise(&g->model) <= good_enough(g, f - 2.0 * se);
+}
+
+/* Variance of a residual by tracing over that by the photographs' stated errors; infinite where they state none. */
+static double noise_ratio(const struct gauss_newton *g)
+{
+    double photograph = 0.0;
+    for (size_t row = 0; row < g->model.n_row; row++) photograph += g->model.weight[row] * g->model.photograph_var[row];
+    return g->noise * (double)g->model.n_row / photograph;
+}
+
+bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g)
+{
+    return g->run.problem->path_budget == 0 && g->model.n_effective >= least_effective &&
+           noise_ratio(g) <= photograph_share;
+}
+
+bool gauss_newton_arrived(const struct gauss_newton *g)
+{
+    double weighted = linear_model_weighted_objective(&g->model); /* the decreases refer to it */
+    return g->far_decrease <= fmax(gauss_newton_noise(g), fmax(arrived_share * weighted, good_enough(g, weighted)));
+}
+
+/* Share of the weighted objective, in percent, that further steps are predicted to remove, rounded to two digits. The
+ * prediction is of first order, so it is cut at 100. */
+static double promised_percent(const struct gauss_newton *g)
+{
+    double weighted = linear_model_weighted_objective(&g->model);
+    double percent = weighted > 0.0 ? fmin(100.0, 100.0 * g->far_decrease / weighted) : 100.0;
+    double digit = percent > 0.0 ? pow(10.0, floor(log10(percent)) - 1.0) : 1.0;
+    return digit * round(percent / digit);
+}
+
+void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double f, double se,
+                              struct fit_result *result)
+{
+    char *text = result->reason;
+    size_t n = sizeof result->reason;
+    result->stop = precise ? STOP_ARRIVED : STOP_ARRIVED_WITHIN_PHOTOGRAPHS;
+    if (precise)
+        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %g %%", f, se,
+                 promised_percent(g));
+    else
+        snprintf(
+            text, n,
+            "further steps promise to lower the objective by %g %%, and tracing adds %.1f times the photographs' own "
+            "variance; exact renderings would narrow the errors by some %.0f %%",
+            promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
+}
+
+void gauss_newton_explain_early_end(const struct gauss_newton *g, const struct gauss_newton_end *end,
+                                    struct fit_result *result)
+{
+    const double f = end->objective, se = end->objective_se;
+    const char *used = end->used_up == STOP_ITERATIONS ? "the iterations" : "the path budget";
+    char *text = result->reason;
+    size_t n = sizeof result->reason;
+    bool explained = result->converged || !(end->failed || end->arrived);
+    result->stop = explained ? end->used_up : end->failed ? STOP_STEP_TAKEN_BACK : STOP_TOO_FEW_STEPS;
+    if (result->converged)
+        snprintf(text, n,
+                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %g %%; "
+                 "more paths "
+                 "would narrow the errors",
+                 used, f, se, promised_percent(g));
+    else if (end->failed)
+        snprintf(text, n, "%s ended with a step that made the objective worse and was taken back", used);
+    else if (end->arrived)
+        snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used,
+                 g->history.n_step);
+    else
+        snprintf(
+            text, n,
+            "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about "
+            "%.0f %%",
+            used, f, se, promised_percent(g));
+}
