@@ -39,8 +39,8 @@ struct scattering_model {
      * components. */
     void (*eval)(const struct scattering_state *state, const float wi[3], const float wo[3], float s_rgb[3],
                  float *score);
-    /* Draw wi for a given wo with u in [0,1)^3. weight_rgb: what S is worth in each channel (a path's throughput),
-     * NULL: the same in all; one lobe may be bright in red where another is bright in blue. wi is drawn with the
+    /* Draw wi for a given wo with u in [0,1)^3. weight_rgb: weight of each channel, such as the throughput of a
+     * path; NULL: equal weights. One lobe may be bright in red where another is bright in blue. wi is drawn with the
      * density per steradian that pdf() returns for the same weights, which is > 0 there. */
     void (*sample)(const struct scattering_state *state, const float wo[3], const float *weight_rgb, const float u[3],
                    float wi[3]);

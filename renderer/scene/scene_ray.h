@@ -24,7 +24,7 @@ struct scene_hit {
     float normal[3];      /* unit, out of the fiber */
     float tangent[3];     /* unit, along the fiber */
     float radius_mm;
-    uint32_t i_segment; /* scene_fiber_of tells its fiber */
+    uint32_t i_segment; /* scene_fiber_of gives its fiber */
 };
 
 /* Nearest front face. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves

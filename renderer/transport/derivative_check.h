@@ -1,15 +1,15 @@
-/* Gradient certificate: the derivatives that the tracers carry along, against differences of the same paths' values.
+/* Gradient certificate: compares the derivatives that the tracers carry along with differences of the same paths.
  *
  * A few paths of every configuration are traced once, with derivatives, and recorded (path_tracer.h, volume_tracer.h).
- * A recorded path's value at other parameters needs no tracing, so its derivative by each parameter also follows from
- * four values around it (five-point stencil; beside a bound, four points on the inner side). Both are of the same
- * paths: what differs beyond rounding is an error of a model's scores or of a tracer's sums, on this very scene and at
- * these very parameters.
+ * The radiance of a recorded path at other parameters needs no tracing, so its derivative by each parameter also follows
+ * from four points around the parameter (five-point stencil; beside a bound, four points on the inner side). Both
+ * derivatives are of the same paths, so a difference beyond rounding is an error in the scores of the model or in the
+ * sums of the tracer, for this scene and these parameters.
  *
  * For parameter p, J_i and D_i being the mean derivatives of configuration i summed over channels, w_i its weight:
  *     error = sum_i w_i |J_i - D_i| / max(sum_i w_i |J_i|, 0.001 sum_i w_i R_i / |p|)
- * (a parameter that hardly acts cannot look worse than a thousandth of what it could do), with the standard error that
- * the scatter of the single paths' differences gives. All random numbers come from the key: same bits every time.
+ * The second term bounds the error of a parameter that hardly acts. The standard error follows from the scatter of the
+ * differences of single paths. All random numbers come from the key, so results are the same bits every time.
  */
 #ifndef SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
 #define SELVEDGE_RENDERER_DERIVATIVE_CHECK_H

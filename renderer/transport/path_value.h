@@ -12,7 +12,7 @@
 
 #define PATH_SURFACE_ROULETTE_BELOW 0.6f /* throughput under which a path is ended at random */
 #define PATH_SURFACE_SHADOW_BELOW 0.01f  /* contribution under which shadow rays are thinned out at random */
-#define PATH_SURFACE_GUIDED_BELOW 0.1f   /* throughput under which probes are */
+#define PATH_SURFACE_GUIDED_BELOW 0.1f   /* throughput under which guided shadow paths are */
 #define PATH_VOLUME_ROULETTE_BELOW 0.3f
 #define PATH_VOLUME_SHADOW_BELOW 0.02f
 

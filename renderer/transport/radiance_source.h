@@ -29,7 +29,7 @@ struct radiance_input {
     const double *param; /* max(n_set, 1) * model->n_param, internal units, one set after the other */
     size_t n_set;        /* parameter sets for the material groups of the fibers; 0 and 1: one set for all fibers */
     bool want_derivative;
-    bool plain_paths; /* trace without probes (path_tracer.h): same means, more variance; volumes have none */
+    bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */
 };
 
 /* Paths that are traced together: at most RADIANCE_BLOCK_PATHS camera paths. The same paths serve every member: members

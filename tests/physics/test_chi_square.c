@@ -72,7 +72,7 @@ static void samples_follow_the_density(void **state)
     static const double angle_deg[][2] = {{0, 90}, {-25, 200}, {50, 10}, {75, -60}, {-88, 33}, {90, 0}};
     enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 3 };
     static const float coloured[2][3] = {{1, 0.1f, 0},
-                                         {0, 0.3f, 20}}; /* what the channels are worth moves the choice of lobes */
+                                         {0, 0.3f, 20}}; /* the weights of the channels change the choice of lobes */
     const float *const weight[3] = {NULL, coloured[0], coloured[1]};
     size_t n_model = 0;
     while (scattering_registry()[n_model] != NULL) n_model++;

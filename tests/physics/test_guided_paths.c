@@ -1,5 +1,5 @@
-/* Probes towards the lamp (path_tracer.h): the guide's density, and paths with probes against plain paths, which must have
- * the same means and derivatives. Lamps above, grazing, directional and, without the sheet, below; four models.
+/* Guided shadow paths (path_tracer.h): the density of the guide, and estimates with guided paths against plain ones, which
+ * must have the same means and derivatives. Lamps above, grazing, directional and, without the sheet, below; four models.
  * Tolerances are standard errors.
  */
 #include "base/angle.h"

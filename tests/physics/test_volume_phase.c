@@ -112,7 +112,7 @@ static void integrals_and_samples(void **state)
     (void)state;
     static const double angle_deg[][2] = {{0.3, 90}, {-25, 200}, {50, 10}, {75, -60}, {-88, 33}};
     enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 3 };
-    static const float worth[3] = {1, 0.1f, 0};
+    static const float channel_weight[3] = {1, 0.1f, 0};
     size_t n_model = 0;
     struct rng r;
     rng_start(&r, &(struct rng_key){31, 0, 0, 0}, 0, 0);
@@ -124,7 +124,7 @@ static void integrals_and_samples(void **state)
                 double param[SCATTERING_MAX_PARAM];
                 box_point(phase_registry()[k], 1 + set, 0.08, &r, param); /* what the grid resolves */
                 direction(angle_deg[a][0] * RAD_PER_DEG, angle_deg[a][1] * RAD_PER_DEG, wo);
-                check_integrals(phase_registry()[k], param, wo, a % 2 ? worth : NULL, &r,
+                check_integrals(phase_registry()[k], param, wo, a % 2 ? channel_weight : NULL, &r,
                                 0.01 / (double)(n_model * N_SET * N_ANGLE));
             }
 }

@@ -25,7 +25,7 @@ struct estimator_call {
     const size_t *n_path; /* per configuration */
     uint32_t iteration, replica;
     bool want_jacobian;
-    bool plain_paths; /* without probes (path_tracer.h), as the published method traces them */
+    bool plain_paths; /* without guided shadow paths (path_tracer.h), as the published method traces them */
 };
 
 struct estimator {

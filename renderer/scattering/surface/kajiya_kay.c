@@ -39,7 +39,7 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-/* Probability of the highlight, by what the channels are worth; neither part is starved. */
+/* Probability of the highlight, by the weights of the channels; neither part gets probability 0. */
 static float p_specular(const struct scattering_state *s, const float *weight_rgb)
 {
     float a = 0, b = 0;

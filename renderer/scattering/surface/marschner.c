@@ -110,7 +110,7 @@ static inline float table_position(float cosine, int *i)
 
 static inline float mix(float a, float b, float t) { return a + t * (b - a); }
 
-/* Probabilities of the lobes at th_o, by their energy and what the channels are worth; no lobe is starved. */
+/* Probabilities of the lobes at th_o, by their energy and the weights of the channels; no lobe gets probability 0. */
 static void lobe_shares(const struct scattering_state *s, float cos_o, const float *weight_rgb, float p[N_LOBE])
 {
     int i;

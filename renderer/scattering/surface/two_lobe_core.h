@@ -6,7 +6,7 @@
  *     published: th_f = th_i, scale = 1 / G(-th_i, beta);  balanced: th_f = (th_i - th_o) / 2, scale = a(th_i) a(th_o)
  *                (R) and b(th_i) b(th_o) (TT), of which b depends on both widths (two_lobe_balanced.c)
  *
- * Sampling of wi: a lobe by its energy at th_o and what the channels are worth, th_i from the normal density about
+ * Sampling of wi: a lobe by its energy at th_o and the weights of the channels, th_i from the normal density about
  * -th_o cut to +-pi/2, azimuth uniform or von Mises. pdf() is the exact density of that. All functions are inlined with
  * `balanced` constant.
  */

@@ -94,9 +94,9 @@ static void crop_means(const struct contrast_plan *c, double mean[2][3 + N_JAC])
 /* Covariance of the means of two values over n paths, from their sums and the sum of their product. */
 static double mean_covariance(double x, double y, double xy, double n) { return (xy - x * y / n) / ((n - 1.0) * n); }
 
-/* What one cell has to say about channel `channel` and one derivative of it (value `k`; its own channel: none). */
+/* Terms of one cell for channel `channel` and for one derivative of it (value `k`; k = channel: no derivative). */
 struct cell {
-    double value[2], slope[2]; /* means less those of the crop */
+    double value[2], slope[2]; /* means minus those of the crop */
     double var[2], slope_var[2], covariance[2];
 };
 
@@ -177,7 +177,7 @@ bool contrast_reduce(const struct contrast_plan *c, struct estimate *e, size_t *
     }
     for (size_t channel = 0; channel < 3; channel++) {
         if (!(mean[0][channel] > 0.0 && mean[1][channel] > 0.0)) {
-            e->var[channel] = 1.0; /* black: says nothing about contrast */
+            e->var[channel] = 1.0; /* a black crop has no contrast; a variance of 1 gives it no weight */
             continue;
         }
         reduce_channel(c, mean, channel, e);

@@ -8,16 +8,16 @@
 #include "renderer/transport/estimate/estimate.h"
 
 struct rotation_mean {
-    size_t n, n_turned;           /* configurations wanted, and with their rotations taken apart */
-    struct configuration *turned; /* in the order wanted; n_rotation 0 */
+    size_t n, n_turned;           /* configurations asked for, and rotations of all of them */
+    struct configuration *turned; /* in the order asked for; n_rotation 0 */
     size_t *n_path;               /* of turned */
-    size_t *first;                /* n + 1: the turned ones of i are first[i] .. first[i + 1] - 1 */
-    struct estimate *estimate;    /* of turned: to be filled in */
+    size_t *first;                /* n + 1 entries: the rotations of i are first[i] .. first[i + 1] - 1 */
+    struct estimate *estimate;    /* of turned; filled in by the caller */
 };
 
-/* True when any configuration asks for more than one rotation: then, and only then, is the rest needed. */
+/* True when any configuration asks for more than one rotation. Otherwise the functions below are not needed. */
 bool rotation_mean_wanted(const struct configuration *c, size_t n);
-/* STATUS_INVALID (contrast of a mean over rotations), STATUS_NO_MEMORY. release it in any case. */
+/* STATUS_INVALID (contrast of a mean over rotations), STATUS_NO_MEMORY. Release in any case. */
 status rotation_mean_init(struct rotation_mean *m, const struct configuration *c, const size_t *n_path, size_t n,
                           struct error *err);
 /* out: n estimates from m->estimate. */

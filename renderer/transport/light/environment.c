@@ -22,7 +22,7 @@ static double row_solid_angle(const struct environment *e, size_t row)
     return (cos(a) - cos(b)) * 2 * M_PI;
 }
 
-/* Cumulative shares; the last is exactly 1, and so is every one behind the last that is not 0. */
+/* Cumulative distribution; it is exactly 1 from the last entry with any luminance on. */
 static void normalise(float *cdf, const double *sum, size_t n)
 {
     for (size_t i = 0; i <= n; i++) cdf[i] = sum[n] > 0 ? (float)(sum[i] / sum[n]) : (float)i / (float)n;
@@ -124,7 +124,7 @@ float environment_at(const struct environment *e, const float d[3], float radian
     return luminance(radiance) * e->pdf_per_luminance;
 }
 
-/* The interval of cdf[0..n] that holds u, and where in it u lies. */
+/* Index of the interval of cdf[0..n] that holds u, and the relative position of u in it. */
 static size_t find_interval(const float *cdf, size_t n, float u, float *share)
 {
     size_t low = 0, high = n; /* cdf[low] <= u < cdf[high] */
@@ -148,7 +148,7 @@ bool environment_sample(const struct environment *e, const float u[2], float d[3
     size_t column = find_interval(e->column_cdf + row * (e->width + 1), e->width, u[1], &x);
     memcpy(radiance, e->radiance + 3 * (row * e->width + column), 3 * sizeof *radiance);
     *pdf_per_sr = luminance(radiance) * e->pdf_per_luminance;
-    if (!(*pdf_per_sr > 0)) return false; /* a black pixel between two that shine, met by rounding */
+    if (!(*pdf_per_sr > 0)) return false; /* a black pixel between two bright ones, chosen by rounding */
     float top = cosf((float)M_PI * (float)row / (float)e->height),
           bottom = cosf((float)M_PI * (float)(row + 1) / (float)e->height);
     float phi = (float)(2 * M_PI) * ((float)column + x) / (float)e->width;

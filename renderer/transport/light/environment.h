@@ -1,8 +1,8 @@
-/* Light from all around as a picture: latitude-longitude, sampled by luminance.
+/* An environment given as an image in latitude and longitude, sampled in proportion to luminance.
  *
  * World frame of configuration.h: row 0 is at +z (the cloth normal), the last row at -z; the first column begins at
- * phi = 0 and phi grows to the right. Every pixel shines evenly over the solid angle that it covers, so the density of
- * samples is exactly proportional to the luminance. Immutable: shared by threads.
+ * phi = 0 and phi grows to the right. The radiance is constant over the solid angle of a pixel, so the density of samples
+ * is exactly proportional to the luminance. Immutable: shared by threads.
  */
 #ifndef SELVEDGE_RENDERER_ENVIRONMENT_H
 #define SELVEDGE_RENDERER_ENVIRONMENT_H
@@ -13,7 +13,7 @@
 
 struct environment;
 
-/* Radiance = the picture's first three channels * scale. STATUS_INVALID for a value that is negative or not finite, for
+/* Radiance = first three channels of the image * scale. STATUS_INVALID for a value that is negative or not finite, for
  * a scale that is not positive, for more than 2^26 pixels; STATUS_NO_MEMORY. im may be released afterwards. */
 status environment_new(const struct image *im, double scale, struct environment **environment, struct error *err);
 /* From an OpenEXR file; also STATUS_FORMAT and what image_read_exr gives. */
@@ -23,7 +23,7 @@ void environment_free(struct environment *environment);
 /* Radiance along a unit direction (from the scene outwards), and the density with which environment_sample would have
  * chosen it. */
 float environment_at(const struct environment *environment, const float direction_world[3], float radiance[3]);
-/* A direction drawn in proportion to luminance. False when the whole picture is black. */
+/* A direction drawn in proportion to luminance. False when the whole image is black. */
 bool environment_sample(const struct environment *environment, const float u[2], float direction_world[3],
                         float radiance[3], float *pdf_per_sr);
 

@@ -1,6 +1,6 @@
 #include "renderer/transport/light/light_guide.h"
 
-/* Samples of the model itself: a rank-1 lattice, the same for everybody. */
+/* From samples of the model at the points of a rank-1 lattice. */
 void light_guide_energy_of(const struct scattering_model *m, const struct scattering_state *s,
                            struct light_guide_energy *e)
 {

@@ -1,4 +1,5 @@
-/* Directions near a lamp: where the fibers are that hand its light on, forward scattering being the strongest.
+/* Density of directions near a lamp, in which guided shadow paths are drawn: fibers in these directions scatter the light
+ * of the lamp on most strongly, because forward scattering dominates.
  *
  *     p(w) = kappa / (2 pi) exp(kappa (w . d - 1)),   d towards the lamp's centre   (von Mises-Fisher; 1 - exp(-2 kappa) taken as 1)
  *
@@ -13,8 +14,8 @@
 
 #define LIGHT_GUIDE_KAPPA 20.0f
 
-/* What a fiber scatters of light that comes across it: within 35 degrees of straight on, and in all; rgb. Fibers that hand
- * little light on are not worth looking for. */
+/* Energy that a fiber scatters of light that arrives across it, per channel: within 35 degrees of straight on, and in all
+ * directions. Sets how often guided paths are traced. */
 struct light_guide_energy {
     float forward[3], all[3];
 };

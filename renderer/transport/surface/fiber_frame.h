@@ -1,11 +1,11 @@
-/* The fiber frame in world coordinates, and small vector arithmetic that both tracers use. */
+/* The fiber frame in the frame of the cloth, and the dot product that goes with it. */
 #ifndef SELVEDGE_RENDERER_FIBER_FRAME_H
 #define SELVEDGE_RENDERER_FIBER_FRAME_H
 
 #include <math.h>
 #include <string.h>
 
-/* Fiber frame: u along the fiber, v and w any two perpendicular to it (Duff et al. 2017, "Building an orthonormal
+/* u along the fiber; v and w are any two directions perpendicular to it (Duff et al. 2017, "Building an orthonormal
  * basis, revisited"). */
 struct fiber_frame {
     float u[3], v[3], w[3];

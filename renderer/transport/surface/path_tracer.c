@@ -41,27 +41,37 @@ static inline void unwrapped(const float local_mm[3], const double offset_mm[2],
     out[2] = local_mm[2];
 }
 
+/* Where the path meets a fiber. */
+struct bounce {
+    struct scene_hit hit;
+    double offset_mm[2]; /* of the ray that hit, in whole tiles */
+    struct fiber_frame frame;
+    float wo[3]; /* towards where the path comes from, in the fiber frame */
+};
+
 /* The state that a path carries. */
 struct walk {
     const struct path_setting *s;
     struct rng *rng;
     const struct lamp *lamp;
     size_t n_lamp;
-    struct path_result *out; /* of one lamp: what is added now goes there */
+    struct path_result *out; /* of the lamp whose light is being added */
     struct path_result *first_out;
-    size_t n_out;                         /* a result for each lamp, one without lamps */
-    struct path_step *step;               /* being recorded, or NULL */
+    size_t n_out;                         /* one result per lamp; one without lamps */
+    struct path_step *step;               /* the step that is being recorded, or NULL */
     const struct scattering_state *state; /* of the fiber that was hit */
     size_t i_set;                         /* its parameter set */
     float throughput[3];
-    float towards[PATH_MAX_LAMP][3]; /* the lamps, from the present vertex: where its probes go */
-    float p_guided;                  /* probability of a probe there */
-    float share[PATH_MAX_LAMP]; /* of lamp connections at the present vertex: the rest is its predecessor's probes' */
+    float towards[PATH_MAX_LAMP][3]; /* directions from the present bounce to the lamps, which guide its guided paths */
+    float p_guided;                  /* probability of a guided path there */
+    float weight[PATH_MAX_LAMP];     /* multiple-importance weight of lamp connections at the present bounce: the guided
+                                        paths of the bounce before have the rest */
     float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
-    float h[PATH_N_DERIVATIVE];            /* running score sums, laid out as path_result's derivatives */
+    float h[PATH_N_DERIVATIVE];            /* running sums of scores, laid out as the derivatives of path_result */
 };
 
-/* Adds value * (1, H + score) to the result; score NULL: the last step's are in H already. */
+/* Adds value to the radiance and value * (H + score) to the derivatives. score NULL: the scores of the last step are part
+ * of H already. */
 static inline void add_light(struct walk *w, const float value[3], const float *score)
 {
     for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
@@ -82,20 +92,21 @@ static void add_light_to_all(struct walk *w, const float value[3], const float *
     }
 }
 
-/* Next-event estimation: one point on the lamp. share: of its light that counts here. What path_step's light is; 0: none. */
-static float connect_lamp(struct walk *w, const struct lamp *lamp, float share, const struct scene_ray *ray,
-                          const struct scene_hit *hit, const struct fiber_frame *f, const float wo[3], float wi[3])
+/* Next-event estimation from a bounce to one point on the lamp. weight: multiple-importance weight of this connection,
+ * in [0, 1]. Returns the incident light as stored in path_step.light, or 0 if the light is occluded. */
+static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight, const struct bounce *b, float wi[3])
 {
     const struct path_setting *s = w->s;
     float position[3], u[2], direction[3], pdf_lamp, s_rgb[3];
-    unwrapped(hit->position_mm, ray->offset_mm, position);
+    unwrapped(b->hit.position_mm, b->offset_mm, position);
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return 0;
-    fiber_frame_to_local(f, direction, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float light = share * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * lights_power_heuristic(pdf_lamp, pdf),
+    fiber_frame_to_local(&b->frame, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float light =
+              weight * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * lights_power_heuristic(pdf_lamp, pdf),
           value[3];
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
     float most = path_value_largest(value), survival;
@@ -109,15 +120,14 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float share, 
         for (int c = 0; c < 3; c++) value[c] /= survival;
     }
     struct scene_ray shadow;
-    scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
+    scene_ray_leave(&b->hit, b->offset_mm, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return 0;
     add_light(w, value, w->score);
     return light;
 }
 
-/* Next-event estimation: one direction of the image environment. */
-static void connect_image(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
-                          const struct fiber_frame *f, const float wo[3])
+/* Next-event estimation from a bounce to one direction of the image environment. */
+static void connect_image(struct walk *w, const struct bounce *b)
 {
     const struct path_setting *s = w->s;
     float u[2], direction[3], radiance[3], pdf_image, wi[3], s_rgb[3], value[3], survival;
@@ -125,8 +135,8 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
     u[1] = rng_float(w->rng);
     if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
     if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
-    fiber_frame_to_local(f, direction, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    fiber_frame_to_local(&b->frame, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
     for (int c = 0; c < 3; c++) {
         radiance[c] *= weight;
@@ -145,7 +155,7 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
         }
     }
     struct scene_ray shadow;
-    scene_ray_leave(hit, ray->offset_mm, direction, &shadow);
+    scene_ray_leave(&b->hit, b->offset_mm, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
     add_light_to_all(w, value, w->score);
     if (w->step != NULL) {
@@ -154,7 +164,8 @@ static void connect_image(struct walk *w, const struct scene_ray *ray, const str
     }
 }
 
-/* Radiance that a ray meets beyond the cloth. pdf: of the scattering sample that made it, 0 for a camera ray. */
+/* Adds the radiance that a ray meets when it has left the cloth. pdf: density of the scattering sample that made the
+ * ray; 0 for a camera ray. */
 static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 {
     const struct path_setting *s = w->s;
@@ -184,47 +195,51 @@ static inline void add_scores(struct walk *w)
     }
 }
 
-static void enter_fiber(struct walk *w, const struct scene_hit *hit)
+static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct scene_ray *ray, struct bounce *b)
 {
+    const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
+    b->hit = *hit;
+    memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
+    fiber_frame_from(&b->frame, hit->tangent);
+    fiber_frame_to_local(&b->frame, back, b->wo);
     if (w->s->n_set == 1) return;
     w->i_set = scene_group_of(w->s->scene, hit->i_segment);
     w->state = w->s->state[w->i_set];
 }
 
-/* The probe's ray from the present vertex, whose throughput and scores the walk has taken. */
-static void follow_guided_path(struct walk *w, size_t i_lamp, const struct scene_hit *from, const double offset_mm[2],
-                               const float direction[3], float weight)
+/* The part of a guided path beyond the present bounce. The walk carries the throughput and scores of the guided path
+ * while it is traced. */
+static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounce *from, const float direction[3],
+                               float weight)
 {
     struct scene_ray ray;
     struct scene_hit hit;
-    struct fiber_frame f;
-    float back[3] = {-direction[0], -direction[1], -direction[2]}, wo[3], wi[3];
-    scene_ray_leave(from, offset_mm, direction, &ray);
-    if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond is the walk's */
-    fiber_frame_from(&f, hit.tangent);
-    fiber_frame_to_local(&f, back, wo);
-    enter_fiber(w, &hit);
-    float light = connect_lamp(w, &w->lamp[i_lamp], 1, &ray, &hit, &f, wo, wi);
+    struct bounce b;
+    float wi[3];
+    scene_ray_leave(&from->hit, from->offset_mm, direction, &ray);
+    if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond the cloth is counted by the walk itself */
+    bounce_at(w, &hit, &ray, &b);
+    float light = connect_lamp(w, &w->lamp[i_lamp], 1, &b, wi);
     if (w->step == NULL || light == 0) return;
-    memcpy(w->step->guided_wo, wo, sizeof wo);
+    memcpy(w->step->guided_wo, b.wo, sizeof b.wo);
     memcpy(w->step->guided_light_wi, wi, sizeof wi);
     w->step->guided_light = light * weight;
     w->step->i_guided_group = scene_group_of(w->s->scene, hit.i_segment);
 }
 
-/* One more way to the light of a lamp by one other fiber: a ray near the lamp's direction (light_guide.h), a connection from
- * what it hits, and nothing further. Such paths have two densities, of S and of the guide; each kind counts with its share of
- * their sum, the walk's own by walk.share. A walk that itself turned towards the lamp would pay for it with its weight. */
-static void trace_guided_path(struct walk *w, size_t i_lamp, const struct scene_ray *ray, const struct scene_hit *hit,
-                              const struct fiber_frame *f, const float wo[3])
+/* A guided shadow path reaches a lamp by way of one other fiber: a ray is drawn near the direction of the lamp
+ * (light_guide.h), connects what it hits with the lamp, and ends. The walk can find the same light by a scattering sample
+ * followed by a connection; the balance heuristic combines the two, and walk.weight is the weight of the walk's own. The
+ * walk itself does not turn towards the lamp, because its later contributions would then carry a smaller weight. */
+static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce *b)
 {
     const struct path_setting *s = w->s;
     float u[2], direction[3], wi[3], s_rgb[3], next[3], survival;
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     light_guide_sample(w->towards[i_lamp], u, direction);
-    fiber_frame_to_local(f, direction, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    fiber_frame_to_local(&b->frame, direction, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = fiber_frame_cos_theta(wi) / (pdf + w->p_guided * light_guide_pdf(w->towards[i_lamp], direction));
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
@@ -245,14 +260,14 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct scene_
     memcpy(w->throughput, next, sizeof next);
     if (s->want_jacobian) add_scores(w);
     if (w->step != NULL) memcpy(w->step->guided_wi, wi, sizeof wi);
-    follow_guided_path(w, i_lamp, hit, ray->offset_mm, direction, weight);
+    follow_guided_path(w, i_lamp, b, direction, weight);
     w->state = state;
     w->i_set = i_set;
     memcpy(w->throughput, throughput, sizeof throughput);
     memcpy(w->h, h, n_flat * sizeof *h);
 }
 
-/* As large as the part of the light that fibers like this one hand on forwards. */
+/* Proportional to the share of light that a fiber of this kind scatters forwards. */
 static float guided_path_probability(const struct walk *w)
 {
     const struct light_guide_energy *e = &w->s->energy[w->i_set];
@@ -265,16 +280,15 @@ static float guided_path_probability(const struct walk *w)
     return p < 1 ? p : 1;
 }
 
-/* All lamps' light at a vertex, straight and by a probe. */
-static void connect_lamps(struct walk *w, const struct scene_ray *ray, const struct scene_hit *hit,
-                          const struct fiber_frame *f, const float wo[3])
+/* Adds the light of all lamps at a bounce, by a direct connection and by a guided path. */
+static void connect_lamps(struct walk *w, const struct bounce *b)
 {
     float wi[3], position[3];
-    unwrapped(hit->position_mm, ray->offset_mm, position);
+    unwrapped(b->hit.position_mm, b->offset_mm, position);
     if (w->s->guided_paths) w->p_guided = guided_path_probability(w);
     for (size_t k = 0; k < w->n_lamp; k++) {
         w->out = w->first_out + k;
-        float light = connect_lamp(w, &w->lamp[k], w->share[k], ray, hit, f, wo, wi);
+        float light = connect_lamp(w, &w->lamp[k], w->weight[k], b, wi);
         if (w->step != NULL && light != 0) {
             memcpy(w->step->light_wi, wi, sizeof wi);
             w->step->light = light;
@@ -282,20 +296,19 @@ static void connect_lamps(struct walk *w, const struct scene_ray *ray, const str
         if (!w->s->guided_paths) continue;
         light_guide_towards(&w->lamp[k], position, w->towards[k]);
         bool sees = w->towards[k][2] > 0 || !scene_has_black_sheet(w->s->scene);
-        if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, k, ray, hit, f, wo);
+        if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, k, b);
     }
 }
 
-/* Scatters the ray at the hit. False: roulette (or a dark fiber) ends the path. */
-static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hit *hit, const struct fiber_frame *f,
-                    const float wo[3], float *pdf_out)
+/* Scatters the path at a bounce into ray. False: roulette or a dark fiber ends the path. */
+static bool scatter(struct walk *w, const struct bounce *b, struct scene_ray *ray, float *pdf_out)
 {
     const struct path_setting *s = w->s;
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
-    s->model->sample(w->state, wo, w->throughput, u, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    if (pdf == 0) return false; /* rounded to a direction along the fiber, where nothing is scattered to */
+    s->model->sample(w->state, b->wo, w->throughput, u, wi);
+    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    if (pdf == 0) return false; /* rounding gave a direction along the fiber, into which nothing is scattered */
     float weight = fiber_frame_cos_theta(wi) / pdf, next[3];
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
@@ -310,11 +323,10 @@ static bool scatter(struct walk *w, struct scene_ray *ray, const struct scene_hi
         memcpy(w->step->wi, wi, sizeof wi);
         w->step->weight = weight / survival;
     }
-    fiber_frame_to_world(f, wi, direction);
+    fiber_frame_to_world(&b->frame, wi, direction);
     for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++)
-        w->share[k] = pdf / (pdf + w->p_guided * light_guide_pdf(w->towards[k], direction));
-    double offset[2] = {ray->offset_mm[0], ray->offset_mm[1]};
-    scene_ray_leave(hit, offset, direction, ray);
+        w->weight[k] = pdf / (pdf + w->p_guided * light_guide_pdf(w->towards[k], direction));
+    scene_ray_leave(&b->hit, b->offset_mm, direction, ray);
     *pdf_out = pdf;
     return true;
 }
@@ -339,7 +351,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, struct rng 
     w->state = s->state[0];
     w->i_set = 0;
     for (int c = 0; c < 3; c++) w->throughput[c] = 1;
-    for (size_t k = 0; k < w->n_lamp; k++) w->share[k] = 1;
+    for (size_t k = 0; k < w->n_lamp; k++) w->weight[k] = 1;
     memset(w->h, 0, n_flat * sizeof *w->h);
     for (size_t i = 0; i < w->n_out; i++) {
         memset(out[i].radiance, 0, sizeof out[i].radiance);
@@ -348,30 +360,28 @@ static void walk_start(struct walk *w, const struct path_setting *s, struct rng 
     }
 }
 
+/* Traces the walk from bounce to bounce until it leaves the cloth or ends. */
 static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *record)
 {
     const struct path_setting *s = w->s;
     float pdf = 0;
     for (uint32_t i = 0; i < PATH_MAX_BOUNCE; i++) {
         struct scene_hit hit;
+        struct bounce b;
         if (!scene_trace(s->scene, ray, &hit)) {
             add_beyond(w, ray, pdf);
             return;
         }
         w->first_out->n_bounce++;
         w->step = next_step(record);
-        struct fiber_frame f;
-        fiber_frame_from(&f, hit.tangent);
-        float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]}, wo[3];
-        fiber_frame_to_local(&f, back, wo);
-        enter_fiber(w, &hit);
+        bounce_at(w, &hit, ray, &b);
         if (w->step != NULL) {
-            memcpy(w->step->wo, wo, sizeof wo);
+            memcpy(w->step->wo, b.wo, sizeof b.wo);
             w->step->i_group = scene_group_of(s->scene, hit.i_segment);
         }
-        connect_lamps(w, ray, &hit, &f, wo);
-        if (s->lights.image != NULL) connect_image(w, ray, &hit, &f, wo);
-        if (!scatter(w, ray, &hit, &f, wo, &pdf)) return;
+        connect_lamps(w, &b);
+        if (s->lights.image != NULL) connect_image(w, &b);
+        if (!scatter(w, &b, ray, &pdf)) return;
     }
 }
 

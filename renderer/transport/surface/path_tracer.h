@@ -1,7 +1,8 @@
-/* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric
- * thesis 5.5.1, figure 5.3): beside the throughput T runs the sum H of scores d ln S / d p, and every light connection
- * adds L and L (H + score). The sampling densities, the roulette and the weights that combine lamp and scattering
- * samples (power heuristic) and those of probes and the walk (balance heuristic) are held fixed.
+/* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric thesis
+ * 5.5.1, figure 5.3): beside the throughput T runs the sum H of the scores d ln S / d p, and every connection to a light
+ * adds L to the radiance and L (H + score) to the derivatives. Densities of sampling, roulette, and the weights that
+ * combine light samples with scattering samples (power heuristic) and guided shadow paths with the path itself (balance
+ * heuristic) are held fixed in the derivatives.
  */
 #ifndef SELVEDGE_RENDERER_PATH_TRACER_H
 #define SELVEDGE_RENDERER_PATH_TRACER_H
@@ -21,19 +22,17 @@ struct path_setting {
     const struct scattering_state *state[SCATTERING_MAX_SET]; /* by material group */
     size_t n_set;                                             /* 1: the first serves all groups */
     struct lights lights;
-    bool
-        guided_paths; /* from vertices rays towards the lamp and a connection from the fiber that they meet: less variance, same mean */
-    struct light_guide_energy
-        energy[SCATTERING_MAX_SET]; /* by material group: probes are as frequent as light goes on forwards */
-    float roulette_below;           /* throughput under which paths are ended at random; 0: never */
+    bool guided_paths;                                    /* trace guided shadow paths: less variance, same mean */
+    struct light_guide_energy energy[SCATTERING_MAX_SET]; /* by material group: sets how many guided paths there are */
+    float roulette_below; /* throughput under which paths are ended at random; 0: never */
     bool want_jacobian;
 };
 
-/* Roulette at the usual place, the configuration's lights, one parameter set. */
+/* The lights of the configuration, the default roulette threshold, guided paths if there is a lamp, one parameter set. */
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
                        const struct scattering_state *state, const struct configuration *c, bool want_jacobian);
 
-/* The same with a parameter set for each material group; they must outlive the setting. */
+/* The same with a parameter set per material group. The sets must outlive the setting. */
 void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
                             const struct configuration *c, bool want_jacobian);
 
@@ -44,20 +43,22 @@ struct path_result {
     uint32_t n_bounce;
 };
 
-/* All that a path's value depends on besides S: value = sum over steps of
- * T (S(light_wi, wo) light + S(image_wi, wo) image + S(guided_wi, wo) S'(guided_light_wi, guided_wo) guided_light) + T' escape
- * with T' = T S(wi, wo) weight after each step. Re-evaluating it for other parameters needs no ray. */
+/* What the radiance of a path depends on besides S. Its radiance is the sum over steps of
+ *     T (S(light_wi, wo) light + S(image_wi, wo) image + S(guided_wi, wo) S'(guided_light_wi, guided_wo) guided_light)
+ *     + T' escape,
+ * where T' = T S(wi, wo) weight is the throughput after the step. It can be evaluated for other parameters without
+ * tracing a ray (path_replay). */
 struct path_step {
     float wo[3], wi[3];
     float weight; /* cos th_i / (density * survival) */
     float light_wi[3];
-    float light; /* lamp sample, same for all channels: radiance cos th_i * heuristic / density; 0 when in shadow */
+    float light; /* lamp sample, the same for all channels: radiance * cos th_i * heuristic / density; 0 if occluded */
     float image_wi[3], image[3];                          /* the same for a sample of the image environment, rgb */
-    float guided_wi[3], guided_wo[3], guided_light_wi[3]; /* the last two at the fiber that the probe met */
-    float guided_light;                                   /* with all weights of the probe; 0: no light found */
-    uint32_t i_guided_group;                              /* material group of that fiber: S' is that group's */
-    uint32_t i_group;                                     /* material group: S is that group's */
-    float escape[3]; /* radiance that the scattered ray meets on leaving the cloth, times its heuristic */
+    float guided_wi[3], guided_wo[3], guided_light_wi[3]; /* the last two at the fiber that the guided path met */
+    float guided_light;                                   /* with all weights of the guided path; 0: no light */
+    uint32_t i_guided_group;                              /* material group of that fiber, whose model is S' */
+    uint32_t i_group;                                     /* material group of the fiber, whose model is S */
+    float escape[3]; /* radiance beyond the cloth along the scattered ray, times its multiple-importance weight */
 };
 
 struct path_record {
@@ -65,12 +66,13 @@ struct path_record {
     struct path_step *step; /* the caller's; steps beyond capacity are counted but not stored */
 };
 
-/* ray: as camera_ray made it; changed. record: NULL, or n_step set to 0 by the caller. */
+/* ray: from camera_ray; it is changed. record: NULL, or with n_step = 0. */
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record);
 
-/* The same path under n_lamp lamps in turn, in place of the setting's: each result is that of path_trace with this lamp
- * alone (environments count in all), and costs its lamp connections only. The results' errors go together. */
+/* The same path under each of n_lamp lamps, which replace the lamp of the setting. Result k is what path_trace gives with
+ * lamp k alone; environments count in all. Further lamps cost their connections only, and the errors of the results are
+ * correlated. */
 void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
                       struct rng *rng, struct path_result *out);
 

@@ -1,4 +1,4 @@
-/* How a ray goes through a volume, step by step: for volume_tracer.c. */
+/* The steps of a ray through a volume: free flights, the brick table, voxels. For volume_tracer.c. */
 #ifndef SELVEDGE_RENDERER_VOLUME_FLIGHT_H
 #define SELVEDGE_RENDERER_VOLUME_FLIGHT_H
 
@@ -7,7 +7,7 @@
 #include "renderer/transport/surface/fiber_frame.h"
 #include "renderer/transport/volume/volume_scene.h"
 
-/* -ln of 1 - u, for u from rng_float: within 2e-7 of the larger of 1 and its value. Exponent and mantissa apart, the
+/* -ln(1 - u) for u from rng_float, with an error below 2e-7 times the larger of 1 and the result. Exponent and mantissa apart, the
  * mantissa between sqrt(1/2) and sqrt(2) through ln((1 + x) / (1 - x)) = 2 (x + x^3 / 3 + ...). No call, no branch. */
 static inline float volume_flight_minus_log(float u)
 {
@@ -53,7 +53,7 @@ static inline const uint32_t *volume_flight_voxel(const struct volume_scene *v, 
     return v->voxel + (size_t)brick * VOLUME_BRICK_VOXELS + place;
 }
 
-/* How far it is out of the cube of empty bricks around the ray's, or out of the tile. Nothing can happen before. */
+/* Distance to the end of the cube of empty bricks around the ray, or to the edge of the tile. Nothing scatters before. */
 static inline float volume_flight_empty_mm(const struct volume_scene *v, const struct volume_ray *ray, int32_t n_empty)
 {
     const float most[3] = {v->n_voxel[0], v->n_voxel[1], v->high};
@@ -70,8 +70,8 @@ static inline float volume_flight_empty_mm(const struct volume_scene *v, const s
     return t > 0 ? t : 0;
 }
 
-/* What a voxel that is not empty does to a ray of direction w: extinction over the majorant, and its derivative by the
- * parameter of s(w). inv_majorant_density: of the density times s at which extinction would equal the majorant. */
+/* Extinction of a voxel that is not empty, for a ray of direction w: its ratio to the majorant, and the derivative of that
+ * ratio by the parameter of s(w). inv_majorant_density: inverse of the density times s at which the ratio is 1. */
 struct volume_lookup {
     float ratio, d_ratio, density, sine;
 };

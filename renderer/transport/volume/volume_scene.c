@@ -5,8 +5,8 @@
 #include <string.h>
 #include <sys/mman.h>
 
-/* Look-ups are all over the volume: large pages, where the system gives them, save it from looking up addresses too.
- * Only whole pages inside the array are touched; failure does no harm. */
+/* Voxels are read in random order, so large pages save misses of the address cache where the system has them. Only whole
+ * pages inside the array are advised; failure does no harm. */
 static void use_large_pages(void *data, size_t n_bytes)
 {
     const uintptr_t page = 2u << 20;
@@ -62,7 +62,7 @@ static uint32_t pack(uint8_t density, const float d[3])
     return (uint32_t)density << 24 | q << 12 | p;
 }
 
-/* The table of bricks: their distances to the nearest one that holds something, with a minus sign, or their numbers. */
+/* Fills the brick table: the number of a stored brick, or minus the distance of an empty one to the nearest stored one. */
 static status number_bricks(struct volume_scene *s, const struct direction_volume *v, struct error *err)
 {
     const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};
@@ -202,7 +202,7 @@ bool volume_ray_enter(const struct volume_scene *s, const double origin_mm[3], c
         ray->at[a] = (float)((x - ray->offset_mm[a]) / (double)s->voxel_mm[a]);
     }
     ray->at[2] = nextafterf(
-        s->high, 0); /* inside: a first step that is lost in rounding would else seem to have crossed the slab */
+        s->high, 0); /* inside: otherwise a first step that rounds to nothing would count as having crossed the slab */
     volume_ray_turn(s, d, ray);
     return true;
 }

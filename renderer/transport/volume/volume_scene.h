@@ -4,10 +4,10 @@
  * Frame: the cloth frame in millimetres, z shifted so that the top of the highest layer that holds anything is z = 0
  * (as with fibers, up to a voxel). Inside, positions are in voxels. Immutable: shared by threads.
  *
- * Storage, made for look-ups that are all over the volume: bricks of 4^3 voxels, a voxel in 4 bytes (8 bits of density,
+ * Storage, made for reads in random order: bricks of 4^3 voxels, a voxel in 4 bytes (8 bits of density,
  * a direction of 12 + 12 bits, right within 0.035 degrees), a brick in 4 cache lines. Bricks that hold
- * nothing are not stored; the table of bricks says instead how far around everything is empty, so that rays skip what
- * cannot scatter. The direction volume (5 bytes a voxel) is not needed afterwards.
+ * nothing are not stored; the brick table has the distance to the nearest brick that holds something in their place, so
+ * that rays skip them. The direction volume (5 bytes a voxel) is not needed afterwards.
  */
 #ifndef SELVEDGE_RENDERER_VOLUME_SCENE_H
 #define SELVEDGE_RENDERER_VOLUME_SCENE_H
@@ -76,7 +76,7 @@ static inline void volume_voxel_direction(uint32_t voxel, float d[3])
 /* Voxel (i, j, k) of the volume that the scene was made from; 0 when nothing is there. */
 uint32_t volume_scene_voxel(const struct volume_scene *scene, size_t i, size_t j, size_t k);
 
-/* A point on its way through the cloth. */
+/* A ray at a point inside the cloth. */
 struct volume_ray {
     double offset_mm[2]; /* whole tiles */
     float at[3];         /* voxels, x and y within the tile */
@@ -89,7 +89,7 @@ struct volume_ray {
 bool volume_ray_enter(const struct volume_scene *scene, const double origin_mm[3], const double direction[3],
                       struct volume_ray *ray);
 void volume_ray_turn(const struct volume_scene *scene, const float direction[3], struct volume_ray *ray);
-/* Where the ray really is. */
+/* Position of the ray with its whole-tile offset. */
 void volume_ray_position_mm(const struct volume_scene *scene, const struct volume_ray *ray, float position_mm[3]);
 
 #endif

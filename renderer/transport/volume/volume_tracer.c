@@ -35,36 +35,37 @@ struct flight_score {
     float ln_d, param;
 };
 
-enum connection { FLIGHT, LAMP, IMAGE }; /* what a ray is for: to scatter again, or to bring light to a vertex */
+/* Purpose of a ray: to find the next scattering event, or to connect a bounce to a light. */
+enum connection { FLIGHT, LAMP, IMAGE };
 
-/* One path under way. Its ray waits at a point whose place in the table of bricks, or whose voxel, has been asked for
- * but not yet looked at. */
+/* One of the paths that are traced in turns. Its ray waits at a point for which the entry of the brick table, or the
+ * voxel, has been prefetched but not yet read. */
 struct volume_path {
     struct volume_ray ray;
     const int32_t *brick;
-    const uint32_t *voxel; /* NULL: the brick comes first */
+    const uint32_t *voxel; /* NULL: the brick is read next */
     enum connection purpose;
-    uint32_t n_lookup; /* of this ray */
+    uint32_t n_lookup; /* of the present ray */
     struct rng rng;
     struct volume_result *out;
     struct volume_record *record;
-    float throughput[3], pdf; /* of the last scattering sample; 0: camera ray */
+    float throughput[3], pdf; /* density of the last scattering sample; 0 for a camera ray */
     float origin_mm[3];
     struct flight_score flight;
 
-    struct volume_ray bounce; /* the last one */
+    struct volume_ray bounce; /* at the last bounce */
     struct fiber_frame frame;
     float wo[3];
 
-    float light_wi[3], light[3], light_max; /* what the connection brings if nothing is in its way; the most of that */
-    float passed;                           /* share of it that got through so far, for the rays thinned out as well */
-    float ratios;                           /* of a recorded path: the share without those */
+    float light_wi[3], light[3], light_max; /* unoccluded light of the connection, and its largest channel */
+    float passed; /* estimated transmittance so far, divided by the probability that the ray was kept */
+    float ratios; /* of a recorded path: transmittance without that division */
     struct flight_score shadow;
 
     float h[VOLUME_N_DERIVATIVE]; /* running score sums of the phase function, [c * n_param + p] */
 };
 
-/* The next event of the record; NULL: none is kept, or it is full. */
+/* The next event of the record, or NULL when nothing is recorded or the record is full. */
 static struct volume_event *note(struct volume_path *l, enum volume_event_kind kind)
 {
     struct volume_record *r = l->record;
@@ -93,7 +94,8 @@ static void note_light(struct volume_path *l, enum volume_event_kind kind, const
     memcpy(e->wo, l->wo, sizeof e->wo);
 }
 
-/* Adds value * (1, H + scores) to the result; score NULL: the last step's are in H already. */
+/* Adds value to the radiance and value * (H + scores) to the derivatives. score NULL: the scores of the last step are part
+ * of H already. */
 static void add_light(const struct volume_setting *s, struct volume_path *l, const float value[3], const float *score,
                       const struct flight_score *shadow)
 {
@@ -130,7 +132,8 @@ static void add_beyond(const struct volume_setting *s, struct volume_path *l)
 
 static bool connect(const struct volume_setting *s, struct volume_path *l, enum connection to);
 
-/* The ray is out of the cloth, or lost in it (VOLUME_MAX_LOOKUP steps: no light can be said to have come through). False: so ends the path. */
+/* The ray has left the cloth, or is lost in it after VOLUME_MAX_LOOKUP steps, when no light can be counted. False: the
+ * path has ended. */
 static bool leave(const struct volume_setting *s, struct volume_path *l, bool lost)
 {
     if (l->purpose == FLIGHT) {
@@ -140,7 +143,7 @@ static bool leave(const struct volume_setting *s, struct volume_path *l, bool lo
     if (!lost && l->passed > 0) {
         float value[3], score[VOLUME_N_DERIVATIVE], f_rgb[3];
         for (int c = 0; c < 3; c++) value[c] = l->light[c] * l->passed;
-        if (s->want_jacobian) /* only now: few connections get here */
+        if (s->want_jacobian) /* the scores are computed here because few connections arrive */
             s->model->eval_pdf(s->state, l->light_wi, l->wo, l->throughput, f_rgb, score);
         add_light(s, l, value, score, &l->shadow);
         note_light(l, VOLUME_ARRIVE, NULL, (float[3]){l->passed / l->ratios, 0, 0});
@@ -148,7 +151,7 @@ static bool leave(const struct volume_setting *s, struct volume_path *l, bool lo
     return connect(s, l, l->purpose + 1);
 }
 
-/* On by at least skip_mm to the next tentative collision. False: the path has ended. */
+/* Moves the ray by skip_mm and on to the next tentative collision. False: the path has ended. */
 static inline bool move_on(const struct volume_setting *s, struct volume_path *l, float skip_mm)
 {
     l->voxel = NULL;
@@ -161,7 +164,7 @@ static inline bool move_on(const struct volume_setting *s, struct volume_path *l
     return true;
 }
 
-/* Sends a ray from the vertex. */
+/* Starts a ray at the bounce. */
 static bool send(const struct volume_setting *s, struct volume_path *l, enum connection purpose,
                  const float direction[3])
 {
@@ -172,7 +175,7 @@ static bool send(const struct volume_setting *s, struct volume_path *l, enum con
     return move_on(s, l, 0);
 }
 
-/* Scatters the path at its vertex. False: roulette ends it. */
+/* Scatters the path at its bounce. False: roulette ends the path. */
 static bool scatter(const struct volume_setting *s, struct volume_path *l)
 {
     float u[3], wi[3], f_rgb[3], score[VOLUME_N_DERIVATIVE], direction[3], next[3], survival = 1;
@@ -195,7 +198,7 @@ static bool scatter(const struct volume_setting *s, struct volume_path *l)
     return send(s, l, FLIGHT, direction);
 }
 
-/* A direction of the lamp or the image, its radiance over its density, and that density. */
+/* A direction to the lamp or of the image, its radiance, and its density. False: there is no light that way. */
 static bool sample_light(const struct volume_setting *s, struct volume_path *l, enum connection to, float direction[3],
                          float radiance[3], float *pdf)
 {
@@ -209,7 +212,7 @@ static bool sample_light(const struct volume_setting *s, struct volume_path *l, 
     return lights_sample_image(&s->lights, u, direction, radiance, pdf);
 }
 
-/* Next-event estimation: a ray to the lamp, one to the image, then the path goes on. False: it ends here. */
+/* Next-event estimation: a shadow ray to the lamp, then one to the image, then the path is scattered. False: it ends. */
 static bool connect(const struct volume_setting *s, struct volume_path *l, enum connection to)
 {
     for (; to <= IMAGE; to++) {
@@ -230,7 +233,8 @@ static bool connect(const struct volume_setting *s, struct volume_path *l, enum 
             continue;
         }
         l->passed = l->ratios = 1;
-        if (l->light_max < s->shadow_below) { /* hardly any light: follow few of these rays, for more each */
+        if (l->light_max <
+            s->shadow_below) { /* hardly any light: trace few of these shadow rays, with a larger weight each */
             l->passed = s->shadow_below / l->light_max;
             if (rng_float(&l->rng) * l->passed >= 1) continue;
         }
@@ -241,7 +245,7 @@ static bool connect(const struct volume_setting *s, struct volume_path *l, enum 
     return scatter(s, l);
 }
 
-/* A real collision: the path's next vertex. */
+/* A real collision: the next bounce of the path. */
 static bool collide(const struct volume_setting *s, struct volume_path *l, uint32_t voxel,
                     const struct volume_lookup *k)
 {
@@ -275,7 +279,7 @@ static bool pass(const struct volume_setting *s, struct volume_path *l, const st
     return move_on(s, l, 0);
 }
 
-/* One look at memory. False: the path has ended. */
+/* One read of the brick table or of a voxel. False: the path has ended. */
 static inline bool step(const struct volume_setting *s, struct volume_path *l)
 {
     if (l->voxel == NULL) {

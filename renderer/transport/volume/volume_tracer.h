@@ -3,7 +3,7 @@
  *
  * Flight: Woodcock tracking with one majorant mu for the whole cloth; lamp connections by ratio tracking (Novak et al.
  * 2014, "Residual ratio tracking"). All three channels follow one path: extinction has no colour, and directions are
- * drawn for what the channels are worth.
+ * drawn in proportion to the throughput of the channels.
  *
  * Derivatives of flight. Write r = sigma_t / mu with mu held fixed. A tracked flight has the probability density
  *     prod_(null) mu exp(-mu s) (1 - r)  *  mu exp(-mu s) r        (a real collision ends it)
@@ -45,11 +45,11 @@ struct volume_setting {
     float inv_majorant_density, mean_step_mm; /* their inverses */
     struct lights lights;
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
-    float shadow_below;   /* light connections worth less are thinned out at random; 0: never */
+    float shadow_below;   /* contribution under which shadow rays are thinned out at random; 0: never */
     bool want_jacobian;
 };
 
-/* Roulette at the usual place, the configuration's lights (NULL: none). */
+/* The default roulette threshold, and the lights of the configuration (NULL: no lights). */
 void volume_setting_init(struct volume_setting *s, const struct volume_scene *scene, const struct volume_parameters *p,
                          const struct configuration *c, bool want_jacobian);
 /* Density times s at which the extinction would equal the majorant that paths are traced with. */
@@ -61,9 +61,9 @@ struct volume_result {
     uint32_t n_bounce, n_lookup;
 };
 
-/* All that a path's value depends on besides the phase function and the extinction, in order. With r = sigma_t over the
- * majorant it was traced with, now for the parameters of interest and then for those of tracing, a path's value is found
- * from T = 1 by:
+/* What the radiance of a path depends on besides the phase function and the extinction, in order. r is the ratio of
+ * extinction to the majorant of tracing, for the parameters in question; r_then is the same for the parameters of
+ * tracing. The radiance follows from T = 1 by:
  *   null       T *= (1 - r) / (1 - r_then)       real     T *= r / r_then
  *   scatter    T *= f(wi, wo) weight[0]
  *   connect    L = T f(wi, wo) weight            passed   L *= 1 - r
@@ -88,12 +88,12 @@ struct volume_record {
     struct volume_event *event; /* the caller's; events beyond capacity are counted but not stored */
 };
 
-/* ray: as volume_ray_enter made it; changed, like rng. record: NULL, or n_event set to 0 by the caller. */
+/* ray: from volume_ray_enter; ray and rng are changed. record: NULL, or with n_event = 0. */
 void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out,
                   struct volume_record *record);
 
-/* n paths, several of them under way at any time, so that one computes while the others wait for memory. Each has its
- * ray and random numbers (left as they are), and the result that volume_trace gives it. */
+/* Traces n paths, 16 of them in turns, so that one computes while the others wait for memory. Each has a ray and random
+ * numbers of its own, which are not changed, and the result that volume_trace gives. */
 void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
                        struct volume_result *out);
 

@@ -1,7 +1,7 @@
 /* Phantom cloth with photographs of it, for the figures of fits: made once, kept in a folder, scored against the truth.
  *
  * Photographs are path-traced mean radiances of the 16 + 24 built-in configurations (phantom_view_table.h) with seeds that no fit uses,
- * by plain paths (a fault of the probes that fits use would show as a misfit), in chunks of at most FIT_CHUNK paths a configuration; a
+ * by plain paths (an error of the guided shadow paths that fits use would show as a misfit), in chunks of at most FIT_CHUNK paths a configuration; a
  * chunk is a file, so an interrupted run goes on. A file's name states everything that it depends on but the renderer itself: empty the
  * folder after a change of that.
  *
@@ -96,7 +96,7 @@ struct fit_score_goal {
     size_t first, most;
 };
 
-/* With paths at param only, traced as fits do (with probes), spread over the configurations so that se is reached with the fewest:
+/* With paths at param only, traced as fits do (with guided shadow paths), spread over the configurations so that se is reached with the fewest:
  * each round's paths are fresh and as many as the round before asks for, so that neither their number nor their spread depends on
  * what they came to; four rounds at most. se may be larger than the goal's where `most` does not reach it. */
 struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set set, const double *param,

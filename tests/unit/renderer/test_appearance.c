@@ -239,7 +239,7 @@ static void test_mean_over_rotations(void **unused)
     for (int k = 0; k < N_ROTATION; k++) sum += turned[k].jac[i_width] / N_ROTATION;
     assert_true(fabs(mean[0].jac[i_width] - sum) < 1e-12 * fmax(1.0, fabs(sum)));
     assert_int_equal(mean[0].n_path, N_ROTATION * 512);
-    const size_t uneven[2] = {1000, 1}; /* rounded up: estimate_n_path foretells to what */
+    const size_t uneven[2] = {1000, 1}; /* rounded up to estimate_n_path */
     q.n_path = uneven;
     assert_int_equal(estimate_run(&q, pool, NULL, mean, NULL), STATUS_OK);
     for (size_t i = 0; i < 2; i++) assert_int_equal(mean[i].n_path, estimate_n_path(&wanted[i], uneven[i]));
