@@ -8,32 +8,6 @@
 
 #define GUIDED_PATH_SCALE 1.5f
 
-void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
-                       const struct scattering_state *state, const struct configuration *c, bool want_jacobian)
-{
-    memset(s, 0, sizeof *s);
-    s->scene = scene;
-    s->model = model;
-    s->state[0] = state;
-    s->n_set = 1;
-    lights_init(&s->lights, c);
-    s->guided_paths = s->lights.has_lamp;
-    s->roulette_below = PATH_SURFACE_ROULETTE_BELOW;
-    if (s->guided_paths) light_guide_energy_of(model, state, &s->energy[0]);
-    s->want_jacobian = want_jacobian;
-}
-
-void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
-                            const struct configuration *c, bool want_jacobian)
-{
-    path_setting_init(s, scene, sets->model, sets->state[0], c, want_jacobian);
-    s->n_set = sets->n;
-    for (size_t i = 0; i < sets->n; i++) {
-        s->state[i] = sets->state[i];
-        if (s->guided_paths && i > 0) light_guide_energy_of(s->model, s->state[i], &s->energy[i]);
-    }
-}
-
 static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
 {
     out[0] = (float)((double)local_mm[0] + offset_mm[0]);
