@@ -31,6 +31,8 @@
 #define OPTION_FIBER_FILE "fiber_file"
 #define OPTION_TILE "tile"
 #define OPTION_DENSITY_VOXEL "density_voxel"
+/* the set-up */
+#define OPTION_ENVIRONMENT_FILE "environment_file"
 /* the measurements */
 #define OPTION_MEASUREMENT_FILE "measurement_file"
 #define OPTION_PHOTOGRAPHS "photographs"

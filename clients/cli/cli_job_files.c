@@ -50,6 +50,8 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
     }
     const json_t *one = json_object_get(json_object_get(document, "fibers"), "file");
     if (one != NULL && (s = add(list, folder, one, "fibers", "fibers.file", err)) != STATUS_OK) goto out;
+    one = json_object_get(json_object_get(document, "environment"), "file");
+    if (one != NULL && (s = add(list, folder, one, "environment", "environment.file", err)) != STATUS_OK) goto out;
     one = json_object_get(json_object_get(document, "measurements"), "file");
     if (one != NULL && (s = add(list, folder, one, "measurements", "measurements.file", err)) != STATUS_OK) goto out;
     json_array_foreach(json_object_get(document, "photographs"), i, item)

@@ -13,7 +13,7 @@ enum { CLI_SHA256_HEX = 65 };
 struct cli_file {
     char *name;       /* as in the document, without a folder */
     char *path;       /* its path on this machine */
-    const char *role; /* "volume", "fibers", "measurements", "photograph" */
+    const char *role; /* "volume", "fibers", "environment", "measurements", "photograph" */
     uint64_t n_bytes;
     char sha256[CLI_SHA256_HEX];
 };

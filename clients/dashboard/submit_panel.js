@@ -11,6 +11,7 @@ function filesOf(doc) {
   const add = (name, role) => { if (typeof name === "string" && !list.some((f) => f.name === name)) list.push({ name, role }); };
   for (const name of doc.volume?.files ?? []) add(name, "volume");
   add(doc.fibers?.file, "fibers");
+  add(doc.environment?.file, "environment");
   add(doc.measurements?.file, "measurements");
   for (const p of doc.photographs ?? []) add(p?.file, "photograph");
   return list;

@@ -45,9 +45,9 @@ class JobFailed(Exception):
 def files_of(document):
     """Return the input files that a job document names, each once: [(name, role), ...]."""
     names = [(n, "volume") for n in document.get("volume", {}).get("files", [])]
-    for key, role in (("fibers", "fibers"), ("measurements", "measurements")):
-        if key in document:
-            names.append((document[key]["file"], role))
+    for key in ("fibers", "environment", "measurements"):
+        if "file" in document.get(key, {}):
+            names.append((document[key]["file"], key))
     names += [(p["file"], "photograph") for p in document.get("photographs", [])]
     return list(dict.fromkeys(names))
 

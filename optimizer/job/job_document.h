@@ -75,6 +75,10 @@ struct job_document {
     double voxel_um;   /* NaN: chosen from the radius */
     /* set-up */
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
+    bool lamp_directional, camera_far_field;
+    double environment_rgb[3];
+    char environment_file[JOB_MAX_NAME_BYTES]; /* "" when none is given */
+    double environment_scale;
     bool black_sheet;
     /* observations */
     char measurement_file[JOB_MAX_NAME_BYTES]; /* "" when photographs are given */
@@ -87,6 +91,7 @@ struct job_document {
     uint64_t seed;
     size_t max_iteration; /* 0: the method's default */
     uint64_t path_budget; /* 0: the method's default */
+    bool share_camera_paths;
     /* volume models: d is a parameter, the last one; its entries in fixed and start follow from these two */
     double density_multiplier_per_cm; /* NaN: the model's default */
     bool fit_density;
@@ -114,7 +119,7 @@ size_t job_texture_cells(const struct job_document *doc);
 /* Their edge in mm: near to texture_block_mm, which need not divide the crop. */
 double job_texture_cell_mm(const struct job_document *doc);
 
-/* Visit every input file the document names, with its role ("volume", "fibers", "measurements", "photograph"). */
+/* Visit every input file the document names, with its role ("volume", "fibers", "environment", "measurements", "photograph"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* The error of a job that wants the density fitted without a row that is lit from behind. */

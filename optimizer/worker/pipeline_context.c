@@ -2,6 +2,7 @@
 #include "base/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
+#include "renderer/transport/light/environment.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,6 +27,7 @@ void pipeline_context_release(struct pipeline_context *c)
     observation_set_release(&c->fitted);
     observation_set_release(&c->row);
     observation_set_release(&c->contrast);
+    environment_free(c->environment);
     volume_release(&c->volume);
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);

@@ -72,6 +72,7 @@ struct pipeline_context {
 
     struct job_document *doc;
     uint64_t fingerprint;               /* of the job document's text and this build of the program */
+    struct environment *environment;    /* image of the surroundings; NULL: none */
     struct observation_set observation; /* all */
     struct observation_set fitted;      /* those of the set "fit" */
     struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */

@@ -8,6 +8,7 @@
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/pipeline_budget.h"
+#include "renderer/transport/light/environment.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -46,6 +47,19 @@ static status load_observations(struct pipeline_context *c, struct error *err)
                            uneven.n - NAMED_PHOTOGRAPHS);
     observation_set_check(&c->observation, &(struct warning_sink){pipeline_warn, c});
     return STATUS_OK;
+}
+
+/* The image of the surroundings, which every observation is taken under. */
+static status load_environment(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    if (c->doc->environment_file[0] == '\0') return STATUS_OK;
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->environment_file, path);
+    status s = environment_read_exr(path, c->doc->environment_scale, &c->environment, err);
+    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_ENVIRONMENT_FILE);
+    for (size_t i = 0; i < c->observation.n && s == STATUS_OK; i++)
+        c->observation.item[i].configuration.environment = c->environment;
+    return s;
 }
 
 static status set_parameters(const struct job_model *given, struct pipeline_model *m, struct error *err)
@@ -180,6 +194,7 @@ static status read_rows(struct pipeline_context *c, struct error *err)
     status s = set_models(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);
     if (s == STATUS_OK) s = load_observations(c, err);
+    if (s == STATUS_OK) s = load_environment(c, err);
     if (s == STATUS_OK) s = select_rows(c, err);
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);

@@ -44,7 +44,8 @@ out:
 
 static bool role_valid(const char *role)
 {
-    static const char *const known[] = {"volume", "fibers", "measurements", "photograph", "chart", "dark_frame"};
+    static const char *const known[] = {"volume",      "fibers", "measurements", "photograph",
+                                        "environment", "chart",  "dark_frame"};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcmp(role, known[i]) == 0) return true;
     return false;
@@ -57,9 +58,10 @@ static status check_declaration(struct job_service *v, struct file_row *row, str
             err, STATUS_INVALID, "name",
             "file name '%.127s' is not allowed: 1..127 of A-Z a-z 0-9 . _ -, not starting with a dot", row->name);
     if (!role_valid(row->role))
-        return error_set_field(err, STATUS_INVALID, "role",
-                               "role '%.31s' is not one of volume, fibers, measurements, photograph, chart, dark_frame",
-                               row->role);
+        return error_set_field(
+            err, STATUS_INVALID, "role",
+            "role '%.31s' is not one of volume, fibers, measurements, photograph, environment, chart, dark_frame",
+            row->role);
     if (row->size_bytes < 1)
         return error_set_field(err, STATUS_INVALID, "size",
                                "file '%s' is declared with %lld bytes, but must not be empty", row->name,

@@ -13,10 +13,10 @@ from small_cloth import TABLE, hair
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 
 
-def run(folder, table=TABLE, expect=0, photographs=(), **fit):
+def run(folder, table=TABLE, expect=0, photographs=(), set_up=None, **fit):
     """Runs a job of the small cloth with a table, or with photographs [(bytes of a PNG, keys)]. Returns status.json."""
     document = {"sample": "alone", "fibers": {"file": "cloth.hair"},
-                "fit": {"path_budget": 100000, "render_px": 8, "render_samples": 1, **fit}}
+                "fit": {"path_budget": 100000, "render_px": 8, "render_samples": 1, **fit}, **(set_up or {})}
     (folder / "input").mkdir()
     (folder / "input" / "cloth.hair").write_bytes(hair())
     if photographs:
@@ -56,6 +56,20 @@ def test_a_table_of_strange_bytes_fails_with_its_message(tmp_path, table):
     state = run(tmp_path, table, expect=1)
     assert state["state"] == "failed"
     assert state["error"]["field"] == "measurements.file" and "rows.csv" in state["error"]["text"]
+
+
+@pytest.mark.parametrize("set_up", [{"lamp": {"kind": "directional"}}, {"camera": {"far_field": True, "distance_cm": 1.01}},
+                                    {"environment": {"radiance": [0.2, 0.1, 0.3]}}], ids=["lamp", "camera", "environment"])
+def test_the_set_up_reaches_the_result(tmp_path, set_up):
+    """The same seed gives the same result, unless the set-up is another one."""
+    lamp = {"lamp": {"side_cm": 60}, "camera": {"distance_cm": 1.01}}
+    rendered = []
+    for name, keys in (("plain", {}), ("again", {}), ("changed", set_up)):
+        (tmp_path / name).mkdir()
+        run(tmp_path / name, set_up={**lamp, **keys}, max_iterations=1, path_budget=20000)
+        rendered.append([row["rendered"] for row in result(tmp_path / name)["rows"]])
+    assert rendered[0] == rendered[1]
+    assert all(a != b for a, b in zip(rendered[0], rendered[2]))
 
 
 def test_many_uneven_photographs_leave_room_for_other_warnings(tmp_path):

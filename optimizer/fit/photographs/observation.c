@@ -102,6 +102,9 @@ struct configuration observation_configuration(const struct job_document *doc, d
         .lamp_side_m = doc->lamp_side_cm * cm,
         .camera_distance_m = doc->camera_distance_cm * cm,
         .crop_m = doc->crop_cm * cm,
+        .light = doc->lamp_directional ? LIGHT_DIRECTIONAL : LIGHT_SQUARE_LAMP,
+        .camera = doc->camera_far_field ? CAMERA_FAR_FIELD : CAMERA_PERSPECTIVE,
     };
+    memcpy(c.environment_rgb, doc->environment_rgb, sizeof c.environment_rgb);
     return c;
 }

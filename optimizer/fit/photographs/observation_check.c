@@ -69,11 +69,14 @@ static void check_dark(const struct observation_set *o, const struct warning_sin
     if (n_dark > NAMED) warning_send(warn, OPTION_NONE, "%zu more rows are dark or zero", n_dark - NAMED);
 }
 
-/* Of a cloth; gaps show the lamp behind it. */
+/* Of a cloth; gaps show the lamp behind it. No bound is known under an image of the surroundings. */
 static double brightest_possible(const struct configuration *c)
 {
+    const double *around = c->environment_rgb;
+    if (c->environment != NULL) return INFINITY;
     double lamp = M_PI * c->light_distance_m * c->light_distance_m / (c->lamp_side_m * c->lamp_side_m);
-    return c->light_theta_rad > M_PI_2 ? fmax(brightest, lamp) : brightest;
+    double most = brightest * (1.0 + fmax(around[0], fmax(around[1], around[2])));
+    return c->light_theta_rad > M_PI_2 && c->light == LIGHT_SQUARE_LAMP ? fmax(most, lamp) : most;
 }
 
 static void check_bright(const struct observation_set *o, const struct warning_sink *warn)

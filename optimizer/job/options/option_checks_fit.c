@@ -59,6 +59,10 @@ status job_check_texture(const struct option_value *v, struct error *err)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' with a weight needs the method '%s': '%s' has no such terms", v->path,
                                method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, doc->method);
+    if (doc->share_camera_paths)
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' cannot be used with 'fit.share_camera_paths': a contrast needs paths of its own",
+                               v->path);
     if (doc->model[0].option.stray_light)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.nuisance.stray_light': a contrast that is lowered by "

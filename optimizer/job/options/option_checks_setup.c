@@ -19,7 +19,7 @@ status job_check_sample(const struct option_value *v, struct error *err)
 
 status job_check_lamp(const struct option_value *v, struct error *err)
 {
-    if (v->doc->lamp_side_cm <= 2.0 * v->doc->lamp_distance_cm) return STATUS_OK;
+    if (v->doc->lamp_directional || v->doc->lamp_side_cm <= 2.0 * v->doc->lamp_distance_cm) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "lamp.side_cm",
                            "'lamp.side_cm' is %g: allowed is at most twice lamp.distance_cm (%g)", v->doc->lamp_side_cm,
                            v->doc->lamp_distance_cm);
@@ -27,7 +27,7 @@ status job_check_lamp(const struct option_value *v, struct error *err)
 
 status job_check_camera(const struct option_value *v, struct error *err)
 {
-    if (v->doc->crop_cm <= v->doc->camera_distance_cm) return STATUS_OK;
+    if (v->doc->camera_far_field || v->doc->crop_cm <= v->doc->camera_distance_cm) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "camera.crop_cm",
                            "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)", v->doc->crop_cm,
                            v->doc->camera_distance_cm);
@@ -131,6 +131,7 @@ static void collect_name(void *context, const char *name, const char *role)
 static status named_twice(const struct job_document *doc, const char *name, struct error *err)
 {
     char path[JSON_PATH_BYTES] = "measurements.file";
+    if (strcmp(doc->environment_file, name) == 0) snprintf(path, sizeof path, "environment.file");
     for (size_t i = 0; i < doc->n_volume_file; i++)
         if (strcmp(doc->volume_file[i], name) == 0) snprintf(path, sizeof path, "volume.files[%zu]", i);
     for (size_t i = 0; i < doc->n_photograph; i++)
@@ -142,7 +143,7 @@ static status named_twice(const struct job_document *doc, const char *name, stru
 static status check_files(const struct job_document *doc, struct error *err)
 {
     status s = STATUS_OK;
-    struct name_list list = {.name = malloc((doc->n_volume_file + doc->n_photograph + 2) * sizeof *list.name)};
+    struct name_list list = {.name = malloc((doc->n_volume_file + doc->n_photograph + 3) * sizeof *list.name)};
     if (list.name == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check the job document: out of memory");
     job_document_visit_files(doc, collect_name, &list);
     qsort(list.name, list.n, sizeof *list.name, compare_names);

@@ -2,10 +2,17 @@
 #include "optimizer/job/options/option_rows.h"
 
 static const char *const set_name[] = {[JOB_SET_FIT] = "fit", [JOB_SET_HELD_OUT] = "held-out", NULL};
+static const char *const lamp_kind[] = {"square", "directional", NULL};
 static const char *const transfer[] = {"linear", "srgb", NULL};
 
 const struct job_option option_rows_setup[] = {
-    {.path = "lamp", .kind = OPTION_SECTION, .check = job_check_lamp, .meaning = "A square lamp of even radiance."},
+    {.path = "lamp", .kind = OPTION_SECTION, .check = job_check_lamp, .meaning = "The lamp of every photograph."},
+    {.path = "lamp.kind",
+     .kind = OPTION_SWITCH,
+     INTO(lamp_directional),
+     .choice = lamp_kind,
+     .meaning = "`square`: a square of even radiance that faces the cloth. `directional`: parallel light, as from a "
+                "collimated or a very distant lamp; `side_cm` and `distance_cm` are then not used."},
     {.path = "lamp.side_cm",
      .kind = OPTION_NUMBER,
      INTO(lamp_side_cm),
@@ -40,6 +47,38 @@ const struct job_option option_rows_setup[] = {
      .standard = "1",
      .allowed = "0.01..100, at most the distance",
      .meaning = "Edge of the square that is averaged."},
+    {.path = "camera.far_field",
+     .kind = OPTION_BOOL,
+     INTO(camera_far_field),
+     .standard = "false",
+     .meaning = "Whether the cloth is seen in parallel projection, as by a telecentric lens or from very far; "
+                "`distance_cm` is then not used."},
+    {.path = "environment",
+     .kind = OPTION_SECTION,
+     .left_out = "none",
+     .meaning = "Light from all around, besides the lamp. With the black sheet none comes from below. Its radiance is "
+                "relative to a white diffuser that faces the lamp, which has radiance 1."},
+    {.path = "environment.radiance",
+     .kind = OPTION_NUMBERS,
+     NUMBERS_INTO(environment_rgb),
+     RANGE(0, 1000),
+     .standard = "[0, 0, 0]",
+     .meaning = "The same radiance from every direction, as red, green, blue."},
+    {.path = "environment.file",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_ENVIRONMENT_FILE,
+     INTO(environment_file),
+     .left_out = "none",
+     .allowed = "OpenEXR",
+     .meaning = "An image of the surroundings in latitude and longitude, added to `radiance`. The first row is the "
+                "normal of the cloth, the first column the direction of phi = 0, and phi grows to the right. It does "
+                "not turn with the cloth. Upload it with the role `environment`."},
+    {.path = "environment.scale",
+     .kind = OPTION_NUMBER,
+     INTO(environment_scale),
+     RANGE(1e-6, 1e6),
+     .standard = "1",
+     .meaning = "Factor from the values of the file to radiance."},
     {.path = "black_sheet",
      .kind = OPTION_BOOL,
      INTO(black_sheet),

@@ -9,14 +9,16 @@
 
 enum { LEAST_PATH = 1024, MOST_PATH = 65536 }; /* a candidate and replica */
 
-static status candidate_set(const struct job_document *doc, struct observation_set *o, struct error *err)
+static status candidate_set(const struct pipeline_context *pipeline, struct observation_set *o, struct error *err)
 {
+    const struct job_document *doc = pipeline->doc;
     status s = STATUS_OK;
     for (size_t i = 0; i < doc->n_candidate && s == STATUS_OK; i++) {
         const struct job_candidate *c = &doc->candidate[i];
         struct observation item = {.weight = 1.0};
         item.configuration = observation_configuration(doc, c->light_theta_deg, c->light_phi_deg, c->camera_theta_deg,
                                                        c->camera_phi_deg, c->cloth_rotation_deg);
+        item.configuration.environment = pipeline->environment;
         s = observation_set_append(o, &item, err);
     }
     return s;
@@ -70,7 +72,7 @@ status pipeline_rank_candidates(struct pipeline_context *c, struct error *err)
     size_t *n_path = malloc(n * sizeof *n_path);
     observation_set_init(&o);
     status s = replica[0] != NULL && replica[1] != NULL && n_path != NULL
-                   ? candidate_set(c->doc, &o, err)
+                   ? candidate_set(c, &o, err)
                    : error_set(err, STATUS_NO_MEMORY, "cannot rank candidates: out of memory");
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) {
         free(c->model[i].candidate);

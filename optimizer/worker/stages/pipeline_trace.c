@@ -39,7 +39,8 @@ status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c,
         .request = {.input = {.scene = pipeline_scene(c), .model = &c->model[i_model].appearance},
                     .configuration = t->configuration,
                     .n_configuration = o->n,
-                    .seed = c->doc->seed},
+                    .seed = c->doc->seed,
+                    .share_camera_paths = c->doc->share_camera_paths},
         .pool = c->pool};
     t->live_estimator = trace_estimator(&t->live);
     status s = pipeline_model_path(c, stage, name, i_model, path, err);
