@@ -489,6 +489,10 @@ static void test_raw_volume(void **state)
     check_error(VOLUME_OF("\"raw\":{\"type\":\"uint8\"}"), "volume.raw", "lacks 'shape'");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,0,5],\"type\":\"uint8\"}"), "volume.raw.shape[1]", "allowed are 1 to");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,5],\"type\":\"uint8\"}"), "volume.raw.shape", "3");
+    check_error(
+        "{\"sample\":\"s\",\"volume\":{\"files\":[\"a.bin\",\"b.bin\"],\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\"}},"
+        "\"photographs\":[" PHOTO "]}",
+        "volume.raw", "describes one file, 'volume.files' names 2");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint12\"}"), "volume.raw.type", "uint8");
     check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\",\"order\":1}"), "volume.raw.order", "order");
 }
