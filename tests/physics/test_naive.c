@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-enum { N_TASK = 64, TASK_PATHS = 1000, LONG_TASK_PATHS = 100000 };
+enum { N_TASK = 64, TASK_PATHS = 1000, LONG_TASK_PATHS = 120000 };
 
 struct job {
     struct fiber_set f;

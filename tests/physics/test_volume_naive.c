@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-enum { N_TASK = 64, LONG_FACTOR = 50 };
+enum { N_TASK = 64, LONG_FACTOR = 70 };
 
 struct job {
     struct naive_volume naive;
