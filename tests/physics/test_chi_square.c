@@ -2,6 +2,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
+#include "tests/support/model_stream.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>
@@ -77,12 +78,12 @@ static void samples_follow_the_density(void **state)
     size_t n_model = 0;
     while (scattering_registry()[n_model] != NULL) n_model++;
     double least_p = 0.01 / (double)(n_model * N_ANGLE * N_SET); /* 1 % for the whole family */
-    struct rng r;
-    rng_start(&r, &(struct rng_key){11, 0, 0, 0}, 0, 0);
-    for (size_t k = 0; k < n_model; k++)
+    for (size_t k = 0; k < n_model; k++) {
+        const struct scattering_model *m = scattering_registry()[k];
+        struct rng r;
+        model_stream_start(&r, 11, m->id);
         for (int set = 0; set < N_SET; set++)
             for (int a = 0; a < N_ANGLE; a++) {
-                const struct scattering_model *m = scattering_registry()[k];
                 double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * RAD_PER_DEG,
                                                     phi = angle_deg[a][1] * RAD_PER_DEG;
                 for (size_t p = 0; p < m->n_param; p++) { /* start; everything widest; narrow lobes */
@@ -96,6 +97,7 @@ static void samples_follow_the_density(void **state)
                 float wo[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
                 check(m, param, wo, weight[(set + a) % 3], &r, least_p);
             }
+    }
 }
 
 /* The narrowest lobes, where the grid above is too coarse: one-dimensional histograms of the angles. */

@@ -3,8 +3,8 @@
  * integral.
  */
 #include "base/angle.h"
-#include "base/rng.h"
 #include "renderer/scattering/phase_model.h"
+#include "tests/support/model_stream.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>
@@ -114,10 +114,10 @@ static void integrals_and_samples(void **state)
     enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 3 };
     static const float channel_weight[3] = {1, 0.1f, 0};
     size_t n_model = 0;
-    struct rng r;
-    rng_start(&r, &(struct rng_key){31, 0, 0, 0}, 0, 0);
     while (phase_registry()[n_model] != NULL) n_model++;
-    for (size_t k = 0; k < n_model; k++)
+    for (size_t k = 0; k < n_model; k++) {
+        struct rng r;
+        model_stream_start(&r, 31, phase_registry()[k]->id);
         for (unsigned set = 0; set < N_SET; set++)
             for (int a = 0; a < N_ANGLE; a++) {
                 float wo[3];
@@ -127,6 +127,7 @@ static void integrals_and_samples(void **state)
                 check_integrals(phase_registry()[k], param, wo, a % 2 ? channel_weight : NULL, &r,
                                 0.01 / (double)(n_model * N_SET * N_ANGLE));
             }
+    }
 }
 
 /* ln f and ln s by each parameter: three-point differences, one-sided where a bound is near. */
@@ -185,14 +186,15 @@ static void check_scores(const struct phase_model *m, const double *param, struc
 static void scores_against_differences(void **state)
 {
     (void)state;
-    struct rng r;
-    rng_start(&r, &(struct rng_key){32, 0, 0, 0}, 0, 0);
-    for (size_t k = 0; phase_registry()[k] != NULL; k++)
+    for (size_t k = 0; phase_registry()[k] != NULL; k++) {
+        struct rng r;
+        model_stream_start(&r, 32, phase_registry()[k]->id);
         for (unsigned b = 0; b < 8; b++) {
             double param[SCATTERING_MAX_PARAM];
             box_point(phase_registry()[k], b, 0, &r, param);
             check_scores(phase_registry()[k], param, &r);
         }
+    }
 }
 
 static void check_finite(const struct phase_model *m, const struct phase_state *s, const float wo[3], const float wi[3])
@@ -213,11 +215,11 @@ static void nothing_is_nan(void **state)
                                        {0, -1, 0},          {0, 0.70710678f, 0.70710678f}};
     enum { N_SPECIAL = sizeof special / sizeof special[0] };
     const float corner[3] = {0, 0.5f, 0.99999994f};
-    struct rng r;
-    rng_start(&r, &(struct rng_key){33, 0, 0, 0}, 0, 0);
-    for (size_t k = 0; phase_registry()[k] != NULL; k++)
+    for (size_t k = 0; phase_registry()[k] != NULL; k++) {
+        const struct phase_model *m = phase_registry()[k];
+        struct rng r;
+        model_stream_start(&r, 33, m->id);
         for (unsigned b = 0; b < 5; b++) {
-            const struct phase_model *m = phase_registry()[k];
             double param[SCATTERING_MAX_PARAM];
             box_point(m, b, 0, &r, param);
             struct phase_state *s = prepare(m, param);
@@ -233,6 +235,7 @@ static void nothing_is_nan(void **state)
             }
             m->release(s);
         }
+    }
 }
 
 static void registry_is_sound(void **state)
