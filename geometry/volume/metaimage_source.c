@@ -229,5 +229,5 @@ static bool metaimage_recognise(const uint8_t b[16], const char *path)
     return memcmp(b, "ObjectType", 10) == 0 || memcmp(b, "NDims", 5) == 0;
 }
 
-const volume_reader metaimage_reader = {"metaimage.v1", metaimage_recognise, metaimage_open, metaimage_read,
-                                        metaimage_close};
+const volume_reader metaimage_reader = {"metaimage.v1", "MetaImage",    metaimage_recognise,
+                                        metaimage_open, metaimage_read, metaimage_close};

@@ -355,4 +355,4 @@ static bool nrrd_recognise(const uint8_t b[16], const char *path)
     return memcmp(b, "NRRD000", 7) == 0;
 }
 
-const volume_reader nrrd_reader = {"nrrd.v1", nrrd_recognise, nrrd_open, nrrd_read, nrrd_close};
+const volume_reader nrrd_reader = {"nrrd.v1", "NRRD", nrrd_recognise, nrrd_open, nrrd_read, nrrd_close};

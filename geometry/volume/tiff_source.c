@@ -278,4 +278,4 @@ static bool tiff_recognise(const uint8_t b[16], const char *path)
            memcmp(b, "MM\0+", 4) == 0;
 }
 
-const volume_reader tiff_reader = {"tiff.v1", tiff_recognise, tiff_open, tiff_read, tiff_close};
+const volume_reader tiff_reader = {"tiff.v1", "TIFF", tiff_recognise, tiff_open, tiff_read, tiff_close};

@@ -316,7 +316,7 @@ static bool vol_recognise(const uint8_t b[16], const char *path)
     return memcmp(b, "VOL\3", 4) == 0;
 }
 
-const volume_reader vol_reader = {"vol.v1", vol_recognise, vol_source_open, vol_source_read, vol_source_close};
+const volume_reader vol_reader = {"vol.v1", ".vol", vol_recognise, vol_source_open, vol_source_read, vol_source_close};
 
 status vol_read_density(const char *path, struct volume *v, struct error *err)
 {

@@ -9,7 +9,7 @@
 #include <stdio.h>
 
 typedef struct volume_reader {
-    const char *id; /* "tiff.v1" */
+    const char *id, *title; /* "tiff.v1"; "TIFF", as messages to users name the format */
     /* Returns whether this reader can read the files, from the first 16 bytes of the first file (padded with zeros)
      * and its name. */
     bool (*recognise)(const uint8_t first_byte[16], const char *path);

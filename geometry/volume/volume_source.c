@@ -44,6 +44,18 @@ static status read_first_bytes(const char *path, uint8_t first_byte[16], struct 
     return STATUS_OK;
 }
 
+/* The error of a file that no reader takes: names every format, "neither TIFF nor ... nor .vol". */
+static status no_reader_takes(const char *path, struct error *err)
+{
+    char list[200] = "";
+    int n = 0;
+    for (size_t i = 0; i < volume_reader_count() && n < (int)sizeof list; i++)
+        n += snprintf(list + n, sizeof list - (size_t)n, "%s %s", i == 0 ? "neither" : " nor", reader[i]->title);
+    return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
+                           "cannot read volume '%s': %s (samples without a header are described by 'raw')",
+                           path_file_name(path), list);
+}
+
 status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
                                    struct volume_source **source, struct error *err)
 {
@@ -56,12 +68,7 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
     const volume_reader *found = raw != NULL && raw->n[0] > 0 ? &raw_reader : NULL;
     for (size_t i = 0; i < volume_reader_count() && found == NULL; i++)
         if (reader[i]->recognise(first_byte, path[0])) found = reader[i];
-    if (found == NULL)
-        return error_set_field(
-            err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
-            "cannot read volume '%s': neither TIFF nor MetaImage nor NRRD nor .vol (samples without a header are "
-            "described by 'raw')",
-            path_file_name(path[0]));
+    if (found == NULL) return no_reader_takes(path[0], err);
     struct volume_source *v = calloc(1, sizeof *v);
     if (v == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", path_file_name(path[0]));
