@@ -16,7 +16,7 @@ if [ $# -eq 0 ]; then
 fi
 bad=0
 for parser; do
-    mkdir -p "$work/corpus/$parser"
+    mkdir -p "$work/corpus/$parser" "$work/seeds/$parser" # a parser may have no seeds
     dictionary=()
     [ ! -f "tests/fuzz/$parser.dict" ] || dictionary=("-dict=tests/fuzz/$parser.dict")
     if nice "$build/tests/fuzz/fuzz_$parser" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1500 -malloc_limit_mb=512 -max_len=16384 \

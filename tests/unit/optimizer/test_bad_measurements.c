@@ -89,9 +89,8 @@ static void test_contradictory(void **state)
     (void)state;
     for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
         struct fixture x;
-        struct fit_result honest, r;
+        struct fit_result r;
         setup(&x, FAKE_N_FIT);
-        fit(&x, *method, &honest);
         for (size_t i = 0; i < 8; i++) { /* the second eight become the first, half and double as bright */
             x.cloth.configuration[8 + i] = x.cloth.configuration[i];
             x.observation.item[8 + i].configuration = x.observation.item[i].configuration;
@@ -102,7 +101,8 @@ static void test_contradictory(void **state)
         }
         fit(&x, *method, &r);
         assert_true(r.uncertainty.misfit_var > 0.02); /* a third of each mean: about 0.1 */
-        for (size_t p = 3; p < 6; p++) assert_true(r.uncertainty.se_param[p] >= 0.8 * honest.uncertainty.se_param[p]);
+        /* 0.004 where the rows agree (gauss_newton.v1) */
+        for (size_t p = 3; p < 6; p++) assert_true(r.uncertainty.se_param[p] > 0.025);
         observation_set_release(&x.observation);
     }
 }
