@@ -9,9 +9,9 @@
  * index eta' = sqrt(eta^2 - sin^2 th_d) / cos th_d, sin th_t = sin th_d / eta. Simplified against the papers: TT and
  * TRT leave along the directions of the central ray (h = 0), their spread over h is part of the widths; attenuation is
  * averaged over h instead of following ph (so no caustics); no tilted scales (textile fibers have none); paths of more
- * than one inner reflection are dropped, which only loses energy. Energy: wide TT and TRT lobes carry the A of one th_d
- * to others, so up to 1.49 of the light leaves at grazing directions (tests/physics/test_energy_bound.c). Reciprocal. A(th_d) and its derivatives by C_T and
- * eta are tabulated over cos th_d (eta by central differences in double).
+ * than one inner reflection are dropped, which only loses energy. Reciprocal. Energy: wide TT and TRT lobes carry the A
+ * of one th_d to others, so up to 1.49 of the light leaves at grazing directions (tests/physics/test_energy_bound.c).
+ * A(th_d) and its derivatives by C_T and eta are tabulated over cos th_d (eta by central differences in double).
  */
 #include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/surface/cone_lobe.h"
