@@ -38,12 +38,9 @@ static void fill_energy(struct scattering_state *s)
     }
 }
 
-static status prepare(const double *param, struct scattering_state **state, struct error *err)
+void two_lobe_init_published(struct scattering_state *s, const double *param)
 {
-    status st = param_check(scattering_two_lobe.param, scattering_two_lobe.n_param, scattering_two_lobe.id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = two_lobe_state_new(param);
-    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    two_lobe_state_init(s, param);
     for (int i = 0; i <= TWO_LOBE_N_TABLE; i++)
         for (int k = 0; k < 2; k++) {
             double d_beta;
@@ -53,6 +50,15 @@ static status prepare(const double *param, struct scattering_state **state, stru
         }
     fill_energy(s);
     two_lobe_fill_reach(s);
+}
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    status st = param_check(scattering_two_lobe.param, scattering_two_lobe.n_param, scattering_two_lobe.id, param, err);
+    if (st != STATUS_OK) return st;
+    struct scattering_state *s = malloc(sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    two_lobe_init_published(s, param);
     *state = s;
     return STATUS_OK;
 }

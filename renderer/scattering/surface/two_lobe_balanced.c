@@ -183,13 +183,14 @@ static status prepare(const double *param, struct scattering_state **state, stru
     status st = param_check(scattering_two_lobe_balanced.param, scattering_two_lobe_balanced.n_param,
                             scattering_two_lobe_balanced.id, param, err);
     if (st != STATUS_OK) return st;
-    struct scattering_state *s = two_lobe_state_new(param);
+    struct scattering_state *s = malloc(sizeof *s);
     struct balance *b = malloc(sizeof *b);
     if (s == NULL || b == NULL) {
         free(s);
         free(b);
         return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     }
+    two_lobe_state_init(s, param);
     fill_grid(b);
     balance_r(b, param[TWO_LOBE_P_BETA_R]);
     balance_tt(b, param[TWO_LOBE_P_BETA_TT]);

@@ -2,10 +2,9 @@
 
 #include <math.h>
 
-struct scattering_state *two_lobe_state_new(const double *param)
+void two_lobe_state_init(struct scattering_state *s, const double *param)
 {
-    struct scattering_state *s = calloc(1, sizeof *s);
-    if (s == NULL) return NULL;
+    *s = (struct scattering_state){0};
     for (int c = 0; c < 3; c++) {
         s->c_r[c] = (float)param[TWO_LOBE_P_C_R + c];
         s->not_c_r[c] = (float)(1 - param[TWO_LOBE_P_C_R + c]);
@@ -20,7 +19,6 @@ struct scattering_state *two_lobe_state_new(const double *param)
         s->inv_cube[k] = (float)(1 / (beta * beta * beta));
     }
     von_mises_init(&s->azimuth, param[TWO_LOBE_P_GAMMA_TT]);
-    return s;
 }
 
 void two_lobe_fill_reach(struct scattering_state *s)

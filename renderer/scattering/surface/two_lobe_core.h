@@ -1,5 +1,5 @@
-/* What two_lobe.v1 and two_lobe_balanced.v1 share: state, evaluation with scores, sampling. Included by those two files
- * only.
+/* What two_lobe.v1, two_lobe_balanced.v1 and two_lobe_diffuse.v1 share: state, evaluation with scores, sampling. Included
+ * by those files only.
  *
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
@@ -52,8 +52,10 @@ struct scattering_state {
     float cross[TWO_LOBE_N_TABLE + 1]; /* balanced only, by |th|: d ln of TT's scale / d beta_R */
 };
 
-/* Everything but the tables; NULL without memory. */
-struct scattering_state *two_lobe_state_new(const double *param);
+/* Everything but the tables. */
+void two_lobe_state_init(struct scattering_state *s, const double *param);
+/* All of two_lobe.v1, in memory of the caller. */
+void two_lobe_init_published(struct scattering_state *s, const double *param);
 /* near and far of the sampling table. */
 void two_lobe_fill_reach(struct scattering_state *s);
 

@@ -294,10 +294,43 @@ static void reciprocal_models_are(void **state)
     }
 }
 
+/* two_lobe_diffuse.v1 in closed form: S is linear in w, w = 0 is two_lobe.v1, and at w = 1 only R and a uniform term are
+ * left. Float arithmetic keeps each S to a few parts in 10^6 of its largest term. */
+static void diffuse_share_in_closed_form(void **unused)
+{
+    (void)unused;
+    const struct scattering_model *lobes = scattering_find("two_lobe.v1"),
+                                  *mixed = scattering_find("two_lobe_diffuse.v1");
+    double param[SCATTERING_MAX_PARAM];
+    struct rng r;
+    rng_start(&r, &(struct rng_key){42, 0, 0, 0}, 0, 0);
+    assert_int_equal(mixed->n_param, lobes->n_param + 1);
+    for (unsigned k = 0; k < 40; k++) {
+        float wi[3], wo[3], two_lobe[3], rgb[3], score[3 * SCATTERING_MAX_PARAM];
+        box_point(mixed, k, &r, param);
+        random_direction(&r, wi);
+        random_direction(&r, wo);
+        double w = param[lobes->n_param], cos_i = sqrt((double)(wi[1] * wi[1] + wi[2] * wi[2]));
+        struct scattering_state *a = prepare(lobes, param), *b = prepare(mixed, param);
+        lobes->eval(a, wi, wo, two_lobe, score);
+        mixed->eval(b, wi, wo, rgb, NULL);
+        for (size_t c = 0; c < 3; c++) {
+            double c_tt = param[3 + c], not_fresnel = (1 - param[c]) * (1 - pow(1 - cos_i, 5));
+            double tt = (double)two_lobe[c] * (double)score[c * lobes->n_param + 3 + c] * c_tt; /* C_TT dS / dC_TT */
+            double uniform = c_tt * not_fresnel / (M_PI * M_PI);
+            double expected = (double)two_lobe[c] + w * (uniform - tt);
+            assert_true(fabs((double)rgb[c] - expected) < 1e-5 * ((double)two_lobe[c] + uniform));
+        }
+        lobes->release(a);
+        mixed->release(b);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(golden_values),
+        cmocka_unit_test(diffuse_share_in_closed_form),
         cmocka_unit_test(normaliser_against_quadrature),
         cmocka_unit_test(bessel_values),
         cmocka_unit_test(erf_inverse_is_inverse),
