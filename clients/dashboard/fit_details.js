@@ -61,6 +61,15 @@ function certificate(result) {
     el("p", { class: "hint" }, `Derivatives of ${c.n_path} paths through this cloth, compared with finite differences over the same paths: the worst relative error is ${c.worst_rel_error.toExponential(1)} ± ${c.worst_rel_error_se.toExponential(0)} (${c.worst_parameter}).`));
 }
 
+// The plain BRDF fitted to the same rows: what a user would take in place of this twin.
+function skill(result) {
+  const plain = result.skill?.plain_brdf;
+  if (!plain || !isNumber(plain.heldout_rel_rms)) return null;
+  const better = result.skill.heldout_ratio < 1;
+  return el("div", { id: "skill" }, el("h3", {}, "Skill ", tag(better ? "better than a plain BRDF" : "no better than a plain BRDF", better ? "good" : "warn")),
+    el("p", { class: "hint" }, `A plain BRDF that knows nothing of the cloth, fitted to the same rows, has a relative RMS error of ${percent(plain.heldout_rel_rms, 2)} over the held-out rows; this fit has ${percent(result.heldout_rel_rms, 2)}.`));
+}
+
 const SHOWN_CANDIDATES = 8;
 
 function nextPhotograph(result) {
@@ -77,6 +86,6 @@ function nextPhotograph(result) {
 // Returns the content of the card, or null if there is nothing to show.
 export function fitDetails(job) {
   if (!job.result) return null;
-  const parts = [certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
+  const parts = [skill, certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
   return parts.length ? el("div", { id: "fit-details" }, parts) : null;
 }

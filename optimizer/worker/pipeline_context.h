@@ -11,6 +11,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume.h"
+#include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/objective/next_photograph.h"
 #include "optimizer/fit/objective/noisy_minimum.h"
@@ -61,6 +62,13 @@ struct pipeline_radius {
     double wall_s;
 };
 
+/* What a plain BRDF makes of the same rows (pipeline_skill.h). */
+struct pipeline_skill {
+    bool measured; /* false where a row is lit by an environment too */
+    struct plain_brdf brdf;
+    double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
+};
+
 struct pipeline_context {
     const struct worker_folder *folder; /* not owned, as the next three */
     struct worker_status *status;
@@ -80,6 +88,7 @@ struct pipeline_context {
     size_t n_model;
     struct pipeline_model *model;  /* in the order of the document */
     struct pipeline_radius radius; /* when the job has the radius fitted */
+    struct pipeline_skill skill;   /* filled in before the report */
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;

@@ -214,6 +214,20 @@ static json_t *radius_json(const struct pipeline_context *c)
                      curve);
 }
 
+static json_t *skill_json(const struct pipeline_context *c)
+{
+    const struct plain_brdf *b = &c->skill.brdf;
+    double twin = c->model[pipeline_best_model(c)].validation.held_out.rel_rms;
+    if (!c->skill.measured) return json_null();
+    json_t *plain = json_pack(
+        "{s:o, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f, s:s}", "fit_rel_rms", json_number(c->skill.fit_rel_rms),
+        "heldout_rel_rms", json_number(c->skill.heldout_rel_rms), "diffuse", json_number_list(b->diffuse_rgb, 3, 1.0),
+        "f0", json_number_list(b->f0_rgb, 3, 1.0), "sheen", json_number_list(b->sheen_rgb, 3, 1.0), "transmission",
+        json_number_list(b->transmission_rgb, 3, 1.0), "retro", b->retro, "roughness", b->roughness, "sheen_roughness",
+        b->sheen_roughness, "masking", b->separable_masking ? "separable" : "correlated");
+    return json_pack("{s:o, s:o}", "plain_brdf", plain, "heldout_ratio", json_number(twin / c->skill.heldout_rel_rms));
+}
+
 static json_t *result_json(struct pipeline_context *c, picture_name *picture)
 {
     const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
@@ -225,6 +239,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     put_fit(json, c, best);
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);
+    json_object_set_new(json, "skill", skill_json(c));
     json_object_set_new(json, "radius", radius_json(c));
     json_object_set_new(json, "geometry", result_geometry_json(c));
     json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));

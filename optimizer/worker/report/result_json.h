@@ -23,6 +23,9 @@
  *             the held-out rows (over the fitted rows when none are held out)
  *  "radius":null|{"model","start_um","radius_um" (what was used),"minimum_um","standard_error_um","lower_um","upper_um",
  *             "determined","at_bound","n_path","wall_s","curve":[{"radius_um","objective","objective_se"}]},
+ *  "skill":null|{"plain_brdf":{"fit_rel_rms","heldout_rel_rms":number|null,"diffuse":[3],"f0":[3],"sheen":[3],
+ *           "transmission":[3],"retro","roughness","sheen_roughness","masking":"correlated"|"separable"} (plain_brdf.h),
+ *           "heldout_ratio":number|null},            heldout_rel_rms of the best model over that of the plain BRDF
  *  "geometry":{...reconstruct_report, "input":"volume"|"fibers", "options":{...}} (result_geometry.h),
  *  "png_exposure",                                    all PNG pictures show radiance x this, sRGB
  *  "n_path_fit", "n_step", "fit_wall_s", "n_path_validation", "stages":[{"name","wall_s":number|null}],

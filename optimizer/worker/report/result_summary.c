@@ -79,6 +79,15 @@ static void print_comparison(const struct pipeline_context *c, FILE *out)
             gains ? ", each photograph with its own gain" : "");
 }
 
+/* The plain BRDF beside the fit's own errors, where it was measured. */
+static void print_skill(const struct pipeline_context *c, FILE *out)
+{
+    if (!c->skill.measured) return;
+    fprintf(out, "a plain BRDF fitted to the same rows       %.3g %% fitted", 100.0 * c->skill.fit_rel_rms);
+    if (isfinite(c->skill.heldout_rel_rms)) fprintf(out, ", %.3g %% held out", 100.0 * c->skill.heldout_rel_rms);
+    fprintf(out, "\n");
+}
+
 static void print_summary(struct pipeline_context *c, FILE *out)
 {
     char text[600];
@@ -104,6 +113,7 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
     percent(&m->validation.held_out, text, sizeof text);
     if (isfinite(m->validation.held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
+    print_skill(c, out);
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
             m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
     print_parameters(m, out);
