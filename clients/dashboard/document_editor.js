@@ -1,15 +1,16 @@
-// The job document of the submit panel: a form made from the server's table of options, and the document as text.
+// The job document in the submit panel: a form made from the server's table of options, and beside it the document as
+// text.
 import { optionForm } from "./option_form.js";
 import { el } from "./page_parts.js";
 import { getJson } from "./server_link.js";
 
-// Whole numbers above 2^53 (a seed may be one) would be rounded when they are written again.
+// True when the document has a whole number above 2^53, as a seed may be. Writing it again would round it.
 function holdsLargeNumber(value) {
   if (typeof value === "number") return Number.isInteger(value) && !Number.isSafeInteger(value);
   return typeof value === "object" && value !== null && Object.values(value).some(holdsLargeNumber);
 }
 
-// changed(text): the form has changed the document.
+// changed(text) is called when the form has changed the document.
 export function documentEditor(changed) {
   const text = el("pre", { class: "log", id: "document" }), body = el("div"), note = el("p", { class: "hint" });
   let source = "", options = null, form = null;
@@ -26,7 +27,7 @@ export function documentEditor(changed) {
     text.textContent = source;
     if (options === null) return;
     let doc = {};
-    try { if (source !== "") doc = JSON.parse(source); } catch { doc = null; } // the panel says what is wrong
+    try { if (source !== "") doc = JSON.parse(source); } catch { doc = null; } // the submit panel reports the error
     const editable = doc !== null && !holdsLargeNumber(doc);
     note.textContent = editable ? "An option is in the document when its box is ticked; the grey text says what holds without it."
       : "The form cannot edit this document: it is not valid JSON, or holds a whole number above 2^53. Edit the file and drop it again.";

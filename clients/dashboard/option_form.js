@@ -1,22 +1,24 @@
-// A form for a job document, built from the table of options (GET /v1/options): nested sections, lists of sections, one row an
-// option. It edits the document that it is given and calls `changed` after every change. What stands under a closed section
-// is built when it is opened.
+// A form for a job document, built from the table of options (GET /v1/options). It has nested sections, lists of
+// sections, and one row for each option. It edits the given document and calls `changed` after every change. The rows of
+// a section are built when the section is opened.
 import { el } from "./page_parts.js";
 
 const isObject = (x) => typeof x === "object" && x !== null && !Array.isArray(x);
 const LISTS = new Set(["numbers", "integers", "number_or_numbers", "file_names"]);
 
-// Rows that stand directly under a path: "volume", or "photographs[]" for the members of an element.
+// The rows directly under a path: "volume" is a section, "photographs[]" an element of a list.
 function membersOf(options, path) {
   const start = path ? `${path}.` : "";
   return options.filter((row) => row.path.startsWith(start) && row.path.length > start.length && !/[.[]/.test(row.path.slice(start.length)));
 }
 const keyOf = (row) => row.path.slice(row.path.lastIndexOf(".") + 1);
 
-// Text with `code` in it.
+// Text in which words between backquotes are shown as code.
 const prose = (text) => text.split("`").map((part, i) => (i % 2 ? el("code", {}, part) : part));
 
-// ---- places: an object of the document that may not be there yet ----
+// ---- places ----
+// A place is an object of the document that may not exist yet. It has a path, get() (the object or undefined), make()
+// (creates it when needed) and prune() (removes it when it is empty).
 
 function memberPlace(parent, key) {
   const place = {
@@ -33,7 +35,7 @@ function memberPlace(parent, key) {
 
 const elementPlace = (list, path, i) => ({ path: `${path}[${i}]`, get: () => list[i], make: () => list[i], prune: () => {} });
 
-// ---- one value: text of an input <-> JSON ----
+// ---- one value: between the text of an input and JSON ----
 
 function textOf(row, value) {
   if (value === undefined) return "";
@@ -41,12 +43,12 @@ function textOf(row, value) {
   return Array.isArray(value) ? value.join(", ") : String(value);
 }
 
-// Throws when the text is no value of the row's kind; ranges are checked by the server.
+// Throws when the text is no value of the row's kind. The server checks ranges.
 function valueOf(row, text) {
   if (text.trim() === "") throw new Error("Give a value.");
   if (row.kind === "other") return JSON.parse(text);
   if (row.kind === "boolean") return text === "true";
-  const number = (word) => { if (word === "" || !Number.isFinite(Number(word))) throw new Error(`'${word}' is no number.`); return Number(word); };
+  const number = (word) => { if (word === "" || !Number.isFinite(Number(word))) throw new Error(`'${word}' is not a number.`); return Number(word); };
   if (row.kind === "number" || row.kind === "integer") return number(text.trim());
   if (!LISTS.has(row.kind)) return text;
   const words = text.split(/[\s,]+/).filter((word) => word !== "");
@@ -75,7 +77,7 @@ function help(row) {
 // ---- rows and sections ----
 
 export function optionForm(options, document, changed) {
-  const sections = new Map(); // path in the document -> opens the section and builds what stands in it
+  const sections = new Map(); // path in the document -> function that opens the section and builds its rows
   const root = { path: "", get: () => document, make: () => document, prune: () => {} };
 
   function leaf(row, place) {
@@ -113,7 +115,7 @@ export function optionForm(options, document, changed) {
     return line;
   }
 
-  // A section that builds its rows when it is opened; `open`: at once.
+  // A section that builds its rows when it is opened. With `open` it is opened at once.
   function folded(path, head, open, build) {
     const body = el("div", { class: "members" }), node = el("details", { "data-path": path }, el("summary", {}, ...head), body);
     let built = false;
@@ -162,7 +164,7 @@ export function optionForm(options, document, changed) {
     });
   }
 
-  // Rows of an object that is allowed instead of the value or the list.
+  // Rows of the object that is allowed instead of the value or the list.
   function inner(row, parent) {
     if (!row.or_section) return [];
     const place = memberPlace(parent, keyOf(row));
@@ -178,7 +180,7 @@ export function optionForm(options, document, changed) {
 
   const node = el("div", { class: "options" }, ...membersOf(options, "").map((row) => part(row, root)));
 
-  // Shows the row of a key that the server refused, and opens the sections on the way there.
+  // Shows the row of a key that the server refused, and opens the sections that contain it.
   function mark(path, message) {
     const ends = [...path.matchAll(/[.[]/g)].map((m) => m.index).concat(path.length);
     let row = null;

@@ -14,7 +14,7 @@
 
 #include <jansson.h>
 
-/* A new reference; NULL without memory. */
+/* Returns a new reference, or NULL when memory ran out. */
 json_t *catalogue_json(void);
 
 #endif

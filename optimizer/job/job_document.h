@@ -1,5 +1,5 @@
-/* The job document: what a job is to do, as JSON text and as a struct. Read and checked by the same code in daemon and
- * worker.
+/* The job document: what a job is to do, as JSON text and as a struct. The daemon and the worker read and check it with
+ * the same code.
  *
  * The keys, with type, unit, range, default and meaning, are the rows of optimizer/job/options (for people:
  * docs/sample-preparation.md, section 4). Unknown keys are errors, so that a misspelt option is not ignored. Errors:
@@ -20,14 +20,14 @@ enum {
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
     JOB_MAX_CANDIDATE = 1024,
-    JOB_MAX_TEXTURE_CELLS = 32, /* blocks of a crop a side; the renderer can do as many */
+    JOB_MAX_TEXTURE_CELLS = 32, /* blocks along the edge of a crop; the renderer has the same limit */
     JOB_MAX_MODEL = 8
 };
 
 /* One model to be fitted. */
 struct job_model {
     char id[64];
-    double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, flat; NaN: not given */
+    double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, one value for each parameter; NaN: not given */
     struct job_fit_option option;
 };
 
@@ -61,14 +61,14 @@ struct job_document {
     char axes[8];
     double matrix[9];
     size_t crop_voxel[6];
-    bool align, crop; /* "auto"; false where matrix, crop_voxel are given */
+    bool align, crop; /* true for "auto"; false where matrix or crop_voxel is given */
     double crop_keep; /* NaN: not given */
     bool join_seams;
     double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j; /* NaN: not given */
     size_t filter_h;                                                                  /* 0: not given */
     double link_sigma_voxel, radius_um;                                               /* NaN: not given */
     size_t min_vertex;
-    int radius_per_axis; /* -1: by what is measured (not given) */
+    int radius_per_axis; /* 1: one radius for each axis class, 0: one for all, -1: the measurement decides */
     /* fibers */
     char fiber_file[JOB_MAX_NAME_BYTES];
     double tile_mm[2]; /* NaN: from the file */
@@ -92,43 +92,46 @@ struct job_document {
     size_t max_iteration; /* 0: the method's default */
     uint64_t path_budget; /* 0: the method's default */
     bool share_camera_paths;
-    /* volume models: d is a parameter, the last one; its entries in fixed and start follow from these two */
+    /* The density multiplier is the last parameter of a volume model. Its entries in job_model.fixed and
+     * job_model.start follow from the next two members. */
     double density_multiplier_per_cm; /* NaN: the model's default */
     bool fit_density;
     bool fit_radius;
     double radius_lower_um, radius_upper_um; /* NaN: from the cloth */
-    double texture_block_mm, texture_weight; /* block 0: not asked for */
-    size_t n_candidate;                      /* for the next photograph; 0: not asked for */
-    bool candidate_grid;                     /* the candidates are the built-in ones */
+    double texture_block_mm, texture_weight; /* texture_block_mm 0: no texture */
+    size_t n_candidate;                      /* for the next photograph; 0: none are ranked */
+    bool candidate_grid;                     /* true: the candidates are the built-in ones */
     struct job_candidate *candidate;
     size_t render_px, render_sample;
 };
 
-/* text need not be NUL-terminated. On success *doc owns memory: job_document_free. */
+/* Parses and checks n_bytes of text, which need not be NUL-terminated. On success the caller frees *doc with
+ * job_document_free. */
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
 
 struct param_info;
-/* Bounds, start and fixed flag of each parameter of a model after ties, bounds and priors; out: n_param. STATUS_INVALID
- * with the field at fault when they contradict each other. */
+/* Bounds, start and fixed flag of each parameter of a model, with ties, bounds and priors taken into account. out has
+ * n_param elements. Returns STATUS_INVALID with the field at fault when they contradict each other. */
 status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
                        struct job_fit_parameter *out, struct error *err);
 
-/* Blocks a side of the crop whose means are compared; texture_block_mm > 0. */
+/* Number of blocks along the edge of the crop whose means are compared. Needs texture_block_mm > 0. */
 size_t job_texture_cells(const struct job_document *doc);
-/* Their edge in mm: near to texture_block_mm, which need not divide the crop. */
+/* Edge of these blocks in mm. It is near to texture_block_mm, which need not divide the crop. */
 double job_texture_cell_mm(const struct job_document *doc);
 
-/* Visit every input file the document names, with its role ("volume", "fibers", "environment", "measurements", "photograph"). */
+/* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment",
+ * "measurements", "photograph"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
-/* The error of a job that wants the density fitted without a row that is lit from behind. */
+/* Sets and returns the error of a job that fits the density although no fitted row is lit from behind. */
 status job_density_undetermined(bool black_sheet, struct error *err);
-/* STATUS_INVALID with the key `path` when job_file_name_valid is false. */
+/* Returns STATUS_INVALID with the key `path` when job_file_name_valid is false. */
 status job_check_file_name(const char *path, const char *name, struct error *err);
 /* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
 bool job_file_name_valid(const char *name);
-/* The like of any text: '_' for what is not allowed, cut to 127 bytes. */
+/* Makes a valid file name of any text: other characters become '_', and it is cut to 127 bytes. */
 void job_file_name_make_valid(const char *text, char name[JOB_MAX_NAME_BYTES]);
 
 #endif

@@ -1,4 +1,4 @@
-/* The part of the section "fit" that depends on the models: which there are, and values of their parameters. */
+/* The part of the section "fit" that depends on the models: their ids, and the values of their parameters. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/job_document_parts.h"
 #include "optimizer/job/options/option_checks.h"
@@ -66,8 +66,8 @@ static status parse_models(const struct json_field *f, struct job_document *doc,
     return parse_model_list(f, name, doc, err);
 }
 
-/* One key of "fixed" or "start": a group ("C_TT": one number for all channels, or three) or one slot ("C_TT.r").
- * *known: set when the model has it. */
+/* Reads one key of "fixed" or "start": a colour ("C_TT", one number for all channels, or three) or one parameter
+ * ("C_TT.r"). Sets *known when the model has it. */
 static status parse_value(const struct json_field *f, const char *key, const json_t *value, const struct model_info *m,
                           double *out, bool *known, struct error *err)
 {
@@ -80,7 +80,7 @@ static status parse_value(const struct json_field *f, const char *key, const jso
     json_field_path(f, key, path);
     const struct param_info *info = &m->param[slot[0]];
     double lower = param_to_file_unit(info, info->lower), upper = param_to_file_unit(info, info->upper);
-    const double slack = 1e-12 * (fabs(lower) + fabs(upper)); /* degrees that went to radians and back */
+    const double slack = 1e-12 * (fabs(lower) + fabs(upper)); /* rounding of degrees to radians and back */
     double v[JOB_MAX_PARAM];
     status s;
     if (json_is_array(value)) {
@@ -99,7 +99,7 @@ static status parse_value(const struct json_field *f, const char *key, const jso
     return STATUS_OK;
 }
 
-/* The section "fixed" or "start": each key for every model that has such a parameter. */
+/* Reads the section "fixed" or "start". Each key applies to every model that has such a parameter. */
 static status parse_values(const struct json_field *fit, bool fixed, const struct model_info *const *model,
                            struct job_document *doc, struct error *err)
 {
@@ -122,7 +122,7 @@ static status parse_values(const struct json_field *fit, bool fixed, const struc
     return STATUS_OK;
 }
 
-/* The density multiplier of volume models is fixed, or starts, at the value that is given. */
+/* Fixes the density multiplier of volume models at the given value, or starts its fit there. */
 static status set_density(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
                           struct error *err)
 {
@@ -134,7 +134,7 @@ static status set_density(const struct json_field *f, const struct model_info *c
         double value = given ? doc->density_multiplier_per_cm : param_to_file_unit(d, d->start);
         if (!doc->fit_density) doc->model[i].fixed[model[i]->n_param - 1] = value;
         if (doc->fit_density && given)
-            doc->model[i].start[model[i]->n_param - 1] = value; /* else a prior's mean may be */
+            doc->model[i].start[model[i]->n_param - 1] = value; /* without a value, a prior's mean may be the start */
         any_volume = true;
     }
     static const char *const key[] = {"density_multiplier_per_cm", "fit_density"};
@@ -142,8 +142,8 @@ static status set_density(const struct json_field *f, const struct model_info *c
         if (json_object_get(f->object, key[i]) != NULL) {
             char path[JSON_PATH_BYTES];
             json_field_path(f, key[i], path);
-            return error_set_field(err, STATUS_INVALID, path, "'%s' is of volume models: the job fits '%s'%s", path,
-                                   doc->model[0].id, doc->n_model > 1 ? " and other surface models" : "");
+            return error_set_field(err, STATUS_INVALID, path, "'%s' belongs to volume models, but the job fits '%s'%s",
+                                   path, doc->model[0].id, doc->n_model > 1 ? " and other surface models" : "");
         }
     return STATUS_OK;
 }
@@ -154,7 +154,7 @@ static status check_radius(const struct model_info *const *model, const struct j
         if (model[i]->kind == MODEL_SURFACE) return STATUS_OK;
     return doc->fit_radius
                ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
-                                 "'fit.fit_radius' needs a model of fibers' surfaces: '%s' sees a volume", model[0]->id)
+                                 "'fit.fit_radius' needs a surface model, and '%s' is a volume model", model[0]->id)
                : STATUS_OK;
 }
 
@@ -174,7 +174,7 @@ static status check_free_parameters(const struct model_info *m, const struct job
     return STATUS_OK;
 }
 
-/* Parameters of all models that are named. */
+/* Reads the parameters of all models of the document. */
 static status parse_parameters(const struct json_field *f, struct job_document *doc, struct error *err)
 {
     const struct model_info *model[JOB_MAX_MODEL];

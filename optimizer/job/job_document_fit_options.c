@@ -22,7 +22,7 @@ struct reader {
     struct job_document *doc;
 };
 
-/* Slots of one model that a key names: a group ("C_TT") or one parameter ("C_TT.r"). */
+/* Indices of the parameters of one model that a key names: a colour ("C_TT") or one parameter ("C_TT.r"). */
 static size_t find_slots(const struct model_info *m, const char *key, size_t slot[JOB_MAX_PARAM])
 {
     size_t n = 0;
@@ -74,7 +74,7 @@ static status read_tie(const struct json_field *f, struct tie *t, struct error *
     return STATUS_OK;
 }
 
-/* Ties the slots of one model that a group names; *n_slot: how many those are. */
+/* Ties the parameters of one model that a group names; *n_slot is their number. */
 static status apply_tie(const struct tie *t, const struct model_info *m, struct job_fit_option *o, size_t *n_slot,
                         struct error *err)
 {
@@ -228,7 +228,7 @@ static status check_method(const struct job_document *doc, struct error *err)
                            method_catalogue_taking(wanted)->id, doc->method);
 }
 
-/* What is the same for all models has been read into the first one. */
+/* Copies the options that are the same for all models. They have been read into the first model. */
 static status share_common(struct job_document *doc, struct error *err)
 {
     const struct job_fit_option *common = &doc->model[0].option;

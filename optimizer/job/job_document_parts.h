@@ -6,18 +6,20 @@
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/json_field.h"
 
-/* Nothing asked for. */
+/* Sets the defaults: no ties, bounds, priors or nuisance terms, and one start. */
 void job_fit_option_init(struct job_fit_option *o);
-/* The keys of job_fit_option.h out of the section "fit", for every model; then all parameters resolved. Everything else
- * of the section is read before. model: those of the document, in its order. */
+/* Reads the keys of job_fit_option.h from the section "fit" for every model, and then resolves all parameters
+ * (job_fit_resolve). The rest of the section must have been read before. model: the models of the document, in its
+ * order. */
 status job_parse_fit_options(const struct json_field *f, const struct model_info *const *model,
                              struct job_document *doc, struct error *err);
-/* True when parameter p leads others or follows one. */
+/* True when parameter p is tied to another parameter, as leader or as follower. */
 bool job_parameter_is_tied(const struct job_fit_option *o, size_t n_param, size_t p);
-/* Number of the parameters that "fixed" and "start" can name: all but the density multiplier, the last one of volume models,
- * which has keys of its own. */
+/* Number of parameters that "fixed" and "start" can name. It excludes the density multiplier, the last parameter of a
+ * volume model, which has keys of its own. */
 size_t job_n_named_parameter(const struct model_info *m);
-/* STATUS_INVALID at the key `path`, which names the parameter `key` that no model has; the text lists those they have. */
+/* Returns STATUS_INVALID for the key `path`, which names a parameter `key` that no model has. The text lists the
+ * parameters that the models have. */
 status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,
                              struct error *err);
 

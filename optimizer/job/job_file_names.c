@@ -1,4 +1,4 @@
-/* Names of input files: which are allowed, and those of a document. */
+/* Names of input files: which names are allowed, and a visit to all input files of a document. */
 #include "optimizer/job/job_document.h"
 
 #include <stdio.h>

@@ -1,4 +1,5 @@
-/* What ties, bounds, priors, fixed values and starts together leave of each parameter (job_fit_resolve). */
+/* Bounds, start and fixed flag of each parameter from ties, bounds, priors, fixed values and starts
+ * (job_fit_resolve). */
 #include "optimizer/job/job_document_parts.h"
 
 #include <math.h>
@@ -14,7 +15,8 @@ bool job_parameter_is_tied(const struct job_fit_option *o, size_t n_param, size_
 
 static bool same(double a, double b) { return fabs(a - b) <= 1e-9 * (fabs(a) + fabs(b)); }
 
-/* The first value of `given` in p's group, as the leader's value; NaN for none. *clash: a member that says otherwise. */
+/* The value of the leader that follows from the first value in `given` of its group; NaN when the group has none.
+ * *clash becomes the index of a member whose value contradicts it, or SIZE_MAX. */
 static double group_value(const struct job_fit_option *o, size_t n_param, const double *given, size_t leader,
                           size_t *clash)
 {
@@ -50,11 +52,11 @@ static status group_bounds(const struct param_info *info, size_t n_param, const 
         info[leader].name);
 }
 
-/* Stated by keys of its own, density_multiplier_per_cm and fit_density. */
+/* The density multiplier has keys of its own, density_multiplier_per_cm and fit_density. */
 static bool is_density(const struct param_info *info) { return info->kind == PARAM_DENSITY; }
 
-/* A prior is one of its leader's value: it must lie where the leader's coordinate is defined, and agree with some value
- * between the bounds that the group has. */
+/* A prior of a tied parameter constrains its leader. Its mean must lie inside the leader's bounds of the model, where
+ * the fit coordinate is defined, and within three standard errors of the bounds of the group. */
 static status check_priors(const struct param_info *info, size_t n_param, const struct job_model *given, size_t leader,
                            const double bound[2], bool held, struct error *err)
 {
@@ -85,7 +87,7 @@ static status check_priors(const struct param_info *info, size_t n_param, const 
     return STATUS_OK;
 }
 
-/* The first member of a group that has a value; the last parameter when none has. */
+/* The first member of a group that has a value, or the last parameter when none has. */
 static size_t stated_member(const struct job_fit_option *o, size_t n_param, const double *value, size_t leader)
 {
     size_t p = 0;
@@ -93,13 +95,14 @@ static size_t stated_member(const struct job_fit_option *o, size_t n_param, cons
     return p;
 }
 
-/* Of the member of the group that the document speaks of; bound: lower and upper, of the leader. */
+/* The error of a value outside of the bounds. It names the member of the group that the document gives. bound: lower
+ * and upper bound of the leader. */
 static status outside_bounds(const struct param_info *info, size_t n_param, const struct job_fit_option *o,
                              size_t leader, const char *field, const double *given, const double bound[2],
                              struct error *err)
 {
     size_t p = stated_member(o, n_param, given, leader);
-    if (is_density(&info[p])) /* neither in 'fit.fixed' nor in 'fit.start' */
+    if (is_density(&info[p])) /* its value stands neither in 'fit.fixed' nor in 'fit.start' */
         return error_set_field(err, STATUS_INVALID, "fit.density_multiplier_per_cm",
                                "'fit.density_multiplier_per_cm' is %g%s: 'fit.bounds' has %g and %g", given[p],
                                strcmp(field, "fit.fixed") == 0 ? ", and held there without 'fit.fit_density'" : "",

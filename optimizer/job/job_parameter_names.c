@@ -1,4 +1,4 @@
-/* The names by which a document speaks of a model's parameters. */
+/* The names of a model's parameters in a job document. */
 #include "optimizer/job/job_document_parts.h"
 
 #include <stdio.h>
@@ -6,7 +6,7 @@
 
 size_t job_n_named_parameter(const struct model_info *m) { return m->n_param - (m->kind == MODEL_VOLUME ? 1 : 0); }
 
-/* "C_R, beta_R, ...": each group once. */
+/* Writes "C_R, beta_R, ...". A colour with three channels stands in the list once. */
 static void list_symbols(const struct model_info *m, char *text, size_t n_bytes)
 {
     size_t used = 0;

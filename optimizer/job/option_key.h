@@ -8,16 +8,17 @@
 
 #include <stddef.h>
 
-/* "volume.files" for OPTION_SCAN_FILES; "[]" stands for the index of an element: "photographs[].file". NULL for a text that is
- * no option's id. */
+/* The key of an option id: "volume.files" for OPTION_SCAN_FILES. "[]" stands for the index of an element, as in
+ * "photographs[].file". Returns NULL for a text that is no option's id. */
 const char *job_option_key(const char *id);
 
-/* Writes the key that a field stands for, with its index ("photographs[3].file" for "photograph_file[3]"). Any other field
- * is copied. */
+/* Writes the key for an option id with an index: "photographs[3].file" for "photograph_file[3]". A field that is no
+ * option's id is copied. */
 void job_option_resolve(const char *field, char *key, size_t n_bytes);
 
-/* Puts the key into err->field, and empties a field that is neither an option's id nor a key: such a field names an argument
- * inside the program, and the text says what is wrong. err may be NULL. Returns code, so that `return job_option_name_field(s, err)` reads well. */
+/* Replaces the option id in err->field by its key. A field that is neither an option id nor a key is emptied, because
+ * it names an argument inside the program; the text says what is wrong. err may be NULL. Returns code, so that a
+ * caller can write `return job_option_name_field(s, err)`. */
 status job_option_name_field(status code, struct error *err);
 
 #endif

@@ -1,7 +1,7 @@
 #include "optimizer/job/stage_table.h"
 
-/* Weights are shares of the wall time of a typical job (one small volume, 16 configurations, default budget, 2 cores).
- */
+/* A weight is the share of the wall time in a typical job: one small volume, 16 configurations, default budget, 2
+ * cores. */
 static const struct pipeline_stage_info stage_table[] = {
     {"volume", "Reading the scan", 0.01},
     {"orientation", "Finding local fiber directions", 0.04},

@@ -1,5 +1,4 @@
-/* The stage table: one list gives resume points, progress weights, the API's stage names and the picture in the README.
- */
+/* The stage table: one list for the resume points, the progress weights and the API's names of the stages. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_H
 
@@ -10,10 +9,10 @@ struct pipeline_context; /* inside the worker */
 struct pipeline_stage_info {
     const char *name;  /* "volume", "orientation", "fibers", "directions", "scene", "fit", "validation", "report" */
     const char *title; /* for people */
-    double weight;     /* share of the whole job's time, sums to 1 */
+    double weight;     /* share of the whole job's time; the weights sum to 1 */
 };
 
-/* Pure data: the daemon links it without the computing parts. */
+/* Constant data; the daemon links it without the code that computes. */
 const struct pipeline_stage_info *pipeline_stage_table(size_t *n_stage);
 
 #endif

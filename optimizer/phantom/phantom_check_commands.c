@@ -21,13 +21,13 @@ static const char photograph_usage[] =
     "  --model ID              scattering model                                            [two_lobe.v1]\n"
     "  --param NAME=v          or NAME=r,g,b; repeat it. Angles in degrees                 [the model's start values]\n"
     "  --table CSV             configurations (columns as in a table of measurements)      [16 to fit + 24 held out]\n"
-    "  --paths N               light paths a photograph                                    [131072]\n"
+    "  --paths N               light paths for each photograph                             [131072]\n"
     "  --px N                  edge of a photograph in pixels                              [64]\n"
-    "  --noise S               relative sd of an error of a whole photograph, per channel  [0]\n"
+    "  --noise S               relative sd of an error per photograph and channel          [0]\n"
     "  --lamp-side-cm 10  --lamp-distance-cm 61  --camera-distance-cm 100  --crop-cm 1\n"
-    "  --no-black-sheet        light may come and go through the cloth\n"
-    "  --seed N                everything random follows from it                           [1]\n"
-    "  --threads N             0: one per processor                                        [0]\n"
+    "  --no-black-sheet        no black sheet: light passes through the cloth\n"
+    "  --seed N                seed of all random numbers                                  [1]\n"
+    "  --threads N             number of threads; 0: one per processor                     [0]\n"
     "  --quiet                 no progress on the terminal\n";
 
 static const char compare_usage[] =
@@ -37,7 +37,7 @@ static const char compare_usage[] =
     "\n"
     "  --truth FILE, --fibers FILE   .hair, or text \"x y z radius\" (the truth then needs --tile-mm X,Y)\n"
     "  --voxel-um V                  the unit of the figures                                  [2]\n"
-    "  --margin-voxel M              leave out what is nearer to a face of the tile           [0]\n";
+    "  --margin-voxel M              ignore fibers nearer than this to a face of the tile     [0]\n";
 
 enum { PARAM_MAX = 64 };
 
@@ -137,7 +137,7 @@ static status load(const char *path, const double tile_mm[2], struct fiber_set *
     return st;
 }
 
-/* JSON has no NaN: figures that could not be taken are null. */
+/* JSON has no NaN, so a figure that could not be measured becomes null. */
 static void set_number(json_t *j, const char *name, double value)
 {
     json_object_set_new(j, name, isfinite(value) ? json_real(value) : json_null());

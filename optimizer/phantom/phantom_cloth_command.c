@@ -31,16 +31,16 @@ static const char usage[] =
     "1]\n"
     "  --twist T               turns a tile, rounded to sixths                                            [0.333]\n"
     "  --migration M           relative radial wandering of fibers, 0 .. 0.5                              [0.05]\n"
-    "  --yarn FILE             plied yarns by a file of measured parameters, in place of --fibers-per-yarn,\n"
+    "  --yarn FILE             plied yarns with measured parameters from FILE; replaces --fibers-per-yarn,\n"
     "                          --twist, --migration and --flyaways; sets --packing 0.5 and --flatness 1\n"
-    "  --yarn-true-size        keep the file's lengths; else the yarn is scaled to --packing\n"
-    "  --flyaways N            hairs leaving each yarn                                                    [0]\n"
+    "  --yarn-true-size        keep the lengths of the yarn file; otherwise the yarn is scaled to --packing\n"
+    "  --flyaways N            hairs that leave each yarn                                                 [0]\n"
     "  --pile-um H             velvet: height of the pile                                                 [200]\n"
     "  --felt-tile-um S, --felt-thickness-um H                                                           [320, 120]\n"
     "scan\n"
     "  --snr S                 (fiber - void) / noise sd; 0: none                                         [5]\n"
     "  --blur B                point spread, sd in voxels                                                 [0.7]\n"
-    "  --poisson N             counts at full signal; 0: no such noise                                    [0]\n"
+    "  --poisson N             photon counts at full signal; 0: no Poisson noise                          [0]\n"
     "  --rings A               sd of ring artefacts, in units of the signal                               [0]\n"
     "  --gradient G            relative change of the signal from face to face in x                       [0]\n"
     "  --bits 8|16             depth of scan.tif                                                          [16]\n"
@@ -49,9 +49,9 @@ static const char usage[] =
     "  --voxels-z N            slices in all, the cloth in the middle of them                             [as many as "
     "it needs]\n"
     "other\n"
-    "  --seed N                everything random follows from it                                          [1]\n"
-    "  --threads N             0: one per processor                                                       [0]\n"
-    "  --memory-mib N          resident memory; beyond it the volume is worked on in a file in DIR          [2048]\n";
+    "  --seed N                seed of all random numbers                                                 [1]\n"
+    "  --threads N             number of threads; 0: one per processor                                    [0]\n"
+    "  --memory-mib N          limit of resident memory; a larger volume is kept in a file in DIR         [2048]\n";
 
 struct cloth {
     const char *out, *yarn; /* yarn: NULL or a file of parameters */
@@ -73,14 +73,14 @@ static status path_in(const char *folder, const char *name, char path[4096], str
                               : STATUS_OK;
 }
 
-/* Options whose values are not stored as they are given. */
+/* Options as the user gives them, whose values are stored in other units or types. */
 struct cloth_input {
     const char *weave_name;
     double voxel_um, diameter[3], pile_um, felt_um[2]; /* diameter: in voxels */
     size_t bits;
 };
 
-/* Checks and converts them. */
+/* Checks these options and stores the converted values in c. */
 static status take_input(struct cloth *c, const struct cloth_input *in, struct error *err)
 {
     if (c->out == NULL) return error_set(err, STATUS_INVALID, "--out is missing");
@@ -140,7 +140,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "seed", .kind = OPTION_U64, .to = &c->phantom.seed},
         {.name = "threads", .kind = OPTION_COUNT, .to = &c->n_thread},
     };
-    /* read twice: weave and yarn set the defaults of the others */
+    /* The options are read twice, because weave and yarn set the defaults of the others. */
     status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st == STATUS_OK) st = phantom_weave_find(in.weave_name, &weave, err);
     if (st != STATUS_OK) return st;
@@ -236,7 +236,7 @@ static json_t *describe(const struct cloth *c)
                              "overlap_max", r->overlap_max, "strain_p95", r->strain_p95);
     const struct phantom_plied *p = &r->plied;
     if (o->yarn.n_ply > 0 && cloth != NULL) {
-        json_object_del(cloth, "migration"); /* of the lattice yarn */
+        json_object_del(cloth, "migration"); /* it describes the yarn without plies */
         json_object_del(cloth, "flyaways_per_yarn");
         json_object_set_new(cloth, "yarn",
                             json_pack("{s:s,s:i,s:i,s:f,s:[f,f],s:[f,f],s:[f,f],s:i,s:i}", "file", path_name(c->yarn),

@@ -1,5 +1,5 @@
-/* The commands of selvedge-phantom. argv[0] is the command's name; they speak to stdout and stderr and return an exit code
- * (0 done, 1 failed, 2 wrong use). Part of that program, not of the service. */
+/* The commands of the program selvedge-phantom, which is not part of the service. argv[0] is the command's name. A
+ * command writes to stdout and stderr and returns the exit code: 0 done, 1 failed, 2 wrong arguments. */
 #ifndef SELVEDGE_OPTIMIZER_PHANTOM_COMMANDS_H
 #define SELVEDGE_OPTIMIZER_PHANTOM_COMMANDS_H
 
@@ -12,7 +12,7 @@ int phantom_command_cloth(int argc, char **argv);
 int phantom_command_photograph(int argc, char **argv);
 int phantom_command_compare(int argc, char **argv);
 
-/* --name VALUE pairs, one table a command. */
+/* What the option --NAME takes. Each command has one table of its options. */
 enum option_kind {
     OPTION_TEXT,
     OPTION_NUMBER,
@@ -27,13 +27,14 @@ enum option_kind {
 struct command_option {
     const char *name;
     enum option_kind kind;
-    void *
-        to; /* const char **, double *, double [n] (fewer values repeat the last), size_t * or [n], uint64_t *, bool * */
-    size_t n;                                                       /* of a list; 0 and 1 mean one value */
-    status (*call)(void *to, const char *value, struct error *err); /* OPTION_CALL */
+    /* Target: const char **, double *, double [n], size_t * or [n], uint64_t * or bool *. When a list has fewer than n
+     * values, the last one fills the rest. */
+    void *to;
+    size_t n;                                                       /* length of a list; 0 and 1 mean one value */
+    status (*call)(void *to, const char *value, struct error *err); /* for OPTION_CALL */
 };
 
-/* Fill in what argv says. STATUS_INVALID with a text for the user. */
+/* Stores the values that argv gives. Returns STATUS_INVALID with a text for the user. */
 status command_options_parse(int argc, char **argv, const struct command_option *option, size_t n_option,
                              struct error *err);
 

@@ -1,4 +1,5 @@
-/* selvedge-phantom: cloth with known answers, to try the whole chain on and to measure it. */
+/* selvedge-phantom makes artificial cloth whose fibers and scattering parameters are known, for trials of the whole
+ * process and for measurements of its accuracy. */
 #include "base/version.h"
 #include "optimizer/phantom/phantom_commands.h"
 
@@ -6,7 +7,7 @@
 #include <string.h>
 
 static const char usage[] =
-    "selvedge-phantom: cloth with known answers\n"
+    "selvedge-phantom: artificial cloth with known fibers and known scattering parameters\n"
     "\n"
     "  selvedge-phantom cloth --out DIR [options]        make fibers, and the CT scan of them\n"
     "  selvedge-phantom photograph --fibers FILE --out DIR [options]\n"
@@ -16,7 +17,7 @@ static const char usage[] =
     "\n"
     "  selvedge-phantom --version                        print the version\n"
     "\n"
-    "Each command has a --help of its own. Exit codes: 0 done, 1 failed, 2 wrong use.\n";
+    "Each command has a --help of its own. Exit codes: 0 done, 1 failed, 2 wrong arguments.\n";
 
 static const struct {
     const char *name;

@@ -8,7 +8,7 @@
 
 enum { MAX_OPTION = 48, OPTION_CODE = 256 }; /* code of the first option in getopt_long */
 
-/* Up to n comma-separated numbers; the last one given fills the rest. */
+/* Reads up to n comma-separated numbers. The last one fills the rest of the list. */
 static bool parse_list(const char *text, double *to, size_t n)
 {
     size_t i = 0;
@@ -77,12 +77,13 @@ static status set_option(const struct command_option *o, const char *value, stru
     return error_set_field(err, STATUS_INVALID, o->name, "option --%s does not take '%s'", o->name, value);
 }
 
-/* What is wrong with the option that getopt_long stopped at: code is ':' or '?', word the last one that it has read. */
+/* The error of the option at which getopt_long stopped. code is what it returned, ':' or '?'; word is the last argument
+ * that it read. */
 static status option_fault(int code, const char *word, const struct command_option *option, struct error *err)
 {
     if (optopt < OPTION_CODE) return error_set(err, STATUS_INVALID, "unknown option '%s'", word);
     return error_set(err, STATUS_INVALID, "option --%s %s", option[optopt - OPTION_CODE].name,
-                     code == ':' ? "wants a value" : "takes no value");
+                     code == ':' ? "needs a value" : "takes no value");
 }
 
 status command_options_parse(int argc, char **argv, const struct command_option *option, size_t n_option,
@@ -94,7 +95,7 @@ status command_options_parse(int argc, char **argv, const struct command_option 
         bool flag = option[i].kind == OPTION_FLAG || option[i].kind == OPTION_FALSE;
         named[i] = (struct option){option[i].name, flag ? no_argument : required_argument, NULL, OPTION_CODE + (int)i};
     }
-    optind = 0; /* start anew */
+    optind = 0; /* restarts getopt_long */
     for (int code; (code = getopt_long(argc, argv, "+:", named, NULL)) != -1;) {
         status s = code >= OPTION_CODE ? set_option(&option[code - OPTION_CODE], optarg, err)
                                        : option_fault(code, argv[optind - 1], option, err);

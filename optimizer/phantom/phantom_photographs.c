@@ -25,7 +25,7 @@ void phantom_photograph_option_default(struct phantom_photograph_option *o)
                                             .black_sheet = true};
 }
 
-/* Comma-separated numbers, at most three. Returns how many, 0 for anything else. */
+/* Reads one to three comma-separated numbers. Returns their count, or 0 for any other text. */
 static size_t parse_numbers(const char *text, double value[3])
 {
     for (size_t n = 0; n < 3; n++) {
@@ -103,7 +103,8 @@ static json_t *param_json(const struct scattering_model *model, const double *pa
     return out;
 }
 
-/* Mean and its standard error per channel, then the whole photograph's error is put on and the rgb planes are written. */
+/* Adds the mean and its standard error of each channel to row, multiplies the picture by its random error, and writes
+ * the rgb channels. */
 static status finish_picture(const struct phantom_photograph_option *o, const struct image *im, size_t number,
                              const char *path, json_t *row, struct error *err)
 {
@@ -164,7 +165,7 @@ static status check_view(const struct phantom_photograph_option *o, const struct
     return STATUS_OK;
 }
 
-/* The array "photographs" of a job document, and what is true of each photograph without its noise. */
+/* Makes the array "photographs" of a job document, and the list of the photographs' means without noise. */
 struct photograph_lists {
     json_t *photographs, *truth;
 };
@@ -183,7 +184,7 @@ static status make_photograph(const struct phantom_photograph_option *o, const s
                                      .configuration = &c,
                                      .width = o->px,
                                      .height = o->px,
-                                     .n_sample = n_sample > 2 ? n_sample : 2, /* one has no error */
+                                     .n_sample = n_sample > 2 ? n_sample : 2, /* one sample has no standard error */
                                      .seed = o->seed,
                                      .stream = (uint32_t)number};
     status st = render_run(&q, pool, progress, &im, err);

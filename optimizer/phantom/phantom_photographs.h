@@ -9,14 +9,13 @@
 struct phantom_photograph_option {
     const char *fiber_file; /* .hair, or text "x y z radius" with tile_mm */
     double tile_mm[2];      /* 0: as the file states */
-    const char
-        *table_file; /* CSV with the angle columns of a measurement table; NULL: the built-in 16 + 24 configurations */
-    const char *folder; /* made if needed */
+    const char *table_file; /* CSV (phantom_view_table.h); NULL: the built-in 16 + 24 configurations */
+    const char *folder;     /* created when it does not exist */
     const struct scattering_model *model;
     double param[SCATTERING_MAX_PARAM]; /* internal units */
     uint64_t n_path;                    /* per photograph */
     size_t px;                          /* edge of the square picture */
-    double noise; /* relative standard deviation of an error that a whole photograph has, drawn per channel */
+    double noise;                       /* relative standard deviation of an error per photograph and channel */
     uint64_t seed;
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
     bool black_sheet;
@@ -24,13 +23,13 @@ struct phantom_photograph_option {
 
 void phantom_photograph_option_default(struct phantom_photograph_option *o);
 
-/* Value of --param: NAME=v or NAME=r,g,b, NAME a parameter or a colour group of the model, in file units.
- * STATUS_INVALID saying what is allowed. */
+/* Reads the value of --param, "NAME=v" or "NAME=r,g,b" in file units. NAME is a parameter of the model, or a colour
+ * with three channels. Returns STATUS_INVALID with a text that says what is allowed. */
 status phantom_param_parse(const struct scattering_model *model, const char *text, double *param, struct error *err);
 
-/* Writes FOLDER/fit-00.exr .. held-out-23.exr, FOLDER/photographs.json (the array "photographs" of a job document) and
- * FOLDER/truth.json (parameters in file units, set-up, counts, and per photograph the mean rgb without noise and its standard
- * error). */
+/* Writes FOLDER/fit-00.exr .. held-out-23.exr, FOLDER/photographs.json (the array "photographs" of a job document)
+ * and FOLDER/truth.json (parameters in file units, set-up, counts, and for each photograph the mean rgb without noise
+ * and its standard error). */
 status phantom_photographs_make(const struct phantom_photograph_option *o, struct thread_pool *pool,
                                 const struct progress *progress, struct error *err);
 

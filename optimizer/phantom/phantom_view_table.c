@@ -11,7 +11,7 @@ struct angles {
     short light_theta, light_phi, camera_theta, camera_phi;
 };
 
-/* Retroreflection, mirror-like and crossed positions; each taken at rotations 0 and 90 degrees. */
+/* Retroreflecting, mirror-like and crossed positions in degrees. Each is used at rotations 0 and 90 of the cloth. */
 static const struct angles fit_angles[] = {{20, 0, 20, 180}, {45, 0, 45, 180}, {75, 0, 75, 180}, {60, 0, 0, 180},
                                            {20, 0, 20, 90},  {45, 0, 45, 90},  {64, 0, 64, 90},  {60, 0, 0, 90}};
 static const struct angles held_out_angles[] = {{10, 0, 30, 180}, {30, 0, 50, 180}, {50, 0, 70, 180}, {70, 0, 50, 180},
@@ -60,7 +60,7 @@ enum {
 static const char *const column_name[N_COLUMN] = {
     "set", "light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg", "cloth_rotation_deg"};
 
-/* Cut a line at its commas, in place. */
+/* Splits a line at its commas, in place. */
 static size_t split(char *line, char *cell[CELLS_MAX])
 {
     size_t n = 0;

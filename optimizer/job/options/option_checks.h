@@ -1,5 +1,5 @@
-/* Checks of the option table: what the range of one number cannot say, and what relates several options. Each returns
- * STATUS_INVALID with the key at fault and what is allowed.
+/* Checks of the option table that the range of one number cannot express, and checks that relate several options. Each
+ * returns STATUS_INVALID with the key at fault and a text that says what is allowed.
  */
 #ifndef SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
 #define SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
@@ -26,10 +26,10 @@ status job_check_fit(const struct option_value *v, struct error *err);
 status job_check_fit_radius(const struct option_value *v, struct error *err);
 status job_check_nuisance(const struct option_value *v, struct error *err);
 status job_check_texture(const struct option_value *v, struct error *err);
-/* Makes the grid where one is asked for. */
+/* Also makes the built-in grid of candidates when the document asks for it. */
 status job_check_candidates(const struct option_value *v, struct error *err);
 
-/* Words of the catalogues: id of model i, of method i; NULL behind the last. */
+/* Id of model i and of method i in the catalogues; NULL after the last. */
 const char *job_model_id(size_t i);
 const char *job_method_id(size_t i);
 

@@ -5,7 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-/* What is given wins over what is chosen from the data, so that a job can be repeated with the values of its result. */
+/* A value that the document gives replaces one that is chosen from the data. A job can therefore be repeated with the
+ * values of its result. */
 status job_check_volume(const struct option_value *v, struct error *err)
 {
     struct job_document *doc = v->doc;
@@ -76,10 +77,10 @@ status job_check_crop_voxel(const struct option_value *v, struct error *err)
 status job_check_filter(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
-    if (doc->filter_t <= 0.5 * doc->filter_s) /* false where one is NaN: left to the data */
+    if (doc->filter_t <= 0.5 * doc->filter_s) /* false where one is NaN, which means chosen from the data */
         return error_set_field(
             err, STATUS_INVALID, "volume.filter.t",
-            "'volume.filter.t' is %g: it must be above half of s (%g), or no direction answers to fibers",
+            "'volume.filter.t' is %g: it must be above half of s (%g), or the filter does not respond to fibers",
             doc->filter_t, doc->filter_s);
     return STATUS_OK;
 }

@@ -41,7 +41,8 @@ double job_texture_cell_mm(const struct job_document *doc)
     return 10.0 * doc->crop_cm / (double)job_texture_cells(doc);
 }
 
-/* Blocks divide the crop, a table of means has none, and contrasts are terms that not every method knows. */
+/* Texture needs blocks that divide the crop, photographs (a table of means has no texture), and a method that takes
+ * contrasts as terms of the objective. */
 status job_check_texture(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
@@ -76,7 +77,8 @@ status job_check_texture(const struct option_value *v, struct error *err)
 static const double light_theta[] = {20, 45, 65, 80}, camera_theta[] = {0, 30, 60, 75}, camera_phi[] = {180, 90},
                     rotation[] = {0, 90};
 
-/* Lamp at phi 0, camera opposite or beside it, cloth along and across; with the lamp behind a cloth without its sheet. */
+/* The built-in candidates: the lamp at phi 0, the camera opposite to it or beside it, the cloth turned by 0 and 90
+ * degrees. Without the black sheet there are also lamps behind the cloth. */
 static status make_grid(struct job_document *doc, struct error *err)
 {
     enum { FRONT = 4 * 4 * 2 * 2, BACK = 4 };
@@ -85,7 +87,7 @@ static status make_grid(struct job_document *doc, struct error *err)
     for (size_t i = 0; i < FRONT; i++) {
         struct job_candidate c = {light_theta[i / 16], 0.0, camera_theta[i / 4 % 4], camera_phi[i / 2 % 2],
                                   rotation[i % 2]};
-        if (c.camera_theta_deg == 0.0 && c.camera_phi_deg != 180.0) continue; /* from above, phi means nothing */
+        if (c.camera_theta_deg == 0.0 && c.camera_phi_deg != 180.0) continue; /* from above, phi makes no difference */
         doc->candidate[doc->n_candidate++] = c;
     }
     for (size_t i = 0; i < BACK && !doc->black_sheet; i++)

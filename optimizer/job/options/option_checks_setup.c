@@ -98,8 +98,8 @@ status job_density_undetermined(bool black_sheet, struct error *err)
                            black_sheet ? ", black_sheet false" : "");
 }
 
-/* Seen from the front, cloths of different density look alike: fitting the density needs light that went through the
- * cloth. Rows of a table are checked when it is read. */
+/* Cloths of different density look alike when they are lit and seen from the front. A fit of the density therefore
+ * needs light that passed through the cloth. Rows of a table are checked when the table is read. */
 static status check_density(const struct job_document *doc, struct error *err)
 {
     bool from_behind = false;
@@ -127,7 +127,7 @@ static void collect_name(void *context, const char *name, const char *role)
     list->name[list->n++] = name;
 }
 
-/* The key whose file is named elsewhere too. */
+/* The error of a file that the document names twice; it names the last of the two keys. */
 static status named_twice(const struct job_document *doc, const char *name, struct error *err)
 {
     char path[JSON_PATH_BYTES] = "measurements.file";

@@ -17,7 +17,7 @@ static status no_memory(struct error *err)
     return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
 }
 
-/* Index of the word in row's choice. */
+/* Index of the word among the choices of the row. */
 static status read_choice(const struct job_option *row, const struct json_field *f, const char *key, size_t *index,
                           struct error *err)
 {
@@ -77,7 +77,7 @@ static status read_bool(const struct job_option *row, const struct json_field *f
     return STATUS_OK;
 }
 
-/* Room for the elements of a list that is not empty and not too long; the count begins at 0. */
+/* Allocates the elements of a list, which must be neither empty nor too long. Sets the count to 0. */
 static status new_list(const struct job_option *row, const struct json_field *list, void *base, char **element,
                        struct error *err)
 {
@@ -149,7 +149,7 @@ static status read_object(const struct job_option *row, const struct json_field 
     return read_section(&sub, row->path, base, doc, err);
 }
 
-/* The value of a key that is given or required. */
+/* Reads the value of a key that is given or required. */
 static status read_value(const struct job_option *row, const struct json_field *f, const char *key, void *base,
                          struct job_document *doc, struct error *err)
 {
@@ -193,7 +193,7 @@ static status read_value(const struct job_option *row, const struct json_field *
     return STATUS_OK;
 }
 
-/* Kinds whose readers do not say what is missing. */
+/* Kinds whose readers report no error when a required key is missing. */
 static bool lacks_message(enum option_kind kind)
 {
     return kind != OPTION_NUMBER && kind != OPTION_TEXT && kind != OPTION_FILE_NAME && kind != OPTION_FILE_NAMES;
@@ -215,7 +215,8 @@ static status read_option(const struct job_option *row, const struct json_field 
     return row->check(&v, err);
 }
 
-/* All members of an object. pattern: its path in the table; base: the struct that the members' offsets are of. */
+/* Reads all members of an object. pattern: its path in the table; base: the struct to which the offsets of the members
+ * refer. */
 static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
                            struct error *err)
 {
@@ -268,7 +269,8 @@ static status put_default(const struct job_option *row, void *base, struct job_d
     return STATUS_OK;
 }
 
-/* Of a section or an element of a list and the sections in it, but not of further lists. */
+/* Sets the defaults in a section, or in an element of a list, and in the sections inside it. Lists inside it are
+ * skipped: their elements get defaults when they are read. */
 static status default_section(const char *pattern, void *base, struct job_document *doc, struct error *err)
 {
     const struct job_option *row;

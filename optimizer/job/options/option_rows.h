@@ -1,4 +1,4 @@
-/* Inside the option table: its parts, and short forms for what rows have in common. */
+/* Inside the option table: its parts, and macros for what rows have in common. */
 #ifndef SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 #define SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 
@@ -13,7 +13,7 @@ extern const struct job_option option_rows_cloth[], option_rows_setup[], option_
 #define TEXT_INTO_OF(type, member) INTO_OF(type, member), .n = sizeof((type *)NULL)->member
 #define NUMBERS_INTO_OF(type, member)                                                                                  \
     INTO_OF(type, member), .n = sizeof((type *)NULL)->member / sizeof((type *)NULL)->member[0]
-/* Into struct job_document. */
+/* Targets in struct job_document. */
 #define INTO(member) INTO_OF(struct job_document, member)
 #define TEXT_INTO(member) TEXT_INTO_OF(struct job_document, member)
 #define NUMBERS_INTO(member) NUMBERS_INTO_OF(struct job_document, member)
@@ -23,7 +23,7 @@ extern const struct job_option option_rows_cloth[], option_rows_setup[], option_
 
 #define RANGE(from, to) .lower = (from), .upper = (to)
 
-/* The angles of a photograph, or of one that could be taken: members of `type` in the list `list`. */
+/* Rows of the angles of a photograph or of a candidate: members of the struct `type` in the list `list`. */
 #define ANGLE(list, type, name, from, to, ...)                                                                         \
     {                                                                                                                  \
         .path = list "." #name, .kind = OPTION_NUMBER, RANGE(from, to), .unit = "degrees", INTO_OF(type, name),        \

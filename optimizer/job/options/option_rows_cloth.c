@@ -6,7 +6,7 @@ static const char *const sample_type[] = {"uint8", "int8",    "uint16",  "int16"
 static const char *const byte_order[] = {"little", "big", NULL};
 static const char *const none_auto[] = {"none", "auto", NULL};
 
-/* Exactly one description of the cloth and one of its measurements. */
+/* Schema of a pair of keys of which exactly one must be given. */
 #define ONE_OF(a, b) "{\"oneOf\": [{\"required\": [\"" a "\"]}, {\"required\": [\"" b "\"]}]}"
 
 const struct job_option option_rows_cloth[] = {

@@ -1,6 +1,4 @@
-/* Rows of the option table: the fit. Sections whose members are named by parameters of the models are read by
- * job_check_fit.
- */
+/* Rows of the option table: the fit. Sections whose keys are names of model parameters are read by job_check_fit. */
 #include "optimizer/job/options/option_rows.h"
 
 static const char *const gain[] = {

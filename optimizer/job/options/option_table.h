@@ -1,6 +1,6 @@
-/* The table of job options: one row a key of the job document. The rows drive the parser (option_reader.h), the keys that
- * are allowed, GET /v1/options (option_json.h), and through that the form of the dashboard, the schema JobDocument of
- * config/openapi.json and the table of docs/sample-preparation.md (`make generate`).
+/* The table of job options: one row for each key of the job document. The rows drive the parser (option_reader.h), the
+ * keys that are allowed, and GET /v1/options (option_json.h). From the latter follow the form of the dashboard, the
+ * schema JobDocument of config/openapi.json and the table of docs/sample-preparation.md (`make generate`).
  *
  * A new option is a row here, a member of struct job_document, and the place that uses it. Constant data.
  */
@@ -19,7 +19,7 @@ struct option_value;
 
 /* What JSON a key takes, and in which form it is stored at its target. */
 enum option_kind {
-    OPTION_SECTION,          /* an object, whose members are the rows under its path -> bool: it is given */
+    OPTION_SECTION,          /* an object, whose members are the rows under its path -> bool: true when given */
     OPTION_LIST,             /* a list of objects, whose members are the rows under path[] -> pointer and count */
     OPTION_NUMBER,           /* -> double */
     OPTION_NUMBERS,          /* n numbers -> double[n] */
@@ -35,7 +35,7 @@ enum option_kind {
     OPTION_TEXT,             /* -> char[n] */
     OPTION_FILE_NAME,        /* -> char[JOB_MAX_NAME_BYTES] */
     OPTION_FILE_NAMES,       /* list -> pointer to char[JOB_MAX_NAME_BYTES] and count */
-    OPTION_OWN,              /* read by the check of its section; `schema` says what it takes */
+    OPTION_OWN,              /* read by the check of its section; `schema` describes the value */
     OPTION_N_KIND
 };
 
@@ -43,27 +43,27 @@ struct job_option {
     const char *path; /* "lamp.side_cm", "photographs[].scale"; "" for the document itself */
     enum option_kind kind;
     bool required;
-    bool or_section; /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
-    bool stored;     /* it has a target */
-    size_t at;       /* offset of the target in struct job_document, or in the element of the list it stands in */
+    bool or_section;                /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
+    bool stored;                    /* it has a target */
+    size_t at;                      /* offset of the target in struct job_document, or in an element of its list */
     size_t count_at, element_bytes; /* of lists: offset of the count, size of an element */
     double lower, upper;            /* numbers; of lists: upper is the largest number of elements */
-    size_t n;                       /* how many numbers; bytes of texts */
-    const char *const *choice;      /* NULL-terminated; the first is the default, unless `left_out` says otherwise */
-    const char *(*choice_at)(size_t i); /* the same for words of a catalogue: NULL behind the last */
+    size_t n;                       /* count of numbers; bytes of a text */
+    const char *const *choice;      /* NULL-terminated; the first is the default, unless `left_out` is given */
+    const char *(*choice_at)(size_t i); /* the same for words of a catalogue: NULL after the last */
     const char *unit;                   /* "" or NULL: none */
-    const char *standard;               /* the default as JSON; NULL: not a number, zero or empty */
+    const char *standard;               /* the default as JSON; NULL: NaN for a number, else zero or empty */
     const char *left_out;               /* in words, what holds without the key when there is no default */
-    const char *allowed;                /* in words, where range and choices do not say all */
-    const char *items;                  /* what a list holds, what an object may be given as: for errors */
+    const char *allowed;                /* in words, when range and choices are not the whole condition */
+    const char *items;                  /* name of the elements of a list, or of the object, in errors */
     const char *schema;                 /* members of a JSON Schema object, added to those that follow from the kind */
-    const char *id;                     /* of base/option_id.h; NULL: no other part of the program speaks of it */
-    const char *meaning;                /* for people, whole sentences, Markdown */
-    status (*check)(const struct option_value *v,
-                    struct error *err); /* of the value; of sections, when all members are read */
+    const char *id;                     /* of base/option_id.h; NULL: no other part of the program names this option */
+    const char *meaning;                /* for people: whole sentences in Markdown */
+    /* Checks the value; of a section it runs when all members are read. NULL: no check beyond the row. */
+    status (*check)(const struct option_value *v, struct error *err);
 };
 
-/* A value that was read, for checks. Members of earlier rows are read too. */
+/* A value for a check. It and all options of earlier rows have been read. */
 struct option_value {
     const struct job_option *row;
     const json_t *value;
@@ -72,14 +72,14 @@ struct option_value {
     struct job_document *doc;
 };
 
-/* Row i in the order of the document, NULL behind the last. */
+/* Row i in the order of the document; NULL after the last. */
 const struct job_option *job_option_at(size_t i);
 /* The row of a path of the table; NULL when there is none. */
 const struct job_option *job_option_find(const char *path);
-/* The key of a row that stands directly in a section ("" for the document; "photographs[]" for an element): "side_cm" in
- * "lamp". NULL when the row stands elsewhere. */
+/* The key of a row inside its section: "side_cm" for the row "lamp.side_cm" in the section "lamp". The section "" is
+ * the document, "photographs[]" an element of a list. NULL when the row does not stand directly in this section. */
 const char *job_option_key_in(const struct job_option *row, const char *section);
-/* Word i of a choice; NULL behind the last. */
+/* Word i of a choice; NULL after the last. */
 const char *job_option_choice(const struct job_option *row, size_t i);
 
 #endif

@@ -56,7 +56,7 @@ status fiber_lengths_measure(const struct fiber_set *f, struct fiber_lengths *l,
     return STATUS_OK;
 }
 
-/* 1, 2 or 5 times a power of ten: at most 7 of them up to most. */
+/* Step between the labels of an axis: 1, 2 or 5 times a power of ten, so that at most 7 steps lead to `most`. */
 static double round_step(double most)
 {
     static const double factor[] = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0};

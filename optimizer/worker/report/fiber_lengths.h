@@ -1,4 +1,4 @@
-/* How long the fibers of a cloth are, by axis class; and a plot of it. */
+/* The distribution of fiber lengths in a cloth by axis class (weft, warp, pile), and a plot of it. */
 #ifndef SELVEDGE_OPTIMIZER_FIBER_LENGTHS_H
 #define SELVEDGE_OPTIMIZER_FIBER_LENGTHS_H
 
@@ -12,14 +12,14 @@ struct fiber_lengths {
     size_t n[3]; /* fibers of weft, warp, pile */
     double total_m[3];
     double shortest_m, p10_m, median_m, p90_m, longest_m, mean_m;
-    double edge_m[LENGTH_BINS + 1]; /* even steps from 0 to the longest */
+    double edge_m[LENGTH_BINS + 1]; /* equal bins from 0 to longest_m */
     size_t count[3][LENGTH_BINS];
     double length_in_bin_m[3][LENGTH_BINS];
 };
 
 status fiber_lengths_measure(const struct fiber_set *f, struct fiber_lengths *l, struct error *err);
-/* Bars of summed length, stacked by class, over fiber length; tile_m (larger edge of the tile) is marked. A whole SVG document without inline
- * styles. */
+/* Writes an SVG document without inline styles: bars of summed length over fiber length, stacked by class. A line marks
+ * tile_m, the larger edge of the tile. */
 void fiber_lengths_plot(const struct fiber_lengths *l, double tile_m, FILE *out);
 
 #endif

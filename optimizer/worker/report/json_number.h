@@ -1,4 +1,4 @@
-/* Numbers and lists of numbers as JSON; what is not finite becomes null. */
+/* Numbers and lists of numbers as JSON. A number that is not finite becomes null. */
 #ifndef SELVEDGE_OPTIMIZER_JSON_NUMBER_H
 #define SELVEDGE_OPTIMIZER_JSON_NUMBER_H
 

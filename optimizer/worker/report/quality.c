@@ -64,7 +64,7 @@ static status write_json(struct pipeline_context *c, const struct fiber_lengths 
     return s;
 }
 
-/* What `print` writes becomes the file. */
+/* Writes the file `name` with the output of `print`. */
 static status write_printed(struct pipeline_context *c, const struct fiber_lengths *l, const char *name,
                             void (*print)(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out),
                             struct error *err)
@@ -85,7 +85,7 @@ static void print_plot(struct pipeline_context *c, const struct fiber_lengths *l
     fiber_lengths_plot(l, fmax(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]), out);
 }
 
-/* Heights of the fibers of one tile from above, y up. */
+/* Writes pictures/top.png: the heights of the fibers of one tile, seen from above with y up. */
 static status write_top(struct pipeline_context *c, struct error *err)
 {
     size_t n[2];

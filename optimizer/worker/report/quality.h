@@ -1,5 +1,6 @@
-/* The quality report of a job's geometry: results/quality.json, and for people results/quality.html with quality.css and pictures/
- * (fiber-lengths.svg, top.png, the slices). Nothing in the page is inline, so that the server's content security policy lets it through. */
+/* The quality report of a job's geometry: results/quality.json for programs, and results/quality.html for people, with
+ * quality.css and pictures/ (fiber-lengths.svg, top.png, the slices). The page has no inline styles or scripts, because
+ * the server's content security policy forbids them. */
 #ifndef SELVEDGE_OPTIMIZER_QUALITY_H
 #define SELVEDGE_OPTIMIZER_QUALITY_H
 
@@ -8,9 +9,9 @@
 
 #include <stdio.h>
 
-/* All files; after result_geometry_write has made the slices. */
+/* Writes all files of the report. Call it after result_geometry_write, which makes the slices. */
 status quality_write(struct pipeline_context *c, struct error *err);
-/* The page alone (quality_page.c). */
+/* Writes quality.html to out. */
 void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out);
 
 #endif

@@ -22,7 +22,7 @@ static void escaped(const char *text, FILE *out)
             fputc(*p, out);
 }
 
-/* A row of a table: name, value, what it means. */
+/* Writes a row of a table: name, value, meaning. */
 __attribute__((format(printf, 4, 5))) static void row(FILE *out, const char *name, const char *hint, const char *format,
                                                       ...)
 {
@@ -81,12 +81,12 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
     open_table(out, "Against the scan");
-    row(out, "material explained (Dice)", "overlap of fibers and kept voxels, 1 is all", "%.3f", g->dice);
+    row(out, "material explained (Dice)", "overlap of fibers and kept voxels; 1 is complete", "%.3f", g->dice);
     row(out, "voxels of material", "density of at least eps_d", "%zu", g->n_material_voxel);
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);
     row(out, "gaps bridged", "missed centers within a fiber", "%zu", g->n_gap_bridged);
     row(out, "pieces joined", "of one fiber, end to end", "%zu", g->n_joined);
-    row(out, "fiber diameter", "measured before tracing; 7 and more tell touching fibers apart", "%.1f voxels",
+    row(out, "fiber diameter", "measured before tracing; from 7 voxels on, touching fibers can be separated", "%.1f voxels",
         g->fiber_diameter_voxel);
     row(out, "direction noise, filtered", "mean angle from voxel to voxel along the fiber", "%.2f&deg;",
         g->direction_noise_deg[0]);
@@ -98,7 +98,7 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     close_table(out);
 }
 
-/* A cell with a figure, or with a dash where there is none. */
+/* Writes a cell with a figure, or with a dash when there is none. */
 static void figure(FILE *out, double v)
 {
     if (isfinite(v))

@@ -44,7 +44,7 @@ static json_t *seam_fibers_json(const struct reconstruct_report *g)
                      json_number_list(s->offset_m, 2, 1e6), "n_joined", json_count(g->n_seam_joined));
 }
 
-/* Everything that was given or chosen, under the names of the job document. */
+/* All options that were given or chosen, under their names in the job document. */
 static json_t *options_json(const struct reconstruct_option *o)
 {
     json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "axes", o->axes, "s", json_number(o->s),

@@ -1,4 +1,4 @@
-/* What result.json and quality.json say about the geometry (keys: docs/file-formats.md). */
+/* The section "geometry" of result.json and quality.json (keys: docs/file-formats.md). */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_GEOMETRY_H
 #define SELVEDGE_OPTIMIZER_RESULT_GEOMETRY_H
 

@@ -28,7 +28,7 @@ status result_picture_names(const struct observation_set *o, picture_name **name
         const char *from = o->item[i].name, *dot = strrchr(from, '.');
         int n = dot != NULL && dot > from ? (int)(dot - from) : (int)strlen(from);
         snprintf(list[i], sizeof list[i], "%.*s", n, from);
-        /* a row may itself be named like what another one was given */
+        /* A number is appended until the name is unique, because a row may already have such a name. */
         for (size_t number = i; name_taken(list, i); number += o->n)
             snprintf(list[i], sizeof list[i], "%.*s-%zu", n < 120 ? n : 120, from, number);
     }
@@ -95,7 +95,8 @@ static json_t *correlation_json(const struct pipeline_model *m)
     return list;
 }
 
-/* What a photograph would show by the rendering (nuisance.h), and its standard error, from both replicas. */
+/* Mean of both replicas with the fitted nuisance terms (nuisance.h), and its standard error: the figures to compare
+ * with the photograph. */
 static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3])
 {
     struct estimate a, b;
@@ -107,7 +108,7 @@ static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[
     }
 }
 
-/* Everything that a fit and its validation gave. */
+/* Adds the results of a fit and of its validation. */
 static void put_fit(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
 {
     uint64_t n_path = 0;

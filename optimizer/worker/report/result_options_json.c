@@ -113,7 +113,7 @@ static json_t *candidate_json(const struct pipeline_context *c, const struct pip
                      "standard_error_after", values_json(m, k->score.se_after), "determines", determines);
 }
 
-/* Best first. */
+/* The ranked candidates, best first. */
 static json_t *candidates_json(const struct pipeline_context *c, const struct pipeline_model *m)
 {
     json_t *list = json_array();
@@ -136,7 +136,7 @@ void result_fit_options(const struct pipeline_context *c, const struct pipeline_
     json_object_set_new(result, "heldout_rel_rms_with_gains_se", json_number(v->held_out_with_gains.rel_rms_se));
 }
 
-/* Scatter of blocks about their mean, in per cent of it, mean over channels. */
+/* Standard deviation of the blocks' means in per cent of their mean, averaged over the channels. */
 static double scatter_percent(const double contrast_rgb[3])
 {
     return 100.0 * sqrt(fmax(0.0, contrast_rgb[0] + contrast_rgb[1] + contrast_rgb[2]) / 3.0);

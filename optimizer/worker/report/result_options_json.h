@@ -1,4 +1,4 @@
-/* Parts of result.json that exist because of options of the fit (job_fit_option.h), and its certificate. */
+/* The parts of result.json that depend on options of the fit (job_fit_option.h), and its certificate. */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_OPTIONS_JSON_H
 #define SELVEDGE_OPTIMIZER_RESULT_OPTIONS_JSON_H
 
@@ -8,12 +8,13 @@
 
 /* Adds "tied_to", "ratio" and "prior" to the entry of parameter p. */
 void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *parameter);
-/* Adds "gain" and "gain_se" to row i: numbers with a gain for each photograph, null otherwise; and "texture": null
- * unless asked for. */
+/* Adds "gain", "gain_se" and "texture" to row i. Gains are numbers when each photograph has its own, otherwise null;
+ * texture is null without that option. */
 void result_row_options(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, json_t *row);
-/* Adds "prior_penalty", "nuisance", "starts", "fit_rel_rms_with_gains", "heldout_rel_rms_with_gains" (each with "..._se"), "next_photograph" and "certificate" to the result. */
+/* Adds "prior_penalty", "nuisance", "starts", "next_photograph", "certificate", and "fit_rel_rms_with_gains" and
+ * "heldout_rel_rms_with_gains", each with its "..._se". */
 void result_fit_options(const struct pipeline_context *c, const struct pipeline_model *m, json_t *result);
-/* The same for people. */
+/* Writes the same parts to the summary for people. */
 void result_summary_options(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out);
 
 #endif

@@ -12,7 +12,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* "RESULTS/<folder>/<name><ending>" and a temporary name beside it with the same ending (writers look at it). */
+/* The path RESULTS/<folder>/<name><ending>, and a temporary one in the same folder. The temporary name has the same
+ * ending, because writers choose the format by it. */
 static void picture_paths(const struct pipeline_context *c, const char *folder, const char *name, const char *ending,
                           char path[WORKER_PATH_BYTES], char temporary[WORKER_PATH_BYTES])
 {
@@ -23,7 +24,7 @@ static void picture_paths(const struct pipeline_context *c, const char *folder, 
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, temporary);
 }
 
-/* After a writer has made `temporary`. */
+/* Renames `temporary` to `path` when writing it succeeded, and removes it otherwise. */
 static status put_in_place(const struct pipeline_context *c, status written, const char *temporary, const char *path,
                            struct error *err)
 {

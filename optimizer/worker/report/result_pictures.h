@@ -1,5 +1,5 @@
-/* Pictures and geometry files under results/. A file that an earlier attempt has written is kept; files appear whole or
- * not at all. */
+/* Pictures and geometry files under results/. Each file is written under a temporary name and then renamed, so that
+ * it is never incomplete. A file that an earlier attempt has written is kept. */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
 #define SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
 
@@ -11,8 +11,8 @@ status result_geometry_write(struct pipeline_context *c, struct error *err);
 /* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
 status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width,
                             size_t height, struct error *err);
-/* renderings/<name>.exr and .png for every observation, photographs/<name>.png beside them. Reports progress from base
- * on. */
+/* renderings/<name>.exr and .png, and photographs/<name>.png, for every observation. base: share of the stage that was
+ * done before, from which progress is reported. */
 status result_renderings_write(struct pipeline_context *c, double base, struct error *err);
 
 #endif

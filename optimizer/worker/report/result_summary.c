@@ -53,7 +53,7 @@ static void print_rows(const struct pipeline_context *c, const struct pipeline_m
     }
 }
 
-/* "2.41 +- 0.05 %"; "-" where there are no such rows. */
+/* Writes "2.41 +- 0.05 %", or "-" when there are no such rows. */
 static void percent(const struct objective_value *v, char *text, size_t n)
 {
     if (isfinite(v->rel_rms))
@@ -62,7 +62,7 @@ static void percent(const struct objective_value *v, char *text, size_t n)
         snprintf(text, n, "-");
 }
 
-/* All models side by side, when there are several. */
+/* Writes a table of all models when there are several. */
 static void print_comparison(const struct pipeline_context *c, FILE *out)
 {
     const bool gains = c->model[0].option->gain == JOB_GAIN_PER_PHOTOGRAPH;
