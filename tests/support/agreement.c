@@ -24,7 +24,7 @@ void agreement_check(const struct agreement *g, double visible)
     double mean = g->sum / g->n, se = sqrt(g->sum_var) / g->n;
     print_message("mean relative difference %.4f, standard error %.4f\n", mean, se);
     if (!(fabs(mean) <= AGREEMENT_SE * se)) fail_msg("%.1f standard errors from 0", mean / se);
-    if (!(AGREEMENT_SE * se <= visible)) fail_msg("a relative difference of %.4f could not be seen", visible);
+    if (!(AGREEMENT_SE * se <= visible)) fail_msg("the test cannot detect a relative difference of %.4f", visible);
 }
 
 bool is_long_variant(void)

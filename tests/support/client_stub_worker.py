@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A stub of selvedge-worker for tests of clients: it goes through the stages and writes invented curves and results,
+"""A stub of selvedge-worker for tests of clients. It reports all stages and writes invented curves and results,
 but computes nothing.
 
 The sample's name selects its behaviour: "slow ..." takes seconds for each stage, "failing ..." fails in the first
@@ -78,7 +78,7 @@ def main():
             objective = series(k) if stage == "fit" else None
             status(stage=stage, i_stage=i, stage_fraction=k / 10, fraction=(10 * i + k) / 80, eta_s=(80 - 10 * i - k) * pause, objective=objective,
                    objective_se=None if objective is None else 0.02 * objective, step=None if objective is None else k)
-            # the fit must last until a client that polls once a second sees it
+            # The fit must last so long that a client that polls once a second sees it.
             time.sleep(15 * pause if stage == "fit" and pause < 0.1 else pause)
     results()
     status(state="succeeded", stage="report", i_stage=len(STAGES) - 1, stage_fraction=1.0, fraction=1.0, eta_s=0.0)

@@ -1,4 +1,4 @@
-/* A fit of the analytic cloth (fake_estimator.h) by any method, without a job around it. */
+/* A fit of the analytic cloth (fake_estimator.h) by any method, without a job. */
 #ifndef SELVEDGE_TESTS_DESCENT_FIXTURE_H
 #define SELVEDGE_TESTS_DESCENT_FIXTURE_H
 
@@ -15,8 +15,8 @@ struct descent_fixture {
     size_t n_reported;
 };
 
-/* All parameters free from the models' starts, photographs of mid-range parameters with a relative error of 0.5 %. The caller releases
- * x->observation. */
+/* Sets up a fit in which all parameters are free and start at the model's start. The photographs have mid-range
+ * parameters and a relative error of 0.5 %. The caller releases x->observation. */
 void descent_fixture_init(struct descent_fixture *x, uint64_t seed, uint64_t path_budget);
 /* Runs the method; fails the test when that fails, or when a reported step is not finite or out of bounds. */
 void descent_fixture_run(struct descent_fixture *x, const struct descent_method *method, struct fit_result *result);

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A worker for tests of the daemon: does what the job's sample name says ("fake: crash_once"), in the real folder
-layout. It counts its runs in work/runs to distinguish "once" from "always"."""
+"""A worker for tests of the daemon. The job's sample name selects its behaviour ("fake: crash_once"); it uses the real
+layout of job folders. It counts its runs in work/runs to distinguish "once" from "always"."""
 import fcntl
 import json
 import os
@@ -100,10 +100,10 @@ elif behaviour == "work_once":  # until it is killed; the next run succeeds
     if run == 1:
         work(3600)
     finish()
-elif behaviour == "clock_set":  # the daemon's wall clock is set forward while this one works
+elif behaviour == "clock_set":  # the wall clock is set forward while this worker runs
     work(float(argument), clock_s=-1e6)
     finish()
-elif behaviour == "unreadable":  # works, then its status cannot be read for a moment
+elif behaviour == "unreadable":  # works, but for a moment its status file cannot be read
     work(float(argument))
     put("status.json", "{")
     time.sleep(0.3)

@@ -20,7 +20,8 @@ def load():
 
 
 def names_a_key(field, schema=None):
-    """True when the field of an error is a key of the job document: "volume.filter.s", "photographs[3].file", "fit.fixed.C_R.g"."""
+    """True when the field of an error is a key of the job document, such as "volume.filter.s", "photographs[3].file" or
+    "fit.fixed.C_R.g"."""
     if schema is None:
         schema = load()["components"]["schemas"]["JobDocument"]
     if field == "":
@@ -40,7 +41,7 @@ def names_a_key(field, schema=None):
 
 
 def check_field(field, text):
-    """The field of an error about a job document names a key, or a key that the document should not have."""
+    """Asserts that the field of an error about a job document is one of its keys, or an unknown key in one of them."""
     unknown = re.search(r"unknown (field|parameter)", text)
     known = names_a_key(field.rpartition(".")[0] if unknown else field)
     assert known, f"'{field}' is no key of the job document: {text}"

@@ -1,4 +1,4 @@
-/* A folder for the files of one test; it is removed with its content at the end. */
+/* A folder for the files of one test. It is removed with its content at the end of the test. */
 #ifndef SELVEDGE_TESTS_SCRATCH_FOLDER_H
 #define SELVEDGE_TESTS_SCRATCH_FOLDER_H
 

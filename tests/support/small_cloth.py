@@ -33,7 +33,7 @@ def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
 
 
 def start_small_job(daemon, document):
-    """Uploads and starts a job of this document, which names cloth.hair and rows.csv."""
+    """Uploads cloth.hair and rows.csv, which the document names, and starts the job."""
     job = daemon.create(document)
     daemon.upload(job, "cloth.hair", hair(), "fibers")
     daemon.upload(job, "rows.csv", TABLE.encode(), "measurements")

@@ -86,8 +86,8 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);
     row(out, "gaps bridged", "missed centers within a fiber", "%zu", g->n_gap_bridged);
     row(out, "pieces joined", "of one fiber, end to end", "%zu", g->n_joined);
-    row(out, "fiber diameter", "measured before tracing; from 7 voxels on, touching fibers can be separated", "%.1f voxels",
-        g->fiber_diameter_voxel);
+    row(out, "fiber diameter", "measured before tracing; from 7 voxels on, touching fibers can be separated",
+        "%.1f voxels", g->fiber_diameter_voxel);
     row(out, "direction noise, filtered", "mean angle from voxel to voxel along the fiber", "%.2f&deg;",
         g->direction_noise_deg[0]);
     row(out, "direction noise, transferred", "after taking the fibers' directions", "%.2f&deg;",

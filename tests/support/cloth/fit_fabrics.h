@@ -1,4 +1,4 @@
-/* The cloths that fits are judged on, with parameters in file units. */
+/* The cloths on which fits are judged, with their true parameters. */
 #ifndef SELVEDGE_TESTS_FIT_FABRICS_H
 #define SELVEDGE_TESTS_FIT_FABRICS_H
 
@@ -12,10 +12,11 @@ struct fit_fabric {
     double truth[SCATTERING_MAX_PARAM]; /* file units */
 };
 
-/* Gabardine, Silk, Fleece: fabric thesis, Table 5.3, fiber model; three mid-range sets; Gabardine of the volume model
- * and of microflakes from the same table. NULL-named end. */
+/* Gabardine, Silk and Fleece with the parameters of the fiber model in Table 5.3 of the fabric thesis; three cloths
+ * with mid-range parameters; and Gabardine with those of the volume model and of microflakes from the same table. The
+ * last element has a NULL name. */
 extern const struct fit_fabric fit_fabric[];
-/* NULL when there is none of that name. */
+/* Returns NULL when no cloth has that name. */
 const struct fit_fabric *fit_fabric_find(const char *name);
 
 #endif

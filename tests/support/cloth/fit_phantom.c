@@ -30,7 +30,8 @@ static void make_volume(struct fit_cloth *c, double voxel_m, struct thread_pool 
     c->has_volume = true;
 }
 
-/* As `selvedge-phantom cloth --yarn FILE --cover 1.1`: looser than smooth yarns, and closed all the same. */
+/* The same as `selvedge-phantom cloth --yarn FILE --cover 1.1`. The yarns are less dense than smooth yarns, but the
+ * cloth has no gaps. */
 static void take_yarn(struct phantom_option *o, const char *file)
 {
     struct error err = {0};
@@ -130,7 +131,7 @@ void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o)
     struct error err = {0};
     forget_observations(f);
     if (o->n > FIT_MAX_OBSERVATION) {
-        fprintf(stderr, "%zu observations: at most %d\n", o->n, FIT_MAX_OBSERVATION);
+        fprintf(stderr, "%zu observations are given: at most %d are allowed\n", o->n, FIT_MAX_OBSERVATION);
         exit(1);
     }
     for (size_t i = 0; i < o->n; i++) fit_check(observation_set_append(&f->observation, &o->item[i], &err), &err);

@@ -93,19 +93,21 @@ struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set
     return score;
 }
 
-/* What score_of makes of the squared error's se, the other way. */
+/* The standard error of the sum of squared errors at which rel_rms has the standard error se; the inverse of the
+ * conversion in score_of. */
 static double squared_se(const struct linear_model *m, double rel_rms, double se)
 {
     return fmax(2.0 * rel_rms, se) * se * (double)m->n_row;
 }
 
-/* Counts of the next round: configuration i's part of f is known to se_i with count[i] paths, so counts as se_i sqrt(count[i]) reach a
- * given se with the fewest. Where few paths bring most of the light a round may see none of them: the largest of what all rounds
- * saw counts, and no configuration gets less than a quarter of the mean. */
+/* Path counts of the next round. The part of f that is due to configuration i has the standard error se_i with
+ * count[i] paths, so counts in proportion to se_i sqrt(count[i]) reach a given standard error with the fewest paths.
+ * Where few paths carry most of the light, a round may contain none of them and underestimate se_i. Therefore the
+ * largest value of all rounds is used, and no configuration gets less than a quarter of the mean. */
 static void spread(const struct linear_model *m, const struct fit_score *now, const struct fit_score_goal *goal,
                    double work[FIT_MAX_OBSERVATION], size_t *count)
 {
-    const double reserve = 1.2; /* the errors are themselves estimates */
+    const double reserve = 1.2; /* because the standard errors are themselves estimates */
     size_t n = m->n_row / 3;
     double sum = 0.0, spent = 0.0, most = (double)(goal->most * n), se = squared_se(m, now->rel_rms, goal->se);
     for (size_t i = 0; i < n; i++) {
@@ -142,7 +144,7 @@ struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set 
     }
 }
 
-/* trace(M J'J) / n_row on one set, J from the kept estimates at the truth. */
+/* Returns trace(M J'J) / n_row on one set, with J from the kept estimates at the truth. */
 static double quadratic(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *m)
 {
     struct scorer s;

@@ -19,7 +19,7 @@ void hand_volume_uniform(struct direction_volume *v, const size_t n[3], double v
     }
 }
 
-/* Height of a yarn's middle over its own plane. */
+/* Height of a yarn's axis above its mean plane. */
 static double wave(double along, double size, int yarn) { return 0.25 * sin(2 * M_PI * along / size + M_PI * yarn); }
 
 void hand_volume_weave(struct direction_volume *v, const size_t n[3], double voxel_m, double occupancy)

@@ -5,14 +5,15 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/volume/volume.h"
 
-/* The same density and direction everywhere. Aborts the test without memory, like the others. */
+/* The same density and direction everywhere. Like the other functions, it aborts the test when memory runs out. */
 void hand_volume_uniform(struct direction_volume *v, const size_t n[3], double voxel_m, uint8_t density,
                          const float direction[3]);
-/* Two crossed systems of wavy fibers with gaps between them; `occupancy` of the voxels hold something. */
+/* Two crossed systems of wavy fibers with gaps between them. A share `occupancy` of the voxels has a density above 0.
+ * */
 void hand_volume_weave(struct direction_volume *v, const size_t n[3], double voxel_m, double occupancy);
-/* Share of each voxel that fibers fill, for fibers far thinner than a voxel, times `scale` (so that bytes resolve it).
- * Points are spread along the fibers, so density times scale is right on the average; f's z = 0 is the bottom of the
- * volume. */
+/* Makes a volume of fibers far thinner than a voxel. The density of a voxel is the share of it that fibers fill, times
+ * `scale`, so that a byte can represent it. Sample points along the fibers are counted, so the density is right on
+ * average. z = 0 of f is the bottom of the volume. */
 void hand_volume_rasterise(struct direction_volume *v, const size_t n[3], double voxel_m, const struct fiber_set *f,
                            double scale);
 

@@ -74,7 +74,7 @@ static void chunk_estimate(const struct fit_phantom *f, const struct kept_call *
     free(data);
 }
 
-/* sum <- sum + part, as means over chunks with equal path counts: divide by n_chunk at the end. */
+/* Adds share times the means of part to sum. Chunks have equal path counts, so the share of each is 1 / n_chunk. */
 static void merge(struct estimate *sum, const struct estimate *part, double share)
 {
     for (int c = 0; c < 3; c++) {

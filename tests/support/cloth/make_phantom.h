@@ -1,10 +1,11 @@
-/* A phantom for tests: its fibers and what was made of the request. */
+/* A phantom for tests. */
 #ifndef SELVEDGE_TESTS_MAKE_PHANTOM_H
 #define SELVEDGE_TESTS_MAKE_PHANTOM_H
 
 #include "geometry/phantom/phantom.h"
 
-/* n_thread: 0 for none. Fails the test when the phantom cannot be made; f is the caller's to release. */
+/* Makes the fibers f and the report r of the phantom o describes. n_thread 0: without a thread pool. Fails the test
+ * when that fails. The caller releases f. */
 void make_phantom(const struct phantom_option *o, size_t n_thread, struct fiber_set *f, struct phantom_report *r);
 
 #endif

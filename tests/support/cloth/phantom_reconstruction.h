@@ -1,4 +1,4 @@
-/* A phantom, its scan, the reconstruction and how it agrees with the truth: what the accuracy tests and benches share. */
+/* A phantom, its scan, the reconstruction of it and a comparison with the truth, for accuracy tests and benchmarks. */
 #ifndef SELVEDGE_TESTS_PHANTOM_RECONSTRUCTION_H
 #define SELVEDGE_TESTS_PHANTOM_RECONSTRUCTION_H
 
@@ -7,7 +7,7 @@
 #include "geometry/reconstruct.h"
 
 struct phantom_reconstruction {
-    struct volume v; /* as mapped to [0, 1] */
+    struct volume v; /* the scan with densities mapped to [0, 1] */
     struct fiber_set truth, found;
     struct compare_report compare;
     struct reconstruct_option option;
@@ -15,10 +15,11 @@ struct phantom_reconstruction {
     double wall_s; /* of the reconstruction */
 };
 
-/* Cloth of fibers diameter_voxel thick at voxels of 2 um: the default phantom of the weave with all lengths scaled to the diameter, and
- * at least 38 fibers or 60 pieces of fiber in the tile. */
+/* Options for a cloth whose fibers are diameter_voxel voxels of 2 um thick: the default phantom of the weave with all
+ * lengths scaled to the diameter. The tile holds at least 38 fibers, or 60 pieces of fiber. */
 void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weave, double diameter_voxel);
-/* Blur 0.7 voxels, Gaussian noise. r->option may be changed before; start from reconstruct_option_default. */
+/* Makes the phantom, scans it with a blur of 0.7 voxels and Gaussian noise, and reconstructs it with r->option, which
+ * the caller sets before (reconstruct_option_default). */
 status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r,
                            struct error *err);
 void phantom_reconstruction_release(struct phantom_reconstruction *r);

@@ -49,7 +49,7 @@ void scan_expect_values(const char *const *path, size_t n_path, const struct vol
         else
             assert_true(isnan(info->voxel_size_m[a]));
     }
-    for (int pass = 0; pass < 2; pass++) { /* all at once, then slices backwards */
+    for (int pass = 0; pass < 2; pass++) { /* first all slices at once, then single slices in reverse order */
         memset(value, 0, n_voxel * sizeof *value);
         for (size_t k = n[2]; k > 0 && pass == 1; k--)
             if (volume_source_read(source, k - 1, 1, value + (k - 1) * n_slice, &err) != STATUS_OK)
@@ -68,12 +68,12 @@ void scan_expect_refused(const char *path, const struct volume_raw_declaration *
     struct error err = {0};
     status s = volume_source_open_declared(&path, 1, raw, &source, &err);
     float value[4096];
-    if (s == STATUS_OK) { /* damage of compressed data shows when it is read */
+    if (s == STATUS_OK) { /* damage of compressed data is found only when it is read */
         const struct volume_source_info *info = volume_source_describe(source);
         for (size_t k = 0; k < info->n[2] && s == STATUS_OK && info->n[0] * info->n[1] <= 4096; k++)
             s = volume_source_read(source, k, 1, value, &err);
         volume_source_close(source);
     }
     if (s != code || strcmp(err.field, field) != 0 || strstr(err.text, part) == NULL)
-        fail_msg("'%s' wanted, got %s, field '%s': %s", part, status_name(s), err.field, err.text);
+        fail_msg("expected '%s', but got %s, field '%s': %s", part, status_name(s), err.field, err.text);
 }

@@ -11,7 +11,7 @@ struct test_cylinder {
     double radius;
 };
 
-/* Density 1 inside of any cylinder, ramp over one voxel at the surface, plus Gaussian noise (seeded). */
+/* Fills v with density 1 inside the cylinders, a ramp over one voxel at the surface, and seeded Gaussian noise. */
 void test_fill_cylinders(struct volume *v, const struct test_cylinder *c, size_t n_cylinder, double noise_sd,
                          uint64_t seed);
 
@@ -26,7 +26,7 @@ enum test_tiff_layout { TEST_STRIPS, TEST_TILES };
 void test_write_tiff(const char *path, const struct test_page *page, size_t n_page, uint16_t compression,
                      enum test_tiff_layout layout);
 void test_write_bytes(const char *path, const void *data, size_t n_byte);
-/* A new folder under /tmp; path in a static buffer per call site's caller. */
+/* Makes a new folder under /tmp and writes its path. */
 void test_make_folder(char path[64]);
 
 #endif

@@ -58,7 +58,7 @@ void stack_check(const char *const *path, size_t n_path, uint16_t bits)
     assert_int_equal(volume_source_describe(s)->n[0], STACK_WIDTH);
     assert_int_equal(volume_source_describe(s)->n[1], STACK_HEIGHT);
     assert_int_equal(volume_source_describe(s)->n[2], STACK_PAGES);
-    for (int from = 2; from >= 0; from -= 2) { /* backwards, too */
+    for (int from = 2; from >= 0; from -= 2) { /* also in reverse order */
         assert_int_equal(volume_source_read(s, (size_t)from, 2, value, &err), STATUS_OK);
         for (size_t i = 0; i < 2 * STACK_WIDTH * STACK_HEIGHT; i++)
             assert_true(value[i] == stack_expected((size_t)from + i / (STACK_WIDTH * STACK_HEIGHT),

@@ -1,18 +1,19 @@
-/* A cloth with a texture whose contrast is known, and an estimator of it: what the renderer's blocks do with its paths is real. */
+/* A cloth with a texture of known contrast, and an estimator of it. The radiances of its paths are invented, but the
+ * renderer's own code collects them in blocks. */
 #ifndef SELVEDGE_TESTS_CHESS_BOARD_H
 #define SELVEDGE_TESTS_CHESS_BOARD_H
 
 #include "base/thread_pool.h"
 #include "optimizer/fit/descent/estimator.h"
 
-/* A cloth like a chess board of 8 x 8 fields with radiance a_c (1 + t) and a_c (1 - t); a path sees that times an
- * exponential deviate (relative variance 1). Parameters: a_r, a_g, a_b, t. */
+/* The cloth is a chess board of 8 x 8 fields with radiances a_c (1 + t) and a_c (1 - t) in channel c. The radiance of a
+ * path is that of its field times an exponential deviate (relative variance 1). Parameters: a_r, a_g, a_b, t. */
 enum { BOARD_N_PARAM = 4, BOARD_SIDE = 8, BOARD_CELL = BOARD_SIDE * BOARD_SIDE, BOARD_N_VIEW = 3 };
 
 extern const struct param_info board_param[BOARD_N_PARAM];
 extern const double board_truth[BOARD_N_PARAM];
 
-/* Views 0 .. BOARD_N_VIEW - 1 ask for means, the others for contrasts. */
+/* For views 0 .. BOARD_N_VIEW - 1 the mean is estimated, for the others the contrast. */
 struct board {
     const double *param;
     bool want_jacobian;
@@ -25,10 +26,11 @@ struct board {
 double board_contrast(double t);
 /* The caller frees b->pool. */
 void board_init(struct board *b, size_t n_thread);
-/* For struct estimator, with the board as its context. STATUS_IO in the call fail_after + 1, unless that is 0. */
+/* The function of struct estimator, with the board as its context. If fail_after is not 0, the call after
+ * fail_after successful ones fails with STATUS_IO. */
 status board_estimate(void *context, const struct estimator_call *call, const struct progress *progress,
                       struct estimate *out, double *wall_s, struct error *err);
-/* Estimates with n_path paths a view. */
+/* Estimates all views with n_path paths each. */
 void board_ask(struct board *b, const double *param, size_t n_path, uint32_t iteration, struct estimate *e);
 
 #endif

@@ -22,8 +22,8 @@ const struct param_info fake_param[FAKE_N_PARAM] = {
      10.0 * RAD_PER_DEG, PARAM_LOG, ""},
 };
 
-/* light theta, camera theta, camera phi; light phi is 0; every row twice, with the cloth turned by 0 and by 90 degrees
- */
+/* Theta of the light, theta and phi of the camera; phi of the light is 0. Every row is used twice, with the cloth
+ * turned by 0 and by 90 degrees. */
 static const double fit_row[8][3] = {{20, 20, 180}, {45, 45, 180}, {75, 75, 180}, {60, 0, 180},
                                      {20, 20, 90},  {45, 45, 90},  {64, 64, 90},  {60, 0, 90}};
 static const double held_row[12][3] = {{10, 30, 180}, {30, 50, 180}, {50, 70, 180}, {70, 50, 180},
@@ -68,7 +68,7 @@ static double radiance(const struct configuration *c, double c_r, double c_tt, d
     double tl = c->light_theta_rad, tc = c->camera_theta_rad, phi = c->camera_phi_rad,
            turn = cos(c->cloth_rotation_rad);
     double half = tl * cos(M_PI - phi) - tc;          /* 0 at the mirror direction */
-    double across = (phi - M_PI) * sin(fmin(tl, tc)); /* away from the plane of incidence */
+    double across = (phi - M_PI) * sin(fmin(tl, tc)); /* distance from the plane of incidence */
     double grazing = pow(sin(0.5 * (tl + tc)), 4.0);
     double fresnel = c_r + (1.0 - c_r) * pow(1.0 - cos(0.5 * (tl + tc)), 5.0);
     double wide_r = beta_r + 0.12 + 0.03 * turn, wide_tt = beta_tt + 0.1;
@@ -102,7 +102,7 @@ void fake_radiance(const struct configuration *c, const double *param, double rg
     }
 }
 
-/* ---- the noise: three kinds of rare paths that carry the light ---- */
+/* ---- the noise: three kinds of rare paths carry the light ---- */
 
 static const double kind_share[3] = {0.5, 0.35, 0.15}, kind_probability[3] = {0.2, 0.03, 0.003};
 
@@ -132,12 +132,12 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
         double q = kind_probability[k], part = exponential_sum(&r, rng_poisson(&r, n * q)) / (n * q);
         factor += kind_share[k] * part;
         var += kind_share[k] * kind_share[k] * 2.0 / (n * q);
-        for (size_t p = 0; p < FAKE_N_PARAM; p++) { /* scores scatter from path to path by twice their mean */
+        for (size_t p = 0; p < FAKE_N_PARAM; p++) { /* derivatives scatter from path to path by twice their mean */
             rng_normal_pair(&r, z);
             score[p] += kind_share[k] * (part + 2.0 * z[0] / sqrt(n * q));
             if (p >= 6)
                 width[p] += kind_share[k] * 2.0 * z[1] /
-                            sqrt(n * q); /* those of widths have either sign, whatever their mean is */
+                            sqrt(n * q); /* those of widths have both signs, independent of their mean */
         }
         score_var += kind_share[k] * kind_share[k] * 6.0 / (n * q);
     }
@@ -150,7 +150,7 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
         }
     }
     for (size_t c = 0; c < 3; c++) {
-        double part = 0.3 + 0.7 * call->param[3 + c]; /* dark channels have short paths and less noise */
+        double part = 0.3 + 0.7 * call->param[3 + c]; /* a dark channel has short paths and less noise */
         e->mean[c] = rgb[c] * (1.0 + part * (factor - 1.0));
         e->var[c] = rgb[c] * rgb[c] * var * part * part;
         for (size_t p = 0; p < FAKE_N_PARAM; p++) {

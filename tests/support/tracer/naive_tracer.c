@@ -32,7 +32,8 @@ static struct vec vertex(const struct fiber_set *f, size_t v)
     return (struct vec){(double)p[0], (double)p[1], (double)p[2]};
 }
 
-/* Inside fiber k, the union of its cylinders and balls: what lies there is no surface, only a joint. */
+/* True when p is inside fiber k, the union of its cylinders and balls. A surface of one of them there is not a
+ * surface of the fiber. */
 static bool inside_fiber(const struct fiber_set *f, size_t k, struct vec p)
 {
     double r = (double)f->radius_m[k] * (1 - 1e-6);
@@ -45,8 +46,8 @@ static bool inside_fiber(const struct fiber_set *f, size_t k, struct vec p)
     return false;
 }
 
-/* Whether the ray's line stays farther from the middle of the segment a b than any of its points lies; d is a unit vector.
- * (length / 2 + r)^2 <= length^2 / 2 + 2 r^2. */
+/* True when the line of the ray misses a sphere about the middle of the segment a b that contains all its points. d
+ * is a unit vector. The squared radius of the sphere is length^2 / 2 + 2 r^2 >= (length / 2 + r)^2. */
 static bool passes_by(struct vec o, struct vec d, struct vec a, struct vec b, double r)
 {
     struct vec axis = add(b, -1, a), to = add(add(a, 0.5, axis), -1, o);
@@ -54,7 +55,7 @@ static bool passes_by(struct vec o, struct vec d, struct vec a, struct vec b, do
     return dot(to, to) - along * along > 0.5 * dot(axis, axis) + 2 * r * r;
 }
 
-/* Entry into the side of segment v of fiber k, or into the balls at its ends; nearer than h->t and beyond tnear. */
+/* Finds the entry into the side of segment v of fiber k, or into the balls at its ends, between tnear and h->t. */
 static void intersect_segment(const struct fiber_set *f, size_t k, size_t v, struct vec o, struct vec d, double tnear,
                               struct hit *h)
 {
@@ -70,7 +71,7 @@ static void intersect_segment(const struct fiber_set *f, size_t k, size_t v, str
         }
         double qa = dot(dd, dd), qb = dot(dd, pp), disc = qb * qb - qa * (dot(pp, pp) - r * r);
         if (disc < 0 || qa < 1e-14) continue;
-        double t = (-qb - sqrt(disc)) / qa; /* the entry only: exits do not exist */
+        double t = (-qb - sqrt(disc)) / qa; /* only entries are hits, exits are ignored */
         if (t <= tnear || t >= h->t) continue;
         struct vec n = add(pp, t, dd);
         double along = dot(add(p, t, d), axis);
@@ -83,12 +84,12 @@ static void intersect_segment(const struct fiber_set *f, size_t k, size_t v, str
     }
 }
 
-/* All copies of all fibers that the stretch t0..t1 of the ray can meet. */
+/* Intersects the part t0..t1 of the ray with all periodic copies of all fibers that it can meet. */
 static void intersect_stretch(const struct fiber_set *f, struct vec o, struct vec d, double tnear, double t0, double t1,
                               struct hit *h)
 {
     struct vec p = add(o, t0, d), q = add(o, t1, d);
-    double margin = 0.3; /* of a tile: how far vertices lie outside */
+    double margin = 0.3; /* largest distance of a vertex from its tile, in tiles */
     int i0 = (int)floor(fmin(p.x, q.x) / f->tile_size_m[0] - margin),
         i1 = (int)floor(fmax(p.x, q.x) / f->tile_size_m[0] + margin);
     int j0 = (int)floor(fmin(p.y, q.y) / f->tile_size_m[1] - margin),
@@ -114,7 +115,8 @@ static bool intersect(const struct fiber_set *f, struct vec o, struct vec d, dou
     return h->t < INFINITY;
 }
 
-/* The lamp's radiance towards -d from o (orbit centre at z_top), with the lamp's unit defined by summing its square. */
+/* Radiance of the lamp that arrives at o from direction d (orbit centre at z_top). The lamp's unit is defined by a
+ * numerical integral over its square. */
 static double lamp_radiance(const struct configuration *c, struct vec o, struct vec d)
 {
     double phi = c->light_phi_rad - c->cloth_rotation_rad, th = c->light_theta_rad, side = c->lamp_side_m,
@@ -161,7 +163,7 @@ double naive_path(const struct fiber_set *f, const struct configuration *c, cons
         double wo[3] = {-dot(d, u), -dot(d, v), -dot(d, w)};
         double a = rng_double(r), z = sqrt(a) * cos(2 * M_PI * rng_double(r)), az = 2 * M_PI * rng_double(r),
                cosine = sqrt(1 - z * z);
-        double wi[3] = {z, cosine * cos(az), cosine * sin(az)}; /* density cos th / pi^2 */
+        double wi[3] = {z, cosine * cos(az), cosine * sin(az)}; /* probability density cos th / pi^2 */
         throughput *= reference_s(param, wi, wo, 0) * M_PI * M_PI;
         d = add(add(add((struct vec){0, 0, 0}, wi[0], u), wi[1], v), wi[2], w);
         tnear = 1e-3 * h.radius;

@@ -20,7 +20,7 @@ void naive_volume_init(struct naive_volume *n, const struct direction_volume *v,
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* alpha S cos th_i over its integral for wo; directions of the fiber frame. */
+/* alpha S cos th_i divided by its integral for wo; directions in the fiber frame. */
 static double phase(const struct naive_volume *n, const double wi[3], const double wo[3])
 {
     double x = fabs(asin(fmin(1, fmax(-1, wo[0])))) / M_PI_2 * NAIVE_VOLUME_N_TABLE;
@@ -29,7 +29,8 @@ static double phase(const struct naive_volume *n, const double wi[3], const doub
     return n->param[9] * reference_s(n->param, wi, wo, 0) * hypot(wi[1], wi[2]) / furnace;
 }
 
-/* Follows the ray through the voxels until the optical depth is used up. False: it leaves. p is moved, tangent found. */
+/* Follows the ray through the voxels up to an optical depth. Returns true with the point of collision in p and the
+ * fiber direction there in tangent, or false when the ray leaves the volume. */
 static bool collide(const struct naive_volume *n, const double d[3], double depth, double p[3], double tangent[3])
 {
     const struct direction_volume *v = n->v;
@@ -57,7 +58,7 @@ static bool collide(const struct naive_volume *n, const double d[3], double dept
     }
 }
 
-/* A new direction, uniform over the sphere, and the weight that goes with it. */
+/* Draws a new direction d, uniform over the sphere, and returns its weight. */
 static double scatter(const struct naive_volume *n, const double u[3], struct rng *r, double d[3])
 {
     double v[3] = {-u[1], u[0], 0}, w[3], wo[3], wi[3], length = hypot(u[0], u[1]);

@@ -1,14 +1,14 @@
-/* What estimates and pictures are made from, put together from a model and its parameter values. */
+/* Inputs of estimates and renderings, made from a model and its parameter values. */
 #ifndef SELVEDGE_TESTS_TRACE_INPUT_H
 #define SELVEDGE_TESTS_TRACE_INPUT_H
 
 #include "renderer/transport/radiance_source.h"
 
-/* model is filled in and must outlive the input, like scene and param. */
+/* Fills in model. model, scene and param must outlive the returned input. */
 struct radiance_input trace_input_surface(const struct scene *scene, const struct scattering_model *m,
                                           const double *param, struct appearance *model);
 
-/* A volume model with the parameters of its phase function and the density multiplier, which become one list. */
+/* A volume model. param holds the parameters of its phase function and then the density multiplier. */
 struct trace_volume {
     struct appearance model;
     double param[SCATTERING_MAX_PARAM];
