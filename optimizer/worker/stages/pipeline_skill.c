@@ -7,14 +7,17 @@ static const double skill_standard_errors = 2.0;
 
 static void warn_without_skill(struct pipeline_context *c)
 {
-    const struct objective_value *twin = &c->model[pipeline_best_model(c)].validation.held_out;
+    const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
+    const struct objective_value *twin = &best->validation.held_out;
     double plain = c->skill.heldout_rel_rms;
     if (!isfinite(plain) || !(twin->rel_rms - skill_standard_errors * twin->rel_rms_se > plain)) return;
     worker_status_warn(c->status,
                        "a plain BRDF that knows nothing of the cloth, fitted to the same rows, predicts the held-out "
-                       "rows better (%.2g %%) than this fit (%.2g %%): the model of the fibers or the cloth does not "
-                       "describe this fabric",
-                       100.0 * plain, 100.0 * twin->rel_rms);
+                       "rows better (%.2g %%) than this fit (%.2g %%): %s",
+                       100.0 * plain, 100.0 * twin->rel_rms,
+                       best->fit.converged ? "the model of the fibers or the cloth does not describe this fabric"
+                                           : "the fit has not converged; if more paths do not help, the model of the "
+                                             "fibers or the cloth does not describe this fabric");
 }
 
 status pipeline_measure_skill(struct pipeline_context *c, struct error *err)
