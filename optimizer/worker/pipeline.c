@@ -1,4 +1,4 @@
-/* The stage table's computing side: runs what is not done, loads what is. */
+/* Runs the stages of a job in the order of the stage table, and loads those that an earlier attempt has finished. */
 #include "base/clock.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
@@ -32,8 +32,9 @@ static void report_fraction(void *context, double fraction)
     worker_status_fraction(c->status, fraction);
 }
 
-/* A stage that runs outdates what later ones have stored, also for an attempt after this one. */
-static status forget_from(struct pipeline_context *c, size_t i, struct error *err)
+/* Removes the marks of stage i and of all later ones: when a stage runs, what later stages have stored is out of
+ * date, also for a later attempt. */
+static status unmark_from(struct pipeline_context *c, size_t i, struct error *err)
 {
     status s = STATUS_OK;
     for (; i < sizeof stage_code / sizeof stage_code[0] && s == STATUS_OK; i++)
@@ -56,7 +57,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
         }
         log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
     }
-    status s = code->load != NULL && !*earlier_ran ? forget_from(c, i, err) : STATUS_OK;
+    status s = code->load != NULL && !*earlier_ran ? unmark_from(c, i, err) : STATUS_OK;
     if (code->load != NULL) *earlier_ran = true;
     log_info(c->log, "stage %s", code->name);
     if (s == STATUS_OK) s = code->run(c, err);

@@ -1,6 +1,6 @@
-/* What the stages of a job share: inputs, products, and the way to the outside. One thread runs the stages; each stage
- * uses the pool. Ownership: pipeline_context_init/release; everything in it is owned unless said otherwise.
- */
+/* What the stages of a job share: their inputs, their products, the log and the status. One thread runs the stages,
+ * and each stage uses the thread pool. Ownership: pipeline_context_init/release; the context owns its members unless
+ * a comment says otherwise. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
 
@@ -24,15 +24,15 @@
 #include "renderer/scene/scene.h"
 #include "renderer/transport/derivative_check.h"
 
-/* Estimates at the fitted parameters, two replicas, every observation in the order of `observation`. */
+/* Fresh estimates at the fitted parameters: two replicas of every observation, in the order of `observation`. */
 struct validation {
     struct estimate *replica[2];
-    struct estimate *contrast[2]; /* of pipeline_context.contrast, as many as observations; unused without one */
+    struct estimate *contrast[2]; /* of pipeline_context.contrast, one per observation; NULL without contrasts */
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
     struct objective_value fit_with_gains,
-        held_out_with_gains; /* each row with its own gain; NaN unless the job asks for that */
-    double
-        worst_rel_se; /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
+        held_out_with_gains; /* with one gain per row; NaN unless the job asks for gains */
+    /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
+    double worst_rel_se;
 };
 
 /* A candidate for the next photograph. */
@@ -41,7 +41,7 @@ struct pipeline_candidate {
     struct candidate_score score;
 };
 
-/* One model of the job: what is fitted and what came out. */
+/* One model of the job: its parameters, and the results of its fit. */
 struct pipeline_model {
     struct appearance appearance;
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
@@ -52,7 +52,7 @@ struct pipeline_model {
     struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */
 };
 
-/* What the search for the fiber radius gave (pipeline_radius.h). */
+/* The result of the search for the fiber radius (pipeline_radius.h). */
 struct pipeline_radius {
     size_t i_model, n_step;         /* the model that was fitted at each radius; records of the series */
     double start_m, radius_m, se_m; /* mean radius before and after; its standard error */
@@ -104,8 +104,8 @@ struct pipeline_context {
 void pipeline_context_init(struct pipeline_context *c);
 void pipeline_context_release(struct pipeline_context *c);
 
-/* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. Here and in
- * pipeline_run err->field is a key of the job document. */
+/* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. Here
+ * and in pipeline_run err->field is a key of the job document. */
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err);
 
 /* Runs all stages that are not done. memory: context of the caller with folder, status, log, pool filled in. */
@@ -131,24 +131,26 @@ status stage_report(struct pipeline_context *c, struct error *err);
 /* Adds a warning to the job's status, with the key of the option that it is about (base/option_id.h). context: a struct
  * pipeline_context. */
 void pipeline_warn(void *context, const char *option, const char *text);
-/* The mapped volume in memory, from its checkpoint when it was let go. */
+/* Makes sure that the density volume is in memory; reads it from its checkpoint if it was released. */
 status pipeline_need_volume(struct pipeline_context *c, struct error *err);
-/* Path of a stage's checkpoint: JOB/work/<stage>/<name>; makes the folder. */
+/* Writes the path of a stage's checkpoint, JOB/work/<stage>/<name>, and makes its folder. */
 status pipeline_work_path(const struct pipeline_context *c, const char *stage, const char *name,
                           char path[WORKER_PATH_BYTES], struct error *err);
-/* The cloth for ray tracing from the fibers as they are; what was made before is released. The second makes it for
- * surface models only. */
+/* Builds the scene for ray tracing from the present fibers, and releases an earlier one. The second function builds
+ * it for surface models only. */
 status pipeline_make_scene(struct pipeline_context *c, struct error *err);
 status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err);
-/* As above, with a number for all models but the first: "estimates.journal", "estimates-1.journal". */
+/* The same as pipeline_work_path, with a number in the name for all models but the first: "estimates.journal",
+ * "estimates-1.journal". */
 status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
                            char path[WORKER_PATH_BYTES], struct error *err);
-/* The cloth in all forms that there are. */
+/* The scene of the fibers, and that of the volume when there is one. */
 struct appearance_scene pipeline_scene(const struct pipeline_context *c);
-/* Unknowns of a model's fit: parameters that are neither fixed nor follow another. */
+/* Number of unknowns of a model's fit: parameters that are neither fixed nor tied to another one. */
 size_t pipeline_n_free(const struct pipeline_model *m);
-/* After validation: the error by which a model is judged, that over the held-out rows (the fitted ones when there are none), each
- * with its own gain where the job says that photographs have one; and the model for which it is lowest (rel_square). */
+/* After validation: the error by which models are compared, which is that over the held-out rows, or over the fitted
+ * rows when none are held out. If the job gives every photograph a gain, each row has its own. pipeline_best_model
+ * returns the model with the lowest one (rel_square). */
 const struct objective_value *pipeline_judged_error(const struct pipeline_model *m);
 size_t pipeline_best_model(const struct pipeline_context *c);
 

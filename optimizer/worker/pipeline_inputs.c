@@ -1,4 +1,4 @@
-/* What a job is given, read and checked before its first stage: the document, the parameters of its models, the
+/* Reads and checks the inputs of a job before its first stage: the document, the parameters of its models, the
  * observations. */
 #include "base/durable.h"
 #include "base/option_id.h"
@@ -119,7 +119,7 @@ struct input_sum {
     uint32_t sum;
 };
 
-/* Name, size and time of change of an input file. */
+/* Adds name, size and time of change of an input file to the checksum. */
 static void add_input(void *context, const char *name, const char *role)
 {
     struct input_sum *input = context;
@@ -127,7 +127,7 @@ static void add_input(void *context, const char *name, const char *role)
     struct stat st = {0};
     (void)role;
     worker_folder_path(input->pipeline->folder, JOB_FOLDER_INPUT, name, path);
-    if (stat(path, &st) != 0) return; /* absence is noticed by the stage that reads it */
+    if (stat(path, &st) != 0) return; /* the stage that reads the file reports that it is missing */
     int64_t seen[3] = {(int64_t)st.st_size, (int64_t)st.st_mtim.tv_sec, (int64_t)st.st_mtim.tv_nsec};
     input->sum = (uint32_t)crc32_z(input->sum, (const void *)name, strlen(name));
     input->sum = (uint32_t)crc32_z(input->sum, (const void *)seen, sizeof seen);
@@ -144,7 +144,7 @@ static status claim_inputs(struct pipeline_context *c, struct error *err)
     return s;
 }
 
-/* What the fit sees, and the contrasts. */
+/* Selects the rows of the fit and makes the rows of contrasts. */
 static status select_rows(struct pipeline_context *c, struct error *err)
 {
     const struct job_document *doc = c->doc;
@@ -164,8 +164,8 @@ static status select_rows(struct pipeline_context *c, struct error *err)
 
 enum { PROGRAM_MAX_BYTES = 256 << 20 };
 
-/* Of the running program: another build may trace other numbers, which must not be mixed with those of the run before. 0
- * where the system does not show it. */
+/* Checksum of the running program, because another build may trace other numbers, which must not be mixed with those
+ * of an earlier run. 0 where the system does not show the program. */
 static uint32_t program_sum(void)
 {
     char *text = NULL;

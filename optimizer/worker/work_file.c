@@ -27,7 +27,8 @@ static uint32_t checksum(uint32_t sum, const void *data, size_t n_bytes)
     return (uint32_t)crc32_z(sum, data, n_bytes);
 }
 
-/* Sections go through in pieces, so that large ones need not be resident as a whole. */
+/* Size of the next piece of a section: large sections are read and written in pieces, so that they need not be
+ * resident as a whole. */
 static size_t chunk(const struct work_section *s, size_t at)
 {
     size_t left = s->n_bytes - at;
@@ -70,8 +71,8 @@ status work_file_write(const char *path, const char *tag, const struct work_sect
     return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
 }
 
-/* Memory for what is read: the section's own, or a copy aside of what the caller has (such sections are small), which is to
- * stay as it is when the checksum is wrong. */
+/* Provides memory for a section that is read: its own, or, if the caller gives the memory (such sections are small),
+ * a copy, so that the caller's data do not change when the checksum is wrong. */
 static status open_section(const char *path, const struct work_section *section, size_t n_bytes,
                            struct work_section *read, struct error *err)
 {
@@ -108,7 +109,8 @@ static status read_sections(FILE *f, const char *path, const struct work_header 
     return STATUS_OK;
 }
 
-/* Of a section that was read: handed over, copied, or dropped. */
+/* Ends the reading of a section: a good one is given to the caller or copied to the caller's memory, any other is
+ * released. */
 static void close_section(bool good, struct work_section *section, struct work_section *read)
 {
     if (section->data != NULL) {
@@ -121,7 +123,7 @@ static void close_section(bool good, struct work_section *section, struct work_s
     }
 }
 
-/* Sizes that cannot be true must not reach malloc. */
+/* Checks the header, so that impossible sizes do not reach malloc. */
 static status check_header(FILE *f, const char *path, const struct work_header *h, const char *tag, size_t n_section,
                            struct error *err)
 {

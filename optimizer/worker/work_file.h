@@ -13,14 +13,17 @@ enum { WORK_FILE_MAX_SECTION = 32, WORK_FILE_TAG_BYTES = 16 };
 struct work_section {
     void *data;
     size_t n_bytes;
-    struct scratch_space *space; /* of data, kept within its limit while bytes are copied; NULL: plain memory */
+    struct scratch_space *space; /* scratch space of data; NULL: data is plain memory */
 };
 
-/* tag: what is in it and in which version, such as "fibers.1". STATUS_INTERNAL beyond WORK_FILE_MAX_SECTION sections, here and below. */
+/* tag: content and version of the file, such as "fibers.1". STATUS_IO, STATUS_DISK_FULL; STATUS_INTERNAL for more
+ * than WORK_FILE_MAX_SECTION sections, here and below. */
 status work_file_write(const char *path, const char *tag, const struct work_section *section, size_t n_section,
                        struct error *err);
-/* section[i].data == NULL: memory is taken from the section's space (scratch_release; free() without a space) and n_bytes set; otherwise the stored size must be n_bytes. On
- * failure nothing is left to free and data given are as they were. STATUS_NOT_FOUND when there is no file; STATUS_FORMAT, STATUS_CHECKSUM. */
+/* Reads all sections. If section[i].data is NULL, memory is taken from the section's space (release it by
+ * scratch_release, or by free() without a space) and n_bytes is set; otherwise the stored size must be n_bytes. After
+ * an error there is nothing to free, and given data are unchanged. STATUS_NOT_FOUND when there is no file;
+ * STATUS_FORMAT, STATUS_CHECKSUM. */
 status work_file_read(const char *path, const char *tag, struct work_section *section, size_t n_section,
                       struct error *err);
 

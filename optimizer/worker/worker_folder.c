@@ -21,7 +21,7 @@ void worker_folder_path(const struct worker_folder *f, const char *a, const char
     snprintf(path, WORKER_PATH_BYTES, "%s/%s%s%s", f->path, a, b != NULL ? "/" : "", b != NULL ? b : "");
 }
 
-/* attempt.json; number 0 and an empty token when there is none. */
+/* Reads attempt.json; without that file the number is 0 and the token empty. */
 static status read_attempt(const struct worker_folder *f, long long *attempt, char *token, size_t n_token,
                            struct error *err)
 {
@@ -110,7 +110,7 @@ static int remove_entry(const char *path, const struct stat *st, int kind, struc
     return at->level == 0 ? 0 : remove(path);
 }
 
-/* Everything in a folder of ours, links not followed. */
+/* Removes everything in a folder of the job; links are not followed. */
 static status empty_folder(const struct worker_folder *f, const char *name, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -131,7 +131,8 @@ status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t finger
         free(have);
         if (!*changed) return STATUS_OK;
     }
-    /* also without a fingerprint: a worker that was killed here may have removed it and left the marks of stages */
+    /* also without a stored fingerprint: a worker that was killed here may have removed it and left the marks of
+     * stages */
     status s = worker_folder_check(f, err);
     if (s == STATUS_OK) s = empty_folder(f, JOB_FOLDER_WORK, err);
     if (s == STATUS_OK) s = empty_folder(f, JOB_FOLDER_RESULTS, err);

@@ -16,15 +16,15 @@ struct worker_folder {
     char token[256];   /* "" when run by hand */
 };
 
-/* Takes the lock and notes the attempt; makes work/ and results/. STATUS_NOT_FOUND: no such folder; STATUS_STALE:
- * another worker holds it. */
+/* Takes the lock, reads the attempt, and makes work/ and results/. STATUS_NOT_FOUND: there is no such folder;
+ * STATUS_STALE: another worker holds it. */
 status worker_folder_open(struct worker_folder *f, const char *path, struct error *err);
 void worker_folder_close(struct worker_folder *f);
-/* STATUS_STALE when attempt.json names another attempt by now. Called before every durable write. */
+/* STATUS_STALE when attempt.json names another attempt by now. To be called before every durable write. */
 status worker_folder_check(const struct worker_folder *f, struct error *err);
-/* "JOB/a/b"; b may be NULL. */
+/* Writes "JOB/a/b" to path; b may be NULL. */
 void worker_folder_path(const struct worker_folder *f, const char *a, const char *b, char path[WORKER_PATH_BYTES]);
-/* Check, then durable_replace. */
+/* worker_folder_check, then durable_replace. */
 status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes,
                              struct error *err);
 
@@ -34,10 +34,10 @@ status worker_folder_replace(const struct worker_folder *f, const char *path, co
 status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed,
                                   struct error *err);
 
-/* Marks of stages whose outputs are whole: work/<stage>.done. */
+/* A stage whose outputs are complete has the mark work/<stage>.done. */
 bool worker_folder_stage_done(const struct worker_folder *f, const char *stage);
 status worker_folder_mark_stage(const struct worker_folder *f, const char *stage, struct error *err);
-/* The stage is to run again, its mark goes; none there is no error. */
+/* Removes the mark of a stage that is to run again. It is no error if there is none. */
 status worker_folder_unmark_stage(const struct worker_folder *f, const char *stage, struct error *err);
 
 #endif

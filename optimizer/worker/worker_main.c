@@ -58,7 +58,7 @@ static int print_catalogue(void)
     return ok && putchar('\n') != EOF ? WORKER_SUCCEEDED : WORKER_FAILED;
 }
 
-/* -1: go on; otherwise the exit status. */
+/* Returns -1 to go on, otherwise the exit status of the program. */
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
     static const struct option option[] = {{"threads", required_argument, NULL, 't'},
@@ -117,7 +117,8 @@ static void pass_on(int signal_number, siginfo_t *info, void *context)
     kill(getpid(), signal_number);
 }
 
-/* SIGTERM and SIGINT belong to the status thread; a broken pipe is an error, not a death. */
+/* Blocks SIGTERM and SIGINT, which the status thread waits for, and ignores SIGPIPE, so that a broken pipe is an
+ * error of write. */
 static void set_signals(void)
 {
     struct sigaction action = {.sa_sigaction = pass_on, .sa_flags = SA_SIGINFO | SA_RESTART};
@@ -141,7 +142,7 @@ static status run_job(struct pipeline_context *c, size_t n_thread, struct error 
     return s;
 }
 
-/* The state that the outcome means, written to status.json and the log. */
+/* Writes the final state that follows from the outcome to status.json and the log. Returns the exit status. */
 static int conclude(struct worker_status *st, struct log *log, status outcome, const struct error *error)
 {
     struct error err = {0};

@@ -13,7 +13,7 @@
 struct worker_series {
     const struct worker_folder *folder;
     char path[WORKER_PATH_BYTES];
-    uint64_t *end; /* end[i]: byte behind record i of the file */
+    uint64_t *end; /* end[i]: first byte after record i of the file */
     size_t n_record, capacity;
     size_t i_next; /* number of the next record */
 };
@@ -75,7 +75,7 @@ void worker_series_close(struct worker_series *s)
     free(s);
 }
 
-/* What the numbers in "parameter" are: with the first step of each model. */
+/* Describes the numbers in "parameter"; written with the first step of each model. */
 static json_t *parameters_json(const struct worker_series_model *model)
 {
     json_t *list = json_array();
@@ -115,7 +115,7 @@ static char *record_text(const struct fit_step *step, const struct worker_series
         json_number(step->damping), "noise", json_number(step->noise), "note", step->note != NULL ? step->note : "");
     if (json != NULL && step->step == 0) json_object_set_new(json, "parameters", parameters_json(model));
     if (json != NULL) {
-        json_t *paths = json_array(); /* of both replicas, a row */
+        json_t *paths = json_array(); /* paths of both replicas, per row */
         for (size_t i = 0; i < step->n_configuration; i++)
             json_array_append_new(paths,
                                   json_integer((json_int_t)(step->replica[0][i].n_path + step->replica[1][i].n_path)));

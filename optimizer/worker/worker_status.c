@@ -27,11 +27,11 @@ struct worker_status {
     char stage[64], message[300];
     size_t i_stage, n_stage;
     double base, weight, stage_fraction;
-    double started_s, started_unix_s, first_fraction; /* first_fraction: what earlier attempts had done */
+    double started_s, started_unix_s, first_fraction; /* first_fraction: fraction that earlier attempts had done */
     bool has_objective;
     size_t step;
     double objective, objective_se;
-    size_t n_warning, n_more; /* more: in the log only */
+    size_t n_warning, n_more; /* n_more: warnings that are in the log only */
     char warning[MAX_WARNING][WARNING_BYTES];
 };
 
@@ -56,7 +56,7 @@ static json_t *error_json(const struct error *error)
     return json_pack("{s:s, s:s, s:s}", "code", status_name(error->code), "field", error->field, "text", error->text);
 }
 
-/* With the mutex held. */
+/* To be called with the mutex held. */
 static char *status_text(const struct worker_status *st, const char *state, const struct error *error)
 {
     bool over = strcmp(state, "running") != 0;
@@ -93,7 +93,7 @@ static void beat(struct worker_status *st)
     pthread_mutex_lock(&st->mutex);
     char *text = status_text(st, "running", NULL);
     pthread_mutex_unlock(&st->mutex);
-    /* a heartbeat that cannot be written (disk full) is no reason to lose the work */
+    /* a heartbeat that cannot be written, because the disk is full, must not end the job */
     if (text != NULL && durable_replace_volatile(path, text, strlen(text), &err) != STATUS_OK)
         log_warning(st->log, "%s", err.text);
     free(text);
@@ -224,7 +224,7 @@ void worker_status_objective(struct worker_status *st, size_t step, double objec
     pthread_mutex_unlock(&st->mutex);
 }
 
-/* With the mutex held. The last place of the list counts what finds none. */
+/* To be called with the mutex held. When the list is full, its last entry counts the other warnings. */
 static void add_warning(struct worker_status *st, const char *text)
 {
     if (st->n_warning < MAX_WARNING - 1) {

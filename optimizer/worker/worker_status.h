@@ -1,6 +1,5 @@
-/* status.json and the thread that keeps it fresh; the same thread waits for SIGTERM and SIGINT and sets the cancel
- * flag, and notices when the attempt has become stale. All functions may be called from any thread.
- */
+/* status.json, and the thread that rewrites it several times a second. The same thread waits for SIGTERM and SIGINT
+ * and sets the cancel flag, also when the attempt has become stale. All functions may be called from any thread. */
 #ifndef SELVEDGE_OPTIMIZER_WORKER_STATUS_H
 #define SELVEDGE_OPTIMIZER_WORKER_STATUS_H
 
@@ -24,19 +23,20 @@ void worker_status_free(struct worker_status *st);
 const atomic_bool *worker_status_cancel(const struct worker_status *st);
 bool worker_status_stale(const struct worker_status *st);
 
-/* Stage i_stage of n_stage begins; base and weight: the whole job's fraction before it and its share. */
+/* Begins stage i_stage of n_stage. base: fraction of the whole job that is done before it; weight: its share of the
+ * job. */
 void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage,
                          double base, double weight);
 void worker_status_fraction(struct worker_status *st, double stage_fraction);
-/* What is done so far cost nothing (an earlier attempt did it): the remaining time is estimated from here on. */
+/* Estimates the remaining time from here on, because what is done so far was done by an earlier attempt. */
 void worker_status_restart_eta(struct worker_status *st);
 void worker_status_message(struct worker_status *st, const char *text);
 void worker_status_objective(struct worker_status *st, size_t step, double objective, double se);
-/* Formats a warning as printf does, keeps it in the list and writes it to the log; a warning that the list has already is
- * not added again. From the 50th on they are in the log only, and the list's last entry counts them. */
+/* Formats a warning as printf does, keeps it in the list and writes it to the log; a warning that the list has
+ * already is not added again. From the 50th on they are in the log only, and the list's last entry counts them. */
 void worker_status_warn(struct worker_status *st, const char *format, ...) __attribute__((format(printf, 2, 3)));
 size_t worker_status_n_warning(struct worker_status *st);
-/* Copies warning i; false when there is none. */
+/* Copies warning i to text. Returns false when there is none. */
 bool worker_status_warning(struct worker_status *st, size_t i, char *text, size_t n_bytes);
 
 #endif

@@ -265,7 +265,7 @@ static void fit_analytic(const char *method, uint64_t seed, struct fit_curve *c)
         parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
     const struct fit_problem problem = {.n_param = FAKE_N_PARAM,
                                         .info = fake_param,
-                                        .param = parameter,
+                                        .parameter = parameter,
                                         .observation = &o,
                                         .estimator = &e,
                                         .report = bench_on_step,

@@ -74,7 +74,7 @@ void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t see
     curve->n_param = f->model.n_param;
     const struct fit_problem problem = {.n_param = f->model.n_param,
                                         .info = f->model.param,
-                                        .param = parameter,
+                                        .parameter = parameter,
                                         .observation = &f->fitted,
                                         .estimator = &estimator,
                                         .path_budget = budget,

@@ -94,7 +94,7 @@ static void fit(const struct volume_scene *scene, size_t n, uint64_t budget, str
     struct estimator e = trace_estimator(&t);
     const struct fit_problem problem = {.n_param = model.n_param,
                                         .info = model.param,
-                                        .param = parameter,
+                                        .parameter = parameter,
                                         .observation = &o,
                                         .estimator = &e,
                                         .path_budget = budget};

@@ -36,7 +36,7 @@ void descent_fixture_init(struct descent_fixture *x, uint64_t seed, uint64_t pat
         x->parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
     x->problem = (struct fit_problem){.n_param = FAKE_N_PARAM,
                                       .info = fake_param,
-                                      .param = x->parameter,
+                                      .parameter = x->parameter,
                                       .observation = &x->observation,
                                       .estimator = &x->estimator,
                                       .path_budget = path_budget,

@@ -41,7 +41,7 @@ void fit_fixture_init(struct fit_fixture *x, const double *file_unit, uint64_t s
         x->parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
     x->problem = (struct fit_problem){.n_param = FAKE_N_PARAM,
                                       .info = fake_param,
-                                      .param = x->parameter,
+                                      .parameter = x->parameter,
                                       .observation = &x->observation,
                                       .estimator = &x->estimator,
                                       .path_budget = 2000000,

@@ -22,7 +22,8 @@ static double evaluate(unsigned n, const double *y, double *gradient, void *cont
     return value;
 }
 
-/* Exact coordinate minimisation in turns: what is left after nlopt stops at its tolerance. */
+/* Minimises exactly along one coordinate after the other, which removes what is left after nlopt stops at its
+ * tolerance. */
 static void polish(const struct quadratic *q, const double *lower, const double *upper, double *y)
 {
     for (int sweep = 0; sweep < 200; sweep++) {
@@ -47,7 +48,8 @@ status bounded_quadratic(const double *hessian, const double *g, const double *l
 {
     struct quadratic q = {hessian, g, n};
     double value;
-    for (size_t i = 0; i < n; i++) y[i] = fmin(fmax(0.0, lower[i]), upper[i]); /* by rounding 0 may lie outside */
+    for (size_t i = 0; i < n; i++)
+        y[i] = fmin(fmax(0.0, lower[i]), upper[i]); /* rounding may have put 0 outside of the bounds */
     nlopt_opt opt = nlopt_create(NLOPT_LD_SLSQP, (unsigned)n);
     if (opt == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot solve for a step: out of memory");
     nlopt_set_min_objective(opt, evaluate, &q);

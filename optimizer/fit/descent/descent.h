@@ -24,7 +24,7 @@ struct fit_start {
     double objective, objective_se, prior_penalty;
     bool converged;
     bool kept;
-    bool elsewhere; /* as good as the kept one within the noise, but ended at other parameters */
+    bool elsewhere; /* its objective equals that of the kept one within the noise, but its parameters differ */
     uint64_t n_path;
 };
 
@@ -32,15 +32,15 @@ struct fit_start {
 struct fit_step {
     size_t step;
     const char *phase;
-    double wall_s; /* since the fit began, this and all earlier attempts */
+    double wall_s; /* since the fit began, summed over this attempt and all earlier ones */
     uint64_t n_path, n_path_total;
     struct objective_value objective;
     size_t n_param, n_configuration;
     const double *param;    /* where the objective was estimated */
     const double *param_se; /* NULL when unknown */
     const struct estimate *replica[2];
-    /* Of the step that led here: its largest move and the limit that it had, both in step limits (coordinate.h), the decrease
-     * of the objective that it was predicted to bring, and the damping added to the diagonal. */
+    /* Of the step that led here: its largest move and the limit that it had, both in step limits (coordinate.h), the
+     * decrease of the objective that it was predicted to bring, and the damping added to the diagonal. */
     double step_length, step_limit, decrease, damping;
     double noise; /* mean Monte-Carlo variance of a residual of the pooled model */
     const char *note;
@@ -49,49 +49,52 @@ struct fit_step {
 
 struct fit_problem {
     size_t n_param;
-    const struct param_info *info; /* of the model */
-    const struct fit_parameter *param;
-    const struct observation_set *observation; /* fitted ones only; one configuration of the estimator each; contrasts
-                                                  behind all radiances */
+    const struct param_info *info;         /* of the model */
+    const struct fit_parameter *parameter; /* bounds, start and fixed flag of each */
+    /* the fitted ones, each of which is one configuration of the estimator; contrasts come after all radiances */
+    const struct observation_set *observation;
     const struct estimator *estimator;
     uint64_t path_budget;                                                            /* 0: the method's default */
     size_t max_iteration;                                                            /* 0: the method's default */
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
-    const struct progress *progress; /* fraction of the budget; cancel */
-    const struct gaussian_prior
-        *prior;     /* n_param, fit coordinates; NULL: none. Methods that know no priors ignore it */
-    double gain_sd; /* of ln gain of every configuration, marginalised; 0: none. Likewise */
+    const struct progress *progress;    /* reports the fraction of the budget that is used */
+    const struct gaussian_prior *prior; /* n_param, in fit coordinates; NULL: none. Methods without priors ignore it */
+    /* standard deviation of ln gain of every configuration, which is marginalised; 0: none. Methods without gains
+     * ignore it */
+    double gain_sd;
 };
 
 struct fit_result {
     double param[SCATTERING_MAX_PARAM];
     bool converged;
     enum stop_reason stop;
-    char reason[240]; /* the same as a sentence, with numbers */
+    char reason[240]; /* the stop reason as a sentence with numbers */
     size_t n_step;
     uint64_t n_path;
     double wall_s;
     struct objective_value objective; /* predicted at `param` by all estimates of the fit together */
     struct uncertainty uncertainty;
     double prior_penalty; /* what the priors add to the objective at `param` */
-    /* Filled in by fit_run (fit_run.h): */
+    /* The fields below are filled in by fit_run (fit_run.h). */
     struct fit_nuisance nuisance;
-    double unknown[SCATTERING_MAX_PARAM]; /* of fit_layout.h: leaders of ties and nuisance terms */
+    /* values of the unknowns of fit_layout.h: leaders of ties and nuisance terms */
+    double unknown[SCATTERING_MAX_PARAM];
     struct uncertainty unknown_uncertainty;
-    size_t n_start; /* entries of start; 0: there was one only */
+    size_t n_start; /* entries of start; 0 when there was only one start */
     struct fit_start start[FIT_MAX_START];
 };
 
 struct descent_method {
     const struct method_info *info; /* its row of the catalogue */
-    bool plain_paths;               /* estimator.h */
-    /* Paths that a fit takes however small its budget is: with this budget, or more, it stays inside. */
+    bool plain_paths;               /* the method traces plain paths (estimator.h) */
+    /* Least number of paths that a fit takes, however small its budget is. A fit with at least this budget keeps to
+     * it. */
     uint64_t (*least_budget)(const struct fit_problem *problem);
     status (*run)(const struct fit_problem *problem, struct fit_result *result, struct error *err);
 };
 
-/* All methods, NULL-terminated, in the order of the catalogue; and by id (NULL when unknown). */
+/* All methods in the order of the catalogue, NULL-terminated; and one by its id, NULL when there is none. */
 const struct descent_method *const *descent_registry(void);
 const struct descent_method *descent_find(const char *id);
 

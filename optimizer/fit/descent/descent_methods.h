@@ -1,4 +1,4 @@
-/* The methods that the registry lists; and what they share. Nobody outside this folder includes this. */
+/* Inside descent/: the methods that the registry lists, and the functions that they share. */
 #ifndef SELVEDGE_OPTIMIZER_DESCENT_METHODS_H
 #define SELVEDGE_OPTIMIZER_DESCENT_METHODS_H
 
@@ -13,26 +13,28 @@ struct descent_run {
     struct coordinate coordinate[SCATTERING_MAX_PARAM];
     bool fixed[SCATTERING_MAX_PARAM];
     size_t *n_path;              /* per configuration, for the next call */
-    struct estimate *replica[2]; /* what the last descent_estimate gave */
+    struct estimate *replica[2]; /* of the last descent_estimate */
     uint64_t path_budget, n_path_total, n_path_step;
     size_t n_step;
     double wall_s;
-    bool plain_paths; /* the method's */
+    bool plain_paths; /* of the method */
 };
 
 status descent_run_init(struct descent_run *run, const struct fit_problem *problem, const struct descent_method *method,
                         struct error *err);
 void descent_run_release(struct descent_run *run);
 
-/* Two independent replicas at param with run->n_path paths each. */
+/* Estimates two independent replicas at param with run->n_path paths each, into run->replica. Errors are the
+ * estimator's. */
 status descent_estimate(struct descent_run *run, const double *param, uint32_t iteration, bool want_jacobian,
                         struct error *err);
-/* Fills the totals into step and hands it to the problem's listener; counts the step. */
+/* Counts the step, fills the totals into it, and calls the problem's report function, whose error it returns. */
 status descent_report(struct descent_run *run, struct fit_step *step, struct error *err);
 /* STATUS_INVALID: fewer than one observation, a start outside its bounds, more parameters than SCATTERING_MAX_PARAM. */
 status descent_check(const struct fit_problem *problem, struct error *err);
 
-/* Minimise g.y + y'Hy/2 over lower <= y <= upper (lower <= 0 <= upper); H positive semi-definite. nlopt's SLSQP. */
+/* Minimises g.y + y'Hy/2 over lower <= y <= upper, with lower <= 0 <= upper and a positive semi-definite H (n x n),
+ * by nlopt's SLSQP. STATUS_NO_MEMORY; STATUS_NUMERIC when H or g is not finite. */
 status bounded_quadratic(const double *hessian, const double *g, const double *lower, const double *upper, size_t n,
                          double *y, struct error *err);
 

@@ -14,7 +14,7 @@ status descent_check(const struct fit_problem *problem, struct error *err)
         return error_set(err, STATUS_INVALID, "cannot fit %zu observations with an estimator of %zu configurations",
                          problem->observation->n, problem->estimator->n_configuration);
     for (size_t p = 0; p < problem->n_param; p++) {
-        const struct fit_parameter *k = &problem->param[p];
+        const struct fit_parameter *k = &problem->parameter[p];
         if (!(k->start >= k->lower && k->start <= k->upper))
             return error_set_field(
                 err, STATUS_INVALID, OPTION_START, "parameter '%s' starts at %g: its bounds are %g and %g",
@@ -39,8 +39,9 @@ status descent_run_init(struct descent_run *run, const struct fit_problem *probl
     if (run->n_path == NULL || run->replica[0] == NULL || run->replica[1] == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot fit %zu observations: out of memory", n);
     for (size_t p = 0; p < problem->n_param; p++) {
-        coordinate_init(&run->coordinate[p], &problem->info[p], problem->param[p].lower, problem->param[p].upper);
-        run->fixed[p] = problem->param[p].fixed;
+        coordinate_init(&run->coordinate[p], &problem->info[p], problem->parameter[p].lower,
+                        problem->parameter[p].upper);
+        run->fixed[p] = problem->parameter[p].fixed;
     }
     return STATUS_OK;
 }

@@ -22,10 +22,10 @@ struct estimate_journal {
     void *may_write_context;
     bool replaying;
     size_t n_replayed;
-    off_t end;      /* behind the last record that is in use */
+    off_t end;      /* after the last record in use */
     size_t n_bytes; /* of a payload: the same for every call of one fit */
     uint8_t *payload, *record;
-    uint8_t *asked; /* the call part of a payload, to compare with */
+    uint8_t *asked; /* call part of the payload expected next */
 };
 
 struct call_header {
@@ -56,7 +56,7 @@ static void get(const uint8_t **p, void *data, size_t n)
     *p += n;
 }
 
-/* The part of a payload that says what was asked; returns the place behind it. */
+/* Writes the call part of a payload to a buffer and returns the place after it. */
 static uint8_t *put_call(const struct estimate_journal *j, const struct estimator_call *call, double wall_s,
                          uint8_t *to)
 {
@@ -190,7 +190,8 @@ void estimate_journal_close(struct estimate_journal *j)
     free(j);
 }
 
-/* Answer from the file; false (and the replay is over) when the next record is absent, damaged or of another call. */
+/* Answers a call from the file. Returns false, which ends the replay, when the next record is absent, damaged or of
+ * another call. */
 static bool replay(struct estimate_journal *j, const struct estimator_call *call, struct estimate *out, double *wall_s)
 {
     uint32_t head[2];

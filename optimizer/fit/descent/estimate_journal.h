@@ -16,9 +16,10 @@
 
 struct estimate_journal;
 
-/* live: answers what the journal cannot; kept by reference. may_write: asked before each record is written (NULL:
- * always). fingerprint: of everything an estimate depends on beside the call; a file with another one is started anew.
- */
+/* Opens or creates the journal at path. live: the estimator that answers calls which the journal cannot; it must
+ * outlive the journal. may_write is called before each record is written, and its error is returned (NULL: writing is
+ * always allowed). fingerprint: of everything but the call that an estimate depends on; a file with another one is
+ * started anew. STATUS_IO, STATUS_NO_MEMORY. */
 status estimate_journal_open(const char *path, uint64_t fingerprint, const struct estimator *live,
                              status (*may_write)(void *context, struct error *err), void *may_write_context,
                              struct estimate_journal **journal, struct error *err);

@@ -7,7 +7,7 @@
 #include "base/progress.h"
 #include "renderer/transport/estimate/estimate.h"
 
-/* Which replica numbers (rng.h) are used for what: streams of different uses never meet. */
+/* Replica numbers (rng.h) of the different uses of an estimator. Each use has its own random streams. */
 enum estimator_replica {
     REPLICA_FIT_A = 0,
     REPLICA_FIT_B = 1,

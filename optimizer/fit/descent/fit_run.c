@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM, KEY_STRIDE = 4096 }; /* iteration keys of one start; rng.h has 65536 */
+enum { N = SCATTERING_MAX_PARAM, KEY_STRIDE = 4096 }; /* iteration keys of one start, out of the 65536 of rng.h */
 
 struct fit {
     const struct fit_problem *problem; /* in the model's parameters */
@@ -15,7 +15,7 @@ struct fit {
     struct fit_layout layout;
     struct estimate *buffer; /* what the renderer gave */
     size_t i_start;
-    size_t n_step; /* of the starts before this one, as the next two */
+    size_t n_step; /* steps of the starts before this one; the next two likewise */
     uint64_t n_path;
     double wall_s;
     uint64_t path_budget; /* of one start; 0: the method's own */
@@ -173,7 +173,7 @@ static status run_start(struct fit *f, const struct descent_method *method, size
     f->i_start = k;
     p.n_param = layout.n_unknown;
     p.info = layout.info;
-    p.param = layout.parameter;
+    p.parameter = layout.parameter;
     p.estimator = &e;
     p.path_budget = f->path_budget;
     p.report = f->problem->report != NULL ? report : NULL;
@@ -196,15 +196,15 @@ static status run_start(struct fit *f, const struct descent_method *method, size
     return STATUS_OK;
 }
 
-/* b's objective minus a's, and its standard error. */
+/* Objective of b minus that of a, both with their prior penalties, and its standard error. */
 static double difference(const struct fit_start *a, const struct fit_start *b, double *se)
 {
     *se = hypot(a->objective_se, b->objective_se);
     return b->objective + b->prior_penalty - a->objective - a->prior_penalty;
 }
 
-/* Marks converged starts that the objective cannot tell from the kept one, although a determined parameter ended more than four
- * standard errors away. */
+/* Marks converged starts whose objective equals that of the kept one within the noise although a determined parameter
+ * differs by more than four standard errors. */
 static void mark_elsewhere(struct fit_result *r, size_t kept)
 {
     for (size_t k = 0; k < r->n_start; k++) {
@@ -256,7 +256,7 @@ status fit_run(const struct descent_method *method, const struct fit_problem *pr
     f->problem = problem;
     f->option = option != NULL ? option : &none;
     memset(result, 0, sizeof *result);
-    status s = fit_layout_init(&f->layout, problem->info, problem->param, problem->n_param, f->option, err);
+    status s = fit_layout_init(&f->layout, problem->info, problem->parameter, problem->n_param, f->option, err);
     if (s == STATUS_OK && (f->option->n_start < 1 || f->option->n_start > FIT_MAX_START))
         s = error_set_field(err, STATUS_INVALID, OPTION_STARTS, "cannot fit from %zu starts: allowed are 1 to %d",
                             f->option->n_start, FIT_MAX_START);

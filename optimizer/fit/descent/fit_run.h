@@ -15,11 +15,12 @@
 
 #include "optimizer/fit/descent/descent.h"
 
-/* problem: in the model's parameters; its prior and gain_sd are not looked at. option NULL: none. */
+/* problem: in the model's parameters; its prior and gain_sd are ignored. option: NULL for none. Errors are those of
+ * fit_layout_init and of the method. */
 status fit_run(const struct descent_method *method, const struct fit_problem *problem, const struct fit_option *option,
                struct fit_result *result, struct error *err);
 
-/* Start k >= 1 of a layout: values of the unknowns. */
+/* Writes the values of the unknowns at start k >= 1 of a layout. */
 void fit_run_start(const struct fit_layout *l, size_t k, double *unknown);
 
 #endif

@@ -33,7 +33,8 @@ static const double least_limit = 1.0 / 32.0; /* smallest factor of the step lim
 static void param_of(const struct gauss_newton *g, const double *x, double *param)
 {
     for (size_t p = 0; p < g->model.n_param; p++)
-        param[p] = g->run.fixed[p] ? g->run.problem->param[p].start : coordinate_to_param(&g->run.coordinate[p], x[p]);
+        param[p] =
+            g->run.fixed[p] ? g->run.problem->parameter[p].start : coordinate_to_param(&g->run.coordinate[p], x[p]);
 }
 
 /* Paths of each configuration for the next estimate, in proportion to the standard deviation of one path, between a
@@ -210,7 +211,7 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     g.model.gain_sd = problem->gain_sd;
     for (size_t p = 0; p < problem->n_param; p++) g.n_free += !g.run.fixed[p];
     for (size_t p = 0; p < problem->n_param; p++)
-        g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->param[p].start);
+        g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->parameter[p].start);
     if (problem->path_budget ==
         0) /* with many rows the default budget grows to that of LEAST_ITERATION iterations with the fewest paths */
         g.run.path_budget = (uint64_t)fmax((double)g.run.path_budget, LEAST_ITERATION * (double)least_budget(problem));

@@ -47,7 +47,7 @@ static bool pull_target(const struct gauss_newton *g, size_t p, double *x)
 {
     const struct coordinate *k = &g->run.coordinate[p];
     const struct param_info *info = &g->run.problem->info[p];
-    double start = g->run.problem->param[p].start;
+    double start = g->run.problem->parameter[p].start;
     bool width = info->kind == PARAM_LOBE_WIDTH;
     *x = coordinate_from_param(k, start);
     if (width && start == info->start) *x = fmax(*x, k->lower + wide_share * (k->upper - k->lower));

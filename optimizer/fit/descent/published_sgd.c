@@ -1,15 +1,16 @@
 /* published_sgd.v1: the optimizer of the fabric thesis (5.5.4, 5.5.5, B.1), so that results can be compared.
  *
- * Rescaling curves first (rescale.h). Then six runs from the start with the step a / i, i = 50, 51, ..., 60 iterations
- * each, with exponentially spaced a; the run with the lowest final objective wins; if it still oscillates, 10 more
- * iterations at a tenth of its last step. Every iteration renders all configurations twice (two replicas). As published
- * that is 64 x 64 x 64 paths a configuration and replica.
+ * Rescaling curves first (rescale.h). Then six runs from the start with the step a / i, i = 50, 51, ..., 60
+ * iterations each, with exponentially spaced a; the run with the lowest final objective wins; if it still oscillates,
+ * 10 more iterations at a tenth of its last step. Every iteration renders all configurations twice (two replicas). As
+ * published that is 64 x 64 x 64 paths a configuration and replica.
  *
- * Differs: the thesis does not give the six values of a; here they grow by a factor of 3, and the first step moves the
- * parameter that moves most by 0.5 % .. 120 % of its rescaled range. "Final objective" is the mean over the last five
- * iterations of a run: the value of one iteration is noisy. "Oscillates" means that successive steps point against each
- * other on average; below a mean cosine of turn_limit, over at least N_EXTRA pairs of steps, counts as converged. A parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors
- * come from 4 more estimates at the winner.
+ * Differs: the thesis does not give the six values of a; here they grow by a factor of 3, and the first step moves
+ * the parameter that moves most by 0.5 % .. 120 % of its rescaled range. "Final objective" is the mean over the last
+ * five iterations of a run: the value of one iteration is noisy. "Oscillates" means that successive steps point
+ * against each other on average; below a mean cosine of turn_limit, over at least N_EXTRA pairs of steps, counts as
+ * converged. A parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors come
+ * from 4 more estimates at the winner.
  */
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/rescale.h"
@@ -30,11 +31,12 @@ struct sgd {
     struct rescale_curve curve[N];
     double param[N];
     double last_step[N];      /* in r */
-    double a;                 /* of this run */
-    double objective[N_LAST]; /* ring of the last ones */
-    double turn;              /* fading sum over some N_EXTRA steps of the cosine with the step before; mean_turn */
-    size_t i;                 /* iterations of this run so far */
-    uint32_t next_key;        /* iteration number of the random key */
+    double a;                 /* of the present run */
+    double objective[N_LAST]; /* ring buffer of the last objectives */
+    /* exponentially fading sum, over some N_EXTRA steps, of the cosine between successive steps; see mean_turn */
+    double turn;
+    size_t i;          /* iterations of this run so far */
+    uint32_t next_key; /* iteration number of the random key */
 };
 
 /* Descent direction in r: df/dr = df/dp dp/dr; zero for fixed parameters. */
@@ -82,11 +84,11 @@ static status iterate(struct sgd *g, const char *phase, double rate, struct erro
     return STATUS_OK;
 }
 
-/* Steps of this run that had one before to be compared with. */
+/* Number of steps of this run that have a predecessor in it. */
 static size_t n_compared(const struct sgd *g) { return g->i > 0 ? g->i - 1 : 0; }
 
-/* Mean cosine of successive steps, the last ones counting most. The sum began at 0, as if earlier steps had stood at right
- * angles: that part is taken out. */
+/* Mean cosine of successive steps, in which the last ones count most. The division corrects for the sum's start at 0,
+ * which acts like earlier steps at right angles. */
 static double mean_turn(const struct sgd *g)
 {
     double known = 1.0 - pow(1.0 - 1.0 / N_EXTRA, (double)n_compared(g));
@@ -116,7 +118,7 @@ static status first_rate(struct sgd *g, double *a, struct error *err)
 
 static void start_run(struct sgd *g, double a)
 {
-    for (size_t p = 0; p < g->run.problem->n_param; p++) g->param[p] = g->run.problem->param[p].start;
+    for (size_t p = 0; p < g->run.problem->n_param; p++) g->param[p] = g->run.problem->parameter[p].start;
     memset(g->last_step, 0, sizeof g->last_step);
     g->a = a;
     g->turn = 0.0;
@@ -149,7 +151,7 @@ static status run_all(struct sgd *g, size_t n_iteration, double a, struct winner
     return STATUS_OK;
 }
 
-static status settle(struct sgd *g, const struct winner *best, struct error *err)
+static status iterate_more(struct sgd *g, const struct winner *best, struct error *err)
 {
     start_run(g, best->a);
     memcpy(g->param, best->param, sizeof g->param);
@@ -160,7 +162,7 @@ static status settle(struct sgd *g, const struct winner *best, struct error *err
     return STATUS_OK;
 }
 
-/* Whether the winner's run had come to rest, and why. */
+/* Decides whether the winner's run has converged, and writes the reason. */
 static void judge(const struct winner *best, struct fit_result *result)
 {
     bool at_end = best->i_run == 0 || best->i_run == N_RUN - 1, enough = best->n_compared >= N_EXTRA;
@@ -182,7 +184,7 @@ static void judge(const struct winner *best, struct fit_result *result)
                  best->n_compared, N_EXTRA);
 }
 
-/* Estimates at the winner only: objective and errors. */
+/* Estimates objective and errors at the winner from renderings at its parameters alone. */
 static status finish(struct sgd *g, const struct winner *best, struct fit_result *result, struct error *err)
 {
     const struct fit_problem *problem = g->run.problem;
@@ -214,7 +216,8 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
     return s;
 }
 
-/* Renderings of one configuration: the curves, the first rate, the runs, settling, the end. */
+/* Number of renderings of one configuration: for the curves, the first rate, the runs, the extra iterations and the
+ * end. */
 static double n_rendering(const struct fit_problem *problem, const struct coordinate *k)
 {
     size_t n_iteration =
@@ -223,7 +226,7 @@ static double n_rendering(const struct fit_problem *problem, const struct coordi
            2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
 }
 
-/* Of one rendering of every configuration with as few paths as there can be. */
+/* Paths of one rendering of every configuration with the fewest paths that an estimate takes. */
 static double least_rendering(const struct observation_set *o)
 {
     double sum = 0.0;
@@ -231,7 +234,8 @@ static double least_rendering(const struct observation_set *o)
     return sum;
 }
 
-/* A stated budget is met by so many times the fewest paths; that is then the whole of which the progress tells. */
+/* Meets a stated budget by a common multiple of the fewest paths. The progress then refers to the paths planned here.
+ */
 static void plan_paths(struct descent_run *run)
 {
     const struct observation_set *o = run->problem->observation;
@@ -249,7 +253,7 @@ static uint64_t least_budget(const struct fit_problem *problem)
 {
     struct coordinate k[N];
     for (size_t p = 0; p < problem->n_param; p++)
-        coordinate_init(&k[p], &problem->info[p], problem->param[p].lower, problem->param[p].upper);
+        coordinate_init(&k[p], &problem->info[p], problem->parameter[p].lower, problem->parameter[p].upper);
     return (uint64_t)(n_rendering(problem, k) * least_rendering(problem->observation));
 }
 
@@ -275,7 +279,7 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
     if (s == STATUS_OK) s = run_all(g, n_iteration, a, &best, err);
     if (s != STATUS_OK) goto out;
     if (best.turn < 0.0)
-        s = settle(g, &best, err);
+        s = iterate_more(g, &best, err);
     else
         memcpy(g->param, best.param, sizeof g->param);
     if (s == STATUS_OK) s = finish(g, &best, result, err);

@@ -87,7 +87,7 @@ static double curve_step(const struct observation_set *o, const struct estimate 
     return sum;
 }
 
-/* The next rendering as a part of the whole fit. */
+/* The progress of the next rendering as a part of the whole fit's. */
 static struct progress_part part_of_budget(const struct fit_problem *problem, const size_t *n_path,
                                            uint64_t n_path_used)
 {
@@ -98,7 +98,7 @@ static struct progress_part part_of_budget(const struct fit_problem *problem, co
         .outer = problem->progress, .from = from, .share = budget > 0.0 ? fmin(1.0 - from, call / budget) : 0.0};
 }
 
-/* What the measurement of all curves needs and counts. */
+/* Inputs, buffers and totals of the measurement of all curves. */
 struct measurement {
     const struct fit_problem *problem;
     const struct coordinate *k;
@@ -108,8 +108,8 @@ struct measurement {
     double wall_s;
 };
 
-/* One curve: all slots of the same symbol move together, each as far as its own bounds go (beyond those of a tied parameter
- * the ones that follow it would leave the model's). */
+/* Measures one curve. All slots of the same symbol move together, each within its own bounds, because beyond the
+ * bounds of a tied parameter the parameters that follow it would leave the model's range. */
 static status measure_symbol(struct measurement *m, size_t first, size_t n_slot, struct rescale_curve *curve,
                              struct error *err)
 {
@@ -117,7 +117,7 @@ static status measure_symbol(struct measurement *m, size_t first, size_t n_slot,
     const struct fit_problem *problem = m->problem;
     const struct coordinate *k = m->k;
     const struct estimator *e = problem->estimator;
-    for (size_t p = 0; p < problem->n_param; p++) param[p] = problem->param[p].start;
+    for (size_t p = 0; p < problem->n_param; p++) param[p] = problem->parameter[p].start;
     for (size_t j = 0; j < curve->n; j++) {
         for (size_t p = first; p < first + n_slot; p++)
             param[p] = fmin(fmax(curve->c[j], k[p].param_lower), k[p].param_upper);
@@ -136,7 +136,8 @@ static status measure_symbol(struct measurement *m, size_t first, size_t n_slot,
     return STATUS_OK;
 }
 
-/* First channel of the same colour with the same bounds, whose curve is also that of parameter i; i when there is none. */
+/* Returns the first channel of the same colour that has the bounds of parameter i, and so its curve too; i when there
+ * is none. */
 static size_t owner_of_curve(const struct fit_problem *problem, const struct coordinate *k, size_t i)
 {
     size_t same = i;

@@ -9,13 +9,13 @@
 struct coordinate {
     enum param_coordinate kind;
     double param_lower, param_upper; /* internal unit */
-    double lower, upper;             /* the same in the coordinate */
+    double lower, upper;             /* the bounds in the fit coordinate */
     double step_limit; /* largest step of one iteration: 1 in logit, 0.25 in log, 1/8 of the range otherwise */
 };
 
 /* lower and upper: bounds of this fit, inside those of the model. */
 void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper);
-/* The coordinate of a value inside the model's range, whatever the bounds of the fit are. */
+/* The coordinate of a value inside the model's range, without regard to the bounds of the fit. */
 double coordinate_of(const struct coordinate *k, double param);
 /* Values beyond a bound map to the bound; a coordinate at (or beyond) a bound gives exactly the bound. */
 double coordinate_from_param(const struct coordinate *k, double param);

@@ -28,7 +28,7 @@ static void add_prior(struct gaussian_prior *to, double mean, double sd)
     to->precision = sum;
 }
 
-/* mean and se: as values of unknown k. */
+/* Adds a prior to unknown k; mean and se are values of that unknown. */
 static void add_parameter_prior(struct fit_layout *l, size_t k, double mean, double se)
 {
     struct coordinate c;
@@ -37,8 +37,9 @@ static void add_parameter_prior(struct fit_layout *l, size_t k, double mean, dou
     l->has_prior = true;
 }
 
-/* A prior of a colour whose channels are tied as equals is one statement, not three. */
-static bool said_before(const struct fit_layout *l, const struct param_info *info, const struct fit_option *o, size_t p)
+/* Returns true for the second and third channel of a colour whose channels are tied as equals: their common prior
+ * counts once. */
+static bool is_repeated(const struct fit_layout *l, const struct param_info *info, const struct fit_option *o, size_t p)
 {
     for (size_t q = 0; q < p; q++)
         if (l->owner[q] == l->owner[p] && strcmp(info[q].symbol, info[p].symbol) == 0 && o->ratio[q] == o->ratio[p] &&
@@ -105,7 +106,7 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
         l->ratio[p] = o->ratio[p];
     }
     for (size_t p = 0; p < n_param; p++) {
-        if (isnan(o->prior_mean[p]) || said_before(l, info, o, p)) continue;
+        if (isnan(o->prior_mean[p]) || is_repeated(l, info, o, p)) continue;
         const struct param_info *owner = &l->info[l->owner[p]];
         double mean = o->prior_mean[p] / o->ratio[p], slack = 1e-9 * (owner->upper - owner->lower); /* of rounding */
         if (mean < owner->lower - slack || mean > owner->upper + slack || !(o->prior_se[p] > 0.0))

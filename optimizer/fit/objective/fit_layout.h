@@ -1,16 +1,16 @@
-/* The unknowns of a fit: the free parameters of the model after ties, and nuisance terms; and the way between them and
- * the model's full list of parameters.
+/* The unknowns of a fit: the free parameters of the model after ties, and nuisance terms; and the way between them
+ * and the model's full list of parameters.
  *
  *   value of parameter p = ratio_p * value of its leader
  *   what a photograph shows = gain * (rendered radiance) + stray light
  *
- * Nuisance terms: a global gain (Gaussian on ln gain about 0) and a stray light (radiance >= 0, half a Gaussian about 0)
- * are unknowns like parameters; one gain for each photograph is not an unknown but taken out of the residuals
+ * Nuisance terms: a global gain (Gaussian on ln gain about 0) and a stray light (radiance >= 0, half a Gaussian about
+ * 0) are unknowns like parameters; one gain for each photograph is not an unknown but taken out of the residuals
  * (linear_model.h).
  *
  * Priors are Gaussian in the fit coordinate x (coordinate.h): mean x(mean), standard deviation se |dx/dp| at the mean
- * (delta rule). With residuals r in units of the objective and s2 their variance, -2 ln(posterior) is
- * (r.r + s2 sum ((x - mean) / sd)^2) / s2, so a fit minimises f + s2 sum ((x - mean) / sd)^2.
+ * (delta rule). With residuals r in units of the objective and s2 their variance, -2 ln(posterior) is (r.r + s2 sum
+ * ((x - mean) / sd)^2) / s2, so a fit minimises f + s2 sum ((x - mean) / sd)^2.
  */
 #ifndef SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
 #define SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
@@ -26,7 +26,8 @@ struct fit_parameter {
     bool fixed;
 };
 
-/* What is asked for beyond the parameters themselves; internal units, one slot for each parameter of the model. */
+/* Ties, priors, nuisance terms and starts of a fit, in internal units; arrays have one slot for each parameter of the
+ * model. */
 struct fit_option {
     size_t leader[SCATTERING_MAX_PARAM];
     double ratio[SCATTERING_MAX_PARAM];
@@ -39,13 +40,13 @@ struct fit_option {
 
 struct fit_layout {
     size_t n_full, n_unknown;
-    size_t owner[SCATTERING_MAX_PARAM]; /* unknown that a parameter follows */
+    size_t owner[SCATTERING_MAX_PARAM]; /* index of the unknown that the parameter follows */
     double ratio[SCATTERING_MAX_PARAM];
-    struct param_info info[SCATTERING_MAX_PARAM]; /* of the unknowns, as the next three */
+    struct param_info info[SCATTERING_MAX_PARAM]; /* of the unknowns; the next three likewise */
     struct fit_parameter parameter[SCATTERING_MAX_PARAM];
     struct gaussian_prior prior[SCATTERING_MAX_PARAM];
     bool has_prior;
-    size_t i_gain, i_stray; /* unknown, or SIZE_MAX */
+    size_t i_gain, i_stray; /* index of the unknown, or SIZE_MAX when there is none */
 };
 
 /* Every parameter on its own, no priors, no nuisance terms, one start. */
@@ -54,13 +55,13 @@ void fit_option_init(struct fit_option *o);
  * model's range. */
 status fit_layout_init(struct fit_layout *l, const struct param_info *info, const struct fit_parameter *parameter,
                        size_t n_param, const struct fit_option *o, struct error *err);
-/* Values of the unknowns -> the model's parameters. */
+/* Computes the model's parameters from the values of the unknowns. */
 void fit_layout_full(const struct fit_layout *l, const double *unknown, double *full);
-/* d fit coordinate of parameter p / d fit coordinate of its owner. */
+/* Derivative of the fit coordinate of parameter p by the fit coordinate of its owner. */
 double fit_layout_stretch(const struct fit_layout *l, const struct param_info *info, const double *unknown, size_t p);
-/* What the photograph would show by an estimate of the renderer, with derivatives by the unknowns when jac is wanted.
- * Derivatives of tied parameters come from the same paths: their errors are taken as fully correlated. e and out may be
- * the same. */
+/* Converts an estimate of the renderer to what the photograph would show (mean, variance), with derivatives by the
+ * unknowns if they are wanted. The derivatives of tied parameters come from the same paths, so their errors are taken
+ * as fully correlated. e and out may be the same. */
 void fit_layout_estimate(const struct fit_layout *l, const double *unknown, bool want_jacobian,
                          const struct estimate *e, struct estimate *out);
 

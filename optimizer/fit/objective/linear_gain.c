@@ -5,7 +5,8 @@
 
 static double dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* Unit vector along m, and the share of a row along it that goes: 1 - 1 / sqrt(1 + sd^2 |m|^2 / v). */
+/* Writes the unit vector along m and returns the share of a row along it that is removed:
+ * 1 - 1 / sqrt(1 + sd^2 |m|^2 / v). */
 static double gain_share(const struct linear_model *m, const struct observation *o, size_t i, double misfit,
                          double unit[3])
 {
@@ -20,8 +21,8 @@ static double gain_share(const struct linear_model *m, const struct observation 
     return 1.0 - 1.0 / sqrt(1.0 + m->gain_sd * m->gain_sd * length2 / (misfit + noise));
 }
 
-/* What is left of a residual's square on average, over the means: contrasts, which no gain changes and whose misfits are of
- * another size, say nothing about what is left of those. */
+/* Mean square of the residuals of means after the gains are removed. Contrasts are left out: no gain changes them,
+ * and their misfits are of another size. */
 static double absorbed_misfit(const struct linear_model *m, const struct observation_set *o, double misfit, bool absorb)
 {
     double sum = 0.0, n = 0.0;
@@ -43,7 +44,7 @@ static void take_out(double *v, size_t stride, const double unit[3], double shar
     for (size_t c = 0; c < 3; c++) v[c * stride] -= along * unit[c];
 }
 
-/* Variances of the same: the larger of what independent and what fully correlated channels give. */
+/* The same for variances. Takes the larger result of independent and of fully correlated channels. */
 static void take_out_var(double *v, size_t stride, const double unit[3], double share)
 {
     double old[3] = {v[0], v[stride], v[2 * stride]};

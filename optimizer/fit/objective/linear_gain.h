@@ -1,11 +1,11 @@
-/* One gain for each configuration, marginalised: see linear_model_pool. */
+/* Marginalises one gain for each configuration; linear_model_pool has the formulas. */
 #ifndef SELVEDGE_OPTIMIZER_LINEAR_GAIN_H
 #define SELVEDGE_OPTIMIZER_LINEAR_GAIN_H
 
 #include "optimizer/fit/objective/linear_model.h"
 
-/* Takes gains of standard deviation m->gain_sd out of residuals, derivatives and their variances; once for each pooling.
- * photograph_var stays as it is. */
+/* Removes gains of standard deviation m->gain_sd from residuals, derivatives and their variances. To be called once
+ * for each pooling. photograph_var is kept. */
 void linear_gain_absorb(struct linear_model *m, const struct observation_set *o);
 
 #endif

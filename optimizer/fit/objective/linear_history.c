@@ -57,7 +57,7 @@ double linear_history_path_variance(const struct linear_history *h, size_t i)
             const struct estimate *e = &h->step[k].replica[q][i];
             if (e->n_path == 0) continue;
             double paths = (double)e->n_path;
-            /* weighted by paths: var is itself an estimate, the more paths the better */
+            /* weighted by paths, because var is itself an estimate that improves with them */
             sum += paths * paths * (e->var[0] + e->var[1] + e->var[2]) / 3.0;
             n += paths;
         }

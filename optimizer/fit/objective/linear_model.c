@@ -68,7 +68,7 @@ double linear_model_row_noise(const struct linear_model *m, size_t row)
     return 0.25 * (m->r_var[0][row] + m->r_var[1][row]);
 }
 
-/* Variance by tracing and photograph, without the extra weight, which is not 0. */
+/* Variance of a row by tracing and by the photograph's error, without its extra weight, which must not be 0. */
 static double known_variance(const struct linear_model *m, size_t row)
 {
     return (linear_model_row_noise(m, row) + m->photograph_var[row]) / m->extra[row];
@@ -81,7 +81,7 @@ static bool counts(const struct linear_model *m, size_t row, enum row_kind kind)
     return m->extra[row] > 0.0 && (kind == ROWS_OF_BOTH || (m->contrast[row] > 0.0) == (kind == ROWS_OF_CONTRASTS));
 }
 
-/* freedom: degrees of freedom a row. */
+/* freedom: degrees of freedom per row. */
 static double misfit_of(const struct linear_model *m, double freedom, enum row_kind kind)
 {
     enum { ROUND = 8 };
@@ -134,7 +134,7 @@ void linear_model_weigh(struct linear_model *m, size_t n_free)
         sum += m->weight[row];
         n += m->extra[row] > 0.0;
     }
-    double mean = sum > 0.0 ? sum / n : 1.0; /* no row says anything: all weights 0 */
+    double mean = sum > 0.0 ? sum / n : 1.0; /* when no row has information, all weights are 0 */
     for (size_t row = 0; row < m->n_row; row++) m->weight[row] /= mean;
     m->row_var = 1.0 / mean; /* weight x variance, the same for all rows */
 }

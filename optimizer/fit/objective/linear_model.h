@@ -1,17 +1,17 @@
-/* What all estimates of a fit so far say about the residuals near one point: R(x) ~ R + J (x - x_ref), for two
- * independent replicas.
+/* The linear model of the residuals near one point, pooled from all estimates of a fit so far:
+ * R(x) ~ R + J (x - x_ref), for two independent replicas.
  *
- * Every estimate of every iteration is kept (linear_history). For a reference point each is carried there by the
- * derivatives half way (averages of all steps, those near the middle counting most: exact to second order), and they
- * are averaged with weights 1 / (noise^2 + bend^2): noise from the path count and the configuration's pooled variance
- * per path (not from the estimate's own variance, which is correlated with its value) and from that of the derivatives on
- * the way, which r_var counts, too; bend from the cube of the
- * predicted change of the residuals between the two points and from the changes by single parameters, which cancel
- * along a valley while their bends do not. So early, cheap iterations fade out and the last ones add up: this is the
- * averaging over the last steps.
+ * Every estimate of every iteration is kept (linear_history). For a reference point each of them is carried there by
+ * derivatives taken half way, which are averages over all steps in which those near the middle count most; that is
+ * exact to second order. The carried estimates are averaged with weights 1 / (noise^2 + bend^2). The noise follows
+ * from the number of paths and the configuration's pooled variance per path, not from the estimate's own variance,
+ * which is correlated with its value; and from the noise of the derivatives on the way, which r_var contains too. The
+ * bend follows from the cube of the predicted change of the residuals between the two points, and from the changes by
+ * single parameters: along a valley these changes cancel, but their bends do not. So early, cheap iterations fade out
+ * and the last ones add up, which is the averaging over the last steps.
  *
- * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic), row 3 i + c; columns are the fit coordinates of
- * all parameters. Ownership: init/release. Not thread-safe.
+ * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic) in row 3 i + c. Columns are the fit coordinates
+ * of all parameters. Ownership: init/release. Not thread-safe.
  */
 #ifndef SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
 #define SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
@@ -20,7 +20,7 @@
 #include "optimizer/fit/photographs/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
-/* Of one unknown, in its fit coordinate. precision 1 / sd^2; 0: none. */
+/* Prior of one unknown in its fit coordinate. precision: 1 / sd^2, 0 for no prior. */
 struct gaussian_prior {
     double mean, precision;
 };
@@ -44,16 +44,17 @@ struct linear_model {
     double x_ref[SCATTERING_MAX_PARAM];
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
-    double
-        *photograph_var; /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
-    double *
-        extra; /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
+    /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
+    double *photograph_var;
+    /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
+    double *extra;
     double *contrast; /* n_row: 1 for a row of a contrast (texture), 0 for one of a mean; set by linear_model_pool */
     double *weight;   /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
     double row_var;   /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
     const struct gaussian_prior *prior; /* n_param, NULL: none; the caller's */
-    double gain_sd;     /* of ln gain of each configuration, taken out of the residuals by linear_model_pool; 0: none */
-    double n_effective; /* paths a configuration and replica that the averages amount to, mean over configurations */
+    double gain_sd; /* of ln gain of each configuration, taken out of the residuals by linear_model_pool; 0: none */
+    /* number of paths per configuration and replica that the averages are equivalent to, mean over configurations */
+    double n_effective;
 };
 
 void linear_history_init(struct linear_history *h, const struct observation_set *o, const struct coordinate *k,
@@ -79,33 +80,36 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
 
 /* Monte-Carlo variance of (r_A + r_B) / 2 of one row. */
 double linear_model_row_noise(const struct linear_model *m, size_t row);
-/* Variance of a residual (of extra weight 1) that neither tracing nor the photographs' stated errors explain, per degree of
- * freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their variance)^2, found by
- * iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows of weight 0 are left out. */
+/* Variance of a residual (of extra weight 1) that neither tracing nor the photographs' stated errors explain, per
+ * degree of freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their
+ * variance)^2, found by iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows
+ * of weight 0 are left out. */
 double linear_model_misfit(const struct linear_model *m, size_t n_free);
-/* The same over the rows of means ([0]) and of contrasts ([1], 0 without any) alone: models that are right in brightness to 1 %
- * may be off by half in texture. */
+/* The same for the rows of means ([0]) and of contrasts ([1], 0 without any) apart, because a model that is right in
+ * brightness to 1 % may be off by half in texture. */
 void linear_model_misfits(const struct linear_model *m, size_t n_free, double misfit[2]);
-/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without extra
- * weights, which act as they are. While noise rules, rows that are known well count more (bright channels have the longest
- * paths and the most noise); where the model does not fit, or photographs state no errors and paths add up, all weights go
- * to 1 and the minimum is that of f. Weights are kept until the next call and by linear_model_pool. */
+/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without
+ * extra weights, which act as they are. While noise rules, rows that are known well count more (bright channels have
+ * the longest paths and the most noise); where the model does not fit, or photographs state no errors and paths add
+ * up, all weights go to 1 and the minimum is that of f. Weights are kept until the next call and by
+ * linear_model_pool. */
 void linear_model_weigh(struct linear_model *m, size_t n_free);
 
 /* s2 sum ((x - mean) / sd)^2 with s2 = row_var: what the priors add to f at x. */
 double linear_model_penalty(const struct linear_model *m, const double *x);
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);
-/* Configuration i's part of it. */
+/* The part of configuration i in f, with its standard error. */
 double linear_model_part(const struct linear_model *m, size_t i, double *se);
 /* 2 x mirrored average of J' r: the gradient of f by coordinates; priors included, here and in the Hessian. */
 void linear_model_gradient(const struct linear_model *m, double *g);
 /* Hessian of Gauss-Newton, 2 J'J. `cross`: symmetrised J_A' J_B, unbiased, may be indefinite; otherwise of the averaged
  * J, positive semi-definite and too large by the noise of J, which acts as a damping that fades as paths add up. */
 void linear_model_hessian(const struct linear_model *m, bool cross, double *hessian);
-/* The objective as the fit weighs rows: what gradient and Hessian are of. */
+/* The objective with the row weights of the fit, to which gradient and Hessian belong. */
 double linear_model_weighted_objective(const struct linear_model *m);
-/* Mean over rows of the variance of (r_A + r_B) / 2: as the fit weighs rows, and all alike, as f counts them. */
+/* Mean over rows of the variance of (r_A + r_B) / 2: with the row weights of the fit, and with equal weights as in f.
+ */
 double linear_model_noise(const struct linear_model *m);
 double linear_model_mean_noise(const struct linear_model *m);
 

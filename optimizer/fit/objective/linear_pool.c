@@ -6,13 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Paths that noise falls with: the variance of a mean is v / n, that of a contrast of few paths nearer v / n^2. */
+/* The number by which noise falls: the variance of a mean is v / n, that of a contrast of few paths is nearer to v /
+ * n^2. */
 static double strength(const struct linear_history *h, size_t i, double n_path)
 {
     return observation_is_contrast(&h->observation->item[i]) ? n_path * n_path : n_path;
 }
 
-/* v of that, of residuals. */
+/* The v of these formulas, for residuals. */
 static double noise_variance(const struct linear_history *h, size_t i)
 {
     double sum = 0.0, n = 0.0;
@@ -28,9 +29,9 @@ static double noise_variance(const struct linear_history *h, size_t i)
     return n > 0.0 ? objective_weight(&h->observation->item[i]) * sum / n : 0.0;
 }
 
-/* Mean derivatives by coordinates over all steps, weighted by paths: n_row x n_param. One set for all steps: measured
- * with its own derivatives, a step that happens to hold a rare bright path would seem farther away, count less, and the
- * mean would come out too dark. */
+/* Writes the mean derivatives by coordinates over all steps, weighted by paths, to mean (n_row x n_param). All steps
+ * use this one set: with its own derivatives, a step that contains a rare bright path would seem farther away and
+ * count less, and the mean would be too dark. */
 static void mean_derivatives(const struct linear_history *h, double *mean)
 {
     size_t n = h->n_param, n_row = 3 * h->observation->n;
@@ -49,9 +50,9 @@ static void mean_derivatives(const struct linear_history *h, double *mean)
     }
 }
 
-/* How far configuration i moves over dx, largest channel. net: square of the predicted change. Along a valley the
- * changes by several parameters cancel, their bends do not: r is the sum over p of (dr/dx_p dx_p^3)^2, j that of
- * (dr/dx_p dx_p)^2. */
+/* How much the residuals of configuration i change over dx, in the channel that changes most. net: square of the
+ * predicted change. Along a valley the changes by several parameters cancel, but their bends do not: r is the sum
+ * over p of (dr/dx_p dx_p^3)^2, and j that of (dr/dx_p dx_p)^2. */
 struct bend {
     double net, r, j;
 };
@@ -88,7 +89,7 @@ static void add_derivatives(struct linear_model *m, const struct linear_history 
     }
 }
 
-/* change: of the mean from the step to x_ref. */
+/* Adds the residuals of a step. change: change of the mean from the step to x_ref. */
 static void add_residuals(struct linear_model *m, const struct linear_history *h, const struct history_step *s, int q,
                           size_t i, const double change[3], double weight)
 {
@@ -101,8 +102,8 @@ static void add_residuals(struct linear_model *m, const struct linear_history *h
     }
 }
 
-/* Variance of one path's derivatives of configuration i, by channel and column and summed over both, and the square of the
- * mean derivatives, summed likewise. */
+/* Variance of one path's derivatives of configuration i, by channel and column and summed over both, and the square
+ * of the mean derivatives, summed likewise. */
 struct derivative_scale {
     double by[3][SCATTERING_MAX_PARAM];
     double path_variance, square;
@@ -132,12 +133,13 @@ static struct derivative_scale derivative_scale(const struct linear_history *h, 
     return scale;
 }
 
-/* Carried means bend to third order, derivatives to first; how much was chosen by trial on analytic cloth, where a
- * factor of four either way made little difference. Without the parts that hide behind cancelling changes, old steps
- * were believed all along a valley: fits ended 3 to 5 % off where noise is 1 %, one in ten. */
+/* Means that were carried to x_ref have errors of third order, derivatives of first order. The factors were chosen by
+ * trial on analytic cloth, where a factor of four either way made little difference. Without the hidden parts, which
+ * cancelling changes conceal, old steps counted fully all along a valley, and one fit in ten ended 3 to 5 % off where
+ * the noise is 1 %. */
 static const double bend_r = 64.0, hidden_r = 2.0, bend_j = 16.0, hidden_j = 16.0;
 
-/* Noise of one path of a mean of n. */
+/* Noise per path of a mean of n paths. */
 static double per_path(const struct linear_history *h, size_t i, size_t k)
 {
     double n = (double)h->step[k].replica[0][i].n_path;
@@ -151,15 +153,15 @@ static double derivative_weight(const struct linear_history *h, size_t i, size_t
                   hidden_j * change->j + 1e-12);
 }
 
-/* A step's way to x_ref: dx, how far that is, the change of the means as the derivatives of all steps say it, and the paths
- * of these (1 / strength). */
+/* How a step is carried to x_ref: dx, its size, the change of the means by the derivatives of all steps, and the
+ * inverse of the paths of these (1 / strength). */
 struct carried {
     double dx[SCATTERING_MAX_PARAM], change[2][3], per_path;
     struct bend bend;
 };
 
-/* Derivatives half way, those near the middle counting most. (Those of the step itself are noisier, and by the same rare
- * paths as its mean.) */
+/* Carries a step by derivatives half way, of which those near the middle count most. The derivatives of the step
+ * itself are noisier, and their noise comes from the same rare paths as that of its mean. */
 static void carry(const struct linear_history *h, const double *mean, size_t i, const struct derivative_scale *scale,
                   const double *x_ref, const double *x, struct carried *out)
 {
@@ -187,7 +189,7 @@ static void carry(const struct linear_history *h, const double *mean, size_t i, 
         for (size_t c = 0; c < 3; c++) out->change[q][c] /= sum;
 }
 
-/* Variance of a change over dx by the noise of derivatives. */
+/* Variance of the change over dx caused by the noise of the derivatives. */
 static double change_variance(const struct derivative_scale *scale, size_t c, const double *dx, size_t n,
                               double per_path)
 {
@@ -223,8 +225,8 @@ static void pool_weights(const struct linear_history *h, size_t i, const struct 
     *n_effective += sum_square > 0.0 ? 1.0 / sum_square : 0.0;
 }
 
-/* All steps are carried by the same derivatives, so their errors by these go together: as those of one step whose way is the
- * mean of theirs. */
+/* Adds the noise of the derivatives that carried the steps. All steps use the same derivatives, so these errors add
+ * up like those of a single step that is carried over the mean of their distances. */
 static void add_carried_noise(struct linear_model *m, const struct linear_history *h, size_t i,
                               const struct derivative_scale *scale, const struct carried *carried,
                               const struct pool_weight *weight)

@@ -7,18 +7,18 @@
 
 enum { N = SCATTERING_MAX_PARAM };
 
-static const double least_var = 1e-6; /* of a residual: nobody photographs better than 0.1 % */
+static const double least_var = 1e-6; /* of a residual: no photograph is more exact than 0.1 % */
 
 struct design {
     size_t n, n_asked;
-    size_t index[N]; /* unknowns that are free: those of the model first, n_asked of them, then nuisance terms */
+    size_t index[N]; /* indices of the free unknowns: first n_asked of the model, then nuisance terms */
     double cov[N * N], j[2][3 * N];
     double noise[9]; /* covariance of the residuals by everything but the unknowns */
 };
 
 static bool is_nuisance(const struct fit_layout *l, size_t k) { return k == l->i_gain || k == l->i_stray; }
 
-/* The covariance of an undetermined parameter can be wider than its range, which is known. */
+/* Copies the covariance, and narrows that of undetermined parameters to their range. */
 static void take_covariance(struct design *d, const struct next_photograph_fit *f)
 {
     const struct fit_layout *l = f->layout;
@@ -41,7 +41,8 @@ static void take_covariance(struct design *d, const struct next_photograph_fit *
     small_clip_eigenvalues(d->cov, d->n, 0.0);
 }
 
-/* Derivatives of the residuals by the fit coordinates, and what the residuals vary by beside these. */
+/* Fills in the derivatives of the residuals by the fit coordinates, and the covariance of the residuals from
+ * everything else. */
 static void take_derivatives(struct design *d, const struct next_photograph_fit *f,
                              const struct estimate *const replica[2])
 {
@@ -71,7 +72,8 @@ static void take_derivatives(struct design *d, const struct next_photograph_fit 
     }
 }
 
-/* both[q] = J C of each replica; symmetrised J_A C J_B' in s[9], its eigenvalues at least 0. */
+/* Writes J C of each replica to both[q], and the symmetrised J_A C J_B', with eigenvalues clipped to 0 or more, to
+ * s[9]. */
 static void project(const struct design *d, double both[2][3 * N], double s[9])
 {
     for (int q = 0; q < 2; q++)
@@ -104,7 +106,8 @@ static double ln_det3(const double *a)
     return sum;
 }
 
-/* Covariance of the nuisance terms where the model's parameters are known: n - n_asked (2 or fewer) square. */
+/* Covariance of the nuisance terms when the model's parameters are known: a square matrix of n - n_asked rows, 2 at
+ * most. */
 static void nuisance_given_parameters(const struct design *d, double *given)
 {
     double inverse[N * N], asked[N * N];
@@ -123,7 +126,7 @@ static void nuisance_given_parameters(const struct design *d, double *given)
     small_clip_eigenvalues(given, m, 0.0);
 }
 
-/* noise + J C J' of the nuisance terms that are left when the parameters are known. */
+/* Covariance of the residuals when the parameters are known: noise + J C J' of the remaining nuisance terms. */
 static void residual_given_parameters(const struct design *d, double v[9])
 {
     double given[4] = {0};
@@ -143,13 +146,14 @@ static void residual_given_parameters(const struct design *d, double v[9])
     small_clip_eigenvalues(v, 3, least_var);
 }
 
-/* What is known of unknown d->index[k] with the photograph, to every parameter of the model that follows it. */
-static void tell_unknown(const struct design *d, size_t k, double fall, const struct next_photograph_fit *f,
-                         struct candidate_score *score)
+/* Writes what the photograph would determine of unknown d->index[k] to every parameter of the model that follows it. */
+static void set_unknown(const struct design *d, size_t k, double decrease, const struct next_photograph_fit *f,
+                        struct candidate_score *score)
 {
     const struct fit_layout *l = f->layout;
     const struct uncertainty *u = f->uncertainty;
-    double before = d->cov[k * d->n + k], share = before > 0.0 ? sqrt(fmin(fmax(0.0, 1.0 - fall / before), 1.0)) : 1.0;
+    double before = d->cov[k * d->n + k],
+           share = before > 0.0 ? sqrt(fmin(fmax(0.0, 1.0 - decrease / before), 1.0)) : 1.0;
     size_t own = d->index[k];
     struct coordinate c;
     coordinate_init(&c, &l->info[own], l->parameter[own].lower, l->parameter[own].upper);
@@ -182,9 +186,9 @@ void next_photograph_score(const struct next_photograph_fit *f, const struct est
     score->information = fmax(0.5 * (ln_det3(s) - ln_det3(alone)), 0.0);
     (void)small_invert(s, 3, inverse); /* eigenvalues are at least v > 0 */
     for (size_t k = 0; k < d.n_asked; k++) {
-        double fall = 0.0;
+        double decrease = 0.0;
         for (size_t i = 0; i < 3; i++)
-            for (size_t e = 0; e < 3; e++) fall += jc[0][i * d.n + k] * inverse[i * 3 + e] * jc[1][e * d.n + k];
-        tell_unknown(&d, k, fall, f, score);
+            for (size_t e = 0; e < 3; e++) decrease += jc[0][i * d.n + k] * inverse[i * 3 + e] * jc[1][e * d.n + k];
+        set_unknown(&d, k, decrease, f, score);
     }
 }

@@ -5,12 +5,13 @@
 #include <string.h>
 
 enum { N_COEFFICIENT = 5, N_GRID = 256, N_NEWTON = 20 };
-/* Points that a cubic and a quartic ask for. */
+/* Least number of points for a polynomial of so many coefficients: 6 for a cubic, 8 for a quartic. */
 static const size_t n_for[N_COEFFICIENT + 1] = {0, 0, 0, 0, 6, 8};
 
-/* How far to the sides, in standard errors of a point: a rise of four is seen well, and more of it bends. */
+/* Points to the sides are placed where the function rises by this many standard errors of a point. That rise is well
+ * measurable; farther out the function departs from the polynomial. */
 static const double side_rise = 4.0;
-/* Share of its rise over the lowest point by which a point may be off the polynomial. */
+/* Allowed deviation of a point from the polynomial, as a share of its rise over the lowest point. */
 static const double bend = 0.2;
 
 static size_t lowest(const struct noisy_minimum *m)
@@ -117,7 +118,7 @@ static bool find_vertex(const struct polynomial *p, const struct noisy_minimum_o
     return isfinite(nearest) && p->u0 + *t > o->lower && p->u0 + *t < o->upper;
 }
 
-/* The vertex, and its error by the delta method; false when there is none. */
+/* Sets the vertex and its error by the delta method. Returns false when there is none. */
 static bool set_vertex(struct noisy_minimum *m, const struct noisy_minimum_option *o, const struct polynomial *p)
 {
     double t = 0.0, slope[N_COEFFICIENT], bent[N_COEFFICIENT];
@@ -133,7 +134,8 @@ static bool set_vertex(struct noisy_minimum *m, const struct noisy_minimum_optio
     return m->curvature > 0.0;
 }
 
-/* Nothing is curved: downhill to a bound, when there is a slope beyond doubt. */
+/* For a function without measurable curvature: the minimum is the bound towards which the function falls, if its
+ * slope is beyond doubt. */
 static void set_slope(struct noisy_minimum *m, const struct noisy_minimum_option *o)
 {
     struct polynomial p;
@@ -147,7 +149,8 @@ static void set_slope(struct noisy_minimum *m, const struct noisy_minimum_option
     m->at_bound = true;
 }
 
-/* From what is known; false when it is no minimum. The highest degree whose curvature is beyond doubt. */
+/* Finds the minimum from all points by the polynomial of the highest degree whose curvature is beyond doubt. Returns
+ * false when there is none. */
 static bool locate(struct noisy_minimum *m, const struct noisy_minimum_option *o)
 {
     struct polynomial p;
@@ -159,7 +162,7 @@ static bool locate(struct noisy_minimum *m, const struct noisy_minimum_option *o
     return false;
 }
 
-/* Half way between the lowest point and its farther neighbour. */
+/* Returns the point half way between the lowest point and its farther neighbour. */
 static double bisect(const struct noisy_minimum *m)
 {
     double u = m->point[lowest(m)].u, left = -INFINITY, right = INFINITY;
@@ -173,16 +176,16 @@ static double bisect(const struct noisy_minimum *m)
     return u - left > right - u ? 0.5 * (left + u) : 0.5 * (right + u);
 }
 
-/* The vertex, then its two sides in turn. */
+/* Returns the next place to evaluate: the vertex, then its two sides in turn. */
 static double next_place(const struct noisy_minimum *m, const struct noisy_minimum_option *o, size_t turn)
 {
     double range = o->upper - o->lower, se = m->point[lowest(m)].se;
     double side = sqrt(2.0 * side_rise * se / m->curvature);
     side = fmin(fmax(side, 0.02 * range), 0.35 * range);
     double u = turn % 3 == 0 ? m->u : m->u + (turn % 3 == 1 ? side : -side);
-    if (u < o->lower || u > o->upper) u = 2.0 * m->u - u; /* the other side then */
+    if (u < o->lower || u > o->upper) u = 2.0 * m->u - u; /* then take the other side */
     u = fmin(fmax(u, o->lower), o->upper);
-    for (size_t i = 0; i < m->n_point; i++) /* a point that is there already says nothing new about its own place */
+    for (size_t i = 0; i < m->n_point; i++) /* avoid a place that has been evaluated already */
         if (fabs(m->point[i].u - u) < 1e-3 * range) u += (u + 0.01 * range <= o->upper ? 0.01 : -0.01) * range;
     return fmin(fmax(u, o->lower), o->upper);
 }

@@ -17,7 +17,7 @@ enum { FIT_MAX_NUISANCE = 2 };
 #define NUISANCE_GAIN "gain"
 #define NUISANCE_STRAY_LIGHT "stray_light"
 
-/* The fitted ones; se NaN when unknown. */
+/* The fitted nuisance terms; se is NaN when it is unknown. */
 struct fit_nuisance {
     size_t n;
     char name[FIT_MAX_NUISANCE][16];
@@ -25,15 +25,15 @@ struct fit_nuisance {
     bool at_bound[FIT_MAX_NUISANCE];
 };
 
-/* What a photograph would show by an estimate: mean and variance; derivatives are left alone. */
+/* Converts mean and variance of an estimate to those of what a photograph would show. Derivatives are not changed. */
 void nuisance_show(const struct fit_nuisance *n, const struct estimate *e, struct estimate *out);
 
 /* Most likely gain of one photograph, with its standard error: Gaussian of sd `sd` about 1, residuals of variance
  * misfit_var (in units of the objective) beside the noise of the two replicas and of the photograph. */
 void nuisance_photograph_gain(const struct observation *o, const struct estimate *a, const struct estimate *b,
                               double sd, double misfit_var, double *gain, double *se);
-/* e times the gain that it says of itself, without the other replica: two of these are still independent of one another, so that
- * the product of their residuals has no bias by noise. */
+/* Multiplies e by the gain that follows from e alone, without the other replica. Two replicas stay independent in
+ * this way, so the product of their residuals has no bias by noise. */
 void nuisance_apply_own_gain(const struct observation *o, const struct estimate *e, double sd, double misfit_var,
                              struct estimate *out);
 

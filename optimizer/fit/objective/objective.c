@@ -58,7 +58,7 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
     out->rel_square = relative / n_radiance;
     out->rel_square_se = sqrt(relative_var) / n_radiance;
     out->rel_rms = sqrt(fmax(0.0, out->rel_square));
-    out->rel_rms_se = sqrt(out->rel_square_se); /* near 0 */
+    out->rel_rms_se = sqrt(out->rel_square_se); /* the delta method fails near 0 */
     if (out->rel_rms > 0.0) out->rel_rms_se = fmin(out->rel_rms_se, 0.5 * out->rel_square_se / out->rel_rms);
 }
 

@@ -7,13 +7,13 @@
  * B: f = sum_i w_i sum_c (A_ic - M_ic)(B_ic - M_ic),       E f = f of the true means; single values may be negative,
  * and the gradient by the mirrored average  sum_i w_i sum_c [(A - M) dB + (B - M) dA].
  *
- * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of one
- * configuration share their paths; their correlation is not in an estimate, so it is taken as full: the stated error is
- * an upper estimate, too large by at most a factor sqrt(3).
+ * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of
+ * one configuration share their paths; their correlation is not in an estimate, so it is taken as full: the stated
+ * error is an upper estimate, too large by at most a factor sqrt(3).
  *
- * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out.
- * Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product, so nothing
- * is subtracted and the figure does not fall when fewer paths are used.
+ * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left
+ * out. Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product,
+ * so nothing is subtracted and the figure does not fall when fewer paths are used.
  */
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H
 #define SELVEDGE_OPTIMIZER_OBJECTIVE_H
@@ -22,16 +22,16 @@
 #include "renderer/transport/estimate/estimate.h"
 
 #define OBJECTIVE_TAU 0.02
-/* Contrasts (observation_is_contrast): C is a squared coefficient of variation, so half its relative error is that of the
- * scatter itself; w_i = weight_i / (2 max(a_i, tau_C))^2 with a_i the mean over channels of C, and cloth that scatters by
- * less than 2 % counts as if it did. */
+/* Contrasts (observation_is_contrast): C is a squared coefficient of variation, so half its relative error is that of
+ * the scatter itself; w_i = weight_i / (2 max(a_i, tau_C))^2 with a_i the mean over channels of C, and cloth that
+ * scatters by less than 2 % counts as if it did. */
 #define OBJECTIVE_CONTRAST_TAU 4e-4
 
 struct objective_value {
     double value, se;
     double rel_rms;
-    /* Only by objective_evaluate: what rel_rms is the root of, which is free of bias and below 0 where noise is all there is, and
-     * standard errors. */
+    /* Set by objective_evaluate only. rel_square: square of rel_rms before the root is taken, which has no bias and
+     * is below 0 when there is nothing but noise; and standard errors. */
     double rel_square, rel_square_se, rel_rms_se;
 };
 

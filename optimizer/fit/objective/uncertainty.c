@@ -7,15 +7,16 @@
 
 enum { N = SCATTERING_MAX_PARAM };
 _Static_assert((int)SMALL_MATRIX_MAX >= (int)N, "small_matrix.h takes matrices of all parameters");
-/* A quantity that is positive and spans decades is not known when it may be half or twice as large (one standard error). */
+/* A positive quantity whose range spans decades counts as determined only if its standard error is below a factor of
+ * 2. */
 static const double log_determined = 0.69;
 
-/* Share of a photograph's stated variance that its three channels have in common: exposure, lamp and the patch of cloth are
- * the same for them, noise is not. Sources state no correlation; taken as independent (0), errors of widths, which all
- * channels tell together, would be up to 30 % too small where half of the variance is common. */
+/* Share of a photograph's stated variance that its three channels have in common: exposure, lamp and the patch of
+ * cloth are the same for them, noise is not. Sources state no correlation; taken as independent (0), errors of
+ * widths, which all channels tell together, would be up to 30 % too small where half of the variance is common. */
 static const double photograph_in_common = 0.5;
 
-/* The part of V of one row that goes with no other row. */
+/* The part of V of one row that is independent of all other rows. */
 static double own_variance(const struct linear_model *m, size_t row, const double misfit[2])
 {
     return (1.0 - photograph_in_common) * m->photograph_var[row] + misfit[m->contrast[row] > 0.0] * m->extra[row];
@@ -28,7 +29,8 @@ static double common_variance(const struct linear_model *m, size_t row)
     return photograph_in_common * m->photograph_var[row];
 }
 
-/* Noise that moves the three channels of a configuration together: they come from the same paths, the same exposure. */
+/* Adds the noise that the three channels of a configuration have in common, because they share their paths and the
+ * exposure. */
 static void add_common_noise(const struct linear_model *m, size_t i,
                              double (*variance)(const struct linear_model *m, size_t row), const size_t *index,
                              size_t n, double *b)
@@ -73,7 +75,7 @@ static void normal_matrices(const struct linear_model *m, const size_t *index, s
     }
 }
 
-/* Covariance of the parameters index[0..n-1], all others held. */
+/* Covariance of the parameters index[0..n-1] with all others fixed. */
 static void covariance(const struct linear_model *m, const struct coordinate *k, const size_t *index, size_t n,
                        const double misfit[2], double *cov)
 {
@@ -94,7 +96,8 @@ static void covariance(const struct linear_model *m, const struct coordinate *k,
         h[p * n + p] += s2 * (1.0 + precision);
         b[p * n + p] += s2 * s2 * (1.0 + precision);
     }
-    if (!small_invert(h, n, inverse)) { /* cannot be: eigenvalues >= s2 > 0; the prior alone then */
+    if (!small_invert(h, n,
+                      inverse)) { /* cannot happen, since all eigenvalues are >= s2 > 0; the prior alone would remain */
         memset(inverse, 0, n * n * sizeof *inverse);
         for (size_t p = 0; p < n; p++) inverse[p * n + p] = 1.0 / s2;
     }
@@ -110,7 +113,7 @@ static void scatter(const double *cov, const size_t *index, size_t n, size_t n_p
         for (size_t q = 0; q < n; q++) full[index[p] * n_param + index[q]] = cov[p * n + q];
 }
 
-/* Near the low end of a log range the range alone is a small error of the parameter: judged in the coordinate, too. */
+/* Near the low end of a logarithmic range every error is small beside the range, so the coordinate is tested too. */
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param)
 {
     bool in_proportion = k->kind != PARAM_LOG || sd < log_determined;
@@ -118,7 +121,7 @@ bool uncertainty_determined(const struct coordinate *k, double sd, double se_par
            se_param < 0.5 * (k->param_upper - k->param_lower) / sqrt(12.0);
 }
 
-/* Of a mean's residual of extra weight 1, over the rows that count. */
+/* Mean variances of residuals of means, for extra weight 1, over the rows of a weight above 0. */
 static void mean_variances(const struct linear_model *m, struct uncertainty *u)
 {
     double n = 0.0;
@@ -132,7 +135,7 @@ static void mean_variances(const struct linear_model *m, struct uncertainty *u)
     u->photograph_var /= fmax(n, 1.0);
 }
 
-/* Within a thousandth of the range; what spans decades is judged in the logarithm. */
+/* Whether x is within a thousandth of the range from a bound; ranges over decades are measured in the logarithm. */
 static bool at_bound(const struct coordinate *k, double x)
 {
     if (k->kind == PARAM_LOG) {

@@ -1,17 +1,21 @@
 /* How well the observations determine the parameters.
  *
- * Sandwich covariance in fit coordinates, on the parameters that are not fixed:
- *   cov = (H + L)^-1 (B + s2 L) (H + L)^-1,   H = J'J,  B = J' V J + D,
- * all three from the mirrored product of two independent replicas, so that the noise of J does not make H look larger
- * (one set of paths alone understates the errors). V: per residual, photograph variance + misfit variance + Monte-Carlo
- * variance of the pooled mean (fully correlated between channels, which share their paths) (what is left of f per
- * degree of freedom, for residuals that no noise explains). D: Monte-Carlo noise of J times the residuals. L = s2 /
- * (prior sd)^2: the allowed range as a weak prior, so that an undetermined parameter gets an error as large as its
- * range and not infinity; the model's own priors (linear_model.h) add their precision to it. s2: mean of V.
- * A parameter at a bound counts like the others: noise may have driven it there, so it is not known as if it were fixed. Where the
- * truth is at the bound, the errors of the others are a little too large.
- * File units by the delta method: se(p) = |dp/dx| se(x), not more than that of a uniform distribution over the allowed
- * range, nor than its prior says.
+ * The covariance in fit coordinates is a sandwich, over the parameters that are not fixed:
+ *   cov = (H + L)^-1 (B + s2 L) (H + L)^-1,   H = J'J,  B = J' V J + D.
+ * J'J, J' V J and D are mirrored products of two independent replicas, so the noise of J does not make H larger; one
+ * set of paths alone understates the errors.
+ *   V    variance of a residual: that of the photograph, that of the misfit (the part of f per degree of freedom that
+ *        no noise explains), and the Monte-Carlo variance of the pooled mean, which is fully correlated between
+ *        channels, because they share their paths;
+ *   D    Monte-Carlo noise of J times the residuals;
+ *   s2   mean of V;
+ *   L    s2 / (prior sd)^2, the allowed range as a weak prior, so that an undetermined parameter gets an error as
+ *        large as its range instead of infinity. The model's own priors (linear_model.h) add their precision to it.
+ *
+ * A parameter at a bound counts like the others: noise may have driven it there, so it is not known as if it were
+ * fixed. Where the truth is at the bound, the errors of the others are a little too large. Errors in file units follow
+ * by the delta method, se(p) = |dp/dx| se(x), and are not larger than that of a uniform distribution over the allowed
+ * range, nor than the prior's.
  */
 #ifndef SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 #define SELVEDGE_OPTIMIZER_UNCERTAINTY_H
@@ -23,16 +27,16 @@
 struct uncertainty {
     size_t n_param;
     double cov[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* fit coordinates; rows of fixed parameters are zero */
-    double
-        correlation[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* 1 on the diagonal, 0 where a parameter is fixed */
-    double se_param[SCATTERING_MAX_PARAM];                        /* internal unit; 0 for fixed parameters */
+    /* 1 on the diagonal, 0 where a parameter is fixed */
+    double correlation[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM];
+    double se_param[SCATTERING_MAX_PARAM]; /* internal unit; 0 for fixed parameters */
     bool at_bound[SCATTERING_MAX_PARAM];
     bool determined[SCATTERING_MAX_PARAM]; /* uncertainty_determined; true for fixed ones */
-    double
-        misfit_var; /* per residual of a mean (contrasts of a texture have a misfit of their own), in units of the objective:
-                          about the squared relative error that the model leaves */
-    double
-        noise_var; /* mean Monte-Carlo variance per residual of the pooled mean; this and the next without extra weights */
+    /* per residual of a mean (contrasts of a texture have a misfit of their own), in units of the objective: about
+     * the squared relative error that the model leaves */
+    double misfit_var;
+    /* mean Monte-Carlo variance per residual of the pooled mean; this and the next without extra weights */
+    double noise_var;
     double photograph_var; /* mean variance per residual by the photographs' stated errors */
 };
 

@@ -55,7 +55,8 @@ struct table {
     int place[COLUMN_COUNT]; /* the file's column for an enum column, or -1 */
     char *cell[MAX_CELL];
     size_t n_cell;
-    size_t n_configuration; /* of the rows so far; fitted and held-out ones are traced together in the end */
+    /* of the rows so far, fitted and held-out ones, which are traced together in the validation */
+    size_t n_configuration;
 };
 
 #define table_error(t, code, ...)                                                                                      \
@@ -126,7 +127,7 @@ static status cell_angle(const struct table *t, enum column c, double lower, dou
     return STATUS_OK;
 }
 
-/* "all" in place of the angle: the row is a mean over all rotations of the cloth. */
+/* Reads the rotation. "all" in place of the angle: the row is a mean over all rotations of the cloth. */
 static status cell_rotation(const struct table *t, double *out_deg, uint32_t *n_rotation, struct error *err)
 {
     int place = t->place[COLUMN_ROTATION];
@@ -157,7 +158,8 @@ static status cell_not_negative(const struct table *t, enum column c, double mis
     return STATUS_OK;
 }
 
-/* The name given, with '_' for what no file name has (pictures are named after rows); else "fit-03". */
+/* Names a row: the name given, with '_' for bytes that a file name cannot have, because pictures are named after
+ * rows; without one "fit-03". */
 static void row_name(const struct table *t, const struct observation_set *o, struct observation *item)
 {
     const char *given = t->place[COLUMN_NAME] >= 0 ? t->cell[t->place[COLUMN_NAME]] : "";

@@ -16,9 +16,9 @@ struct observation {
     enum job_set set;
     struct configuration configuration;
     double mean_rgb[3];
-    double se_rgb[3];                           /* 0 when the source states none */
-    double weight;                              /* factor of the objective's weight of this observation; 1 */
-    size_t n_cell;                              /* a side, of the contrast; 0: not measured */
+    double se_rgb[3]; /* 0 when the source states none */
+    double weight;    /* factor of the objective's weight of this observation; 1 */
+    size_t n_cell;    /* parts along an edge of the crop of which the contrast is taken; 0: not measured */
     double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
 };
 
@@ -34,7 +34,7 @@ size_t observation_set_count(const struct observation_set *o, enum job_set set);
 /* Copies the observations of one set, in order, into `part` (initialised). */
 status observation_set_select(const struct observation_set *o, enum job_set set, struct observation_set *part,
                               struct error *err);
-/* What a fit sees of a set: rows of weight 0 are taken out, and the other weights divided by their mean, so that only their
+/* Prepares a set for a fit: removes rows of weight 0, and divides the other weights by their mean, so that only their
  * ratios count. */
 void observation_set_weigh(struct observation_set *o);
 
@@ -43,13 +43,13 @@ void observation_set_weigh(struct observation_set *o);
 bool observation_is_contrast(const struct observation *o);
 /* Whether the contrast of all channels is known: its standard errors are below 1, which a black channel has not. */
 bool observation_contrast_known(const struct observation *o);
-/* That observation from one with n_cell > 0. */
+/* Makes that observation from one with n_cell > 0. weight: of contrasts beside means. */
 struct observation observation_of_contrast(const struct observation *o, double weight);
 /* Appends the contrasts of all observations of `from` to `to`. */
 status observation_set_append_contrasts(const struct observation_set *from, double weight, struct observation_set *to,
                                         struct error *err);
 
-/* Configuration in SI units from the document's angles and set-up. */
+/* Makes a configuration in SI units from angles and the document's set-up. */
 struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
                                                double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
                                                double cloth_rotation_deg);

@@ -6,12 +6,13 @@
 
 enum { NAMED = 3 };
 
-/* Dark: below this share of the median of the rows lit from the same side, as seen per light that falls on the cloth.
- * From the front, measured cloths have no row below 0.33 of it and black satins none below 0.07; what passes through a
- * dense cloth beside its gaps can be far less. */
+/* A row is dark when its brightness per incident light is below this share of the median of the rows lit from the
+ * same side. From the front, measured cloths have no row below 0.33 of the median and black satins none below 0.07.
+ * Light that passes through a dense cloth beside its gaps can be far less. */
 static const double dark_share_front = 0.04, dark_share_behind = 1e-3;
-static const double least_cos = 0.05; /* a lamp has a size: some of it stays above the horizon */
-/* Too bright: in white diffusers facing the lamp. Highlights of measured cloths reach 2. */
+static const double least_cos = 0.05; /* a lamp has a size, so part of it stays above the horizon */
+/* Radiance, in units of a white diffuser facing the lamp, above which a row is too bright. Highlights of measured
+ * cloths reach 2. */
 static const double brightest = 20.0;
 static const double allowed_difference = 0.05, allowed_se = 5.0;
 
@@ -28,13 +29,14 @@ static int compare_double(const void *a, const void *b)
 
 static bool lit_from_behind(const struct observation *o) { return o->configuration.light_theta_rad > M_PI_2; }
 
-/* Brightness per light that falls on the cloth, which grazing lamps do not make dark. */
+/* Brightness per light that falls on the cloth, so that a row is not dark only because its lamp is at a grazing
+ * angle. */
 static double reflected(const struct observation *o)
 {
     return brightness(o) / fmax(fabs(cos(o->configuration.light_theta_rad)), least_cos);
 }
 
-/* Of the rows of weight that are lit from one side. */
+/* Median of `reflected` over the rows of a weight above 0 that are lit from one side. */
 static double median_reflected(const struct observation_set *o, bool behind)
 {
     double *v = malloc((o->n + 1) * sizeof *v), median = 0.0;
@@ -69,7 +71,8 @@ static void check_dark(const struct observation_set *o, const struct warning_sin
     if (n_dark > NAMED) warning_send(warn, OPTION_NONE, "%zu more rows are dark or zero", n_dark - NAMED);
 }
 
-/* Of a cloth; gaps show the lamp behind it. No bound is known under an image of the surroundings. */
+/* Largest radiance that a cloth can have; through gaps the lamp behind it is visible. Infinite under an image of the
+ * surroundings, whose radiance has no known bound. */
 static double brightest_possible(const struct configuration *c)
 {
     const double *around = c->environment_rgb;
@@ -110,8 +113,9 @@ static bool close_to(const double *a, const double *b)
     return fmax(fmax(fabs(a[0] - b[0]), fabs(a[1] - b[1])), fabs(a[2] - b[2])) < 1e-6;
 }
 
-/* Where lamp and camera are as seen from the cloth: directions, because angles have many names for one (180 and -180,
- * any phi at theta 0). Means over rotations know no phi but that between the two. */
+/* Compares the directions of lamp and camera as seen from the cloth, because different angles can describe one
+ * direction (180 and -180, any phi at theta 0). Of means over rotations only the phi between lamp and camera is
+ * compared. */
 static bool same_configuration(const struct configuration *a, const struct configuration *b)
 {
     const struct configuration *of[2] = {a, b};

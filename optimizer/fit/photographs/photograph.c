@@ -10,7 +10,8 @@
 enum { LIMIT_PIXEL = 200 * 1000 * 1000, MAX_BLOCK = 8, MIN_BLOCK_PX = 4 };
 
 static const double saturated_limit = 0.02;
-/* Sub-block means of cloth at 1 cm scatter by a few per cent; a shadow edge or a wrong crop by much more. */
+/* Largest standard deviation of sub-block means over the mean without a warning. Cloth at 1 cm has a few per cent; a
+ * shadow edge or a wrong crop has much more. */
 static const double contrast_limit = 0.35;
 
 static status crop_image(struct image *im, const size_t crop[4], const char *name, struct error *err)

@@ -30,7 +30,7 @@ status image_contrast(const struct image *im, size_t channel, size_t n_cell, dou
     size_t n = n_cell * n_cell;
     double *part = malloc((n + 1) * sizeof *part), mean = 0.0, scatter = 0.0;
     *contrast = 0.0;
-    *se = 1.0; /* of a black channel nothing is known */
+    *se = 1.0; /* the contrast of a black channel is unknown */
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure contrast: out of memory");
     for (size_t i = 0; i < n; i++) {
         part[i] = part_mean(im, channel, n_cell, i % n_cell, i / n_cell);
@@ -40,7 +40,7 @@ status image_contrast(const struct image *im, size_t channel, size_t n_cell, dou
         for (size_t i = 0; i < n; i++) part[i] = part[i] / mean - 1.0;
         for (size_t i = 0; i < n; i++) *contrast += part[i] * part[i] / (double)(n - 1);
         for (size_t i = 0; i < n; i++) {
-            double own = part[i] * part[i] - *contrast * (1.0 + 2.0 * part[i]); /* what the part adds */
+            double own = part[i] * part[i] - *contrast * (1.0 + 2.0 * part[i]); /* contribution of the part */
             scatter += own * own;
         }
         *se = sqrt(scatter / ((double)n * (double)(n - 1)));

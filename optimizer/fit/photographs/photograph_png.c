@@ -48,7 +48,7 @@ static void convert(png_structp png, png_infop info, bool srgb, struct image *im
     }
 }
 
-/* The size stands at bytes 16..23; checked before libpng takes memory for it. */
+/* Checks the size, which is at bytes 16..23, before libpng allocates memory for it. */
 static status check_size(FILE *f, const char *name, size_t limit_pixel, struct error *err)
 {
     unsigned char h[24];

@@ -1,14 +1,14 @@
-/* What is said about a result beyond its numbers: whether its derivatives can be trusted (gradient certificate), and which photograph would tell most. Done
- * at the beginning of the stage "report", for every model. */
+/* Two additions to the result of every model, made at the beginning of the stage "report": whether its derivatives
+ * can be trusted (gradient certificate), and which photograph would improve it most. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_ADVICE_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_ADVICE_H
 
 #include "optimizer/worker/pipeline_context.h"
 
-/* Fills in the certificate of every model, and warns of one that fails. Some seconds at most. */
+/* Fills in the certificate of every model and warns if one fails. Takes some seconds at most. */
 status pipeline_certify(struct pipeline_context *c, struct error *err);
 
-/* Ranks the candidates of the document for every model. Nothing when there are none. */
+/* Ranks the candidate photographs of the document for every model. Without candidates it does nothing. */
 status pipeline_rank_candidates(struct pipeline_context *c, struct error *err);
 
 #endif

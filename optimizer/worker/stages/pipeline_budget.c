@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* What all starts of a model's fit take together. */
+/* Least number of paths that all starts of a model's fit take together. */
 static status least_budget(const struct pipeline_context *c, const struct pipeline_model *m, uint64_t *least,
                            struct error *err)
 {
@@ -19,7 +19,7 @@ static status least_budget(const struct pipeline_context *c, const struct pipeli
     status s = fit_layout_init(layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
     const struct fit_problem problem = {.n_param = layout->n_unknown,
                                         .info = layout->info,
-                                        .param = layout->parameter,
+                                        .parameter = layout->parameter,
                                         .observation = &c->row,
                                         .max_iteration = c->doc->max_iteration};
     *least = s == STATUS_OK && method != NULL ? method->least_budget(&problem) * option.n_start : 0;

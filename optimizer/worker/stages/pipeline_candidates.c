@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEAST_PATH = 1024, MOST_PATH = 65536 }; /* a candidate and replica */
+enum { LEAST_PATH = 1024, MOST_PATH = 65536 }; /* paths of a candidate and replica */
 
 static status candidate_set(const struct pipeline_context *pipeline, struct observation_set *o, struct error *err)
 {

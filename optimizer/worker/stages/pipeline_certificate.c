@@ -9,7 +9,8 @@
 
 enum { N_PATH = 2048 };
 
-/* What counts as a failure: rounding of single precision leaves up to 0.2 %. */
+/* Relative error of a derivative above which the certificate fails. Rounding in single precision alone gives up to
+ * 0.2 %. */
 static const double allowed_error = 0.01;
 
 static void warn_of(struct pipeline_context *c, const struct pipeline_model *m)

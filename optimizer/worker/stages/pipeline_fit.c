@@ -44,7 +44,7 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
         return error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
     struct fit_problem problem = {.n_param = m->appearance.n_param,
                                   .info = m->appearance.param,
-                                  .param = m->parameter,
+                                  .parameter = m->parameter,
                                   .observation = &c->row,
                                   .estimator = estimator,
                                   .path_budget = c->doc->path_budget,
@@ -57,7 +57,8 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
     return fit_run(method, &problem, &option, &m->fit, err);
 }
 
-/* Another start that ended elsewhere with the same objective: the photographs cannot tell the two apart. */
+/* Warns of starts that ended at other parameters with the same objective, because the photographs do not distinguish
+ * the two. */
 static void warn_of_starts(struct pipeline_context *c, const struct pipeline_model *m)
 {
     for (size_t k = 0; k < m->fit.n_start; k++) {
@@ -88,7 +89,7 @@ static void warn_density(struct pipeline_context *c, const struct pipeline_model
         m->appearance.id);
 }
 
-/* "a, b, c" of the flagged parameters; false when there is none. */
+/* Writes the names of the flagged parameters as "a, b, c". Returns false when there is none. */
 static bool list_names(const struct pipeline_model *m, const bool *flag, size_t n_text, char *text)
 {
     size_t used = 0;
@@ -118,8 +119,8 @@ static void warn_parameters(struct pipeline_context *c, const struct pipeline_mo
     }
 }
 
-/* Of a fit that was made, now or by an earlier attempt. */
-static void tell(struct pipeline_context *c, const struct pipeline_model *m)
+/* Logs the result of a fit, made now or by an earlier attempt, and sends its warnings. */
+static void conclude_fit(struct pipeline_context *c, const struct pipeline_model *m)
 {
     log_info(c->log, "fit of %s %s after %zu steps, %.3g paths, %.1f s: %s", m->appearance.id,
              m->fit.converged ? "converged" : "did NOT converge", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s,
@@ -155,7 +156,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     if (s != STATUS_OK) goto out;
     if (estimate_journal_n_replayed(trace.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
-    tell(c, m);
+    conclude_fit(c, m);
     listener->step_base += m->fit.n_step;
 out:
     pipeline_trace_close(&trace);
@@ -188,7 +189,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = work_file_read(path, "fit.6", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
-    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) tell(c, &c->model[i]);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) conclude_fit(c, &c->model[i]);
     return s;
 }
 

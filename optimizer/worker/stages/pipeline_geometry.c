@@ -12,7 +12,7 @@
 
 static const double um = 1e-6, mm = 1e-3;
 
-/* The document's options over the defaults. */
+/* Replaces defaults by the options of the document. */
 static void set_options(const struct job_document *doc, struct reconstruct_option *o)
 {
     reconstruct_option_default(o);
@@ -186,8 +186,8 @@ status stage_directions_load(struct pipeline_context *c, struct error *err)
 
 /* ---- fibers ---- */
 
-/* No cloth has a fiber as wide as its tile. A length in a wrong unit makes such fibers, all of which meet across the faces:
- * the pairs of their ends are more than can be counted. */
+/* Refuses fibers as wide as their tile, which no cloth has. A length in a wrong unit makes such fibers; all of them
+ * meet across the faces, and the pairs of their ends would be too many to search. */
 static status check_radii(const struct fiber_set *f, const char *name, struct error *err)
 {
     double most_m = 0.5 * fmin(f->tile_size_m[0], f->tile_size_m[1]);

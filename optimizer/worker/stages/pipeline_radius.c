@@ -14,13 +14,14 @@
 enum { FIRST_POINTS = 5, MOST_POINTS = 11 };
 
 static const double um = 1e-6, tolerance = 0.01;
-/* Of the budget of a fit, for each radius; with less than some paths a row there would be no second iteration. */
+/* Share of the fit's path budget for the fit at each radius, and the least number of paths per row, without which
+ * there would be no second iteration. */
 static const double budget_share = 0.12, least_paths_a_row = 21000.0;
 
 struct search {
     struct pipeline_context *c;
     struct worker_series *series;
-    float *radius_m; /* of the cloth as it came */
+    float *radius_m; /* original radii of the cloth */
     size_t n_done;
     double u[NOISY_MAX_POINT], param[NOISY_MAX_POINT][SCATTERING_MAX_PARAM];
 };
@@ -37,7 +38,7 @@ static void scale_radii(struct fiber_set *f, const float *radius_m, double facto
     for (size_t i = 0; i < f->n_fiber; i++) f->radius_m[i] = (float)((double)radius_m[i] * factor);
 }
 
-/* Each fit begins where the one at the nearest radius ended. */
+/* Starts each fit at the result of the one at the nearest radius. */
 static void set_starts(const struct search *q, double u, struct fit_parameter *parameter)
 {
     size_t nearest = 0;
@@ -66,7 +67,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     option.n_start = 1;
     const struct fit_problem problem = {.n_param = m->appearance.n_param,
                                         .info = m->appearance.param,
-                                        .param = parameter,
+                                        .parameter = parameter,
                                         .observation = &c->fitted,
                                         .estimator = e,
                                         .path_budget = (uint64_t)paths,
@@ -74,7 +75,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     return fit_run(method, &problem, &option, r, err);
 }
 
-/* One record of the series a radius. */
+/* Writes one record of the series for a radius. */
 static status report(struct search *q, const struct fit_result *r, double radius_m, bool replayed, struct error *err)
 {
     struct pipeline_context *c = q->c;
@@ -135,7 +136,7 @@ out:
     return s;
 }
 
-/* From the place on the curve to the radius and its error. */
+/* Computes the radius and its error from the minimum of the curve. */
 static void conclude(struct pipeline_context *c)
 {
     struct pipeline_radius *r = &c->radius;
@@ -178,7 +179,7 @@ static status check_range(struct pipeline_context *c, struct error *err)
     const struct job_document *doc = c->doc;
     r->lower_m = isnan(doc->radius_lower_um) ? 0.5 * r->start_m : doc->radius_lower_um * um;
     r->upper_m = isnan(doc->radius_upper_um) ? 2.0 * r->start_m : doc->radius_upper_um * um;
-    if (r->upper_m < 1.1 * r->lower_m) /* one of the two was given and lies beyond the other's default */
+    if (r->upper_m < 1.1 * r->lower_m) /* one bound was given and lies beyond the default of the other */
         return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
                                "'%s' leaves no range to search: %.4g to %.4g um; the cloth's fibers have %.4g um",
                                job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um, r->start_m / um);
@@ -190,7 +191,8 @@ static status check_range(struct pipeline_context *c, struct error *err)
     return STATUS_OK;
 }
 
-/* Said before the search, which takes long; the range is what the user asked for. */
+/* Warns before the search, which takes long, that the range the user asked for does not contain the cloth's own
+ * radius. */
 static void warn_of_range(struct pipeline_context *c)
 {
     const struct pipeline_radius *r = &c->radius;

@@ -14,14 +14,14 @@
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/worker_series.h"
 
-/* Share of the stage's progress that the search takes. */
+/* Share of the search in the progress of the stage. */
 #define PIPELINE_RADIUS_SHARE 0.4
 
 /* Fills in c->radius, sets the fibers' radii and makes the scene anew. Steps go to the series. */
 status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err);
-/* Brings back what an earlier attempt found: c->radius is filled in. */
+/* Applies the radius that an earlier attempt found; c->radius is filled in. */
 status pipeline_radius_apply(struct pipeline_context *c, struct error *err);
-/* The radius has come out and is used; false: the cloth's own is kept. */
+/* Whether the fitted radius is used; false when the cloth's own is kept. */
 bool pipeline_radius_used(const struct pipeline_radius *r);
 
 #endif

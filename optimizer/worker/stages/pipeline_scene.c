@@ -17,7 +17,8 @@ static bool wants_volume_scene(const struct pipeline_context *c)
     return false;
 }
 
-/* The cloth came as fibers: volume models get the density of those. Cheap enough to be done again after a resume. */
+/* Computes the density of a cloth that was given as fibers, for volume models. It is cheap enough to be done again
+ * after a resume. */
 static status voxelise(struct pipeline_context *c, struct error *err)
 {
     const struct voxelise_option option = {
@@ -83,7 +84,8 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
 
 status stage_scene(struct pipeline_context *c, struct error *err)
 {
-    reconstruct_warn_fibers(&c->geometry, &c->fiber,
-                            &(struct warning_sink){pipeline_warn, c}); /* this stage runs in every attempt */
+    reconstruct_warn_fibers(
+        &c->geometry, &c->fiber,
+        &(struct warning_sink){pipeline_warn, c}); /* this stage runs in every attempt, so the warnings are not lost */
     return pipeline_make_scene(c, err);
 }

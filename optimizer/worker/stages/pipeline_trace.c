@@ -4,7 +4,7 @@
 #include <string.h>
 #include <zlib.h>
 
-/* Of everything that estimates depend on beside the call. */
+/* Checksum of everything but the call that estimates depend on. */
 static uint64_t fingerprint(const struct pipeline_context *c, size_t i_model)
 {
     const struct fiber_set *f = &c->fiber;

@@ -14,8 +14,8 @@ struct pipeline_trace {
     struct estimate_journal *journal;
 };
 
-/* Opens (and replays) the journal work/<stage>/<name> of the model, "estimates.journal" for its own fit. Not to be moved in memory until closed; close in any
- * case. */
+/* Opens the journal work/<stage>/<name> of the model ("estimates.journal" for its fit) in front of the path tracer.
+ * *t must not move in memory until it is closed, and must be closed after an error too. */
 status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
                            size_t i_model, const struct observation_set *o, struct error *err);
 void pipeline_trace_close(struct pipeline_trace *t);

@@ -26,8 +26,8 @@ static double relative_path_variance(const struct observation *o, const struct e
     return (double)pilot->n_path * largest / (a * a);
 }
 
-/* Paths a replica, so that both together reach the standard error asked for; all rows give way alike when the budget is
- * short. */
+/* Plans the paths per replica so that both together reach validation_rel_se. When the budget is short, all rows get
+ * less in the same proportion. */
 static void plan_validation(const struct pipeline_context *c, const struct pipeline_model *m,
                             const struct estimate *pilot, size_t *n_path)
 {
@@ -44,12 +44,12 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
         double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
                    (validation_rel_se * validation_rel_se);
         n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
-        if (!(c->observation.item[i].weight > 0.0)) n = (double)pilot[i].n_path; /* shown, and counts nowhere */
+        if (!(c->observation.item[i].weight > 0.0)) n = (double)pilot[i].n_path; /* the row is shown, but not scored */
         n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
     }
 }
 
-/* What row i's photograph would show by one replica. */
+/* Converts one replica of row i to what its photograph would show. */
 static void show_row(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, int replica,
                      bool own_gain, struct estimate *out)
 {
@@ -59,7 +59,7 @@ static void show_row(const struct pipeline_context *c, const struct pipeline_mod
                                 out);
 }
 
-/* NaN when the set has no rows. */
+/* Scores the rows of one set; NaN when it has none. */
 static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
                            bool own_gains, struct objective_value *value, struct error *err)
 {
@@ -112,7 +112,8 @@ static status allocate_validations(struct pipeline_context *c, struct error *err
     return STATUS_OK;
 }
 
-/* Pilot, then two replicas, each through a journal: an interrupted validation does not start over. */
+/* Estimates a pilot, then two replicas, each through a journal, so that an interrupted validation does not start
+ * over. */
 static status estimate_validation(struct pipeline_context *c, struct pipeline_model *m, const struct estimator *e,
                                   const struct progress *whole, size_t *n_path, struct error *err)
 {
@@ -135,7 +136,8 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
     return s;
 }
 
-/* Models whose error cannot be told from that of the best one: which is best is chance. */
+/* Warns of models whose error equals that of the best one within the noise, so that the choice between them is
+ * chance. */
 static void warn_of_equals(struct pipeline_context *c)
 {
     size_t best = pipeline_best_model(c), used = 0, n;

@@ -41,7 +41,7 @@ static void setup(struct fixture *x, size_t n_row)
         x->parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
     x->problem = (struct fit_problem){.n_param = N,
                                       .info = fake_param,
-                                      .param = x->parameter,
+                                      .parameter = x->parameter,
                                       .observation = &x->observation,
                                       .estimator = &x->estimator,
                                       .path_budget = 2000000,

@@ -59,7 +59,7 @@ static void setup(struct fixture *x, double gain, double weight)
             (struct fit_parameter){board_param[p].lower, board_param[p].upper, board_param[p].start, false};
     x->problem = (struct fit_problem){.n_param = BOARD_N_PARAM,
                                       .info = board_param,
-                                      .param = x->parameter,
+                                      .parameter = x->parameter,
                                       .observation = &x->observation,
                                       .estimator = &x->estimator,
                                       .path_budget = 1500000,

@@ -55,7 +55,7 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
     struct estimator e = trace_estimator(t);
     const struct fit_problem problem = {.n_param = t->request.input.model->n_param,
                                         .info = t->request.input.model->param,
-                                        .param = parameter,
+                                        .parameter = parameter,
                                         .observation = &o,
                                         .estimator = &e,
                                         .path_budget = 200000,

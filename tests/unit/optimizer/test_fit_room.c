@@ -90,7 +90,7 @@ static status fit_wide(size_t n_param, const struct fit_option *o, const char *m
     }
     const struct fit_problem problem = {.n_param = n_param,
                                         .info = info,
-                                        .param = parameter,
+                                        .parameter = parameter,
                                         .observation = &observation,
                                         .estimator = &e,
                                         .path_budget = 3000000,

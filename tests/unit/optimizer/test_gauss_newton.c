@@ -37,7 +37,7 @@ static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double 
         parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
     struct fit_problem problem = {.n_param = FAKE_N_PARAM,
                                   .info = fake_param,
-                                  .param = parameter,
+                                  .parameter = parameter,
                                   .observation = &o,
                                   .estimator = &e,
                                   .path_budget = budget};
@@ -247,7 +247,7 @@ static struct blind fit_blind(const struct param_info *eighth, double start, siz
     parameter[8].start = start;
     struct fit_problem problem = {.n_param = FAKE_N_PARAM,
                                   .info = info,
-                                  .param = parameter,
+                                  .parameter = parameter,
                                   .observation = &o,
                                   .estimator = &e,
                                   .max_iteration = max_iteration,

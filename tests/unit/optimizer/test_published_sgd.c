@@ -67,7 +67,7 @@ static void run(struct slope *x, double start)
     assert_int_equal(observation_set_append(&observation, &row, NULL), STATUS_OK);
     struct fit_problem problem = {.n_param = 1,
                                   .info = one_param,
-                                  .param = &parameter,
+                                  .parameter = &parameter,
                                   .observation = &observation,
                                   .estimator = &estimator,
                                   .report = on_step,

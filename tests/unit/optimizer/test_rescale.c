@@ -100,7 +100,7 @@ static void measure(struct fixture *x, const struct estimator *e)
     for (size_t i = 0; i < FAKE_N_FIT; i++) n_path[i] = 256;
     const struct fit_problem problem = {.n_param = FAKE_N_PARAM,
                                         .info = fake_param,
-                                        .param = x->parameter,
+                                        .parameter = x->parameter,
                                         .observation = &x->observation,
                                         .estimator = e};
     assert_int_equal(rescale_measure(&problem, x->k, n_path, x->curve, &x->n_path, &x->wall_s, NULL), STATUS_OK);
