@@ -1,32 +1,52 @@
-/* Recovery of known parameters by fits: figures fit.<fabric>.*, one JSON object a line; progress on standard error.
- *   bench_fit [--folder F] [--photograph-paths N] [--kept-paths N] [--score-paths N] [--path-budget N] [--sample S] [--prepare] [WHAT ...]
- *             [--sgd-budget N] [--curve-paths N] [--fabric NAME] [--journal FILE] [--model M] [--yarn FILE|none] [--flatness F] [--row-paths N]
- * WHAT: names of fit_fabrics.c, "coverage", "seeds", "curve", "analytic", "real", "grazing"; nothing: all these. "real_all_rotations"; "published": the published method
- * in full (3.3e9 paths: hours), continued from the file of --journal when it was stopped; it and "curve" take --fabric (gabardine).
- * --prepare renders photographs only.
- * Defaults are those of the figures: 1,000,000 paths a photograph, 2 x 200,000 a held-out mean of the truth, 2 x 50,000
- * of a fit (10,000 of a point of a curve), the method's own budget. SELVEDGE_DATA: where measured-reflectance/ and yarns/ are.
- * "grazing" takes --model (of the four); "real" and "real_all_rotations" --sample (a table), --model, --yarn (file of the weave's yarn;
- * none: smooth yarns), --flatness (of the yarns; 3.6) and --row-paths (tells rendered / measured of every row).
- *   fit.<fabric>.wall_s, .paths          of one fit by the default method, from the default start
+/* Benchmark of fits: how well they recover known parameters. Prints figures fit.*, one JSON object on each line, and
+ * progress on standard error.
+ *
+ *   bench_fit [OPTION ...] [WHAT ...]
+ *
+ * WHAT is a name of fit_fabrics.c, or one of these. Without WHAT, all but the last two run.
+ *   coverage             20 fits, five of each of four fabrics, each to a fifth of the photographs' paths
+ *   seeds                10 fits of gabardine with different seeds
+ *   curve                error of one fabric over the course of a fit, for both methods
+ *   analytic             both methods with their own budgets on the analytic cloth of the tests, 10 seeds
+ *   real                 measured tables, with the cloth turned as they state: 16 rows fitted, 24 held out
+ *   grazing              all models fitted to gabardine, seen in mirrored directions up to grazing angles
+ *   real_all_rotations   measured tables, with rows as means over all rotations (their data are isotropic)
+ *   published            the published method with its own budget (3.3e9 paths, which take hours)
+ *
+ * Options, with the defaults of the figures:
+ *   --folder F              where photographs and estimates are kept
+ *   --photograph-paths N    1,000,000 for each photograph
+ *   --kept-paths N          2 x 200,000 for each held-out mean of the truth
+ *   --score-paths N         2 x 50,000 for each held-out mean of a fit (10,000 of a point of a curve)
+ *   --path-budget N         of each fit; the method's default
+ *   --prepare               only make photographs
+ *   --sgd-budget N          of the published method in "curve": 20 million paths in all
+ *   --curve-paths N         for each point of a curve
+ *   --fabric NAME           of "curve" and "published": gabardine
+ *   --journal FILE          of "published", which continues from it after a stop
+ *   --model M               of "grazing" and of measured tables: one of the four models
+ *   --sample S              of measured tables: only this one
+ *   --yarn FILE|none        of measured tables: yarn of the weave; none: smooth yarns
+ *   --flatness F            of measured tables: width over height of the yarns, 3.6
+ *   --row-paths N           of measured tables: print rendered / measured of every row
+ * The environment variable SELVEDGE_DATA names the folder of measured-reflectance/ and yarns/.
+ *
+ *   fit.<fabric>.wall_s, .paths          of one fit by the default method from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
- *   fit.<fabric>.first_order_ratio       held-out error against that of the truth, by derivatives: no noise of score paths
- *   fit.<fabric>.published_paths         what the published method's own budget comes to
- *   fit.coverage_2sigma                  20 fits, five of each of four fabrics to a fifth of the photographs' paths each, with new noise:
- *                                        share of determined parameters within 2 se
- *   fit.seeds.worst_over_median          10 fits of gabardine with other seeds: held-out error; first_order_worst_over_median: by
- *                                        first_order_ratio
- *   fit.curve.<method>                   held-out error of --fabric against paths and seconds, one line a point; the
- *                                        published method with --sgd-budget paths (20 million) in all
- *   fit.analytic.<method>                error of the fitted means against the exact ones, Gabardine's parameters on the
- *                                        analytic cloth of the tests, both methods with their own budgets, 10 seeds
- *   fit.published.<fabric>.{wall_s,paths,heldout_rel_rms,truth_rel_rms,first_order_ratio}   that fabric by the published method
- *   fit.real.<sample>.<model>.fit_rel_rms, .heldout_rel_rms   measured tables on a plain weave of plied yarns, felts on felt: 16 rows fitted,
- *                                        24 held out, cloth turned as they state
- *   fit.real_all_rotations.<sample>...   the same with rows as means over all rotations: isotropic data, so each is taken once
- *   fit.grazing.<model>, .truth, .photograph   radiance of gabardine (photographed as two_lobe.v1) in mirrored directions against their angle
- *                                        from the normal, as fitted by each model to the 16 photographs; _brightest: at 80 degrees, of any microflakes
+ *   fit.<fabric>.first_order_ratio       held-out error over that of the truth, by derivatives, without noise of paths
+ *   fit.<fabric>.published_paths         path budget of the published method
+ *   fit.coverage_2sigma                  share of determined parameters within two standard errors
+ *   fit.seeds.worst_over_median          held-out error of the worst seed over the median
+ *   fit.seeds.first_order_worst_over_median   the same by first_order_ratio
+ *   fit.curve.<method>                   held-out error against paths and seconds, one line for each point
+ *   fit.analytic.<method>                error of the fitted means against the exact ones, with Gabardine's parameters
+ *   fit.published.<fabric>.{wall_s,paths,heldout_rel_rms,truth_rel_rms,first_order_ratio}
+ *   fit.real.<sample>.<model>.{fit_rel_rms,heldout_rel_rms}   on a plain weave of plied yarns; felt samples on felt
+ *   fit.real_all_rotations.<sample>...   the same
+ *   fit.grazing.<model>, .truth, .photograph   radiance in mirrored directions against their angle from the normal. The
+ *                                        models are fitted to 16 photographs that are made with two_lobe.v1
+ *   fit.grazing.microflake_brightest     largest radiance of any microflakes at 80 degrees
  */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/objective/objective.h"
@@ -43,7 +63,7 @@
 
 enum { N_PART = 5, N_SEED = 10, N_CURVE = 14 };
 
-/* Without photographs. */
+/* Opens cloth and model of a fabric, without photographs. */
 static void open_cloth(const struct bench *b, const char *name, struct fit_phantom *f)
 {
     const struct fit_fabric *fabric = fit_fabric_find(name);
@@ -64,11 +84,12 @@ static struct fit_score score(const struct bench *b, const struct fit_phantom *f
                              param == f->truth ? 0 : b->score_paths);
 }
 
-/* 16 configurations x 2 replicas x 64 x 64 x 64 paths x (6 x 60 iterations, one for the first rate, up to 10 to settle);
- * rescaling curves: 5 of nine values each, one replica. */
+/* Path budget of the published method: 16 configurations x 2 replicas x 64 x 64 pixels x 64 samples for each iteration.
+ * There are 6 x 60 iterations, one for the first step length, and up to 10 with short steps at the end. The 5 rescaling
+ * curves need nine values each, in one replica. */
 static double published_paths(void) { return 16.0 * 64 * 64 * 64 * (2.0 * (6 * 60 + 1 + 10) + 5 * 9); }
 
-/* What the stated errors of the held-out photographs make of the score of the truth: no rendering, no noise. */
+/* The score of the truth that follows from the stated errors of the held-out photographs, without rendering. */
 static double expected_score(const struct fit_phantom *f)
 {
     struct observation_set part;
@@ -80,19 +101,20 @@ static double expected_score(const struct fit_phantom *f)
     return score;
 }
 
-/* The held-out error without the noise of score paths: photographs' stated errors, and the fit's to first order. Both are
- * free of bias, so where derivatives are noisy they may come out below nothing. */
+/* The held-out error over that of the truth, from the stated errors of the photographs and the error of the fit to
+ * first order, so that it has no noise of score paths. Both terms are unbiased; where derivatives are noisy they can
+ * therefore be negative. */
 static double first_order_ratio(const struct bench *b, const struct fit_phantom *f, const struct fit_result *r)
 {
     double photographs = expected_score(f), square = photographs * photographs;
     double fit = fit_phantom_first_order(f, JOB_SET_HELD_OUT, b->kept_paths, r->param),
            stated = fit_phantom_expected(f, JOB_SET_HELD_OUT, b->kept_paths, r->uncertainty.cov);
     double ratio = sqrt(fmax(1.0 + fit / square, 0.0));
-    fprintf(stderr, "  to first order %.4f (x %.2f), ", photographs * ratio, ratio);
+    fprintf(stderr, "  held out to first order %.4f (%.2f times the truth), ", photographs * ratio, ratio);
     if (stated > -square)
-        fprintf(stderr, "%.4f expected of the stated errors of photographs and parameters\n", sqrt(square + stated));
+        fprintf(stderr, "%.4f expected from the stated errors of photographs and parameters\n", sqrt(square + stated));
     else
-        fprintf(stderr, "derivatives too noisy to tell what the stated errors let expect\n");
+        fprintf(stderr, "derivatives are too noisy for the value expected from the stated errors\n");
     return ratio;
 }
 
@@ -102,11 +124,11 @@ static void bench_fabric(const struct bench *b, const char *name)
     struct fit_result r;
     open_fabric(b, name, &f);
     struct fit_score truth = score(b, &f, f.truth);
-    fprintf(stderr, "  the truth scores %.4f +- %.4f, %.4f expected of the photographs' stated errors\n", truth.rel_rms,
-            truth.se, expected_score(&f));
+    fprintf(stderr, "  the truth scores %.4f +- %.4f, %.4f expected from the photographs' stated errors\n",
+            truth.rel_rms, truth.se, expected_score(&f));
     if (!b->prepare) {
         bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget, NULL, &r, NULL);
-        bench_tell_fit(&f, &r);
+        bench_print_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
         fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
         bench_print(name, "first_order_ratio", first_order_ratio(b, &f, &r), "1", "lower");
@@ -119,7 +141,7 @@ static void bench_fabric(const struct bench *b, const char *name)
     fit_phantom_release(&f);
 }
 
-/* Fits of one fabric to a part each of the figures' photographs. */
+/* Fits one fabric several times, each time to another part of its photographs' paths. */
 static void cover_fabric(const struct bench *b, const char *name, size_t *n_inside, size_t *n_judged)
 {
     struct fit_phantom f;
@@ -128,13 +150,13 @@ static void cover_fabric(const struct bench *b, const char *name, size_t *n_insi
         struct fit_result r;
         fit_phantom_photograph(&f, &(struct fit_photography){b->photograph_paths / N_PART, BENCH_NOISE, 100 + i, i});
         bench_run_fit(&f, method_gauss_newton.id, 100 + i, b->path_budget, NULL, &r, NULL);
-        bench_tell_fit(&f, &r);
+        bench_print_fit(&f, &r);
         for (size_t p = 0; p < f.model.n_param; p++) {
             if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
             ++*n_judged;
             *n_inside += fabs(r.param[p] - f.truth[p]) < 2.0 * r.uncertainty.se_param[p];
         }
-        fprintf(stderr, "  %zu of %zu inside so far\n", *n_inside, *n_judged);
+        fprintf(stderr, "  %zu of %zu inside two standard errors so far\n", *n_inside, *n_judged);
     }
     fit_phantom_release(&f);
 }
@@ -154,7 +176,7 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Puts them in order. */
+/* Returns the median, and sorts the values. */
 static double median(double value[N_SEED])
 {
     qsort(value, N_SEED, sizeof *value, by_size);
@@ -169,7 +191,7 @@ static void bench_seeds(const struct bench *b)
     for (uint64_t i = 0; i < N_SEED; i++) {
         struct fit_result r;
         bench_run_fit(&f, method_gauss_newton.id, 200 + i, b->path_budget, NULL, &r, NULL);
-        bench_tell_fit(&f, &r);
+        bench_print_fit(&f, &r);
         struct fit_score s = score(b, &f, r.param);
         fprintf(stderr, "  held out %.4f +- %.4f\n", s.rel_rms, s.se);
         ratio[i] = first_order_ratio(b, &f, &r);
@@ -183,7 +205,7 @@ static void bench_seeds(const struct bench *b)
     fit_phantom_release(&f);
 }
 
-/* Points evenly spaced in the logarithm of paths, and the result. */
+/* Prints points that are evenly spaced in the logarithm of paths, and the result of the fit. */
 static void print_curve(const struct bench *b, const struct fit_phantom *f, const char *method,
                         const struct fit_curve *c, const struct fit_result *r)
 {
@@ -219,7 +241,7 @@ static void bench_curve(const struct bench *b)
     for (size_t k = 0; k < 2; k++) {
         struct fit_result r;
         bench_run_fit(&f, run[k].method, 1, run[k].budget, NULL, &r, c);
-        bench_tell_fit(&f, &r);
+        bench_print_fit(&f, &r);
         print_curve(b, &f, run[k].method, c, &r);
     }
     fit_phantom_release(&f);
@@ -234,7 +256,7 @@ static void bench_published(const struct bench *b)
     snprintf(of, sizeof of, "published.%s", b->fabric);
     open_fabric(b, b->fabric, &f);
     bench_run_fit(&f, method_published_sgd.id, 1, 0, b->journal, &r, NULL);
-    bench_tell_fit(&f, &r);
+    bench_print_fit(&f, &r);
     bench_print(of, "wall_s", r.wall_s, "s", "lower");
     bench_print(of, "paths", (double)r.n_path, "path", "lower");
     struct fit_score fitted = score(b, &f, r.param), truth = score(b, &f, f.truth);
@@ -246,7 +268,7 @@ static void bench_published(const struct bench *b)
     fit_phantom_release(&f);
 }
 
-/* ---- both methods with their own budgets, on the cloth without a cloth (fake_estimator.h): seconds ---- */
+/* ---- both methods with their own budgets on the analytic cloth (fake_estimator.h); takes seconds ---- */
 
 static void fit_analytic(const char *method, uint64_t seed, struct fit_curve *c)
 {
@@ -272,7 +294,7 @@ static void fit_analytic(const char *method, uint64_t seed, struct fit_curve *c)
                                         .report_context = c};
     c->n = 0;
     fit_check(descent_find(method)->run(&problem, &r, &err), &err);
-    for (size_t i = 0; i <= c->n; i++) /* the result last: the published method returns the best of its runs */
+    for (size_t i = 0; i <= c->n; i++) /* the result is the last point: the published method returns its best run */
         printf("{\"name\":\"fit.analytic.%s\",\"value\":%.5g,\"unit\":\"1\",\"better\":\"lower\",\"paths\":%.6g,"
                "\"seed\":%d}\n",
                method, fake_rel_rms(&f, 0, FAKE_N_FIT, i < c->n ? c->param[i] : r.param, truth),
@@ -317,7 +339,7 @@ static void run_one(const struct bench *b, const char *what)
     }
 }
 
-/* A whole number of 1 or more, all of the text. */
+/* Reads a text that is a whole number of 1 or more. */
 static bool take_count(const char *text, uint64_t *count)
 {
     char *end;
@@ -368,7 +390,7 @@ int main(int argc, char **argv)
         if (strcmp(argv[i], "--prepare") == 0) {
             b.prepare = true;
         } else if (i + 1 == argc || !take_option(&b, argv[i], argv[i + 1])) {
-            fprintf(stderr, "unknown option '%s', or its value is missing or makes no sense\n", argv[i]);
+            fprintf(stderr, "option '%s' is unknown, or its value is missing or wrong\n", argv[i]);
             return 1;
         } else {
             i++;

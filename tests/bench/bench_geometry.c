@@ -1,9 +1,18 @@
-/* How near reconstructed fibers come to the true ones, on phantoms of all weaves (definitions: geometry/phantom/compare.h). One JSON object a line.
- *   geometry.<weave>.d<diameter in voxels>.snr<signal-to-noise>.{precision,recall,length_recovered,fragments_per_fiber,merges} shares and
- *       counts a fiber; centerline_rms_voxel; direction_{mean,p95}_deg; radius_bias: |found / true - 1|
- *   geometry.weave_ct.axis_class_accuracy   share of the labelled tow voxels of a real weave in the right axis class
- * bench_geometry [--pictures DIR] [TEXT...]: only those of plain.d4.snr2 ... felt.d12.snr5, weave_ct whose name contains a TEXT. DIR gets
- * slices with the fibers drawn on them. What is not a figure (times, counts) goes to standard error. */
+/* Accuracy of reconstructed fibers on phantoms of all weaves (definitions: geometry/phantom/compare.h). Prints one JSON
+ * object on each line.
+ *
+ *   geometry.<weave>.d<diameter in voxels>.snr<signal-to-noise>.<figure>, where <figure> is
+ *       precision, recall, length_recovered      shares
+ *       fragments_per_fiber, merges              counts per fiber
+ *       centerline_rms_voxel, direction_mean_deg, direction_p95_deg
+ *       radius_bias                              |found / true - 1|
+ *   geometry.weave_ct.axis_class_accuracy        share of the labelled tow voxels of a real weave in the right class
+ *
+ * bench_geometry [--pictures DIR] [TEXT...]
+ *   TEXT   run only those of plain.d4.snr2 ... felt.d12.snr5 and weave_ct whose name contains a TEXT
+ *   DIR    slices with the fibers drawn on them are written there
+ * Progress, times and counts go to standard error.
+ */
 #include "tests/support/cloth/phantom_reconstruction.h"
 #include "tests/support/cloth/weave_labels.h"
 

@@ -1,11 +1,20 @@
-/* Time and memory of a reconstruction by size, under the default memory setting of 2 GiB. One JSON object a line.
+/* Time and memory of reconstructions of different sizes, with the default memory limit of 2 GiB. Prints one JSON object
+ * on each line.
+ *
  *   geometry.{cotton,fleece,1024}.{wall_s,cpu_s,peak_bytes,material_voxels,material_share}
- *       from the scan's file to transferred directions; peak_bytes: largest resident memory of the process that does it (what it reads from
- *       and writes to files is not counted). cotton 461 x 440 x 160, plain weave; fleece 500 x 540 x 586, felt of 5 voxels a fiber with a
- *       fifth of the volume filled; 1024: 1024 x 1024 x 1024, twill with void above and below. Signal-to-noise 5
- *   geometry.fleece.{quarter,half,full}.cpu_us_per_material_voxel   of parts of the same scan: equal when time is linear in the material
- * bench_geometry_size [--folder DIR] [NAME...]: only those named. Scans (up to 2 GiB) are kept in DIR and found there the next time;
- * without it they are made in a temporary folder. What is not a figure goes to standard error. */
+ *       From the scan's file to transferred directions, at a signal-to-noise ratio of 5. peak_bytes is the largest
+ *       resident memory of the process, without the files that it reads and writes.
+ *         cotton   461 x 440 x 160 voxels, plain weave
+ *         fleece   500 x 540 x 586 voxels, felt with fibers of 5 voxels that fill a fifth of the volume
+ *         1024     1024 x 1024 x 1024 voxels, twill with void above and below
+ *   geometry.fleece.{quarter,half,full}.cpu_us_per_material_voxel
+ *       Parts of the same scan. The figures are equal when time is linear in the material.
+ *
+ * bench_geometry_size [--folder DIR] [NAME...]
+ *   NAME   run only these
+ *   DIR    scans (up to 2 GiB) are kept there and used again the next time; otherwise they are temporary
+ * Progress goes to standard error.
+ */
 #include "base/clock.h"
 #include "geometry/phantom/phantom.h"
 #include "geometry/reconstruct.h"
@@ -128,7 +137,8 @@ static status reconstruct(const char *path, const size_t n[3], const char *folde
     return s;
 }
 
-/* In a process of its own, whose memory is measured. n == NULL: makes the scan, else reconstructs n voxels of it. */
+/* Runs in a process of its own, whose memory is measured. n NULL: makes the scan, otherwise reconstructs n voxels of
+ * it. */
 static struct outcome in_child(const struct sample *p, const size_t *n, const char *folder, const char *path)
 {
     struct outcome o = {.s = STATUS_INTERNAL, .text = "the process died"};

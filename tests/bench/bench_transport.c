@@ -1,18 +1,31 @@
-/* Paths per second and core, and time to a given standard error, on the bench cloth. One JSON object a line.
- *   transport.<set>.paths_per_s_core      with all derivatives
- *   transport.<set>.s_to_1pct_mean        seconds a configuration on one core, mean over the 16 configurations
- *   transport.<set>.s_to_5pct_derivative  the same for the derivative by C_TT (mean of the channels)
- *   transport.<set>.<parameter>.s_to_5pct_derivative   the same for each of C_R, beta_R, beta_TT, gamma_TT. The median
- *       over the 16 configurations: some derivatives pass through 0, where a relative error means nothing
- *   transport.<set>.<width>.s_to_1pct_of_mean   seconds a configuration on one core until the standard error of
- *       d R / d ln(width) is 1 % of R, mean over the configurations: says something where the derivative is nearly 0, too
- *   transport.<set>.shared_camera_speedup   time of the 16 configurations over the time when those that differ in their
- *       lamp only (two and two) share their paths
- *   transport.fleece.peak_bytes   largest resident memory of a process that makes the fibers (as many as the Fleece
- *       cloth has: 31,091 with 580,660 segments) into a scene and traces 16 x 256 paths with derivatives
- *   transport.published_iteration_s.gabardine   processor seconds of 16 configurations x 2 replicas x 64 x 64 x 64 plain paths, traced
- * bench_transport [PATHS] [NAME]: paths a configuration (16384; published_iteration has its own); only that set, "fleece" or
- * "published".
+/* Paths per second and core, and time to a given standard error, on the cloth of the benchmarks. Prints one JSON object
+ * on each line.
+ *
+ *   transport.<set>.paths_per_s_core
+ *       Paths with all derivatives.
+ *   transport.<set>.s_to_1pct_mean
+ *       Seconds for each configuration on one core until the mean has a standard error of 1 %; mean over the 16
+ *       configurations.
+ *   transport.<set>.s_to_5pct_derivative
+ *       The same until the derivative by C_TT (mean of the channels) has a standard error of 5 %.
+ *   transport.<set>.<parameter>.s_to_5pct_derivative
+ *       The same for each of C_R, beta_R, beta_TT, gamma_TT. It is the median over the 16 configurations, because some
+ *       derivatives pass through 0, where a relative error has no meaning.
+ *   transport.<set>.<width>.s_to_1pct_of_mean
+ *       Seconds until the standard error of d R / d ln(width) is 1 % of R; mean over the configurations. This has a
+ *       meaning also where the derivative is near 0.
+ *   transport.<set>.shared_camera_speedup
+ *       Time of the 16 configurations over the time when pairs that differ only in their lamp share their paths.
+ *   transport.fleece.peak_bytes
+ *       Largest resident memory of a process that makes a scene of as many fibers as the Fleece cloth has (31,091 with
+ *       580,660 segments) and traces 16 x 256 paths with derivatives.
+ *   transport.published_iteration_s.gabardine
+ *       Processor seconds of one iteration of the published method: 16 configurations x 2 replicas x 64 x 64 x 64 plain
+ *       paths.
+ *
+ * bench_transport [PATHS] [NAME]
+ *   PATHS   for each configuration (16384); published_iteration has its own number
+ *   NAME    run only this set, "fleece" or "published"
  */
 #include "base/rng.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -41,7 +54,8 @@ static const struct {
     {"cotton", {0.989, 0.959, 0.874, 0.999, 0.999, 0.999, 1, 27.197, 38.269}},
 };
 
-/* One thread does all the work: its processor time, so that a busy machine counts less. */
+/* Processor time of this thread, which does all the work. It depends less on other load of the machine than wall
+ * time. */
 static double processor_s(void)
 {
     struct timespec t;
@@ -62,7 +76,8 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Seconds on one core to a relative standard error of 5 %, median over the configurations; colours: mean of channels. */
+/* Seconds on one core to a relative standard error of 5 %, as a median over the configurations. For a colour it is the
+ * error of the mean of its channels. */
 static double s_to_derivative(const struct estimate e[16], size_t first, bool colour, double per_path)
 {
     double s[16];
@@ -79,7 +94,7 @@ static double s_to_derivative(const struct estimate e[16], size_t first, bool co
     return 0.5 * (s[7] + s[8]);
 }
 
-/* Seconds on one core until the standard error of d R / d ln p is 1 % of R, mean over the configurations. */
+/* Seconds on one core until the standard error of d R / d ln p is 1 % of R, as a mean over the configurations. */
 static double s_to_log_derivative(const struct estimate e[16], size_t p, double at, double per_path)
 {
     double s = 0;
@@ -94,7 +109,7 @@ static double s_to_log_derivative(const struct estimate e[16], size_t p, double 
     return s;
 }
 
-/* 31,091 fibers of 18 or 19 segments, 580,660 in all, lying in the plane in every direction. */
+/* 31,091 fibers with 18 or 19 segments, 580,660 segments in all, that lie in the plane in random directions. */
 static void fleece_fibers(struct fiber_set *f)
 {
     enum { N_FIBER = 31091, N_SEGMENT = 580660 };
@@ -156,7 +171,7 @@ static int trace_fleece(void)
     return st == STATUS_OK ? 0 : 1;
 }
 
-/* In a process of its own, so that nothing else counts. */
+/* Runs in a process of its own, so that nothing else contributes to its memory. */
 static int bench_fleece(void)
 {
     int code = 0;
@@ -176,7 +191,7 @@ struct bench {
     size_t n_path;
 };
 
-/* Estimates with all derivatives; gives the processor seconds. Ends the program when it fails. */
+/* Estimates with all derivatives. Returns the processor seconds. Ends the program when that fails. */
 static double trace(const struct bench *b, const double param[9], size_t n_path, uint32_t replica, bool share,
                     bool plain, struct estimate e[N_CONFIGURATION])
 {
@@ -201,8 +216,8 @@ static double trace(const struct bench *b, const double param[9], size_t n_path,
     return processor_s() - t0;
 }
 
-/* Time to 1 % of the mean and 5 % of the derivative by C_TT, mean over the configurations. Channels are correlated: their
- * standard errors are added. */
+/* Prints the times to 1 % of the mean and to 5 % of the derivative by C_TT, as means over the configurations.
+ * Channels are correlated, so their standard errors are added. */
 static void print_times(const char *set, const struct estimate e[N_CONFIGURATION], double per_path)
 {
     double s_mean = 0, s_derivative = 0, sd = 0, bounce = 0;
@@ -251,7 +266,7 @@ static void bench_set(const struct bench *b, const char *set, const double param
     print(set, "shared_camera_speedup", alone_s / trace(b, param, b->n_path, 0, true, false, e), "", "higher");
 }
 
-/* What one iteration of the published method traces. */
+/* Traces the paths of one iteration of the published method. */
 static void bench_published(const struct bench *b, const char *set, const double param[9])
 {
     static struct estimate e[N_CONFIGURATION];
@@ -278,7 +293,8 @@ int main(int argc, char **argv)
 {
     struct bench b = {.n_path = argc > 1 ? strtoul(argv[1], NULL, 10) : 16384};
     const char *only = argc > 2 ? argv[2] : NULL;
-    if ((only == NULL || strcmp(only, "fleece") == 0) && bench_fleece() != 0) return 1; /* first: little is in memory */
+    if ((only == NULL || strcmp(only, "fleece") == 0) && bench_fleece() != 0)
+        return 1; /* first, while little memory is in use */
     make_bench(&b);
     const struct scattering_model *m = scattering_find("two_lobe.v1");
     for (size_t k = 0; k < sizeof fabric / sizeof fabric[0]; k++) {

@@ -1,9 +1,12 @@
-/* Paths per second and core through a volume, with all derivatives (12 parameters and d). One JSON object a line.
+/* Paths per second and core through a volume, with all derivatives (12 parameters and d). Prints one JSON object on
+ * each line.
+ *
  *   transport.volume.mfp{67,25,6}um.paths_per_s_core   500^3 voxels of 2 um, 28 % of them occupied, mean over 16
  *                                                      configurations; mean free path at the mean occupied density
  *   transport.volume.{mfp...}.bounces_per_path, s_to_1pct_mean
  *   transport.volume.memory_over_stored                bytes of the scene over the stored bytes of its volume
- * Arguments: paths a configuration (4096), voxels along an edge (500).
+ *
+ * Arguments: paths for each configuration (4096), voxels along an edge (500).
  */
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -15,7 +18,8 @@
 #include <stdlib.h>
 #include <time.h>
 
-/* One thread does all the work: its processor time, so that a busy machine counts less. */
+/* Processor time of this thread, which does all the work. It depends less on other load of the machine than wall
+ * time. */
 static double processor_s(void)
 {
     struct timespec t;
@@ -55,7 +59,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s\n", err.text);
         return 1;
     }
-    direction_volume_release(&v); /* the scene has what it needs */
+    direction_volume_release(&v); /* the scene has its own copy */
     for (int i = 0; i < 16; i++) {
         n[i] = n_path;
         warm[i] = 256;
@@ -69,7 +73,7 @@ int main(int argc, char **argv)
     for (int k = 0; k < 3; k++) {
         char set[32];
         snprintf(set, sizeof set, "mfp%.0fum", mean_free_path_um[k]);
-        /* directions are everywhere: the mean sine of the angle to the fiber is pi / 4 */
+        /* directions are uniform, so the mean sine of the angle to the fiber is pi / 4 */
         double multiplier_per_m = 1 / (1e-6 * mean_free_path_um[k] * density * M_PI_4);
         struct trace_volume volume_model;
         struct estimate_request q = {.input = trace_input_volume(&scene, m, param, multiplier_per_m, &volume_model),
@@ -90,7 +94,7 @@ int main(int argc, char **argv)
         double per_path = (processor_s() - t0) / (16.0 * (double)n_path), s_mean = 0, bounce = 0;
         for (int i = 0; i < 16; i++) {
             double mean = 0, se = 0;
-            for (int ch = 0; ch < 3; ch++) { /* channels are correlated: add standard errors */
+            for (int ch = 0; ch < 3; ch++) { /* channels are correlated, so their standard errors are added */
                 mean += e[i].mean[ch];
                 se += sqrt(e[i].var[ch]);
             }

@@ -1,11 +1,12 @@
 /* The pictures of the documentation, rendered from a phantom twill.
  *
- *   documentation_pictures twill FILE.png [samples [width]] docs/images/twill.png: a warp and a weft of their own
- *                                                           colours (material groups) under a lamp and a soft sky
- *   documentation_pictures derivatives FILE.png [samples]   docs/images/derivatives.png: after figure 5.5 of the fabric
- *       thesis. Two configurations (rows); the rendering, then the derivatives by C_R, C_TT, beta_R, beta_TT, gamma_TT
- *       (columns). Mean of the channels, a colour parameter's by its own component; white is 0, the ends of each scale
- *       are what 97 % of the column's pixels stay below.
+ *   documentation_pictures twill FILE.png [samples [width]]
+ *       docs/images/twill.png: warp and weft of different colours (material groups) under a lamp and a soft sky.
+ *   documentation_pictures derivatives FILE.png [samples]
+ *       docs/images/derivatives.png, after figure 5.5 of the fabric thesis. The rows are two configurations. The
+ *       columns are the rendering and its derivatives by C_R, C_TT, beta_R, beta_TT, gamma_TT, as means of the
+ *       channels. For a colour, each channel is differentiated by its own component. White is 0. The scale of a column ends at
+ *       the value below which 97 % of its pixels lie.
  */
 #include "base/angle.h"
 #include "geometry/phantom/phantom.h"
@@ -81,7 +82,7 @@ enum {
     GAP = 8,
     N_COLUMN = 6,
     N_ROW = 2,
-    TITLE = 24, /* names above the panels, scales below */
+    TITLE = 24, /* height of the names above the panels and of the scales below */
     SCALE_BAR = 8,
     WIDTH = N_COLUMN * (PANEL + GAP) - GAP,
     BELOW = TITLE + N_ROW * (PANEL + GAP),
@@ -101,7 +102,7 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What a pixel shows in a column of derivatives, by the units of files. */
+/* The value of a pixel in a column of derivatives, in file units. */
 static double derivative(const struct image *im, size_t pixel, size_t column)
 {
     double sum = 0;
@@ -112,7 +113,7 @@ static double derivative(const struct image *im, size_t pixel, size_t column)
     return sum / 3 * (column_of[column].colour ? 1 : RAD_PER_DEG);
 }
 
-/* The size that 97 % of the values of a column stay below, rounded up to two digits. */
+/* The absolute value below which 97 % of the values of a column lie, rounded up to two digits. */
 static double scale_of(const struct image im[N_ROW], size_t column)
 {
     static double size[N_ROW * PANEL * PANEL];
@@ -124,7 +125,7 @@ static double scale_of(const struct image im[N_ROW], size_t column)
     return ceil(size[n - n * 3 / 100] / digit) * digit;
 }
 
-/* Blue for -1, white for 0, red for 1. */
+/* Maps -1 to blue, 0 to white and 1 to red. */
 static void paint(double value, uint8_t *rgb)
 {
     static const double end[2][3] = {{0.02, 0.19, 0.38}, {0.40, 0.0, 0.12}},

@@ -85,7 +85,7 @@ void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t see
     free(configuration);
 }
 
-void bench_tell_fit(const struct fit_phantom *f, const struct fit_result *r)
+void bench_print_fit(const struct fit_phantom *f, const struct fit_result *r)
 {
     fprintf(stderr, "  %s after %zu steps, %.3g paths, %.1f s (%.0f k paths/s), objective %.4g: %s\n",
             r->converged ? "converged" : "NOT converged", r->n_step, (double)r->n_path, r->wall_s,
@@ -100,7 +100,7 @@ void bench_tell_fit(const struct fit_phantom *f, const struct fit_result *r)
 
 void bench_keep_truth_inside(struct fit_phantom *f)
 {
-    for (size_t p = 0; p < f->model.n_param; p++) /* tables are rounded: not beyond a bound */
+    for (size_t p = 0; p < f->model.n_param; p++) /* rounded tables can be outside of a bound */
         f->truth[p] = fmin(fmax(f->truth[p], f->model.param[p].lower), f->model.param[p].upper);
 }
 

@@ -16,7 +16,7 @@ static void print_mirror(const char *of, double angle_deg, const double rgb[3], 
            of, (rgb[0] + rgb[1] + rgb[2]) / 3.0, angle_deg, se);
 }
 
-/* The photographs of the fit that were taken in such directions. */
+/* Prints the fitted photographs that were taken in mirrored directions. */
 static void print_mirror_photographs(const struct observation_set *o)
 {
     const double deg = DEG_PER_RAD;
@@ -29,7 +29,7 @@ static void print_mirror_photographs(const struct observation_set *o)
     }
 }
 
-/* Replaces f's observations by mirrored directions: n of them from first_deg on. */
+/* Replaces the observations of f by n mirrored directions from first_deg on. */
 static void observe_mirror(struct fit_phantom *f, double first_deg, size_t n)
 {
     const struct job_document set_up = {
@@ -60,7 +60,8 @@ static void print_mirror_curve(const struct bench *b, struct fit_phantom *f, con
     fflush(stdout);
 }
 
-/* The brightest that microflakes get at 80 degrees (thesis, figure 5.15): albedo at its upper bound, gamma over its range, several d. */
+/* Prints the largest radiance of microflakes at 80 degrees (thesis, figure 5.15), with the albedo at its upper bound,
+ * over the range of gamma and for several d. */
 static void print_brightest_microflake(const struct bench *b, const struct fit_cloth *cloth)
 {
     enum { N_GAMMA = 7, N_DENSITY = 3 };
@@ -86,7 +87,7 @@ static void print_brightest_microflake(const struct bench *b, const struct fit_c
     fit_phantom_release(&f);
 }
 
-/* Gabardine's fibers are known to be two_lobe.v1: what the other models make of photographs of them. */
+/* Fits all models to photographs of Gabardine that are made with two_lobe.v1, and prints their grazing radiances. */
 void bench_grazing(const struct bench *b)
 {
     const struct fit_fabric *fabric = fit_fabric_find("gabardine");
@@ -105,7 +106,7 @@ void bench_grazing(const struct bench *b)
         fit_phantom_init_on(&f, b->folder, b->pool, &cloth, bench_model[k].id, NULL);
         fit_phantom_observe(&f, &truth.observation);
         bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget, NULL, &r, NULL);
-        bench_tell_fit(&f, &r);
+        bench_print_fit(&f, &r);
         print_mirror_curve(b, &f, bench_model[k].name, r.param);
         fit_phantom_release(&f);
     }

@@ -11,15 +11,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Paths of a fit and, at most, of a replica's mean when it is scored. Rows state no errors and the models are off by several percent:
- * more paths do not pay. */
+/* REAL_BUDGET is the path budget of a fit, MOST_SCORE_PATHS the largest number of paths for each configuration and
+ * replica of a score. Rows state no errors and the models deviate by several percent, so more paths would not be
+ * useful. */
 enum { MAX_REAL = 32, REAL_BUDGET = 2000000, MOST_SCORE_PATHS = 400000 };
 #define SCORE_SE 0.01
 
 struct real {
     const struct bench *bench;
     bool all_rotations;
-    struct fit_cloth cloth[2]; /* weave, felt: made when the first sample asks for it */
+    struct fit_cloth cloth[2]; /* weave and felt, made for the first sample that needs them */
 };
 
 struct real_row {
@@ -48,7 +49,8 @@ static void tell_rows(const struct fit_phantom *f, const double *param, size_t n
     }
 }
 
-/* The tables hold each row twice, with the cloth turned by 0 and by 90 degrees, and equal values: one mean over rotations is enough. */
+/* The tables have each row twice, with the cloth turned by 0 and by 90 degrees, and with equal values. This keeps one
+ * of the two as a mean over all rotations. */
 static void take_as_isotropic(struct observation_set *o)
 {
     size_t n = 0;
@@ -77,7 +79,8 @@ static void read_table(const struct real *real, const char *path, struct real_ro
     free(text);
 }
 
-/* Both errors by fresh paths: the fit's own objective is at its lowest partly by the luck of the paths that it was fitted to. */
+/* Both errors are estimated with fresh paths. The fit's own objective is too low, because its minimum is partly due
+ * to the noise of the paths that it was fitted to. */
 static void score_table(const struct real *real, const struct fit_phantom *f, const double *param, size_t k,
                         struct real_row *row)
 {
@@ -102,7 +105,7 @@ static void fit_table(const struct real *real, const struct fit_cloth *cloth, si
     fit_phantom_init_on(&f, b->folder, b->pool, cloth, bench_model[k].id, NULL);
     fit_phantom_observe(&f, &row->observation);
     bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget > 0 ? b->path_budget : REAL_BUDGET, NULL, &r, NULL);
-    bench_tell_fit(&f, &r);
+    bench_print_fit(&f, &r);
     if (b->row_paths > 0) tell_rows(&f, r.param, b->row_paths);
     score_table(real, &f, r.param, k, row);
     fit_phantom_release(&f);

@@ -1,6 +1,6 @@
 """Error against paths of the fast and the published method as an SVG picture: plot_fit_curve.py FIGURES.json PICTURE.svg
 
-FIGURES.json: what `bench_fit curve` or `bench_fit analytic` prints, one JSON object a line (of the latter, three seeds are drawn).
+FIGURES.json is the output of `bench_fit curve` or `bench_fit analytic` (of the latter, three seeds are drawn).
 A large point at the end of a line is the result: the published method returns the best of its six runs.
 """
 import json

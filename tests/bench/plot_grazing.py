@@ -1,7 +1,7 @@
-"""Radiance in mirrored directions against their angle from the normal, as each model was fitted, as an SVG picture:
+"""Radiance of each fitted model in mirrored directions against their angle from the normal, as an SVG picture:
 plot_grazing.py FIGURES.json PICTURE.svg
 
-FIGURES.json: what `bench_fit grazing` prints, one JSON object a line.
+FIGURES.json is the output of `bench_fit grazing`.
 """
 import json
 import math

@@ -1,4 +1,5 @@
-"""Print every figure as one JSON object a line: {"name", "value", "unit", "better"}. Progress goes to standard error."""
+"""Prints every figure as one JSON object on a line: {"name", "value", "unit", "better"}. Progress goes to standard
+error."""
 import argparse
 import json
 import os

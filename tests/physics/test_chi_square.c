@@ -23,7 +23,7 @@ static size_t cell_of(const float w[3])
     return i * N_PHI + j;
 }
 
-/* Integral of the density over each cell; returns its sum. */
+/* Integrates the density over each cell. Returns the sum of the integrals. */
 static double expected_counts(const struct scattering_model *m, const struct scattering_state *s, const float wo[3],
                               const float *weight, double *expected)
 {
@@ -53,7 +53,7 @@ static void check(const struct scattering_model *m, const double *param, const f
     if (fabs(total - 1) > 2e-3)
         fail_msg("%s: density integrates to %.6f for wo = %g %g %g", m->id, total, (double)wo[0], (double)wo[1],
                  (double)wo[2]);
-    for (size_t i = 0; i < N_THETA * N_PHI; i++) expected[i] /= total; /* what is left is the quadrature's */
+    for (size_t i = 0; i < N_THETA * N_PHI; i++) expected[i] /= total; /* removes the error of the quadrature */
     memset(count, 0, sizeof count);
     for (int i = 0; i < N_SAMPLE; i++) {
         float u[3] = {rng_float(r), rng_float(r), rng_float(r)}, wi[3];
@@ -100,7 +100,7 @@ static void samples_follow_the_density(void **state)
     }
 }
 
-/* The narrowest lobes, where the grid above is too coarse: one-dimensional histograms of the angles. */
+/* The grid above is too coarse for the narrowest lobes. This test uses one-dimensional histograms of the angles. */
 static void narrowest_lobes(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Light scattered once by straight parallel fibers, against quadrature over the lamp. Fibers so dark that a second
- * scattering does not show, so far apart that they neither shade nor light each other.
+/* Light that straight parallel fibers scatter once, against quadrature over the lamp. The fibers are so dark that a
+ * second scattering is negligible, and so far apart that they neither shadow nor light each other.
  */
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -64,7 +64,7 @@ static double single_scattering(const struct configuration *c, const double para
     return sum * M_PI / irradiance;
 }
 
-/* Of all comparisons together: what a lamp of the wrong size or a cosine too many would shift. */
+/* Mean deviation over all comparisons. A lamp of the wrong size or a superfluous cosine would change it. */
 struct joint {
     double sum, weight;
 };
@@ -91,7 +91,7 @@ static void check(const struct configuration *c, const double param[9], struct t
                      c->light_theta_rad / RAD_PER_DEG, c->light_phi_rad / RAD_PER_DEG,
                      c->cloth_rotation_rad / RAD_PER_DEG, k, e.mean[k], se, want);
         joint->sum +=
-            want * want / (se * se) * (e.mean[k] / want - 1); /* channels share paths: their errors go together */
+            want * want / (se * se) * (e.mean[k] / want - 1); /* channels share paths, so their errors are correlated */
         joint->weight += want * want / (se * se);
     }
 }
@@ -131,7 +131,7 @@ static void single_scattering_from_straight_fibers(void **state)
         check(&c, narrow, pool, scene, &joint);
     }
     double off = joint.sum / joint.weight, se = sqrt(3 / joint.weight);
-    print_message("all together %.4f +- %.4f off\n", off, se);
+    print_message("mean relative deviation of all comparisons: %.4f +- %.4f\n", off, se);
     assert_true(fabs(off) < 4 * se + 2e-3 && se < 0.005);
     thread_pool_free(pool);
     scene_free(scene);

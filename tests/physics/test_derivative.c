@@ -1,6 +1,7 @@
-/* Derivatives of rendered radiance on a woven cloth, all parameters of all models, lamp at a grazing angle included:
- * (a) recorded paths evaluated again at shifted parameters (tight: the same paths, no tracing),
- * (b) traced again with common random numbers, judged by the standard error of paired batches.
+/* Derivatives of radiance on a woven cloth by all parameters of all models, also with a lamp at a grazing angle. They
+ * are compared with differences of two kinds: (a) recorded paths are evaluated again at shifted parameters, which is
+ * precise because the paths stay the same; (b) paths are traced again with common random numbers, and the standard
+ * error of paired batches is the tolerance.
  */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
@@ -161,8 +162,9 @@ static void run(const struct scene *scene, const struct scattering_model *m, con
     if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
 
-/* Moves every slot of one symbol (all channels of a colour) together: each channel sees only its own. The mean slope
- * over [p - h, p + h] is compared with the derivatives' mean over it by Simpson's rule, so that steps can be wide. */
+/* Shifts all parameters of one symbol together (the three channels of a colour), because each channel depends only on
+ * its own. Compares the mean slope over [p - h, p + h] with the mean of the derivatives over it, by Simpson's rule,
+ * so that steps can be wide. */
 static void check_symbol(const struct scene *scene, const struct scattering_model *m, const double *param,
                          const char *symbol, struct thread_pool *pool, int *n_check, int *n_beyond_2se)
 {
@@ -210,9 +212,9 @@ static void check_symbol(const struct scene *scene, const struct scattering_mode
     }
 }
 
-/* Channels share their paths, so the sum over channels counts: of fifteen comparisons 4.6 % each are beyond two
- * standard errors by chance; four or more are with probability 0.4 %. Every channel by itself has to stay within four.
- */
+/* Channels share their paths, so their sum is compared. Each of fifteen comparisons is beyond two standard errors
+ * with a probability of 4.6 %; four or more of them are with a probability of 0.4 %. Each single channel must stay
+ * within four standard errors. */
 static void traced_again(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* The gradient certificate: every model passes it, at its defaults and at its bounds; wrong scores do not. */
+/* The gradient certificate: every model passes it at its defaults and at its bounds, and wrong derivatives fail it. */
 #include "renderer/transport/derivative_check.h"
 #include "tests/support/cloth/hand_volume.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -69,10 +69,10 @@ static void every_model(void **state)
             struct error err = {0};
             for (size_t p = 0; p < m.n_param; p++)
                 param[p] = place == 0 ? m.param[p].lower : place == 2 ? m.param[p].upper : m.param[p].start;
-            if (place == 3) /* the first colour at its lower bound beside bright ones: many bounces off nearly 1 - C */
+            if (place == 3) /* the first colour at its lower bound beside bright ones, so that paths are long */
                 for (size_t p = 0; p < m.n_param; p++)
                     if (m.param[p].channel >= 0) param[p] = p < 3 ? m.param[p].lower : 0.9;
-            if (place == 0 || place == 2) /* white cloth for ever, or nothing to see: colours stay inside */
+            if (place == 0 || place == 2) /* not the bounds of colours: a white path never ends, black has no light */
                 for (size_t p = 0; p < m.n_param; p++)
                     if (m.param[p].channel >= 0) param[p] = place == 0 ? 0.2 : 0.9;
             if (m.kind == MODEL_VOLUME) param[m.n_param - 1] = m.param[m.n_param - 1].start;
@@ -88,7 +88,7 @@ static void every_model(void **state)
     }
 }
 
-/* ---- a model whose scores are wrong ---- */
+/* ---- a model whose derivatives are wrong ---- */
 
 static void wrong_scores(float *score)
 {

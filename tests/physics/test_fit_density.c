@@ -1,5 +1,5 @@
-/* The density multiplier of a volume model as a fitted parameter: with the lamp behind the cloth it comes back within
- * its standard error; and one that nothing depends on is said not to be determined. */
+/* The density multiplier of a volume model as a fitted parameter. With the lamp behind the cloth the fit finds it
+ * within its standard error. A density that no photograph depends on is reported as not determined. */
 #include "base/angle.h"
 #include "base/catalogue/method_catalogue.h"
 #include "base/rng.h"
@@ -38,12 +38,12 @@ static void set_views(struct configuration c[N])
     c[2] = view(60, 0, 90);
     c[3] = view(45, 20, 90);
     c[4] = view(65, 60, 0);
-    c[5] = view(180, 30, 0); /* from behind, the lamp itself out of sight */
+    c[5] = view(180, 30, 0); /* from behind; the camera does not see the lamp itself */
     c[6] = view(150, 0, 0);
     c[7] = view(135, 20, 90);
 }
 
-/* Photographs of the truth, each number with its own error. */
+/* Photographs at the true parameters. Each number has an error of its own. */
 static void observe(struct trace_estimator *t, const double *truth, struct observation_set *o)
 {
     struct estimate e[N];
@@ -131,12 +131,13 @@ static void test_recovered_with_light_from_behind(void **unused)
     double se = r.uncertainty.se_param[d];
     assert_true(r.uncertainty.determined[d]);
     assert_true(fabs(r.param[d] - 9e4) < 2.0 * se);
-    assert_true(se < 0.1 * 9e4); /* and the error says something */
+    assert_true(se < 0.1 * 9e4); /* and the standard error is small */
     volume_scene_release(&scene);
     direction_volume_release(&v);
 }
 
-/* So thick that nothing comes through: brightness does not depend on d, and the fit must not claim to know it. */
+/* The cloth is so thick that no light passes through it. Brightness does not depend on d, and the fit must report it as
+ * not determined. */
 static void test_not_determined_from_the_front(void **unused)
 {
     (void)unused;

@@ -1,5 +1,5 @@
-/* Energy: single fibers from the incident side (quadrature) and from the camera side (sampling against quadrature), and
- * a whole endless cloth in a uniform environment.
+/* Conservation of energy: by single fibers from the side of the light (quadrature) and from the side of the camera
+ * (sampling against quadrature), and by a periodic cloth in a uniform environment.
  */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
@@ -51,7 +51,8 @@ static double incident_furnace(const struct scattering_model *m, const struct sc
     return sum * (M_PI / N_THETA) * (2 * M_PI / N_PHI);
 }
 
-/* What goes in comes out, but for what C_TT absorbs and the margin of Q above cos^2 (which only takes energy away). */
+/* All light leaves the fiber again, except for what C_TT absorbs and the margin of Q above cos^2, which only reduces
+ * energy. */
 static void lossless_from_the_incident_side(void **state)
 {
     (void)state;
@@ -80,7 +81,7 @@ static void published_lobe_from_the_camera_side(void **state)
                                        {10, 1.029, 1.017, 0.907, 0.626, 0.477, 0.323},
                                        {25, 1.132, 1.023, 0.669, 0.437, 0.364, 0.296}};
     for (int b = 0; b < 4; b++)
-        for (int a = 0; a < 6; a++) { /* only R, without its Fresnel rise */
+        for (int a = 0; a < 6; a++) { /* only R, without the increase by Fresnel's law */
             double param[9] = {1, 1, 1, 0, 0, 0, table[b][0] * RAD_PER_DEG, 10 * RAD_PER_DEG, 10 * RAD_PER_DEG};
             assert_true(fabs(reference_camera_furnace(param, angle[a] * RAD_PER_DEG, 0) - table[b][a + 1]) < 6e-4);
         }
@@ -123,9 +124,9 @@ static void sampling_gives_the_camera_side_integral(void **state)
         }
 }
 
-/* Integral of S cos th over the far side's directions for the near side's angle, per channel; light comes from theta
- * (incident) or leaves to it. The grids resolve a lobe of 1 degree: periodic or nearly so, they converge
- * exponentially. */
+/* Integral of S cos th over all directions of one side, for a given angle theta of the other side, in each channel:
+ * light arrives from theta (incident) or leaves to it. The grids resolve a lobe of 1 degree. The integrands are
+ * periodic or nearly so, so that the quadrature converges exponentially. */
 static void both_furnaces(const struct scattering_model *m, const struct scattering_state *s, double theta,
                           bool incident, size_t n_phi, double sum[3])
 {
@@ -144,8 +145,8 @@ static void both_furnaces(const struct scattering_model *m, const struct scatter
     }
 }
 
-/* What goes in comes out, for both sides, over the whole parameter box. S is linear in C_TT: two channels that differ
- * in nothing else tell what an unbounded C_TT = 1 would give. */
+/* All light leaves the fiber again, seen from both sides, over the whole range of the parameters. S is linear in
+ * C_TT, so two channels that differ only in C_TT give the value at C_TT = 1, which is outside of the bounds. */
 static void balanced_is_lossless_from_both_sides(void **state)
 {
     (void)state;
@@ -185,7 +186,7 @@ static void balanced_is_lossless_from_both_sides(void **state)
     }
 }
 
-/* Mean radiance of n paths of the crop, everything lit by a uniform environment of radiance 1. */
+/* Mean radiance of n paths of the crop in a uniform environment of radiance 1. */
 static void cloth_furnace(const struct scene *scene, const struct scattering_model *m, const double *param,
                           const struct configuration *c, uint32_t n, bool want_jacobian, struct sample_mean mean[3],
                           double *worst)
@@ -226,7 +227,7 @@ static struct scene *small_cloth(bool black_sheet)
     return scene;
 }
 
-/* With the lossless isotropic model every single path must bring 1. */
+/* With the lossless isotropic model every single path must have the radiance 1. */
 static void whole_cloth_isotropic(void **state)
 {
     (void)state;
@@ -238,7 +239,7 @@ static void whole_cloth_isotropic(void **state)
         struct sample_mean mean[3] = {{0}}, coloured[3] = {{0}};
         double worst, unused;
         cloth_furnace(scene, scattering_find("isotropic.v1"), white, &c[i], 20000, false, mean, &worst);
-        if (worst > 1e-3) fail_msg("configuration %d: a path brings %g more or less than 1", i, worst);
+        if (worst > 1e-3) fail_msg("configuration %d: the radiance of a path differs from 1 by %g", i, worst);
         cloth_furnace(scene, scattering_find("isotropic.v1"), grey, &c[i], 20000, false, coloured, &unused);
         assert_true(fabs(coloured[0].mean - 1) < 1e-3);
         assert_true(coloured[1].mean < 0.95 && coloured[2].mean < coloured[1].mean);
@@ -246,9 +247,9 @@ static void whole_cloth_isotropic(void **state)
     scene_free(scene);
 }
 
-/* The balanced model: radiance 1 within noise. C_TT = 1 is outside the bounds; the three channels see 0.999, 0.998 and
- * 0.997 along the same paths, and radiance is a power series in it: extrapolated by the parabola, what is left is third
- * order (1e-9 times the cube of the number of passages through fibers, some dozens). */
+/* The balanced model: radiance 1 within noise. C_TT = 1 is outside of the bounds, so the three channels have 0.999,
+ * 0.998 and 0.997 along the same paths. Radiance is a power series in C_TT, and a parabola extrapolates it to 1. The
+ * remainder is of third order: 1e-9 times the cube of the number of passages through fibers, which is some dozens. */
 static void whole_cloth_balanced(void **state)
 {
     (void)state;

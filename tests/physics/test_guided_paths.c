@@ -1,6 +1,6 @@
-/* Guided shadow paths (path_tracer.h): the density of the guide, and estimates with guided paths against plain ones, which
- * must have the same means and derivatives. Lamps above, grazing, directional and, without the sheet, below; four models.
- * Tolerances are standard errors.
+/* Guided shadow paths (path_tracer.h): the density of the guide, and estimates with guided paths against plain ones,
+ * which must have the same means and derivatives. Lamps above, grazing, directional and, without the sheet, below;
+ * four models. Tolerances are standard errors.
  */
 #include "base/angle.h"
 #include "base/rng.h"
@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-/* Counts in rings of equal probability and quarters of the turn. */
+/* Compares counts of samples in rings of equal probability, each divided into four quarters. */
 static void test_guide(void **state)
 {
     (void)state;
@@ -142,12 +142,12 @@ static void test_same_means(void **state)
         all.sum_square += here.sum_square;
         all.largest = fmax(all.largest, here.largest);
         gain += log(e[1].var[1] / e[0].var[1]) / (double)n_view;
-        /* means to 4 %, so that light counted twice or left out would show */
+        /* the means are known to 4 %, so that light that is counted twice or left out would be detected */
         assert_true(sqrt(e[0].var[1] + e[1].var[1]) < 0.04 * e[0].mean[1]);
     }
     print_message("%zu numbers: mean square %.2f, largest %.1f; variance %.2f of the plain one\n", all.n,
                   all.sum_square / (double)all.n, all.largest, exp(-gain));
-    assert_true(all.largest < 4.5); /* of some 200 numbers that go together in views */
+    assert_true(all.largest < 4.5); /* of some 200 numbers, which are correlated in each view */
     assert_true(all.sum_square / (double)all.n < 2.0);
     assert_true(gain > log(1.2));
     for (int i = 0; i < 2; i++) scene_free(weave[i]);

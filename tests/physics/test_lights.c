@@ -1,5 +1,5 @@
-/* Lights and cameras beside the square lamp and the perspective camera: against closed forms, quadrature, or each
- * other. Tolerances are standard errors (4, over several dozen comparisons) plus the stated remainders.
+/* Lights and cameras other than the square lamp and the perspective camera, against closed forms, quadrature, or each
+ * other. Tolerances are 4 standard errors (for several dozen comparisons) plus the stated remainders.
  */
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
@@ -123,7 +123,7 @@ static void directional_lamp_closed_form(void **state)
     fiber_set_release(&f);
 }
 
-/* A lamp 30 m away and 1 m wide is as good as parallel light: angles differ by a degree at most. */
+/* The light of a lamp 30 m away and 1 m wide is nearly parallel: angles differ by a degree at most. */
 static void directional_lamp_is_a_distant_one(void **state)
 {
     (void)state;
@@ -201,7 +201,7 @@ static void constant_picture_is_the_constant_environment(void **state)
     environment_free(e);
 }
 
-/* Light adds up: lamp and sky together are lamp plus sky. */
+/* Radiance is additive: that of lamp and sky together is the sum of that of each. */
 static void lights_add_up(void **state)
 {
     (void)state;
@@ -226,8 +226,8 @@ static void lights_add_up(void **state)
     environment_free(e);
 }
 
-/* The sky's light on one straight fiber, against quadrature over the picture: fibers turn in it, it does not turn with
- * the cloth. */
+/* The light of the sky on one straight fiber, against quadrature over the picture. The picture does not turn with the
+ * cloth. */
 static void picture_on_a_straight_fiber(void **state)
 {
     (void)state;
@@ -270,7 +270,7 @@ static void picture_on_a_straight_fiber(void **state)
     environment_free(e);
 }
 
-/* Samples fall into solid angles as the density says; the density integrates to 1; both calls agree. */
+/* Samples follow the density, the density integrates to 1, and both functions return the same density. */
 static void picture_samples_follow_their_density(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* The resident memory of a reconstruction stays under its limit when the arrays of the volume need several times as much. */
+/* The resident memory of a reconstruction stays under its limit when the arrays of the volume need several times as
+ * much. */
 #include "geometry/reconstruct.h"
 #include "tests/support/cloth/scan_files.h"
 
@@ -24,7 +25,7 @@ static const struct test_cylinder cylinder[N_CYLINDER] = {
     {{40.0, 170.0, 200.0}, {0.5, 0.8, 0.0}, 3.5},
 };
 
-/* 0 when the fibers were found; the process's exit status. */
+/* Returns the exit status of the process: 0 when the fibers were found. */
 static int reconstruct(const char *folder)
 {
     const size_t n[3] = {N, N, N};
@@ -65,7 +66,7 @@ static void test_resident_memory(void **state)
     print_message("peak %.1f MiB of %zu MiB\n", (double)usage.ru_maxrss / 1024.0, LIMIT_BYTES >> 20);
     assert_true(WIFEXITED(how));
     assert_int_equal(WEXITSTATUS(how), 0);
-#if !defined(__SANITIZE_ADDRESS__) /* whose shadow is resident, too */
+#if !defined(__SANITIZE_ADDRESS__) /* its shadow memory would count as resident memory */
     assert_true((size_t)usage.ru_maxrss * 1024 < LIMIT_BYTES);
 #endif
 }

@@ -1,5 +1,5 @@
-/* Cloths of several fiber groups with a parameter set each. Equal sets change nothing; derivatives belong to their set.
- */
+/* Cloths of several fiber groups, each with a parameter set of its own. Equal sets give the result of one set, and
+ * derivatives are by the parameters of their set. */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -87,7 +87,7 @@ static void equal_sets_are_one_set(void **state)
     }
 }
 
-/* Groups given fiber by fiber, and only the sets in use matter. */
+/* Groups can be given for each fiber, and sets that no fiber uses have no effect. */
 static void groups_by_fiber(void **state)
 {
     (void)state;

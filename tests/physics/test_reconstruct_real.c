@@ -1,6 +1,7 @@
-/* Real scans. fiber-ct: github.com/libenke/CT_FiberSegmentation, demo_data (GPL-3.0), fibers in a polymer.
- * weave-ct: github.com/nasa/puma, python/pumapy/data (NOSA 1.3), a woven textile with labelled tows; single fibers are barely
- * resolved there, so only the directions are judged. Pictures of slices go to the folder named by SELVEDGE_PICTURES, if set. */
+/* Real scans. fiber-ct: github.com/libenke/CT_FiberSegmentation, demo_data (GPL-3.0), fibers in a polymer. weave-ct:
+ * github.com/nasa/puma, python/pumapy/data (NOSA 1.3), a woven textile with labelled tows; single fibers are barely
+ * resolved there, so only the directions are judged. Pictures of slices go to the folder named by SELVEDGE_PICTURES,
+ * if set. */
 #include "base/clock.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/tile_crop.h"
@@ -54,7 +55,7 @@ static void save_pictures(const struct scan *s, const char *name)
     }
 }
 
-/* edge: voxels of the cube that is taken from the middle of the scan; 0: all of it. */
+/* edge: edge in voxels of the cube in the middle of the scan that is used; 0: the whole scan. */
 static void reconstruct_scan(const char *path, const char *axes, const char *name, size_t edge, struct scan *s)
 {
     struct error err = {0};
@@ -99,11 +100,11 @@ static void test_fiber_ct(void **state)
     data_path(path, "fiber-ct/crop256.tif");
     reconstruct_scan(path, "xyz", "fiber_ct", 112, &s);
     double diameter = 2.0 * s.r.radius_m[0] / s.v.voxel_size_m[0];
-    /* At half the contrast round sections in a slice are 5 to 6 voxels across, the finest fibers 4.5. With their soft edges they
-     * are 7 to 9, which is what the data's description says. */
+    /* Round sections in a slice are 5 to 6 voxels wide at half the contrast, and the finest fibers 4.5. With their soft
+     * edges they are 7 to 9 voxels wide, as the description of the data states. */
     assert_true(diameter > 4.5 && diameter < 6.0);
     assert_true(s.r.dice > 0.84); /* 0.858 */
-    /* Fibers of the fitted radius hold as much material as the scan shows. */
+    /* Fibers of the fitted radius have as much material as the scan. */
     double model = M_PI * s.r.radius_m[0] * s.r.radius_m[0] * s.r.total_length_m;
     double voxel_m3 = s.v.voxel_size_m[0] * s.v.voxel_size_m[1] * s.v.voxel_size_m[2];
     double ratio = model / ((double)s.r.n_kept_voxel * voxel_m3);

@@ -64,7 +64,7 @@ static void check(const char *what, const struct sample_mean *got, double want, 
         fail_msg("%s: %.6g +- %.2g, closed form %.6g", what, got->mean, se, want);
 }
 
-/* What is seen straight through, in a uniform environment, by flakes and fibers that scatter next to nothing. */
+/* Transmittance in a uniform environment, by flakes and fibers that scatter almost nothing. */
 static void transmittance(void **state)
 {
     (void)state;
@@ -142,7 +142,8 @@ static void single_scattering(void **state)
         trace(&setting, direction, 100000, 10 + a, value);
         double mi = cos(theta_i), mo = cos(theta_o), sum = 1 / mi + 1 / mo, head = alpha / 4 * mi / (mi + mo);
         double once = head * -expm1(-tau * sum), by_d = head * tau / d_per_m * sum * exp(-tau * sum);
-        check("single scattering", &value[0], once, alpha * once); /* twice scattered: less than alpha of it */
+        check("single scattering", &value[0], once,
+              alpha * once); /* light scattered twice is less than alpha times this */
         check("by d", &value[3 + 3], by_d, alpha * (by_d + once / d_per_m));
         check("by alpha", &value[3 + 0], once / alpha, 2 * once);
         assert_true(sample_mean_se(&value[0]) < 0.01 * once);
@@ -152,9 +153,9 @@ static void single_scattering(void **state)
     direction_volume_release(&v);
 }
 
-/* A slab that absorbs nothing shows the environment's radiance everywhere. Albedos end at 0.999, so extrapolate to 1
- * with the derivative; what that leaves out is (1 - alpha)^2 times half the second derivative, at most n^2 for n
- * scatterings. */
+/* A slab that absorbs nothing has the radiance of the environment everywhere. The bound of albedos is 0.999, so the
+ * result is extrapolated to 1 by its derivative. The remainder is (1 - alpha)^2 times half the second derivative,
+ * which is at most n^2 for n scatterings. */
 static void white_furnace(void **state)
 {
     (void)state;
@@ -184,7 +185,7 @@ static void white_furnace(void **state)
             struct sample_mean white = value[c];
             white.mean += missing * value[3 + c * (m->n_param + 1) + alpha + c].mean;
             check(m->id, &white, 1, missing * missing * 400);
-            if (sample_mean_se(&value[c]) > 0.01) fail_msg("%s is too noisy to tell", m->id);
+            if (sample_mean_se(&value[c]) > 0.01) fail_msg("%s is too noisy for this test", m->id);
         }
         m->release(s);
     }
@@ -192,7 +193,7 @@ static void white_furnace(void **state)
     direction_volume_release(&v);
 }
 
-/* Rays exactly along the fibers, and within rounding of that, from everywhere in the slab. */
+/* Rays along the fibers, exactly and within rounding, from random points of the slab. */
 static void along_the_fiber(void **state)
 {
     (void)state;
@@ -233,7 +234,7 @@ static void along_the_fiber(void **state)
     direction_volume_release(&v);
 }
 
-/* One random cloud of straight fibers, estimated as cylinders and as a volume of one coarse voxel. */
+/* A random cloud of straight fibers, estimated as cylinders and as a volume of one coarse voxel. */
 enum { N_CLOUD = 128, N_FIBER = 16 };
 static const double cloud_tile_m = 5e-3, cloud_radius_m = 5e-6, cloud_scale = 5000;
 
@@ -280,13 +281,14 @@ static void estimate_cloud(uint32_t i_cloud, const double *param, const struct c
     direction_volume_release(&v);
 }
 
-/* Thin fibers far apart. A fiber of radius r is 2 r wide and fills pi r^2, so full density stands for d = 2 / (pi r)
- * per metre; its albedo towards wo is the integral of S cos th_i. Seen and lit in the plane across the fibers. A cloud
- * shadows its fibers in single events where the volume takes their mean, so the comparison is over many clouds and its
- * standard error is that of the differences from cloud to cloud, Monte-Carlo noise included. Light scattered twice is
- * of the order of the optical depth, 0.032, in both. Left out: in the volume a fiber shadows itself, 1 / N of a shadow
- * of half the depth both ways, 0.25 %; the byte of its density, 0.15 %. (Fibers much thinner against the tile are
- * beyond what single precision resolves as cylinders.) */
+/* Thin fibers far apart, seen and lit in the plane across the fibers. A fiber of radius r is 2 r wide and its section
+ * is pi r^2, so full density corresponds to d = 2 / (pi r) per metre; its albedo towards wo is the integral of S cos
+ * th_i. In a cloud some fibers are shadowed and others are not, while the volume has the mean shadow. The comparison
+ * is therefore over many clouds, and its standard error is that of the differences between clouds, with Monte-Carlo
+ * noise. Light scattered twice is of the order of the optical depth, 0.032, in both. Two known differences remain: in
+ * the volume a fiber shadows itself (1 / N of a shadow of half the depth both ways, 0.25 %), and its density is
+ * rounded to a byte (0.15 %). Fibers that are much thinner than the tile cannot be traced as cylinders in single
+ * precision. */
 static void agrees_with_the_surface_tracer(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Derivatives of volume estimates: by every parameter and by d, against differences of independent runs; and the same
- * bits for any number of threads. */
+/* Derivatives of volume estimates by every parameter and by d, against differences of independent runs. Also tests that
+ * estimates have the same bits for any number of threads, and the storage of voxels in the tracer. */
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
@@ -65,9 +65,9 @@ static void run(const struct cloth *k, const struct phase_model *m, const double
     if (estimate_run(&q, k->pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
 
-/* The derivative against a difference, channels together: the sum over channels, whose standard error is at most the
- * sum of theirs. Steps are wide, so the difference carries some curvature: 3 % of itself is allowed beside the noise.
- */
+/* Compares the derivative with a difference, both summed over the channels. The standard error of a sum is at most
+ * the sum of the channels' standard errors. Steps are wide, so that 3 % of the difference is allowed for curvature
+ * besides the noise. */
 static void compare(const char *model, const char *name, size_t p, size_t n_param, int channel, double step,
                     const struct estimate *low, const struct estimate *high, const struct estimate *at, size_t *n,
                     size_t *n_beyond)
@@ -176,8 +176,8 @@ static void nonsense_is_refused(void **state)
     cloth_release(&k);
 }
 
-/* What the tracer stores is the volume: densities exactly, directions within their 12 bits, nothing where nothing is,
- * and no ray is told to skip what holds something. */
+/* The tracer stores the volume correctly: densities exactly, directions within their 12 bits, and empty voxels as
+ * empty. No distance that rays may skip contains an occupied voxel. */
 static void stored_voxels_are_the_volume(void **state)
 {
     (void)state;
@@ -215,8 +215,8 @@ static void stored_voxels_are_the_volume(void **state)
     cloth_release(&k);
 }
 
-/* One voxel in a large empty volume whose edges are no whole number of bricks: the distances that rays skip, against
- * all bricks. */
+/* One voxel in a large empty volume whose edges are no multiples of a brick. The distances that rays may skip are
+ * compared with a search over all bricks. */
 static void empty_distances(void **state)
 {
     (void)state;
@@ -249,7 +249,7 @@ static void empty_distances(void **state)
     direction_volume_release(&v);
 }
 
-/* Paths traced together are the paths traced one by one, and recording changes nothing. */
+/* Paths that are traced together are equal to paths that are traced one by one, and recording does not change them. */
 static void interleaved_paths_are_the_same(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
-/* Lights and cameras of volumes: the directional lamp and the picture environment against closed forms and quadrature of
- * single scattering in a slab that scatters equally everywhere, from above and from below; the limits of distant lamps
- * and cameras; pictures against constants; lights that add up. Tolerances are standard errors, with what a closed form
- * leaves out beside them. */
+/* Lights and cameras of volumes. The directional lamp and the picture environment are compared with closed forms and
+ * quadrature of single scattering in a slab that scatters isotropically, from above and from below. Distant lamps and
+ * cameras are compared with their limits, and constant pictures with constant environments; lights must be additive.
+ * Tolerances are standard errors plus the stated remainders of closed forms. */
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
@@ -76,8 +76,9 @@ static void same(const char *what, int i, const struct estimate *a, const struct
     }
 }
 
-/* Single scattering of irradiance pi (facing) towards a camera at cosine mo: alpha / 4 times the integral over depth of
- * exp(-way in - way out) sigma / mo; mi < 0 for light from below. And its derivative by the optical depth. */
+/* Single scattering of parallel light (irradiance pi on a plane that faces it) towards a camera at cosine mo: alpha / 4
+ * times the integral over depth of exp(-way in - way out) sigma / mo. mi < 0 is light from below. *d_tau becomes the
+ * derivative by the optical depth. */
 static double scattered_once(double tau, double mi, double mo, double *d_tau)
 {
     enum { N = 4000 };
@@ -110,7 +111,7 @@ static void directional_lamp_closed_form(void **state)
             fail_msg("view %d: %.6g +- %.2g, closed form %.6g", i, e.mean[0], se, want);
         if (!(fabs(e.jac[3] - by_d) < 3.5 * se_d + alpha * (fabs(by_d) + want / d_per_m)))
             fail_msg("view %d, by d: %.6g +- %.2g, closed form %.6g", i, e.jac[3], se_d, by_d);
-        if (c.light_theta_rad > M_PI_2) { /* nothing from below through the sheet */
+        if (c.light_theta_rad > M_PI_2) { /* with the black sheet, no light arrives from below */
             e = run(&thin[1], "phase_isotropic.v1", param, &c, 2560, 3);
             assert_true(e.mean[0] == 0);
         }
@@ -178,8 +179,8 @@ static void constant_picture_is_the_constant_environment(void **state)
     environment_free(e);
 }
 
-/* The picture's light, scattered once by the thin slab, by quadrature over the picture; it does not turn with the
- * cloth. Without the sheet the picture is also seen straight through. */
+/* Light of the picture that the thin slab scatters once, against quadrature over the picture, which does not turn
+ * with the cloth. Without the sheet the picture is also visible through the slab. */
 static void picture_on_the_slab(void **state)
 {
     (void)state;
@@ -224,7 +225,7 @@ static void picture_on_the_slab(void **state)
     environment_free(e);
 }
 
-/* Lamp and sky together are lamp plus sky, derivatives too. */
+/* The radiance of lamp and sky together, and its derivatives, are the sums of those of each. */
 static void lights_add_up(void **state)
 {
     (void)state;
@@ -253,8 +254,9 @@ static void lights_add_up(void **state)
     environment_free(e);
 }
 
-/* A slab of many layers that nothing gets through: steps as short as a rounding of the height must not carry camera rays out of it at
- * the face where they came in (1 in 200 at 80 degrees here, if they start on the face itself). */
+/* A slab of many layers that no light passes. Steps as short as the rounding error of the height must not move camera
+ * rays out of the slab through the face where they entered. If rays started on the face itself, 1 in 200 would leave
+ * at 80 degrees. */
 static void no_ray_leaves_where_it_enters(void **state)
 {
     (void)state;
@@ -287,8 +289,9 @@ static void no_ray_leaves_where_it_enters(void **state)
     direction_volume_release(&thick);
 }
 
-/* A path that gives up inside of the cloth brings no light from beyond it: a column of full voxels and a large multiplier make the steps so short
- * that no ray through the empty voxels beside it gets across within its look-ups. */
+/* A path that reaches the limit of look-ups inside the cloth has no light from beyond it. A column of full voxels and a
+ * large multiplier make the steps so short that no ray through the empty voxels beside it passes the cloth within that
+ * limit. */
 static void a_lost_path_brings_nothing(void **state)
 {
     (void)state;
@@ -306,7 +309,7 @@ static void a_lost_path_brings_nothing(void **state)
     for (size_t z = 0; z < n[2]; z++) one.density[z * EDGE * EDGE] = 255;
     if (volume_scene_init(&scene, &one, &(struct volume_scene_option){.black_sheet = false}, &err) != STATUS_OK)
         fail_msg("%s", err.text);
-    for (int k = 0; k < 2; k++) { /* mean step 8e-6 m: all get across; 8e-10 m: none of the 0.8 mm */
+    for (int k = 0; k < 2; k++) { /* with a mean step of 8e-6 m all rays pass the 0.8 mm, with 8e-10 m none */
         struct trace_volume volume_model;
         const struct estimate_request q = {.input = trace_input_volume(&scene, phase_find("phase_isotropic.v1"), grey,
                                                                        k == 0 ? 1e5 : 1e9, &volume_model),

@@ -35,7 +35,8 @@ static void random_direction(struct rng *r, float w[3])
     direction(asin(2 * rng_double(r) - 1), 2 * M_PI * rng_double(r), w);
 }
 
-/* Lower and upper corner, start, then random points of the box; widths from `from` of their range upwards. */
+/* Point k of the parameter ranges: the lower bounds, the upper bounds, the start, then random points. Widths lie
+ * above the share `from` of their range. */
 static void box_point(const struct phase_model *m, unsigned k, double from, struct rng *r, double *param)
 {
     for (size_t p = 0; p < m->n_param; p++) {
@@ -122,7 +123,7 @@ static void integrals_and_samples(void **state)
             for (int a = 0; a < N_ANGLE; a++) {
                 float wo[3];
                 double param[SCATTERING_MAX_PARAM];
-                box_point(phase_registry()[k], 1 + set, 0.08, &r, param); /* what the grid resolves */
+                box_point(phase_registry()[k], 1 + set, 0.08, &r, param); /* widths that the grid resolves */
                 direction(angle_deg[a][0] * RAD_PER_DEG, angle_deg[a][1] * RAD_PER_DEG, wo);
                 check_integrals(phase_registry()[k], param, wo, a % 2 ? channel_weight : NULL, &r,
                                 0.01 / (double)(n_model * N_SET * N_ANGLE));
@@ -261,7 +262,7 @@ static void registry_is_sound(void **state)
     }
 }
 
-/* s(w) = integral of |w . m| D(m) dm straight, and D itself integrates to 1. */
+/* s(w) against a direct integral of |w . m| D(m) dm, and the integral of D, which is 1. */
 static void microflake_extinction(void **state)
 {
     (void)state;

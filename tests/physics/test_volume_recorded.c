@@ -1,6 +1,6 @@
-/* Recorded volume paths, evaluated again for other parameters with everything else held fixed: the recorded value is the
- * traced one, and its differences are the traced derivatives, to 1e-3, for every parameter and the density multiplier.
- * And white cloth without roulette. */
+/* Recorded volume paths, evaluated again for other parameters while the paths stay the same. The recorded value must
+ * be the traced one, and its differences must be the traced derivatives to 1e-3, for every parameter and the density
+ * multiplier. Also tests white cloth with and without roulette. */
 #include "base/angle.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -43,7 +43,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-/* A lamp, grazing for every other one, and the sky. */
+/* The sky and a lamp, which is at a grazing angle in every other configuration. */
 static struct configuration configuration(int i)
 {
     return (struct configuration){.light_theta_rad = (i % 2 ? 78 : 25) * RAD_PER_DEG,
@@ -63,7 +63,7 @@ static void start_ray(const struct volume_scene *s, uint32_t i, struct rng *rng,
     assert_true(volume_ray_enter(s, origin, direction, ray));
 }
 
-/* The phase function and the density multiplier now; setting: those the record was made with. */
+/* The phase function and the density multiplier of the evaluation; setting: those with which the record was made. */
 struct now {
     const struct phase_state *state;
     double d_per_m;
@@ -153,8 +153,8 @@ static void differences_of(const struct phase_model *m, const struct configurati
     m->release(base);
 }
 
-/* Central differences of fourth order. A derivative that is small beside the value over the parameter is compared with
- * that: single precision in f sets a floor. */
+/* Central differences of fourth order. The error is relative to the derivative, or to value / parameter where the
+ * derivative is much smaller, because f has single precision. */
 static void derivatives_of_recorded_paths(void **state)
 {
     (void)state;
@@ -184,7 +184,7 @@ static void derivatives_of_recorded_paths(void **state)
     print_message("largest relative difference %.1e\n", worst);
 }
 
-/* Albedo 0.999: the same radiance and derivatives whether roulette thins paths and connections, or none ends early. */
+/* With an albedo of 0.999, radiance and derivatives must be the same with roulette and without it. */
 static void white_without_roulette(void **state)
 {
     (void)state;
@@ -221,7 +221,7 @@ static void white_without_roulette(void **state)
         if (off > 4.5 * se)
             fail_msg("value %zu: %g and %g, standard error %g", k, value[0][k].mean, value[1][k].mean, se);
     }
-    assert_true(n_beyond <= 4); /* of 42, three channels of each much the same */
+    assert_true(n_beyond <= 4); /* of 42, where the three channels of each are correlated */
     m->release(ps);
 }
 

@@ -16,8 +16,8 @@
  *   "rows"                                          each measurement: angles, measured and rendered colour, pictures
  *   "models"                                        the keys above for each model, in the order of the job document
  *   "radius"                                        the search for the fiber radius, or null
- *   "skill"                                         comparison with a plain BRDF fitted to the same rows (plain_brdf.h), or
- *                                                   null
+ *   "skill"                                         comparison with a plain BRDF fitted to the same rows
+ *                                                   (plain_brdf.h), or null
  *   "geometry", "quality"                           the geometry (result_geometry.h); names of its quality report
  *   "png_exposure"                                  factor from radiance to the values of PNG pictures, before sRGB
  *   "n_path_fit", "n_step", "fit_wall_s", "n_path_validation", "stages"   paths and wall time

@@ -1,5 +1,5 @@
-/* Measurements that no one should have: too few, contradictory, dark, all zero; and an estimator that fails. A fit ends,
- * says what it does not know, and never gives a number that is not finite. */
+/* Measurements that no one should have: too few, contradictory, dark, all zero; and an estimator that fails. A fit
+ * ends, says what it does not know, and never gives a number that is not finite. */
 #include "base/angle.h"
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
@@ -61,7 +61,7 @@ static void fit(struct fixture *x, const struct descent_method *method, struct f
     }
 }
 
-/* Three numbers for nine parameters, and six. */
+/* Three, and then six measured numbers for nine parameters. */
 static void test_fewer_numbers_than_parameters(void **state)
 {
     (void)state;
@@ -123,7 +123,7 @@ static void test_all_zero(void **state)
     }
 }
 
-/* One row is a thousand times darker than it should be: the others still decide. */
+/* One row is a thousand times darker than it should be. The other rows still determine the result. */
 static void test_one_dark_row(void **state)
 {
     (void)state;
@@ -131,13 +131,13 @@ static void test_one_dark_row(void **state)
     struct fit_result r;
     setup(&x, FAKE_N_FIT);
     for (int c = 0; c < 3; c++) x.observation.item[4].mean_rgb[c] *= 1e-3;
-    x.observation.item[4].weight = 0.0; /* the remedy that a user has */
+    x.observation.item[4].weight = 0.0; /* what a user can do about it */
     fit(&x, descent_find(method_gauss_newton.id), &r);
     assert_true(fake_rel_rms(&x.cloth, 0, FAKE_N_FIT, r.param, x.truth) < 0.1);
     observation_set_release(&x.observation);
 }
 
-/* Nothing counts: nothing is determined, and nothing is learned. */
+/* When all weights are 0, no parameter is determined. */
 static void test_no_row_has_weight(void **state)
 {
     (void)state;
@@ -228,7 +228,7 @@ static void test_warnings(void **state)
     observation_set_release(&x.observation);
 }
 
-/* Five rows, three lit from the front by these lamps and two from behind: the warnings. */
+/* Collects the warnings for five rows, three lit from the front by these lamps and two from behind. */
 static void check_rows(const double light_theta_deg[3], const double value[5], const double weight[5], struct said *s)
 {
     struct observation item[5];
@@ -258,7 +258,7 @@ static void test_too_dark_and_too_bright(void **state)
     assert_int_equal(s.n, 1);
     assert_non_null(strstr(s.text[0], "'row-1' is dark: its brightness 0.0006 is 0.65 %"));
     check_rows(usual, (const double[5]){0.1, 0.0006, 0.09, 0.01, 0.01}, (const double[5]){1, 0, 1, 1, 1}, &s);
-    assert_int_equal(s.n, 0);                                                     /* nobody asks for it */
+    assert_int_equal(s.n, 0);                                                     /* the density is not fitted */
     check_rows(grazing, (const double[5]){0.1, 0.1, 0.003, 0.01, 0.01}, one, &s); /* little light falls on the cloth */
     assert_int_equal(s.n, 0);
     check_rows(usual, (const double[5]){0.1, 0.1, 0.1, 0.0001, 0.01}, one, &s); /* a dense cloth beside its gaps */
@@ -274,7 +274,7 @@ static void test_too_dark_and_too_bright(void **state)
     assert_non_null(strstr(s.text[1], "'row-3' is brighter"));
 }
 
-/* Two rows that contradict each other: how many warnings? */
+/* Number of warnings for two rows that contradict each other. */
 static size_t warnings_of(const struct configuration *a, const struct configuration *b)
 {
     struct observation item[2] = {{.name = "a", .configuration = *a, .mean_rgb = {0.2, 0.2, 0.2}, .weight = 1},
@@ -285,7 +285,7 @@ static size_t warnings_of(const struct configuration *a, const struct configurat
     return s.n;
 }
 
-/* One place of lamp and camera above the cloth can be written in many ways. */
+/* The same position of lamp and camera above the cloth can be written in many ways. */
 static void test_names_of_one_configuration(void **state)
 {
     (void)state;

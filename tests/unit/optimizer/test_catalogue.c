@@ -1,4 +1,4 @@
-/* The catalogue of models and methods against itself and against the registries: what a new row must satisfy. */
+/* Conditions that each row of the catalogues of models and methods must satisfy, also against the registries. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/model_catalogue.h"
 #include "base/catalogue/stop_reason.h"
@@ -30,7 +30,7 @@ static void check_parameter(const struct model_info *m, const struct param_info 
     if (p->kind == PARAM_LOBE_WIDTH) assert_int_equal(p->unit, PARAM_UNIT_DEG);
 }
 
-/* The three slots of a colour follow each other: "C_R.r", "C_R.g", "C_R.b"; all others stand alone. */
+/* The three parameters of a colour follow each other: "C_R.r", "C_R.g", "C_R.b". All others are single. */
 static void check_slots(const struct model_info *m)
 {
     for (size_t p = 0, channel = 0; p < m->n_param; p++) {

@@ -1,4 +1,5 @@
-/* Fits with the contrasts of a texture: a parameter that only they determine, beside gains, resumed bit by bit. */
+/* Fits with the contrasts of a texture: they determine a parameter that means do not, do not disturb gains, and resume
+ * with the same bits. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/fit/descent/fit_run.h"
@@ -29,11 +30,11 @@ static status count_rows(void *context, const struct fit_step *step, struct erro
 {
     (void)context;
     (void)err;
-    assert_int_equal(step->n_configuration, BOARD_N_VIEW); /* contrasts are no rows of the series */
+    assert_int_equal(step->n_configuration, BOARD_N_VIEW); /* the series has no rows for contrasts */
     return STATUS_OK;
 }
 
-/* gain: of the photographs. Contrasts have no weight, or one. */
+/* gain: exposure gain of the photographs. weight: that of the contrasts, 0 or 1. */
 static void setup(struct fixture *x, double gain, double weight)
 {
     memset(x, 0, sizeof *x);
@@ -79,7 +80,7 @@ static void fit(struct fixture *x, struct fit_result *r)
         fail_msg("%s", err.text);
 }
 
-/* Means say nothing of t; the contrast does. */
+/* The means do not depend on t, but the contrast does. */
 static void test_recovery(void **state)
 {
     (void)state;
@@ -101,7 +102,7 @@ static void test_recovery(void **state)
     release(&x);
 }
 
-/* A gain of the photographs does not touch their contrasts. */
+/* A gain of the photographs does not change their contrasts. */
 static void test_gain(void **state)
 {
     (void)state;
@@ -119,8 +120,8 @@ static void test_gain(void **state)
     }
 }
 
-/* Photographs that are 5 % too bright or too dark each, and contrasts that the model misses by far: the gains are taken out as
- * if there were no contrasts. */
+/* Each photograph is 5 % too bright or too dark, and the model does not fit the contrasts. The gains are found as if
+ * there were no contrasts. */
 static void test_gains_beside_contrasts_that_do_not_fit(void **state)
 {
     (void)state;

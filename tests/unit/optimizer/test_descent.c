@@ -1,5 +1,5 @@
-/* Every method of the registry: it recovers a known cloth, honours fixed parameters and bounds, and repeats itself bit by
- * bit. */
+/* Every method of the registry recovers a known cloth, respects fixed parameters and bounds, and gives the same bits
+ * when it is repeated. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/descent_methods.h"
@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-/* The estimator of the fixture, counting calls of either kind. */
+/* The estimator of the fixture, with a count of calls with plain paths and with guided paths. */
 struct counted {
     struct estimator inner;
     size_t n_plain, n_probing;
@@ -28,7 +28,7 @@ static status counted_run(void *context, const struct estimator_call *call, cons
     return c->inner.run(c->inner.context, call, progress, out, wall_s, err);
 }
 
-/* The published method is traced as published, ours with all that the renderer has. */
+/* The published method uses plain paths, as published; ours uses guided paths too. */
 static void test_kind_of_paths(void **state)
 {
     (void)state;
@@ -46,7 +46,8 @@ static void test_kind_of_paths(void **state)
     }
 }
 
-/* The estimator of the fixture, each call of which reports its own progress from 0 to 1; and what a listener hears. */
+/* The estimator of the fixture, each call of which reports its own progress from 0 to 1, and the progress of the fit
+ * that is reported. */
 struct heard {
     struct estimator inner;
     double fraction, after_first;
@@ -71,11 +72,11 @@ static void hear(void *context, double fraction)
     h->fraction = fraction;
 }
 
-/* A rendering that is done is not the whole fit that is done. */
+/* The end of one rendering must not be reported as the end of the fit. */
 static void test_progress(void **state)
 {
     (void)state;
-    static const uint64_t budget[] = {4000000, 200000}; /* less than published_sgd's least, too */
+    static const uint64_t budget[] = {4000000, 200000}; /* the second is less than published_sgd.v1 needs */
     for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
         for (size_t i = 0; i < 2; i++) {
             struct descent_fixture x;
@@ -96,7 +97,8 @@ static void test_progress(void **state)
     }
 }
 
-/* What a method calls its least budget is what it takes when it is given less, and it stays inside when it is given that. */
+/* With a smaller budget a method uses as many paths as it states as its least budget. With its least budget it does not
+ * use more. */
 static void test_least_budget(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* The journal of estimates: every method resumes from it bit by bit, wherever it was cut; what it does not answer. */
+/* The journal of estimates: every method resumes from it with the same bits, wherever it was cut, and a journal of
+ * another fit is not used. */
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "tests/support/descent_fixture.h"
 #include "tests/support/scratch_folder.h"
@@ -11,8 +12,8 @@
 
 #include <cmocka.h>
 
-/* Through a journal, stopped at several places, with and without a torn tail: the end is that of an uninterrupted fit.
- */
+/* A fit with a journal that is stopped after n_call estimates, with or without a torn last record, has the same
+ * result as an uninterrupted fit. */
 static void resume_after(void **state, const struct descent_method *m, size_t n_call, bool tear,
                          const struct fit_result *want)
 {
@@ -65,7 +66,7 @@ static void test_resume(void **state)
     }
 }
 
-/* Another fingerprint, or another request, must not be answered from the file. */
+/* A journal with another fingerprint, or an estimate of another request, must not be used. */
 static void test_foreign_journal(void **state)
 {
     struct descent_fixture x;

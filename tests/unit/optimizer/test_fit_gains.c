@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-/* Photographs that are all too bright by one factor, behind glare. */
+/* All photographs are too bright by one factor and have glare. */
 static void test_global_gain_and_stray_light(void **state)
 {
     (void)state;
@@ -38,7 +38,8 @@ static void test_global_gain_and_stray_light(void **state)
     fit_fixture_release(&x);
 }
 
-/* Exposure errors of 8 % from photograph to photograph: a fit that knows of them is closer, and says so honestly. */
+/* Photographs have exposure errors of 8 %. A fit with a gain for each is more accurate, and its standard errors are
+ * right. */
 static void test_gain_of_each_photograph(void **state)
 {
     (void)state;
@@ -84,18 +85,18 @@ static void test_photograph_gain_estimate(void **state)
     double gain, se;
     nuisance_photograph_gain(&o, &e, &e, 1.0, 1e-6, &gain, &se);
     assert_true(fabs(gain - 1.1) < 1e-4 && se < 1e-2);
-    nuisance_photograph_gain(&o, &e, &e, 1e-3, 1.0, &gain, &se); /* nothing is known beyond the prior */
+    nuisance_photograph_gain(&o, &e, &e, 1e-3, 1.0, &gain, &se); /* only the prior determines it */
     assert_true(fabs(gain - 1.0) < 1e-4 && fabs(se / 1e-3 - 1.0) < 1e-3);
 }
 
-/* Noise that the channels share, a gain that the prior hardly holds: by the gain of both replicas together the product of the
- * residuals would be too small by the variance of their mean; each by its own, it is right. */
+/* The channels share their noise, and the prior of the gain is weak. With one gain for both replicas the product of the
+ * residuals would be too small by the variance of their mean. With a gain for each replica it is unbiased. */
 static void test_own_gains_leave_no_bias(void **state)
 {
     (void)state;
     enum { ROUND = 20000 };
     const double noise = 0.02, mean[3] = {0.3, 0.4, 0.5},
-                 off[3] = {0.01, 0.0, -0.01}; /* what no gain mends, relative */
+                 off[3] = {0.01, 0.0, -0.01}; /* relative errors that no gain can remove */
     double sum = 0.0, square = 0.0, exact = 0.0;
     struct observation o = {.weight = 1.0};
     struct rng rng;

@@ -1,5 +1,5 @@
-/* A model of scattering that gives no number, in a fit through the real path tracer: fiber surfaces and a volume. The fit
- * ends with an error that names model, parameter and configuration, whenever it begins. */
+/* A scattering model that returns NaN, in a fit with the real tracers of surfaces and of volumes. Whenever the first
+ * NaN occurs, the fit ends with an error that names model, parameter and configuration. */
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -109,7 +109,7 @@ static void test_surface(void **state)
                                             .n_configuration = N_ROW,
                                             .seed = 3}};
     fit(&t, 0, "broken.v1", "beta_R");
-    fit(&t, 60000, "broken.v1", "beta_R"); /* in the midst of it */
+    fit(&t, 60000, "broken.v1", "beta_R"); /* during the fit */
     scene_free(scene);
 }
 

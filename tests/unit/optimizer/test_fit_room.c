@@ -1,4 +1,4 @@
-/* Fits with as many unknowns as there is room for, and one more. */
+/* Fits with as many unknowns as are allowed, and with one more. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "base/rng.h"
@@ -19,7 +19,7 @@
 
 enum { WIDE = SCATTERING_MAX_PARAM, WIDE_ROWS = 40 };
 
-/* As if by chance, so that every parameter is determined. */
+/* A pseudo-random factor, so that every parameter is determined. */
 static double wide_factor(size_t i, size_t c, size_t p)
 {
     struct rng_key key = {.seed = 3};
@@ -57,7 +57,7 @@ static status wide_run(void *context, const struct estimator_call *call, const s
     return STATUS_OK;
 }
 
-/* n_param parameters of one model beside two nuisance terms and a gain for each of 40 photographs. */
+/* Fits n_param parameters of one model together with two nuisance terms and a gain for each of 40 photographs. */
 static status fit_wide(size_t n_param, const struct fit_option *o, const char *method, struct fit_result *r,
                        struct error *err)
 {
@@ -121,7 +121,7 @@ static void test_as_many_unknowns_as_there_is_room_for(void **state)
     assert_string_equal(err.field, OPTION_NUISANCE);
 }
 
-/* Every model of the program has room for all nuisance terms, with every parameter free. */
+/* The limit on unknowns allows all nuisance terms with every model of the program, when all its parameters are free. */
 static void test_every_model_has_room_for_nuisance_terms(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* What a job may ask of a fit beyond the method: ties, bounds, priors, several starts; and that a fit with any of them
- * resumes bit by bit. */
+/* Options of a fit that do not depend on the method: ties, bounds, priors, several starts. A fit with any of them
+ * resumes with the same bits. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "base/rng.h"
@@ -100,14 +100,14 @@ static void test_tied(void **state)
         double se = coordinate_slope(&k, r.param[p]) * sqrt(r.uncertainty.cov[p * FAKE_N_PARAM + p]);
         assert_true(fabs(se - r.uncertainty.se_param[p]) < 1e-6 * se || !r.uncertainty.determined[p]);
     }
-    double ratio = 0.0; /* ln of the errors' ratio: three channels now speak for one colour */
+    double ratio = 0.0; /* ln of the ratio of the errors: three channels now determine one value */
     for (size_t p = 0; p < 3; p++) ratio += log(r.uncertainty.se_param[p] / loose.uncertainty.se_param[p]) / 3.0;
     print_message("errors of a tied colour: %.2f of those of an untied one\n", exp(ratio));
     assert_true(ratio < -0.1);
     fit_fixture_release(&x);
 }
 
-/* A prior without data is the prior; with data it is the sum of two precisions; a weak one changes nothing. */
+/* Without data the result is the prior. With data their precisions are added. A weak prior changes nothing. */
 static void test_priors(void **state)
 {
     (void)state;
@@ -137,8 +137,8 @@ static void test_priors(void **state)
     fit_fixture_release(&x);
 }
 
-/* Two channels tied in proportion, each with a prior of its own: two statements about the leader, although their numbers are the
- * same; tied as equals they are one. */
+/* Two channels that are tied in proportion have a prior each. These are two different priors of the leader, although
+ * their numbers are equal. When the channels are tied with equal values, they are one prior. */
 static void test_priors_of_tied_channels(void **state)
 {
     (void)state;
@@ -211,7 +211,7 @@ static void test_starts(void **state)
     fit_fixture_release(&x);
 }
 
-/* Cut after every few estimates, with all options on: the end is that of an uninterrupted fit. */
+/* A fit with all options that is stopped again and again has the same result as an uninterrupted fit. */
 static void test_resume(void **state)
 {
     struct fit_fixture x;
@@ -267,7 +267,7 @@ static void test_too_many_unknowns(void **state)
     assert_string_equal(err.field, OPTION_NUISANCE);
 }
 
-/* A method that takes priors is drawn to one; any other gives the same numbers as without. */
+/* A prior changes the result of a method that takes priors, and no number of any other method. */
 static void test_methods_take_priors_as_they_declare(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Gauss-Newton over several cloths and seeds: error, honesty of the standard errors, and that it says when it has not
- * converged. */
+/* Gauss-Newton over several cloths and seeds: the errors of the result, whether the standard errors are right, and the
+ * report of a fit that has not converged. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/descent.h"
 #include "tests/support/tracer/fake_estimator.h"
@@ -45,7 +45,7 @@ static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double 
     observation_set_release(&o);
 }
 
-/* No noise anywhere: the truth comes back, parameters at bounds included. */
+/* Without any noise the fit finds the truth, also for parameters at their bounds. */
 static void test_exact(void **state)
 {
     (void)state;
@@ -76,7 +76,7 @@ static void test_recovery_and_errors(void **state)
             mean += error[seed - 1] / SEEDS;
             worst = fmax(worst, error[seed - 1]);
             assert_true(r.n_path <= 6600000);
-            assert_int_equal(r.stop, STOP_PATH_BUDGET); /* the noise never is 0.07 % of all rows by then */
+            assert_int_equal(r.stop, STOP_PATH_BUDGET); /* the noise is still above 0.07 % of all rows */
             for (size_t p = 0; p < FAKE_N_PARAM; p++) {
                 if (!r.uncertainty.determined[p] || r.uncertainty.at_bound[p]) continue;
                 n_judged++;
@@ -95,8 +95,8 @@ static void test_recovery_and_errors(void **state)
     assert_true(share > 0.9 && share < 0.99);
 }
 
-/* Photographs known to 2 %: fits that no budget was asked of end when tracing is about as good as those, with errors that
- * hold; one with a budget goes on. */
+/* Photographs with errors of 2 %: fits without a stated budget end when tracing is about as precise as the
+ * photographs, and their standard errors are right. A fit with a budget continues. */
 static void test_ends_at_the_noise_of_the_photographs(void **state)
 {
     (void)state;
@@ -127,8 +127,9 @@ static void test_ends_at_the_noise_of_the_photographs(void **state)
     assert_true(r.n_path > 5000000);
 }
 
-/* Wide lobes and photographs known to 1 %: some fits end with gamma_TT at its bound of 45 degrees. It is not known for that, so the
- * errors of the colours, which go with it, must hold all the same (they were ten times too small where it counted as known). */
+/* Wide lobes and photographs with errors of 1 %: some fits end with gamma_TT at its bound of 45 degrees. The
+ * parameter is not exactly known there, so the standard errors of the colours, which are correlated with it, must
+ * include its uncertainty. They are ten times too small when it is treated as known. */
 static void test_errors_where_a_width_ends_at_its_bound(void **state)
 {
     (void)state;
@@ -155,11 +156,13 @@ static void test_errors_where_a_width_ends_at_its_bound(void **state)
     print_message("%zu of %d fits end at the bound; C_TT is off by %.2f standard errors (RMS of %.0f)\n", n_at_bound,
                   FITS, sqrt(square / n), n);
     assert_true(n_at_bound >= 1);
-    /* channels share their paths, so some 40 free numbers: 1 +- 0.11, and errors that are a little too large are allowed */
+    /* channels share their paths, so some 40 free numbers: 1 +- 0.11, and errors that are a little too large are
+     * allowed */
     assert_true(sqrt(square / n) > 0.6 && sqrt(square / n) < 1.33);
 }
 
-/* Exact renderings of photographs that are not: the weighted minimum is not that of f, and the fit ends there all the same. */
+/* Exact renderings and noisy photographs: the weighted minimum differs from that of f, and the fit must still end at
+ * it. */
 static void test_exact_renderings_of_noisy_photographs(void **state)
 {
     (void)state;
@@ -188,13 +191,15 @@ static void test_says_when_it_has_not_converged(void **state)
     assert_false(r.converged);
     assert_int_equal(r.stop, STOP_PATH_BUDGET);
     assert_non_null(strstr(r.reason, "path budget ended"));
-    const char *share = strstr(r.reason, "by about "); /* first-order promises can be more than there is: not told so */
+    const char *share =
+        strstr(r.reason, "by about "); /* the predicted decrease can exceed f; then the text does not state it */
     assert_non_null(share);
     double percent = strtod(share + strlen("by about "), NULL);
     assert_true(percent > 0.0 && percent <= 100.0);
 }
 
-/* A cloth that looks the same whatever parameter 8 is; its value in the first and in the last iteration. */
+/* A cloth whose radiance does not depend on parameter 8, and the value of that in the first and in the last
+ * iteration. */
 struct blind {
     struct estimator inner;
     double same, first, last;
@@ -224,7 +229,7 @@ static status blind_report(void *context, const struct fit_step *step, struct er
     return STATUS_OK;
 }
 
-/* A fit of that, with parameter 8 as info says and from `start`. */
+/* Fits this cloth, with `eighth` as the description of parameter 8 and from `start`. */
 static struct blind fit_blind(const struct param_info *eighth, double start, size_t max_iteration, struct fit_result *r)
 {
     struct fake_cloth f;
@@ -258,8 +263,9 @@ static struct blind fit_blind(const struct param_info *eighth, double start, siz
     return b;
 }
 
-/* What the photographs do not tell shows where the pull leads: a width from the model's start to wide lobes, from a stated
- * start back to that; another positive quantity nowhere. What they do tell is as if there had been no pull. */
+/* A parameter that the photographs do not determine follows the pull: a width goes from the model's start to wide
+ * lobes, and from a stated start back to that start; another positive quantity stays. Parameters that are determined
+ * are the same as without the pull. */
 static void test_pull(void **state)
 {
     (void)state;
@@ -287,7 +293,8 @@ static void test_pull(void **state)
                         fabs(r[k].param[p] - truth[p]) < 4.0 * r[k].uncertainty.se_param[p]);
         assert_true(fake_rel_rms(&f, 0, FAKE_N_FIT, r[k].param, truth) < 0.01);
     }
-    (void)fit_blind(&width, width.start, 1, &r[0]); /* no fit ends with it, not even one of a single step */
+    (void)fit_blind(&width, width.start, 1,
+                    &r[0]); /* the pull does not act at the end of a fit, not even of a single step */
     assert_true(fabs(log(r[0].param[8] / width.start)) < 1e-6);
 }
 

@@ -1,4 +1,4 @@
-/* The job document: what is accepted, and that every mistake is refused with the path of the field at fault. */
+/* The job document: valid documents are accepted, and each mistake is refused with the path of the field at fault. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/model_catalogue.h"
 #include "optimizer/fit/descent/descent.h"
@@ -148,7 +148,7 @@ static void test_volume(void **state)
     check_error(VOLUME_OF("\"density_low\":1e999"), "", "not valid JSON");
 }
 
-/* A matrix or a box that is given wins over "auto". */
+/* A given matrix or box replaces "auto". */
 static void test_alignment(void **state)
 {
     (void)state;
@@ -249,7 +249,7 @@ static void test_fit_options(void **state)
     job_document_free(d);
 }
 
-/* The density multiplier of a volume model, 1/cm: last of phase_two_lobe.v1's parameters. */
+/* The start of the density multiplier in 1/cm, which is the last parameter of phase_two_lobe.v1. */
 static void test_start_of_density(void **state)
 {
     (void)state;
@@ -278,14 +278,15 @@ static void test_start_of_density(void **state)
     }
 }
 
-/* PHOTO's crop is 10 mm. */
+/* The crop of PHOTO is 10 mm. */
 static void test_texture(void **state)
 {
     (void)state;
     struct job_document *d = parse(FIT_OF("{\"texture\":{\"block_mm\":0.5}}"));
     assert_true(d->texture_block_mm == 0.5 && d->texture_weight == 1.0 && job_texture_cells(d) == 20);
     job_document_free(d);
-    d = parse(FIT_OF("{\"texture\":{\"block_mm\":0.85}}")); /* 11.8 blocks of that size, so 12 of another */
+    d = parse(FIT_OF(
+        "{\"texture\":{\"block_mm\":0.85}}")); /* the crop has 11.8 of these blocks, so 12 smaller ones are used */
     assert_true(d->texture_block_mm == 0.85 && job_texture_cells(d) == 12 && job_texture_cell_mm(d) == 10.0 / 12);
     job_document_free(d);
     d = parse(FIT_OF("{\"texture\":{\"block_mm\":5,\"weight\":0},\"method\":\"published_sgd.v1\"}"));
@@ -402,8 +403,8 @@ static void test_file_names(void **state)
     assert_false(job_file_name_valid(name));
 }
 
-/* Cutting a document anywhere, or changing any one byte of it, must never crash and never leave a document behind on
- * failure. */
+/* A document that is cut anywhere, or has any one byte changed, must not crash the parser. When parsing fails, no
+ * document is returned. */
 static void test_damage(void **state)
 {
     (void)state;
@@ -433,7 +434,7 @@ static void test_damage(void **state)
     assert_int_equal(job_document_parse(text, (size_t)JOB_MAX_DOCUMENT_BYTES + 1, &doc, &err), STATUS_TOO_LARGE);
 }
 
-/* A term is refused for the methods that do not take it, and only for those; the error names one that does. */
+/* A term of the objective is refused for exactly those methods that do not take it. The error names one that does. */
 static void test_methods_get_what_they_take(void **state)
 {
     static const struct {

@@ -13,8 +13,8 @@
 
 static const double mid_range[FAKE_N_PARAM] = {0.15, 0.08, 0.05, 0.9, 0.6, 0.4, 5.0, 15.0, 20.0};
 
-/* A history with exact estimates at several points: pooling returns exactly what holds at the reference point, to
- * second order. */
+/* A history of exact estimates at several points. Pooling returns the value at the reference point, exactly to second
+ * order. */
 static void test_pool(void **state)
 {
     (void)state;
@@ -106,8 +106,9 @@ static void append_parabola(struct linear_history *h, double x, uint64_t n_path)
     assert_int_equal(linear_history_append(h, &x, &e, &e, NULL), STATUS_OK);
 }
 
-/* From x = 0 to 0.1 by the derivatives at 0.05, which a second estimate tells (of one path, so that its own mean counts for
- * nothing): exact for a parabola. Derivatives at 0 would be 0.01 off. */
+/* An estimate at x = 0 is extrapolated to 0.1 by the derivative at 0.05, which comes from a second estimate of one
+ * path, whose own mean has no weight. This is exact for a parabola; the derivative at 0 would give an error of 0.01.
+ * */
 static void test_carried_to_second_order(void **state)
 {
     (void)state;
@@ -122,7 +123,8 @@ static void test_carried_to_second_order(void **state)
     one_row_release(&r);
 }
 
-/* One estimate, carried by its own derivative: the variance is its own and dx^2 times that of the derivative. */
+/* One estimate that is extrapolated by its own derivative has its own variance plus dx^2 times that of the
+ * derivative. */
 static void test_noise_of_carrying(void **state)
 {
     (void)state;

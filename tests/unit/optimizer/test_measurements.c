@@ -1,4 +1,4 @@
-/* Tables of measured radiances: what is read, and that mistakes are named with file, line and column. */
+/* Tables of measured radiances: values are read correctly, and errors name file, line and column. */
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/fit/photographs/observation_load.h"
@@ -74,7 +74,7 @@ static void test_rotations(void **state)
     check_error(HEAD "fit,0,20,0,20,180,any,0.1,0.1,0.1\n", STATUS_FORMAT, "column 'cloth_rotation_deg': 'any'");
 }
 
-/* What cannot name a file is made so, and not thrown away. */
+/* A row name that is no valid file name is changed into one, and the row is kept. */
 static void test_names(void **state)
 {
     (void)state;
@@ -102,7 +102,7 @@ static void test_names(void **state)
     observation_set_release(&o);
 }
 
-/* A header, n_all rows over all rotations and n_one rows at one; free(). */
+/* A table with a header, n_all rows over all rotations and n_one rows at one rotation. The caller frees it. */
 static char *long_table(size_t n_all, size_t n_one)
 {
     static const char all[] = "held-out,0,20,0,20,180,all,0.1,0.1,0.1\n", one[] = "fit,0,20,0,20,180,0,0.1,0.1,0.1\n";
@@ -115,7 +115,7 @@ static char *long_table(size_t n_all, size_t n_one)
     return text;
 }
 
-/* What the renderer takes at once: a row over all rotations is nine of them. */
+/* The limit of renderings at once: a row over all rotations needs nine of them. */
 static void test_too_many_renderings(void **state)
 {
     (void)state;
@@ -164,7 +164,7 @@ static void test_errors(void **state)
     observation_set_release(&o);
 }
 
-/* All real tables, where they are at hand. */
+/* All measured tables, when the data folder is there. */
 static void test_real_tables(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Which photograph to take next: against the update of the whole covariance, and a parameter that one candidate alone
- * can determine. */
+/* Ranking of candidates for the next photograph: against the update of the whole covariance, and with a parameter
+ * that only one candidate determines. */
 #include "base/angle.h"
 #include "base/small_matrix.h"
 #include "optimizer/fit/objective/next_photograph.h"
@@ -24,7 +24,7 @@ static double ln_det(const double *a, size_t n)
     return sum;
 }
 
-/* What is known of `n_unknown` unknowns, the last perhaps a global gain, before the candidate. */
+/* Covariance of `n_unknown` unknowns before the candidate. The last may be a global gain. */
 struct before {
     struct fit_layout layout;
     struct uncertainty u;
@@ -54,7 +54,7 @@ static void set_before(struct before *k, const struct fit_option *o)
     }
 }
 
-/* Of the first N unknowns, the others not known. */
+/* ln of the determinant of the covariance of the first N unknowns, marginal over the others. */
 static double ln_det_of_parameters(const double *cov, size_t n)
 {
     double part[N * N];
@@ -63,7 +63,8 @@ static double ln_det_of_parameters(const double *cov, size_t n)
     return ln_det(part, N);
 }
 
-/* cov_after = (cov^-1 + J' V^-1 J)^-1 with everything that is unknown, and the fall of the determinant of the parameters' part. */
+/* Compares with cov_after = (cov^-1 + J' V^-1 J)^-1 of all unknowns, and with the decrease of the determinant of its
+ * block of parameters. */
 static void check_against_the_whole_matrix(const struct fit_option *o)
 {
     struct before k;
@@ -151,7 +152,7 @@ static void covariance_of(const double (*row)[4], size_t n_row, const double *pa
     }
 }
 
-/* Photographs far from the mirror direction say nothing of beta_R; of several candidates one looks into it. */
+/* Photographs far from the mirror direction do not determine beta_R. One of several candidates is in that direction. */
 static void test_finds_what_is_missing(void **state)
 {
     (void)state;
@@ -191,7 +192,7 @@ static void test_finds_what_is_missing(void **state)
             best = score.information;
             i_best = i;
         }
-        /* rough derivatives make a candidate look worse */
+        /* noise of the derivatives lowers the score of a candidate */
         double exact = score.information;
         for (size_t k = 0; k < 3; k++) e.jac_var[k * N + 6] = pow(e.mean[k] / param[6], 2.0);
         next_photograph_score(&fit, &e, &e, &score);

@@ -1,5 +1,4 @@
-/* The minimum of noisy functions: found where it is, within the error that is stated; and no minimum where there is
- * none. */
+/* The minimum of noisy functions is found within its stated error, and none is found where there is none. */
 #include "base/rng.h"
 #include "optimizer/fit/objective/noisy_minimum.h"
 
@@ -20,7 +19,8 @@ struct function {
     uint32_t n_call, fail_at;
 };
 
-/* A bowl with a slant, and one that is twice as steep on the left: the objective of a weave over the radius. */
+/* A parabola with a linear term, and a function that is twice as steep on the left, like the objective of a weave
+ * over the radius. */
 static double value(const struct function *f, double u)
 {
     double x = u - f->at;
@@ -58,8 +58,8 @@ static void test_without_noise(void **unused)
     }
 }
 
-/* Over many seeds: at least 95 % inside two errors, less three standard deviations of a binomial (200 x 0.95 - 3 x 3.1 =
- * 180); no shift by more than half of the error that is stated. */
+/* Over many seeds at least 95 % of the minima lie inside two stated errors, less three standard deviations of a
+ * binomial (200 x 0.95 - 3 x 3.1 = 180). Their mean is off by at most half of the stated error. */
 static void check_errors(enum shape shape, double noise)
 {
     enum { SEEDS = 200 };
@@ -90,8 +90,8 @@ static void test_error_is_honest(void **unused)
     check_errors(SHAPE_LOPSIDED, 0.01);
 }
 
-/* Flat: no seed may call the place of the lowest noise a minimum that is determined more often than two standard errors
- * of curvature allow (2.3 % one-sided; with the freedom of where to look, five times that). */
+/* In a flat function the lowest noise may be reported as a determined minimum only as often as two standard errors of
+ * the curvature allow: 2.3 % one-sided, and five times that because its position is free. */
 static void test_flat_is_not_determined(void **unused)
 {
     (void)unused;
@@ -102,7 +102,7 @@ static void test_flat_is_not_determined(void **unused)
         assert_int_equal(noisy_minimum_search(&option, evaluate, &f, &m, NULL), STATUS_OK);
         n_fooled += m.determined;
     }
-    print_message("flat taken for a minimum: %zu of 100\n", n_fooled);
+    print_message("flat functions with a reported minimum: %zu of 100\n", n_fooled);
     assert_true(n_fooled <= 12);
 }
 

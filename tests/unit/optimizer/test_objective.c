@@ -1,4 +1,4 @@
-/* Objective, coordinates, what follows from a linear model, uncertainty. */
+/* The objective, fit coordinates, the linear model of an objective, and uncertainty. */
 #include "base/rng.h"
 #include "optimizer/fit/objective/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
@@ -36,10 +36,10 @@ static void test_by_hand(void **state)
     objective_evaluate(&o, a, b, &v);
     assert_true(fabs(v.rel_square_se - 25.0 * 0.2 * 0.02 / 6.0) < 1e-12);
     assert_true(fabs(v.rel_rms_se - 0.5 * v.rel_square_se / v.rel_rms) < 1e-12);
-    item[1].weight = 0.0; /* counts nowhere */
+    item[1].weight = 0.0; /* this row contributes to nothing */
     objective_evaluate(&o, a, b, &v);
     assert_true(fabs(v.value - f0) < 1e-12 && fabs(v.rel_square - f0 / 3.0) < 1e-12);
-    a[0].mean[0] = 0.0; /* products below 0: the root is 0, its square is told as it is */
+    a[0].mean[0] = 0.0; /* the product is below 0: the root is reported as 0, its square as it is */
     objective_evaluate(&o, a, b, &v);
     assert_true(v.rel_rms == 0.0 && fabs(v.rel_square + f0 / 3.0) < 1e-12 && v.rel_rms_se == sqrt(v.rel_square_se));
 }
@@ -150,8 +150,8 @@ static void test_coordinates(void **state)
     assert_int_equal(k.kind, PARAM_LINEAR);
 }
 
-/* A linear model with known noise: the sandwich gives the textbook covariance, and a column of zeros is called
- * undetermined. */
+/* A linear model with known noise: the sandwich estimator gives the known covariance, and a parameter whose
+ * derivatives are zero is reported as not determined. */
 static void test_uncertainty(void **state)
 {
     (void)state;
@@ -185,7 +185,8 @@ static void test_uncertainty(void **state)
     linear_model_release(&m);
 }
 
-/* What spans decades is at its bound in the logarithm: a thousandth of the whole range would be ten times the lower bound. */
+/* For a parameter with a range of decades, being at a bound is decided in its logarithm. A thousandth of the linear
+ * range would be ten times the lower bound. */
 static void test_bound_of_a_wide_range(void **state)
 {
     (void)state;
@@ -209,8 +210,8 @@ static void test_bound_of_a_wide_range(void **state)
     linear_model_release(&m);
 }
 
-/* Means that are off by 1 % and contrasts that are off by 30 %: each kind has its own misfit, and what is told of a photograph's
- * means (misfit, noise, stated error) is of the means alone. */
+/* The means deviate by 1 % and the contrasts by 30 %. Each kind has a misfit of its own, and what is reported for means
+ * (misfit, noise, stated error) comes from the means alone. */
 static void test_contrasts_have_a_misfit_of_their_own(void **state)
 {
     (void)state;
@@ -236,7 +237,7 @@ static void test_contrasts_have_a_misfit_of_their_own(void **state)
             for (int q = 0; q < 2; q++) {
                 m.r[q][row] = m.extra[row] * (left * normal[0] + noise * normal[1 + q]);
                 m.r_var[q][row] = m.extra[row] * noise * noise;
-                m.j[q][row] = row < ROWS / 2 ? 0.5 : 0.0; /* contrasts say nothing about this parameter */
+                m.j[q][row] = row < ROWS / 2 ? 0.5 : 0.0; /* contrasts do not depend on this parameter */
             }
         }
         linear_model_misfits(&m, 1, misfit);
@@ -254,8 +255,9 @@ static void test_contrasts_have_a_misfit_of_their_own(void **state)
     linear_model_release(&m);
 }
 
-/* Residuals of 1 % that nothing explains in rows known to 0.2 %, among rows known to 5 %: the misfit is found in spite of
- * those, none is where the stated errors explain it, and weights follow; an extra weight changes neither. */
+/* Some rows have stated errors of 0.2 % and residuals of 1 %, the other rows have stated errors of 5 %. The misfit of
+ * 1 % is found in spite of the others, no misfit is found where the stated errors explain the residuals, and the
+ * weights follow from it. An additional weight of rows changes neither. */
 static void test_misfit_and_weights(void **state)
 {
     (void)state;
@@ -298,7 +300,8 @@ static void test_misfit_and_weights(void **state)
     linear_model_release(&m);
 }
 
-/* Its derivative along the model is the gradient, so what a step promises and what has been reached are of one function. */
+/* The derivative of the weighted objective along the model is the gradient, so that the predicted and the actual
+ * decrease of a step refer to the same function. */
 static void test_weighted_objective(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Photographs of a phantom: the table of configurations, the parameters, and what is written. */
+/* Photographs of a phantom: the table of configurations, the parameters, and the files that are written. */
 #include "base/angle.h"
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/phantom/phantom_photographs.h"
@@ -95,7 +95,7 @@ static void test_parameters(void **state)
         assert_int_equal(phantom_param_parse(m, bad[i], param, &err), STATUS_INVALID);
 }
 
-/* Sixteen touching fibers along x: a little carpet. */
+/* Sixteen touching fibers along x. */
 static void write_carpet(const char *path)
 {
     struct fiber_set f;
@@ -148,7 +148,7 @@ static json_t *truth_of(void **state)
     return truth;
 }
 
-/* The means of a picture are the stated ones times the stated gains. */
+/* The mean of a picture must be the stated mean times the stated gain. */
 static void check_picture(const char *folder, const json_t *row)
 {
     char path[2048];
@@ -207,7 +207,7 @@ static void test_refused_requests(void **state)
     assert_int_equal(phantom_photographs_make(&q.o, NULL, NULL, &err), STATUS_NOT_FOUND);
 }
 
-/* One path a pixel at most, and an error all the same. */
+/* A photograph with fewer paths than pixels still has a standard error. */
 static void test_fewest_paths(void **state)
 {
     struct request q;

@@ -1,4 +1,4 @@
-/* Contrasts of photographs: those of a chess board behind noise, their stated errors, parts whose edges cut through pixels. */
+/* Contrasts of photographs: of a chess board with noise, their stated errors, and blocks whose edges divide pixels. */
 #include "optimizer/fit/photographs/observation.h"
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-/* The same picture with five times as many pixels a side. */
+/* The same picture with five times as many pixels along each edge. */
 static double magnified_contrast(const struct image *im)
 {
     enum { TIMES = 5 };
@@ -29,8 +29,9 @@ static double magnified_contrast(const struct image *im)
     return contrast;
 }
 
-/* Draws one of a series of square pictures in its first n_channel channels: a chess board of the contrast `chess` with fields of BOARD_SIDE
- * pixels, and a deviate of standard deviation sd for each block of `block` pixels a side. */
+/* Draws one of a series of square pictures in its first n_channel channels: a chess board of the contrast `chess`
+ * with fields of BOARD_SIDE pixels, and a deviate of standard deviation sd for each block of `block` pixels a side.
+ * */
 static void draw(struct image *im, const struct rng_key *key, size_t block, double chess, double sd, size_t n_channel)
 {
     const size_t px = im->width;
@@ -43,8 +44,8 @@ static void draw(struct image *im, const struct rng_key *key, size_t block, doub
     }
 }
 
-/* A chess board with independent noise of every pixel, whose share is as the header says; parts whose edges cut through
- * pixels. */
+/* A chess board with independent noise in every pixel, which changes the contrast as the header states; and blocks
+ * whose edges divide pixels. */
 static void test_photograph(void **state)
 {
     enum { PX = 64, ROUND = 50 };
@@ -77,8 +78,8 @@ static void test_photograph(void **state)
     assert_non_null(strstr(err.text, "board.exr"));
 }
 
-/* Blocks that scatter at random: the stated error of a contrast is the scatter of contrasts of such photographs. A channel that is
- * black has no contrast, and the photograph's row does not count. */
+/* Blocks with random values: the stated error of a contrast is the standard deviation over such photographs. A black
+ * channel has no contrast, and the row of the photograph is left out. */
 static void test_photograph_error(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* Photographs to mean radiances: exact means, errors that know about texture, and pictures that must be refused. */
+/* Mean radiances of photographs: exact means, standard errors that include texture, and pictures that must be
+ * refused. */
 #include "base/rng.h"
 #include "optimizer/fit/photographs/observation.h"
 #include "optimizer/fit/photographs/photograph.h"
@@ -45,8 +46,8 @@ static void test_mean(void **state)
     assert_true(fabs(m.mean_rgb[0] - (1.0 + 0.001 * 11.5 + 0.002 * 20.5)) < 1e-6);
 }
 
-/* Pixels in 4 x 4 patches of one random value each: the error of the mean is that of 256 patches, not of 4096 pixels.
- */
+/* Each patch of 4 x 4 pixels has one random value. The standard error of the mean is that of 256 patches, not of 4096
+ * pixels. */
 static float patches(size_t x, size_t y, size_t c)
 {
     struct rng_key key = {.seed = 5};
@@ -126,7 +127,7 @@ static void test_png(void **state)
     p.crop_px[1] = 0;
     assert_int_equal(photograph_measure(path, &p, &m, NULL), STATUS_OK);
     assert_true(m.saturated_share == 4.0 / 256.0);
-    /* what is saturated counts within the crop only: 4 of 16 pixels are too many, a lamp beside the crop is not */
+    /* saturated pixels count only within the crop: 4 of 16 are too many, but a lamp beside the crop is allowed */
     p.crop_px[2] = p.crop_px[3] = 4;
     assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_INVALID);
     assert_true(m.saturated_share == 0.25);
@@ -157,14 +158,15 @@ static void test_truncated_png(void **state)
         scratch_write(scratch_path(state, "cut.png"), bytes, cut);
         assert_int_not_equal(photograph_measure(scratch_path(state, "cut.png"), &p, &m, NULL), STATUS_OK);
     }
-    memcpy(bytes + 16, "\x7f\xff\xff\xff\x7f\xff\xff\xff", 8); /* a header that lies about its size */
+    memcpy(bytes + 16, "\x7f\xff\xff\xff\x7f\xff\xff\xff", 8); /* a header with a wrong size */
     scratch_write(scratch_path(state, "cut.png"), bytes, n);
     struct photograph_mean m;
     assert_int_equal(photograph_measure(scratch_path(state, "cut.png"), &p, &m, NULL), STATUS_TOO_LARGE);
     free(bytes);
 }
 
-/* Headers that promise hundreds of millions of pixels in a file of some hundred bytes: refused before memory is taken. */
+/* A file of some hundred bytes whose header states hundreds of millions of pixels is refused before memory is
+ * allocated. */
 static void test_small_files_of_huge_pictures(void **state)
 {
     uint8_t rgb[8 * 8 * 3] = {0};

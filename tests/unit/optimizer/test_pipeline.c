@@ -1,4 +1,4 @@
-/* The worker's plumbing: checkpoint files, the hold on a job folder, the series across resumes, the inputs. */
+/* Files of the worker: checkpoints, the lock of a job folder, the series of a resumed fit, the inputs. */
 #include "base/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
@@ -35,7 +35,7 @@ static void test_work_file(void **state)
     free(in[2].data);
     size_t n;
     char *bytes = scratch_read(path, &n);
-    for (size_t i = 0; i < n; i++) { /* every flipped bit and every cut is noticed, and nothing leaks */
+    for (size_t i = 0; i < n; i++) { /* every changed bit and every truncation is detected, and no memory leaks */
         struct work_section damaged[] = {{&back, sizeof back}, {NULL, 0}, {NULL, 0}};
         bytes[i] ^= 16;
         scratch_write(path, bytes, n);
@@ -45,14 +45,14 @@ static void test_work_file(void **state)
         assert_int_not_equal(work_file_read(path, "t.1", damaged, 3, NULL), STATUS_OK);
         assert_null(damaged[1].data);
     }
-    assert_true(back == fixed); /* what the caller has stays as it was */
+    assert_true(back == fixed); /* the caller's value is unchanged */
     scratch_write(path, bytes, n);
     struct work_section other[] = {{&back, sizeof back}, {NULL, 0}, {NULL, 0}};
     assert_int_equal(work_file_read(path, "t.2", other, 3, NULL), STATUS_FORMAT);
     free(bytes);
 }
 
-/* As many sections as a job of the most models has, and not one more. */
+/* As many sections as a job with the largest number of models needs, and not one more. */
 static void test_work_file_of_many_sections(void **state)
 {
     const char *path = scratch_path(state, "many.bin");
@@ -128,8 +128,8 @@ static void add_steps(struct worker_series *s, size_t first, size_t n, bool repl
     }
 }
 
-/* A resumed fit passes through its old steps again: none is written twice, what is behind the resumption is cut, a torn
- * record too. */
+/* A resumed fit repeats its earlier steps. No step is written twice, and records after the point of resumption, also a
+ * torn one, are removed. */
 static void test_series(void **state)
 {
     struct worker_folder f;
@@ -189,7 +189,7 @@ static void test_inputs(void **state)
                       "photographs[0].file");
 }
 
-/* Radii as if in micrometres: refused before the ends on the faces are paired, each with each. */
+/* Radii in a wrong unit are refused before all ends on the faces are compared with each other. */
 static void test_fibers_wider_than_the_tile(void **state)
 {
     static const char document[] = "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.txt\",\"tile_mm\":[1,2]},"

@@ -1,6 +1,6 @@
-/* The step rule of published_sgd.v1 (fabric thesis 5.5.4), on a problem whose gradient is the same everywhere: the i-th
- * step of a run is a / (50 + i), a grows threefold from run to run, and a run that oscillates is followed by ten steps of
- * a tenth of its last one. */
+/* The step rule of published_sgd.v1 (fabric thesis 5.5.4), on a problem whose gradient is the same everywhere: the
+ * i-th step of a run is a / (50 + i), a grows threefold from run to run, and a run that oscillates is followed by ten
+ * steps of a tenth of its last one. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/rescale.h"
 #include "tests/support/descent_fixture.h"
@@ -24,8 +24,8 @@ struct slope {
     double param[MAX_STEP];
 };
 
-/* The picture as a function of x is measured once, for the rescaling curve: it is linear, so that steps in the rescaled
- * parameter are proportional to steps in x. In the descent, picture and derivative do not depend on x. */
+/* The first calls measure the picture as a function of x for the rescaling curve. It is linear, so that steps in the
+ * rescaled parameter are proportional to steps in x. In the descent, picture and derivative do not depend on x. */
 static status run_estimator(void *context, const struct estimator_call *call, const struct progress *progress,
                             struct estimate *out, double *wall_s, struct error *err)
 {
@@ -89,7 +89,7 @@ static void test_steps_decay(void **state)
     assert_int_equal(x.n_step, N_RUN * N_ITERATION + N_FINAL);
     for (size_t k = 0; k < N_RUN; k++, a *= 3.0) {
         const size_t first = k * N_ITERATION;
-        assert_true(x.param[first] == 0.9); /* every run starts anew */
+        assert_true(x.param[first] == 0.9); /* every run begins at the start */
         for (size_t i = 0; i + 1 < N_ITERATION && x.param[first + i + 1] > one_param->lower; i++, n_checked++)
             if (fabs(step_length(&x, first + i) - a / (50.0 + (double)i)) > 1e-9)
                 fail_msg("run %zu, step %zu: %.6f, published %.6f", k, i, step_length(&x, first + i),
@@ -98,7 +98,7 @@ static void test_steps_decay(void **state)
     assert_true(n_checked >= 2 * (N_ITERATION - 1)); /* the longer runs reach the bound before their end */
 }
 
-/* All runs end at the same objective, so the first one wins; its steps point against each other. */
+/* All runs end at the same objective, so the first one is the best. Its steps have alternating signs. */
 static void test_steps_after_an_oscillation(void **state)
 {
     (void)state;
@@ -112,7 +112,7 @@ static void test_steps_after_an_oscillation(void **state)
         assert_true(fabs(step_length(&x, settling + i) - 0.1 * 0.25 / (50.0 + N_ITERATION - 1.0)) < 1e-9);
 }
 
-/* A few short runs hold no steps that could be compared: that is not converged, however low the objective. */
+/* Short runs have too few steps to compare. Such a fit is not converged, however low the objective is. */
 static void test_published_sgd_needs_steps(void **state)
 {
     (void)state;
@@ -128,7 +128,7 @@ static void test_published_sgd_needs_steps(void **state)
     }
 }
 
-/* Steps that all point the same way have a mean cosine near 1, also in the first run that is long enough. */
+/* Steps in the same direction have a mean cosine near 1, also in the shortest run that is long enough. */
 static void test_published_sgd_mean_cosine_has_no_start(void **state)
 {
     (void)state;

@@ -52,9 +52,9 @@ static void test_exposure(void **state)
     (void)state;
     struct observation item[11] = {0};
     struct observation_set o = {.n = 11, .item = item};
-    assert_true(result_png_exposure(&o) == 1.0); /* all black: leave it */
+    assert_true(result_png_exposure(&o) == 1.0); /* all rows are black: the exposure stays 1 */
     for (size_t i = 0; i < 11; i++) item[i].mean_rgb[1] = 0.1 * (double)(i + 1);
-    item[10].mean_rgb[1] = 50.0; /* one highlight does not darken everything */
+    item[10].mean_rgb[1] = 50.0; /* one highlight does not darken all pictures */
     assert_true(fabs(result_png_exposure(&o) - 0.8) < 1e-9);
     o.n = 0;
     assert_true(result_png_exposure(&o) == 1.0);

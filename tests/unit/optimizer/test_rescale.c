@@ -78,7 +78,7 @@ struct fixture {
     uint64_t n_path;
 };
 
-/* tight: a parameter that ends at `upper`, below its model's bound. */
+/* tight: index of a parameter whose upper bound is `upper`, below that of its model. */
 static void setup(struct fixture *x, size_t tight, double upper)
 {
     memset(x, 0, sizeof *x);
@@ -106,7 +106,7 @@ static void measure(struct fixture *x, const struct estimator *e)
     assert_int_equal(rescale_measure(&problem, x->k, n_path, x->curve, &x->n_path, &x->wall_s, NULL), STATUS_OK);
 }
 
-/* Channels of one colour with bounds of their own are not held to those of the first. */
+/* The bounds of the first channel of a colour do not limit the other channels, which have bounds of their own. */
 static void test_bounds_of_one_channel(void **state)
 {
     (void)state;
@@ -122,7 +122,7 @@ static void test_bounds_of_one_channel(void **state)
     observation_set_release(&x.observation);
 }
 
-/* An estimator that may not be asked for anything beyond the bounds of the fit's parameters. */
+/* An estimator that fails the test when a parameter is outside of the bounds of the fit. */
 static status run_strict(void *context, const struct estimator_call *call, const struct progress *progress,
                          struct estimate *out, double *wall_s, struct error *err)
 {
@@ -132,7 +132,8 @@ static status run_strict(void *context, const struct estimator_call *call, const
     return x->estimator.run(x->estimator.context, call, progress, out, wall_s, err);
 }
 
-/* The leader of a tie in proportion may not go as far as the channels beside it: what follows it would leave the model's range. */
+/* The leader of a proportional tie has a narrower range than the other channels, because its follower must stay
+ * inside the range of the model. */
 static void test_channels_stay_within_their_own_bounds(void **state)
 {
     (void)state;
@@ -146,7 +147,7 @@ static void test_channels_stay_within_their_own_bounds(void **state)
     observation_set_release(&x.observation);
 }
 
-/* Without noise the measured curve is eq. 5.14 word for word, and colours get a third of it. */
+/* Without noise the measured curve is exactly eq. 5.14, and each channel of a colour gets a third of it. */
 static void test_measured_curve(void **state)
 {
     (void)state;

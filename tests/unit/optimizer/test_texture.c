@@ -1,5 +1,5 @@
-/* The contrast of a texture: estimates without bias at any number of paths, with their errors and derivatives; equal to
- * what a picture says. */
+/* The contrast of a texture: estimates are unbiased for any number of paths, their errors and derivatives are right,
+ * and they agree with the contrast of a rendered picture. */
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/chess_board.h"
@@ -14,8 +14,9 @@
 
 #include <cmocka.h>
 
-/* Four paths a cell, where the plain variance of the cells' means would be 0.25 (1 + t^2) too large; the mean of many
- * estimates is right within its error, and the stated variances are those of the scatter. */
+/* With four paths in each cell, the plain variance of the cells' means would be 0.25 (1 + t^2) too large. The mean of
+ * many estimates is right within its standard error, and the stated variances agree with the variance over many
+ * estimates. */
 static void test_unbiased(void **state)
 {
     (void)state;
@@ -75,7 +76,7 @@ static void test_derivative(void **state)
     thread_pool_free(b.pool);
 }
 
-/* Any number of threads. */
+/* The result has the same bits for any number of threads. */
 static void test_same_bits(void **state)
 {
     (void)state;
@@ -92,7 +93,7 @@ static void test_same_bits(void **state)
     }
 }
 
-/* A real cloth seen through one camera. */
+/* A woven cloth seen by one camera. */
 struct woven {
     struct fiber_set fiber;
     struct scene *scene;
@@ -143,7 +144,7 @@ static void woven_picture(struct woven *w, struct image *im)
     assert_int_equal(render_run(&q, w->pool, NULL, im, NULL), STATUS_OK);
 }
 
-/* Contrast of one channel of a rendered picture, its pixels' noise taken out, and its standard error. */
+/* Contrast of one channel of a rendered picture without the noise of its pixels, and its standard error. */
 static double picture_contrast(const struct image *im, size_t c, double *se)
 {
     double mean = 0.0, sum = 0.0, noise = 0.0, var = 0.0;
@@ -159,7 +160,7 @@ static double picture_contrast(const struct image *im, size_t c, double *se)
     return (sum - noise * (BOARD_CELL - 1.0) / BOARD_CELL) / (BOARD_CELL - 1.0);
 }
 
-/* The contrast of the cloth's estimate is that of the pixels of a picture with as many pixels as cells. */
+/* The estimated contrast of the cloth agrees with that of a rendered picture with as many pixels as cells. */
 static void test_against_picture(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* The worker's status: its warnings when there are many, and texts that would not go into JSON. */
+/* The worker's status: many warnings, and texts that are not valid in JSON. */
 #include "base/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/worker_status.h"
@@ -38,7 +38,7 @@ static void start(struct desk *d, void **state)
     assert_int_equal(worker_status_start(&d->hold, d->log, &d->status, &err), STATUS_OK);
 }
 
-/* Ends it, and gives status.json. */
+/* Ends the status and returns status.json. */
 static json_t *finish(struct desk *d, const struct error *error)
 {
     struct error err = {0};
@@ -61,7 +61,7 @@ static void test_warnings_beyond_the_list_are_counted(void **state)
     for (int i = 0; i < 60; i++) {
         snprintf(text, sizeof text, "warning %d", i);
         worker_status_warn(d.status, "%s", text);
-        worker_status_warn(d.status, "warning 0"); /* known: not counted again */
+        worker_status_warn(d.status, "warning 0"); /* an equal warning is not counted again */
     }
     assert_int_equal(worker_status_n_warning(d.status), 50);
     assert_true(worker_status_warning(d.status, 48, text, sizeof text));
@@ -82,7 +82,8 @@ static void test_texts_that_are_no_utf8(void **state)
     longer[599] = '\0';
     struct error error = {.code = STATUS_FORMAT};
     snprintf(error.text, sizeof error.text, "x%s", longer);
-    worker_status_warn(d.status, "%s", error.text); /* the limits of warnings and of messages cut a character in two */
+    worker_status_warn(d.status, "%s",
+                       error.text); /* the length limits of warnings and messages divide a character of two bytes */
     worker_status_warn(d.status, "gr\xf6\xdf"
                                  "e");
     json_t *json = finish(&d, &error);
