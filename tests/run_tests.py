@@ -17,7 +17,7 @@ import time
 import xml.etree.ElementTree as ElementTree
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-CHECKS = ["layers", "format-check", "lint-c", "lint-javascript", "lint-python", "lint-shell"]
+CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lint-python", "lint-shell"]
 SLOW_CHECKS = ["clang"]
 TIMEOUT_S = 600
 PYTEST_TIMEOUT_S = 1500

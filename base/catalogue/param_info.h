@@ -51,8 +51,8 @@ double param_to_file_unit(const struct param_info *p, double value);
 /* Index of a flat parameter by name, or -1. */
 int param_index(const struct param_info *info, size_t n_param, const char *name);
 
-/* Checks param[n_param] of the scattering model model_id against its bounds, widened by 1e-9 of their distance so that a
- * bound that went through a file is still inside. STATUS_INVALID with the parameter's name in err->field for a value
+/* Checks param[n_param] of the scattering model model_id against its bounds, widened by 1e-9 of their distance so that
+ * a bound that went through a file is still inside. STATUS_INVALID with the parameter's name in err->field for a value
  * outside or NaN. */
 status param_check(const struct param_info *info, size_t n_param, const char *model_id, const double *param,
                    struct error *err);

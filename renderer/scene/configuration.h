@@ -6,7 +6,8 @@
  * z, counter- clockwise seen from the camera side, under fixed lamp and camera.
  *
  * Radiance unit everywhere in Selvedge: the lamp is scaled so that a perfect white diffuser at the orbit centre FACING
- * the lamp would have radiance 1 (irradiance pi from a lamp at the same distance). Environments are plain radiance in that unit.
+ * the lamp would have radiance 1 (irradiance pi from a lamp at the same distance). Environments are plain radiance in
+ * that unit.
  */
 #ifndef SELVEDGE_RENDERER_CONFIGURATION_H
 #define SELVEDGE_RENDERER_CONFIGURATION_H
@@ -63,8 +64,8 @@ struct configuration {
 enum { CONFIGURATION_TEXT = 128 };
 void configuration_describe(const struct configuration *c, char text[CONFIGURATION_TEXT]);
 
-/* STATUS_INVALID for more than CONFIGURATION_MAX_COUNT configurations (field "n_configuration"), and for one whose angles,
- * distances or lights make no sense (field "configuration"). */
+/* STATUS_INVALID for more than CONFIGURATION_MAX_COUNT configurations (field "n_configuration"), and for one whose
+ * angles, distances or lights make no sense (field "configuration"). */
 status configuration_check(const struct configuration *c, size_t n, struct error *err);
 
 #endif

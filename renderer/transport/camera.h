@@ -1,6 +1,6 @@
-/* The camera of a configuration, in the frame of the (turned) cloth: perspective or far-field (orthographic). Its crop is
- * crop_m wide and crop_m / crop_aspect high, at the orbit centre and perpendicular to the view. Up is the projection of
- * the cloth normal; for a view along the normal, up points away from phi.
+/* The camera of a configuration, in the frame of the (turned) cloth: perspective or far-field (orthographic). Its crop
+ * is crop_m wide and crop_m / crop_aspect high, at the orbit centre and perpendicular to the view. Up is the projection
+ * of the cloth normal; for a view along the normal, up points away from phi.
  */
 #ifndef SELVEDGE_RENDERER_CAMERA_H
 #define SELVEDGE_RENDERER_CAMERA_H

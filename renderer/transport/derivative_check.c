@@ -10,9 +10,9 @@ enum { N_POINT = 4, MAX_ENTRY = 32768, MAX_BOUNCE_CONFIGURATION = 4096, N_VALUE 
 
 /* Relative step. With it, rounding of the float factors of a path (1e-6) stays below 1e-3 of the difference. */
 static const double relative_step = 2e-3;
-/* Least scale of a step, relative to the range of the parameter. Models also use 1 - C, which single precision rounds to
- * 3e-8 however small the colour C is: with steps proportional to C alone the error was 5 % at the bound 0.001. Above 0.1
- * the error of the stencil itself shows in black cloth. */
+/* Least scale of a step, relative to the range of the parameter. Models also use 1 - C, which single precision rounds
+ * to 3e-8 however small the colour C is: with steps proportional to C alone the error was 5 % at the bound 0.001. Above
+ * 0.1 the error of the stencil itself shows in black cloth. */
 static const double least_scale = 1e-3, least_scale_of_colour = 0.1;
 
 /* Values at offset[k] h give the derivative sum coefficient[k] f / h. */

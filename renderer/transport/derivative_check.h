@@ -1,10 +1,10 @@
 /* Gradient certificate: compares the derivatives that the tracers carry along with differences of the same paths.
  *
  * A few paths of every configuration are traced once, with derivatives, and recorded (path_tracer.h, volume_tracer.h).
- * The radiance of a recorded path at other parameters needs no tracing, so its derivative by each parameter also follows
- * from four points around the parameter (five-point stencil; beside a bound, four points on the inner side). Both
- * derivatives are of the same paths, so a difference beyond rounding is an error in the scores of the model or in the
- * sums of the tracer, for this scene and these parameters.
+ * The radiance of a recorded path at other parameters needs no tracing, so its derivative by each parameter also
+ * follows from four points around the parameter (five-point stencil; beside a bound, four points on the inner side).
+ * Both derivatives are of the same paths, so a difference beyond rounding is an error in the scores of the model or in
+ * the sums of the tracer, for this scene and these parameters.
  *
  * For parameter p, J_i and D_i being the mean derivatives of configuration i summed over channels, w_i its weight:
  *     error = sum_i w_i |J_i - D_i| / max(sum_i w_i |J_i|, 0.001 sum_i w_i R_i / |p|)

@@ -55,7 +55,8 @@ struct radiance_record {
 struct radiance_tracer {
     size_t max_member;  /* configurations that one path can serve */
     size_t entry_bytes; /* of a record */
-    /* STATUS_INVALID: a parameter (field: its name) or n_set; STATUS_NO_MEMORY. Leaves nothing to release on failure. */
+    /* STATUS_INVALID: a parameter (field: its name) or n_set; STATUS_NO_MEMORY. Leaves nothing to release on
+     * failure. */
     status (*prepare)(const struct radiance_input *in, const struct configuration *c, size_t n_configuration,
                       void **state, struct error *err);
     void (*release)(void *state);

@@ -1,4 +1,5 @@
-/* A picture of one configuration: the crop that a photograph shows, pixel by pixel, with the same tracers as estimate.h.
+/* A picture of one configuration: the crop that a photograph shows, pixel by pixel, with the same tracers as
+ * estimate.h.
  *
  * Channels: R G B, var.R var.G var.B (of the mean; infinite for one sample), and with derivatives d_<name>.R .G .B for
  * every flat parameter (radiance_derivative_name). The bits do not depend on the number of threads. Random numbers are

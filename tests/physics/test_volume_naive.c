@@ -1,5 +1,5 @@
-/* The volume renderer against the naive volume tracer of tests/support: two implementations that must agree. The lamp is
- * large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
+/* The volume renderer against the naive volume tracer of tests/support: two implementations that must agree. The lamp
+ * is large, so that the naive one finds it, and the lobes are wide, so that its directions serve.
  * A difference of 4 % in all configurations fails the test; of 0.5 % with the paths of `make test-long`. */
 #include "base/angle.h"
 #include "base/thread_pool.h"

@@ -11,7 +11,8 @@
  *
  * The colours enter linearly, so they are solved exactly within their ranges (diffuse, F0 and transmission in [0, 1],
  * sheen in [0, 2]) for every trial of the three shapes, and only these are searched: a grid first, then nlopt's Sbplx
- * from the best of its points. Both maskings are fitted and the one with the lower objective of the fitted rows is kept.
+ * from the best of its points. Both maskings are fitted and the one with the lower objective of the fitted rows is
+ * kept.
  */
 #ifndef SELVEDGE_OPTIMIZER_PLAIN_BRDF_H
 #define SELVEDGE_OPTIMIZER_PLAIN_BRDF_H
@@ -34,8 +35,8 @@ bool plain_brdf_applies(const struct configuration *c);
 /* Mean radiance of a configuration, rgb. */
 void plain_brdf_radiance(const struct plain_brdf *b, const struct configuration *c, double rgb[3]);
 
-/* Fits all rows of `rows` by the objective of the cloth's own fit (objective.h); contrasts and rows of weight 0 are left
- * out. Takes milliseconds. STATUS_INVALID when no row is left, STATUS_NO_MEMORY. */
+/* Fits all rows of `rows` by the objective of the cloth's own fit (objective.h); contrasts and rows of weight 0 are
+ * left out. Takes milliseconds. STATUS_INVALID when no row is left, STATUS_NO_MEMORY. */
 status plain_brdf_fit(const struct observation_set *rows, struct plain_brdf *b, struct error *err);
 
 /* Relative RMS error over the rows of one set (objective.h); NaN when the set has none. */

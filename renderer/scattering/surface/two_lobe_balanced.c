@@ -149,8 +149,8 @@ static double at_entry(const double *f, int i)
                   : (before - 5 * f[k] + 15 * f[k + 1] + 5 * f[k + 2]) / 16;
 }
 
-/* The tables are read by straight lines, which lie above a convex function, on the average by step^2 f'' / 12: taken off
- * beforehand, as energy would grow by it near the poles of narrow lobes. */
+/* The tables are read by straight lines, which lie above a convex function, on the average by step^2 f'' / 12: taken
+ * off beforehand, as energy would grow by it near the poles of narrow lobes. */
 static void level_lines(struct scattering_state *s, int lobe)
 {
     float before = s->normal[1].value[lobe]; /* even */

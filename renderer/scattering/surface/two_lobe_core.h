@@ -1,5 +1,5 @@
-/* What two_lobe.v1, two_lobe_balanced.v1 and two_lobe_diffuse.v1 share: state, evaluation with scores, sampling. Included
- * by those files only.
+/* What two_lobe.v1, two_lobe_balanced.v1 and two_lobe_diffuse.v1 share: state, evaluation with scores, sampling.
+ * Included by those files only.
  *
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)

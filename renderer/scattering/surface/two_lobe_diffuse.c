@@ -2,12 +2,13 @@
  *
  *     S = R + C_TT (1 - F(th_i)) [(1 - w) M_TT f(ph_o; ph_i + pi, gamma_TT) + w / pi^2]
  *
- * w is the share of the transmitted light that leaves the fiber in all directions alike; 1 / pi^2 keeps its energy, since
- * the integral of cos th over the sphere is pi^2. The limit w = 0 is two_lobe.v1. The energy bound is that of two_lobe.v1:
- * what R leaves is split between two terms, each of which returns at most its share from the incident side.
+ * w is the share of the transmitted light that leaves the fiber in all directions alike; 1 / pi^2 keeps its energy,
+ * since the integral of cos th over the sphere is pi^2. The limit w = 0 is two_lobe.v1. The energy bound is that of
+ * two_lobe.v1: what R leaves is split between two terms, each of which returns at most its share from the incident
+ * side.
  *
- * Sampling of wi: the diffuse term with the probability that its energy asks for, with density cos th_i / pi^2, otherwise
- * as two_lobe.v1.
+ * Sampling of wi: the diffuse term with the probability that its energy asks for, with density cos th_i / pi^2,
+ * otherwise as two_lobe.v1.
  */
 #include "renderer/scattering/surface/two_lobe_core.h"
 

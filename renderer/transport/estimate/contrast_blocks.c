@@ -6,7 +6,7 @@
 
 enum { BLOCK_PATHS = RADIANCE_BLOCK_PATHS, TASK_PATHS = 4096, N_JAC = 3 * SCATTERING_MAX_FLAT };
 
-/* ---- sums: for each cell and set the values, their squares, and the products of derivatives with their channel ---- */
+/* ---- sums: for each cell and set the values, their squares, the products of derivatives with their channel ---- */
 
 static size_t set_size(const struct contrast_plan *c) { return 2 * (3 + c->n_jac) + c->n_jac; }
 

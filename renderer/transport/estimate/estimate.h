@@ -1,6 +1,6 @@
-/* Path-traced estimates of mean radiance over a photograph's crop, with derivatives by every parameter of the model from
- * the same paths (fabric thesis 5.5.1, figure 5.3), for fibers and for volumes. Every figure carries the variance of its
- * mean. Results depend on the key and the counts only: bit-identical for any number of threads.
+/* Path-traced estimates of mean radiance over a photograph's crop, with derivatives by every parameter of the model
+ * from the same paths (fabric thesis 5.5.1, figure 5.3), for fibers and for volumes. Every figure carries the variance
+ * of its mean. Results depend on the key and the counts only: bit-identical for any number of threads.
  */
 #ifndef SELVEDGE_RENDERER_ESTIMATE_H
 #define SELVEDGE_RENDERER_ESTIMATE_H

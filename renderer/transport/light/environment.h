@@ -1,8 +1,8 @@
 /* An environment given as an image in latitude and longitude, sampled in proportion to luminance.
  *
  * World frame of configuration.h: row 0 is at +z (the cloth normal), the last row at -z; the first column begins at
- * phi = 0 and phi grows to the right. The radiance is constant over the solid angle of a pixel, so the density of samples
- * is exactly proportional to the luminance. Immutable: shared by threads.
+ * phi = 0 and phi grows to the right. The radiance is constant over the solid angle of a pixel, so the density of
+ * samples is exactly proportional to the luminance. Immutable: shared by threads.
  */
 #ifndef SELVEDGE_RENDERER_ENVIRONMENT_H
 #define SELVEDGE_RENDERER_ENVIRONMENT_H

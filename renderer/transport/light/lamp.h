@@ -1,8 +1,8 @@
-/* The lamp of a configuration, square or directional, in the frame of the turned cloth: millimetres, with the orbit centre
- * at the origin. A square lamp faces the orbit centre, has one horizontal edge, and emits from its front side only. Its
- * radiance is such that a surface at the orbit centre that faces the lamp has an irradiance of exactly pi
- * (configuration.h). A directional lamp is treated as one of 2^-60 sr: its weight against scattering samples rounds to 1,
- * and scattering samples never hit it.
+/* The lamp of a configuration, square or directional, in the frame of the turned cloth: millimetres, with the orbit
+ * centre at the origin. A square lamp faces the orbit centre, has one horizontal edge, and emits from its front side
+ * only. Its radiance is such that a surface at the orbit centre that faces the lamp has an irradiance of exactly pi
+ * (configuration.h). A directional lamp is treated as one of 2^-60 sr: its weight against scattering samples rounds to
+ * 1, and scattering samples never hit it.
  */
 #ifndef SELVEDGE_RENDERER_LAMP_H
 #define SELVEDGE_RENDERER_LAMP_H

@@ -1,9 +1,11 @@
-/* Density of directions near a lamp, in which guided shadow paths are drawn: fibers in these directions scatter the light
- * of the lamp on most strongly, because forward scattering dominates.
+/* Density of directions near a lamp, in which guided shadow paths are drawn: fibers in these directions scatter the
+ * light of the lamp on most strongly, because forward scattering dominates.
  *
- *     p(w) = kappa / (2 pi) exp(kappa (w . d - 1)),   d towards the lamp's centre   (von Mises-Fisher; 1 - exp(-2 kappa) taken as 1)
+ *     p(w) = kappa / (2 pi) exp(kappa (w . d - 1)),   d towards the lamp's centre
  *
- * kappa 20 is 13 degrees a side, between the widths of usual TT lobes; 10 and 40 cost up to 10 % more time to the same error.
+ * (von Mises-Fisher; 1 - exp(-2 kappa) is taken as 1).
+ * kappa 20 is 13 degrees a side, between the widths of usual TT lobes; 10 and 40 cost up to 10 % more time to the same
+ * error.
  */
 #ifndef SELVEDGE_RENDERER_LIGHT_GUIDE_H
 #define SELVEDGE_RENDERER_LIGHT_GUIDE_H
@@ -14,8 +16,8 @@
 
 #define LIGHT_GUIDE_KAPPA 20.0f
 
-/* Energy that a fiber scatters of light that arrives across it, per channel: within 35 degrees of straight on, and in all
- * directions. Sets how often guided paths are traced. */
+/* Energy that a fiber scatters of light that arrives across it, per channel: within 35 degrees of straight on, and in
+ * all directions. Sets how often guided paths are traced. */
 struct light_guide_energy {
     float forward[3], all[3];
 };

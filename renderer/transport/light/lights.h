@@ -32,7 +32,8 @@ static inline void lights_turn(const float by[2], float sign, const float d[3], 
     out[2] = d[2];
 }
 
-/* A direction of the image drawn in proportion to luminance, its radiance and density. False when the image is black. */
+/* A direction of the image drawn in proportion to luminance, its radiance and density. False when the image is
+ * black. */
 static inline bool lights_sample_image(const struct lights *l, const float u[2], float direction[3], float radiance[3],
                                        float *pdf_per_sr)
 {

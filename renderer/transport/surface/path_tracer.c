@@ -44,8 +44,8 @@ struct walk {
     float h[PATH_N_DERIVATIVE];            /* running sums of scores, laid out as the derivatives of path_result */
 };
 
-/* Adds value to the radiance and value * (H + score) to the derivatives. score NULL: the scores of the last step are part
- * of H already. */
+/* Adds value to the radiance and value * (H + score) to the derivatives. score NULL: the scores of the last step are
+ * part of H already. */
 static inline void add_light(struct walk *w, const float value[3], const float *score)
 {
     for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
@@ -202,9 +202,10 @@ static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounc
 }
 
 /* A guided shadow path reaches a lamp by way of one other fiber: a ray is drawn near the direction of the lamp
- * (light_guide.h), connects what it hits with the lamp, and ends. The walk can find the same light by a scattering sample
- * followed by a connection; the balance heuristic combines the two, and walk.weight is the weight of the walk's own. The
- * walk itself does not turn towards the lamp, because its later contributions would then carry a smaller weight. */
+ * (light_guide.h), connects what it hits with the lamp, and ends. The walk can find the same light by a scattering
+ * sample followed by a connection; the balance heuristic combines the two, and walk.weight is the weight of the walk's
+ * own. The walk itself does not turn towards the lamp, because its later contributions would then carry a smaller
+ * weight. */
 static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce *b)
 {
     const struct path_setting *s = w->s;

@@ -1,8 +1,8 @@
 /* One light path from the camera, with the derivatives of its contribution by every scattering parameter (fabric thesis
- * 5.5.1, figure 5.3): beside the throughput T runs the sum H of the scores d ln S / d p, and every connection to a light
- * adds L to the radiance and L (H + score) to the derivatives. Densities of sampling, roulette, and the weights that
- * combine light samples with scattering samples (power heuristic) and guided shadow paths with the path itself (balance
- * heuristic) are held fixed in the derivatives.
+ * 5.5.1, figure 5.3): beside the throughput T runs the sum H of the scores d ln S / d p, and every connection to a
+ * light adds L to the radiance and L (H + score) to the derivatives. Densities of sampling, roulette, and the weights
+ * that combine light samples with scattering samples (power heuristic) and guided shadow paths with the path itself
+ * (balance heuristic) are held fixed in the derivatives.
  */
 #ifndef SELVEDGE_RENDERER_PATH_TRACER_H
 #define SELVEDGE_RENDERER_PATH_TRACER_H
@@ -28,7 +28,8 @@ struct path_setting {
     bool want_jacobian;
 };
 
-/* The lights of the configuration, the default roulette threshold, guided paths if there is a lamp, one parameter set. */
+/* The lights of the configuration, the default roulette threshold, guided paths if there is a lamp, one parameter
+ * set. */
 void path_setting_init(struct path_setting *s, const struct scene *scene, const struct scattering_model *model,
                        const struct scattering_state *state, const struct configuration *c, bool want_jacobian);
 
@@ -70,9 +71,9 @@ struct path_record {
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record);
 
-/* The same path under each of n_lamp lamps, which replace the lamp of the setting. Result k is what path_trace gives with
- * lamp k alone; environments count in all. Further lamps cost their connections only, and the errors of the results are
- * correlated. */
+/* The same path under each of n_lamp lamps, which replace the lamp of the setting. Result k is what path_trace gives
+ * with lamp k alone; environments count in all. Further lamps cost their connections only, and the errors of the
+ * results are correlated. */
 void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
                       struct rng *rng, struct path_result *out);
 

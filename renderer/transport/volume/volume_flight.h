@@ -7,8 +7,9 @@
 #include "renderer/transport/surface/fiber_frame.h"
 #include "renderer/transport/volume/volume_scene.h"
 
-/* -ln(1 - u) for u from rng_float, with an error below 2e-7 times the larger of 1 and the result. Exponent and mantissa apart, the
- * mantissa between sqrt(1/2) and sqrt(2) through ln((1 + x) / (1 - x)) = 2 (x + x^3 / 3 + ...). No call, no branch. */
+/* -ln(1 - u) for u from rng_float, with an error below 2e-7 times the larger of 1 and the result. Exponent and mantissa
+ * apart, the mantissa between sqrt(1/2) and sqrt(2) through ln((1 + x) / (1 - x)) = 2 (x + x^3 / 3 + ...). No call, no
+ * branch. */
 static inline float volume_flight_minus_log(float u)
 {
     union {
@@ -53,7 +54,8 @@ static inline const uint32_t *volume_flight_voxel(const struct volume_scene *v, 
     return v->voxel + (size_t)brick * VOLUME_BRICK_VOXELS + place;
 }
 
-/* Distance to the end of the cube of empty bricks around the ray, or to the edge of the tile. Nothing scatters before. */
+/* Distance to the end of the cube of empty bricks around the ray, or to the edge of the tile. Nothing scatters
+ * before. */
 static inline float volume_flight_empty_mm(const struct volume_scene *v, const struct volume_ray *ray, int32_t n_empty)
 {
     const float most[3] = {v->n_voxel[0], v->n_voxel[1], v->high};
@@ -70,8 +72,8 @@ static inline float volume_flight_empty_mm(const struct volume_scene *v, const s
     return t > 0 ? t : 0;
 }
 
-/* Extinction of a voxel that is not empty, for a ray of direction w: its ratio to the majorant, and the derivative of that
- * ratio by the parameter of s(w). inv_majorant_density: inverse of the density times s at which the ratio is 1. */
+/* Extinction of a voxel that is not empty, for a ray of direction w: its ratio to the majorant, and the derivative of
+ * that ratio by the parameter of s(w). inv_majorant_density: inverse of the density times s at which the ratio is 1. */
 struct volume_lookup {
     float ratio, d_ratio, density, sine;
 };

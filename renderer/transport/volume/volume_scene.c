@@ -5,8 +5,8 @@
 #include <string.h>
 #include <sys/mman.h>
 
-/* Voxels are read in random order, so large pages save misses of the address cache where the system has them. Only whole
- * pages inside the array are advised; failure does no harm. */
+/* Voxels are read in random order, so large pages save misses of the address cache where the system has them. Only
+ * whole pages inside the array are advised; failure does no harm. */
 static void use_large_pages(void *data, size_t n_bytes)
 {
     const uintptr_t page = 2u << 20;
@@ -62,7 +62,8 @@ static uint32_t pack(uint8_t density, const float d[3])
     return (uint32_t)density << 24 | q << 12 | p;
 }
 
-/* Fills the brick table: the number of a stored brick, or minus the distance of an empty one to the nearest stored one. */
+/* Fills the brick table: the number of a stored brick, or minus the distance of an empty one to the nearest stored
+ * one. */
 static status number_bricks(struct volume_scene *s, const struct direction_volume *v, struct error *err)
 {
     const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};

@@ -94,8 +94,8 @@ static void note_light(struct volume_path *l, enum volume_event_kind kind, const
     memcpy(e->wo, l->wo, sizeof e->wo);
 }
 
-/* Adds value to the radiance and value * (H + scores) to the derivatives. score NULL: the scores of the last step are part
- * of H already. */
+/* Adds value to the radiance and value * (H + scores) to the derivatives. score NULL: the scores of the last step are
+ * part of H already. */
 static void add_light(const struct volume_setting *s, struct volume_path *l, const float value[3], const float *score,
                       const struct flight_score *shadow)
 {
@@ -212,7 +212,8 @@ static bool sample_light(const struct volume_setting *s, struct volume_path *l, 
     return lights_sample_image(&s->lights, u, direction, radiance, pdf);
 }
 
-/* Next-event estimation: a shadow ray to the lamp, then one to the image, then the path is scattered. False: it ends. */
+/* Next-event estimation: a shadow ray to the lamp, then one to the image, then the path is scattered. False: it
+ * ends. */
 static bool connect(const struct volume_setting *s, struct volume_path *l, enum connection to)
 {
     for (; to <= IMAGE; to++) {

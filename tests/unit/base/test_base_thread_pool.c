@@ -127,7 +127,8 @@ static void count_flushed(void *context, size_t i, size_t i_thread)
     if (!keeps_denormals()) atomic_fetch_add((atomic_size_t *)context, 1);
 }
 
-/* A resumed job may use the pool later than one that was not interrupted: the caller must compute alike before and after. */
+/* A resumed job may use the pool later than one that was not interrupted: the caller must compute alike before and
+ * after. */
 static void test_caller_computes_as_before(void **state)
 {
     (void)state;

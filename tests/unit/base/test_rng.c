@@ -146,7 +146,8 @@ static void test_poisson_moments(void **state)
     assert_int_equal(rng_poisson(&r, (double)NAN), 0);
 }
 
-/* Chi-square of counts against the Poisson law on both sides of the change of method; 30 to 60 cells, alpha about 1e-6. */
+/* Chi-square of counts against the Poisson law on both sides of the change of method; 30 to 60 cells, alpha about
+ * 1e-6. */
 static void test_poisson_law(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Arrays beyond the memory limit live in files: contents survive dropping, residence stays within the limit, a disk that cannot hold
- * them is an error. */
+/* Arrays beyond the memory limit live in files: contents survive dropping, residence stays within the limit, a disk
+ * that cannot hold them is an error. */
 #include "base/scratch_space.h"
 #include "tests/support/cloth/scan_files.h"
 

@@ -1,4 +1,5 @@
-/* Linear algebra of small symmetric matrices against known answers, and its refusal of matrices that are not definite. */
+/* Linear algebra of small symmetric matrices against known answers, and its refusal of matrices that are not
+ * definite. */
 #include "base/rng.h"
 #include "base/small_matrix.h"
 
@@ -57,7 +58,8 @@ static void test_invert(void **state)
     }
 }
 
-/* -u'' = 1 on N points between two zeros: u_i = i (N + 1 - i) / 2. A band of 3 holds the two diagonals and one of zeros. */
+/* -u'' = 1 on N points between two zeros: u_i = i (N + 1 - i) / 2. A band of 3 holds the two diagonals and one of
+ * zeros. */
 static void test_banded(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* The command line of `selvedge`: the tables of commands and options. The client's parts are in no library, so they are compiled in here. */
+/* The command line of `selvedge`: the tables of commands and options. The client's parts are in no library, so they are
+ * compiled in here. */
 #include "clients/cli/cli_args.c" /* NOLINT */
 
 #include <setjmp.h>

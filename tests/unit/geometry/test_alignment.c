@@ -138,7 +138,8 @@ static void test_threads(void **state)
     thread_pool_free(pool);
 }
 
-/* One bundle: its direction goes to the nearer axis, nothing else is turned. Isotropic noise and felt have no direction. */
+/* One bundle: its direction goes to the nearer axis, nothing else is turned. Isotropic noise and felt have no
+ * direction. */
 static void test_one_system_and_none(void **state)
 {
     (void)state;
@@ -240,7 +241,8 @@ static void test_known_period(void **state)
     volume_release(&v);
 }
 
-/* Turned by 8 degrees, aligned by what is found: the box holds no cell from outside of the scan, and has a whole number of repeats. */
+/* Turned by 8 degrees, aligned by what is found: the box holds no cell from outside of the scan, and has a whole number
+ * of repeats. */
 static void test_align_and_crop(void **state)
 {
     const struct cloth *c = *state;

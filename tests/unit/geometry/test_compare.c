@@ -140,8 +140,8 @@ static void test_cut_and_missing(void **state)
     (void)state;
     struct piece p[N_FIBER + 2];
     nine(p);
-    p[9] = p[10] = p
-        [4]; /* fiber 4 in three pieces with two gaps of 10 voxels, closed by the radius for 3.4 voxels from each side */
+    /* fiber 4 in three pieces with two gaps of 10 voxels, closed by the radius for 3.4 voxels from each side */
+    p[9] = p[10] = p[4];
     p[4].to = 30;
     p[9].from = 40;
     p[9].to = 60;
@@ -177,7 +177,8 @@ static void test_merged(void **state)
     check_near(r.direction_p95_deg, slope_deg, 0.01);
 }
 
-/* A fiber that leaves through a face and comes in through the opposite one is two fibers in a scan; one that grazes the face is not. */
+/* A fiber that leaves through a face and comes in through the opposite one is two fibers in a scan; one that grazes the
+ * face is not. */
 static void test_faces_cut_fibers(void **state)
 {
     (void)state;

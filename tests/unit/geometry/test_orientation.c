@@ -27,7 +27,8 @@ static double angle_deg(const float a[3], const double b[3])
     return angle_to_deg(acos(fmin(1.0, fabs(dot) / sqrt(norm))));
 }
 
-/* J by its definition, q over all voxels with |d.p| <= h / 2 (trapezoid ends), against the sum of samples along the line. */
+/* J by its definition, q over all voxels with |d.p| <= h / 2 (trapezoid ends), against the sum of samples along the
+ * line. */
 static void test_j_is_the_published_filter(void **state)
 {
     (void)state;
@@ -69,7 +70,8 @@ static void test_j_is_the_published_filter(void **state)
     volume_release(&l);
 }
 
-/* The descent from the structure tensor finds what a search over a dense set finds: median difference under 1 degree. */
+/* The descent from the structure tensor finds what a search over a dense set finds: median difference under 1
+ * degree. */
 static void test_search_agrees_with_brute_force(void **state)
 {
     (void)state;
@@ -164,7 +166,8 @@ static void test_straight_fibers(void **state)
     }
 }
 
-/* The diameter of fibers side by side is the same at signal-to-noise 2 (after clamping to 0..1, as scans are mapped) as without noise. */
+/* The diameter of fibers side by side is the same at signal-to-noise 2 (after clamping to 0..1, as scans are mapped) as
+ * without noise. */
 static void test_diameter_in_strong_noise(void **state)
 {
     (void)state;

@@ -67,7 +67,8 @@ static void test_same_fibers_for_any_number_of_threads(void **state)
     for (size_t i = 0; i < 3; i++) fiber_set_release(&f[i]);
 }
 
-/* Pushing apart alone leaves kinks that no fiber survives: strains of 0.51 in the plain weave, 0.46 in the velvet, 0.34 in the felt. */
+/* Pushing apart alone leaves kinks that no fiber survives: strains of 0.51 in the plain weave, 0.46 in the velvet, 0.34
+ * in the felt. */
 static void test_no_fiber_is_bent_until_it_breaks(void **state)
 {
     (void)state;

@@ -83,8 +83,9 @@ static double spread_m2(const struct fiber_set *f, double spacing_m)
     return square / (count[0] + count[1]);
 }
 
-/* The four measured yarns, true to the file's lengths or scaled, have the designed share of fiber: that of a ply's section, in the
- * material of the tile and in how far its fibers lie apart. As designed, before fibers push each other apart. */
+/* The four measured yarns, true to the file's lengths or scaled, have the designed share of fiber: that of a ply's
+ * section, in the material of the tile and in how far its fibers lie apart. As designed, before fibers push each other
+ * apart. */
 static void test_real_yarn_files(void **state)
 {
     static const char *const name[] = {"cotton1", "polyester1", "rayon1", "silk1"};

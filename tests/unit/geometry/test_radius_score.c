@@ -1,6 +1,7 @@
 /* The overlap score of the fiber radius (fabric thesis 5.6.5) on a histogram written by hand:
- *     score(r) = |C(r) and V| - |C(r) xor V|, and a ring belongs to the best C(r) while more than a third of its points are
- *     in V, because a point of V inside of C(r) counts twice (it joins the intersection and leaves the difference). */
+ *     score(r) = |C(r) and V| - |C(r) xor V|, and a ring belongs to the best C(r) while more than a third of its points
+ *     are in V, because a point of V inside of C(r) counts twice (it joins the intersection and leaves the
+ *     difference). */
 #include "geometry/fibers/shape/radius.h"
 
 #include <math.h>

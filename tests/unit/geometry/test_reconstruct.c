@@ -157,8 +157,8 @@ static void test_chain(void **state)
     release(&x);
 }
 
-/* What is chosen from the data is written into the options; a run that is given these values does the same, one that is given others takes
- * them. */
+/* What is chosen from the data is written into the options; a run that is given these values does the same, one that is
+ * given others takes them. */
 static void test_choices_are_reported_and_overridable(void **state)
 {
     (void)state;
@@ -209,7 +209,8 @@ static void take_advice(void *context, const char *option, const char *text)
     if (at != NULL && sscanf(at, "crop to x %zu..%zu, y %zu..%zu", &a->x0, &a->x1, &a->y0, &a->y1) == 4) a->n_said++;
 }
 
-/* The box that a warning names is of the whole volume, as the job takes it, also when the job has cropped it: given, the warning goes. */
+/* The box that a warning names is of the whole volume, as the job takes it, also when the job has cropped it: given,
+ * the warning goes. */
 static void test_advice_to_crop_can_be_followed(void **state)
 {
     (void)state;
@@ -284,7 +285,8 @@ static void test_threads(void **state)
     release(&three);
 }
 
-/* Slabs of a few slices and arrays in files give the bits that everything in memory gives; "zxy" writes across the slices. */
+/* Slabs of a few slices and arrays in files give the bits that everything in memory gives; "zxy" writes across the
+ * slices. */
 static void test_memory_limit(void **state)
 {
     (void)state;
@@ -333,8 +335,8 @@ static void test_axes(void **state)
                 assert_true(plain.v.density[volume_index(plain.v.n, i, j, k)] ==
                             turned.v.density[volume_index(turned.v.n, k, i, NY - 1 - j)]);
     assert_int_equal(turned.f.n_fiber, N_CYLINDER);
-    /* All fibers end where their axes meet a face, at up to 48 degrees from its normal. Axes are found to a tenth of a voxel (test_chain), so
-     * each of the ten ends is, too: one voxel in all. */
+    /* All fibers end where their axes meet a face, at up to 48 degrees from its normal. Axes are found to a tenth of a
+     * voxel (test_chain), so each of the ten ends is, too: one voxel in all. */
     print_message("length %.3f voxels, turned %.3f\n", plain.r.total_length_m / 2e-6, turned.r.total_length_m / 2e-6);
     assert_true(fabs(turned.r.total_length_m - plain.r.total_length_m) < 2e-6);
     for (size_t l = 0; l < N_CYLINDER; l++) {

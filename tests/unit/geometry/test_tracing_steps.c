@@ -151,9 +151,10 @@ static void test_relax(void **state)
     volume_release(&v);
 }
 
-/* Three fibers, two of them touching, of which only two have lines: these end on their axes, whatever the third one does, and with the true
- * radius. A straight axis through N voxels of a surface that blur b spreads is known to sigma / sqrt(A) per voxel of length,
- * A = pi r / (2 sqrt(pi) b) (a quarter of a circle's surface pushes each way), some 0.1 voxel; the fit averages over a few. */
+/* Three fibers, two of them touching, of which only two have lines: these end on their axes, whatever the third one
+ * does, and with the true radius. A straight axis through N voxels of a surface that blur b spreads is known to sigma /
+ * sqrt(A) per voxel of length, A = pi r / (2 sqrt(pi) b) (a quarter of a circle's surface pushes each way), some 0.1
+ * voxel; the fit averages over a few. */
 static void test_axis_fit(void **state)
 {
     (void)state;
@@ -235,7 +236,8 @@ static void test_radius(void **state)
     free(part);
 }
 
-/* Fibers along x and along y: when their radii differ they get one each, with an error that says so; when not, or when asked, one for all. */
+/* Fibers along x and along y: when their radii differ they get one each, with an error that says so; when not, or when
+ * asked, one for all. */
 static void test_radius_of_each_class(void **state)
 {
     (void)state;

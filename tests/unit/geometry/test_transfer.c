@@ -1,5 +1,6 @@
-/* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a fiber
- * takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels within r. */
+/* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a
+ * fiber takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels within
+ * r. */
 #include "geometry/reconstruct.h"
 
 #include <math.h>

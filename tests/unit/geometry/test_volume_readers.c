@@ -62,7 +62,8 @@ static const char *beginning_of(const char *reader_id)
     return NULL;
 }
 
-/* Every reader of the registry has an id of its own with a version, takes its own kind of file only, and refuses that cut short. */
+/* Every reader of the registry has an id of its own with a version, takes its own kind of file only, and refuses that
+ * cut short. */
 static void test_registry(void **state)
 {
     for (size_t i = 0; i < volume_reader_count(); i++) {

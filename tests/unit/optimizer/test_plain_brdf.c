@@ -82,7 +82,8 @@ static void test_unit(void **state)
     struct configuration c = {.camera_theta_rad = 0.5};
     double rgb[3];
     plain_brdf_radiance(&lambert, &c, rgb);
-    /* f_d90 is 1 - sin^2 of the difference angle here and cos(theta_l) is 1; what is left is GGX's Fresnel term alone */
+    /* f_d90 is 1 - sin^2 of the difference angle here and cos(theta_l) is 1; what is left is GGX's Fresnel term
+     * alone */
     double grazing = 0.5 * pow(cos(0.25), 2) - 0.5, expected = 1 + grazing * pow(1 - cos(0.5), 5);
     double fresnel = pow(1 - cos(0.25), 5);
     assert_true(fabs(rgb[0] - expected) < fresnel);
@@ -148,7 +149,8 @@ static bool load_table(const char *name, struct observation_set *o)
     return true;
 }
 
-/* Fitted errors of an independent least-squares fit (scipy, 18 starts, the better masking), and no more than 1 % above. */
+/* Fitted errors of an independent least-squares fit (scipy, 18 starts, the better masking), and no more than 1 %
+ * above. */
 static void test_measured_fabrics(void **state)
 {
     (void)state;

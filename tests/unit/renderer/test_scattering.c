@@ -294,8 +294,8 @@ static void reciprocal_models_are(void **state)
     }
 }
 
-/* two_lobe_diffuse.v1 in closed form: S is linear in w, w = 0 is two_lobe.v1, and at w = 1 only R and a uniform term are
- * left. Float arithmetic keeps each S to a few parts in 10^6 of its largest term. */
+/* two_lobe_diffuse.v1 in closed form: S is linear in w, w = 0 is two_lobe.v1, and at w = 1 only R and a uniform term
+ * are left. Float arithmetic keeps each S to a few parts in 10^6 of its largest term. */
 static void diffuse_share_in_closed_form(void **unused)
 {
     (void)unused;

@@ -196,8 +196,8 @@ static void too_thin_fibers_are_refused(void **state)
     fiber_set_release(&f);
 }
 
-/* Two segments of 2^63 pieces each: as integers their sum wraps to one vertex. Along x such a fiber leaves the widest block,
- * along z nothing else limits it. Read from both kinds of file, as a job would. */
+/* Two segments of 2^63 pieces each: as integers their sum wraps to one vertex. Along x such a fiber leaves the widest
+ * block, along z nothing else limits it. Read from both kinds of file, as a job would. */
 static void segments_beyond_all_numbers_are_refused(void **state)
 {
     (void)state;
