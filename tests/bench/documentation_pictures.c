@@ -5,8 +5,8 @@
  *   documentation_pictures derivatives FILE.png [samples]
  *       docs/images/derivatives.png, after figure 5.5 of the fabric thesis. The rows are two configurations. The
  *       columns are the rendering and its derivatives by C_R, C_TT, beta_R, beta_TT, gamma_TT, as means of the
- *       channels. For a colour, each channel is differentiated by its own component. White is 0. The scale of a column
- *       ends at the value below which 97 % of its pixels lie.
+ *       channels. For a colour, each channel is differentiated by its own component. White is 0. The scale of a
+ *       column ends at the value below which 97 % of its pixels lie.
  */
 #include "base/angle.h"
 #include "geometry/phantom/phantom.h"

@@ -1,4 +1,4 @@
-/* The log: one call is one line, whatever is in the text. */
+/* The log: one call writes one line, whatever the text contains. */
 #include "base/log.h"
 #include "tests/support/scratch_folder.h"
 

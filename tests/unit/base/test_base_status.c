@@ -50,7 +50,7 @@ static void test_error_may_quote_itself(void **state)
     assert_int_equal(error_prefix(&err, STATUS_IO, "file %d", 7), STATUS_IO);
     assert_string_equal(err.text, "file 7: outer (inner)");
     assert_int_equal(error_prefix(NULL, STATUS_IO, "file %d", 7),
-                     STATUS_IO); /* nobody wants the text: the code stays */
+                     STATUS_IO); /* without an error record only the code is returned */
     error_set_field(&err, STATUS_IO, err.field, "again");
     assert_string_equal(err.field, "f");
 }

@@ -1,4 +1,4 @@
-/* Thread pool: every task once, the same result for any number of threads, cancellation, progress. */
+/* Thread pool: every task runs once, the result is the same for any number of threads; cancellation, progress. */
 #include "base/thread_pool.h"
 
 #include <setjmp.h>
@@ -127,8 +127,8 @@ static void count_flushed(void *context, size_t i, size_t i_thread)
     if (!keeps_denormals()) atomic_fetch_add((atomic_size_t *)context, 1);
 }
 
-/* A resumed job may use the pool later than one that was not interrupted: the caller must compute alike before and
- * after. */
+/* A resumed job may use the pool at another time than an uninterrupted one. The calling thread must therefore compute
+ * the same before and after its first use. */
 static void test_caller_computes_as_before(void **state)
 {
     (void)state;

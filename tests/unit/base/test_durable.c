@@ -1,4 +1,4 @@
-/* Whole-file replacement and record files: what survives, what is noticed. */
+/* Replacement of whole files, and record files: which data survive a failure, and which damage is detected. */
 #include "base/durable.h"
 #include "tests/support/scratch_folder.h"
 
@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-/* The C library's own, watched: what is synced, and what happens when that fails. */
+/* Functions in place of those of the C library: they record what is synced, and can fail. */
 static struct watched_syncs {
     int n_data, n_folder, fail_with;
 } watch;
@@ -56,7 +56,7 @@ static void test_failed_replace_leaves_nothing_behind(void **state)
     struct error err;
     assert_int_equal(durable_replace(scratch_path(state, "none/file"), "x", 1, &err), STATUS_NOT_FOUND);
     assert_non_null(strstr(err.text, "none/file"));
-    /* the target is a folder: written beside it, then the rename fails */
+    /* the target is a folder: the temporary file is written, and then the rename fails */
     const char *inner = scratch_path(state, "outer/inner");
     assert_int_equal(durable_make_folder(inner, NULL), STATUS_OK);
     assert_int_equal(durable_replace(inner, "x", 1, &err), STATUS_IO);
@@ -81,7 +81,7 @@ static void test_make_folder(void **state)
     struct error err = {0};
     assert_int_not_equal(durable_make_folder(scratch_path(state, "a/file/under"), NULL), STATUS_OK);
     assert_int_equal(durable_make_folder(scratch_path(state, "a/file"), &err),
-                     STATUS_EXISTS); /* no folder, though the name is taken */
+                     STATUS_EXISTS); /* the name exists, but it is no folder */
     assert_non_null(strstr(err.text, "a/file': a file of that name"));
     assert_int_equal(symlink("b", scratch_path(state, "a/link")), 0);
     assert_int_equal(durable_make_folder(scratch_path(state, "a/link/d"), NULL), STATUS_OK);
@@ -119,7 +119,7 @@ static void test_name_without_folders(void **state)
     (void)state;
     assert_string_equal(path_file_name("/var/lib/scan.tif"), "scan.tif");
     assert_string_equal(path_file_name("scan.tif"), "scan.tif");
-    assert_string_equal(path_file_name("folder/"), "folder/"); /* nothing behind the slash: all of it */
+    assert_string_equal(path_file_name("folder/"), "folder/"); /* there is nothing after the slash, so all of it */
 }
 
 struct seen {
@@ -183,7 +183,7 @@ static void test_every_torn_tail_is_noticed(void **state)
         assert_int_equal(record_read(path, 0, visit, &seen, &next, NULL), STATUS_OK);
         assert_int_equal(seen.n, n_good);
         assert_int_equal(next, offset[n_good]);
-        /* cut, go on */
+        /* truncate and continue */
         assert_int_equal(record_truncate(path, next, NULL), STATUS_OK);
         assert_int_equal(record_append(path, "{\"again\":true}", false, NULL), STATUS_OK);
         seen.n = 0;
@@ -228,7 +228,8 @@ static void test_new_record_file_is_synced_with_its_folder(void **state)
     watch = (struct watched_syncs){0};
     assert_int_equal(record_append(path, "{}", true, NULL), STATUS_OK);
     assert_int_equal(watch.n_data, 1);
-    assert_int_equal(watch.n_folder, 1); /* or the file is gone after a power loss, synced or not */
+    assert_int_equal(watch.n_folder,
+                     1); /* otherwise a power loss can remove the file, although its content is synced */
     assert_int_equal(record_append(path, "{}", true, NULL), STATUS_OK);
     assert_int_equal(watch.n_data, 2);
     assert_int_equal(watch.n_folder, 1);
@@ -297,8 +298,8 @@ static bool read_on(void *context, const char *json, size_t n_json)
     return number < r->stop;
 }
 
-/* Records from 20 bytes to 200 kB; every one is found, by few looks, with little to read before it; a torn tail is no
- * record. */
+/* Records of 20 bytes to 200 kB. Each is found with few reads, and reading starts only a little before it. A torn last
+ * record is not returned. */
 static void test_seek(void **state)
 {
     const char *path = scratch_path(state, "ordered.rec");
@@ -329,7 +330,8 @@ static void test_seek(void **state)
     assert_int_equal(from, 0);
 }
 
-/* A file that another writer made: on disk before it has its name, the name on disk before the call returns. */
+/* Renames a file that another writer made. Its content must be on disk before it gets its name, and the name must be
+ * on disk before the call returns. */
 static void test_rename(void **state)
 {
     char temporary[4096];
@@ -342,7 +344,7 @@ static void test_rename(void **state)
     assert_true(watch.n_data == 1 && watch.n_folder == 1);
     assert_true(access(temporary, F_OK) != 0 && access(path, F_OK) == 0);
     assert_int_equal(durable_rename(temporary, path, &err),
-                     STATUS_NOT_FOUND); /* nothing to rename; what is there stays */
+                     STATUS_NOT_FOUND); /* without a file to rename, the target is unchanged */
     assert_int_equal(access(path, F_OK), 0);
     scratch_write(temporary, "pixels", 6);
     watch = (struct watched_syncs){.fail_with = EIO};

@@ -29,11 +29,11 @@ static void test_known_answers(void **state)
         memcpy(r.counter.v, known[i].counter, sizeof known[i].counter);
         memcpy(r.key.v, known[i].key, sizeof known[i].key);
         for (size_t k = 4; k-- > 0;)
-            assert_int_equal(rng_u32(&r), known[i].answer[k]); /* a block is used from its end */
+            assert_int_equal(rng_u32(&r), known[i].answer[k]); /* the numbers of a block are used from its end */
     }
 }
 
-/* The third vector again, through the names of a stream. */
+/* The third vector again, with the key and the indices of a stream. */
 static void test_stream_names_fill_the_counter(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Arrays beyond the memory limit live in files: contents survive dropping, residence stays within the limit, a disk
- * that cannot hold them is an error. */
+/* Arrays beyond the memory limit are kept in files. Their contents are the same after they leave memory, the resident
+ * memory stays within the limit, and a disk that is too small gives an error. */
 #include "base/scratch_space.h"
 #include "tests/support/cloth/scan_files.h"
 
@@ -53,7 +53,7 @@ static void test_contents_survive(void **state)
     }
     scratch_release(space, array);
     assert_true(scratch_file_bytes(space) == 0);
-    scratch_space_free(space); /* with what is left */
+    scratch_space_free(space); /* also frees the remaining arrays */
 }
 
 static void test_without_space(void **state)
@@ -83,8 +83,8 @@ static void test_errors(void **state)
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &old), 0);
     tight.rlim_max = old.rlim_max;
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
-    status s =
-        scratch_new(space, 16 * MIB, "densities", &array, &err); /* no place for it: an error now, no signal later */
+    status s = scratch_new(space, 16 * MIB, "densities", &array,
+                           &err); /* a full disk gives an error here, and no signal later */
     setrlimit(RLIMIT_FSIZE, &old);
     assert_int_equal(s, STATUS_IO);
     assert_null(array);

@@ -1,5 +1,4 @@
-/* Linear algebra of small symmetric matrices against known answers, and its refusal of matrices that are not
- * definite. */
+/* Linear algebra of small symmetric matrices against known answers. Matrices that are not definite are refused. */
 #include "base/rng.h"
 #include "base/small_matrix.h"
 
@@ -58,7 +57,7 @@ static void test_invert(void **state)
     }
 }
 
-/* -u'' = 1 on N points between two zeros: u_i = i (N + 1 - i) / 2. A band of 3 holds the two diagonals and one of
+/* -u'' = 1 on N points between two zeros: u_i = i (N + 1 - i) / 2. The band of 3 has the two diagonals and one of
  * zeros. */
 static void test_banded(void **state)
 {
@@ -67,7 +66,7 @@ static void test_banded(void **state)
     double m[N * BAND] = {0}, x[N];
     for (size_t i = 0; i < N; i++) {
         m[i * BAND] = 2.0;
-        m[i * BAND + 1] = -1.0; /* of row 0: outside of the matrix, not read */
+        m[i * BAND + 1] = -1.0; /* in row 0 this element is outside of the matrix and is not read */
         x[i] = 1.0;
     }
     assert_true(small_solve_banded(m, N, BAND, x));

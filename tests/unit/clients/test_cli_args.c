@@ -1,5 +1,5 @@
-/* The command line of `selvedge`: the tables of commands and options. The client's parts are in no library, so they are
- * compiled in here. */
+/* The command line of `selvedge`: the tables of commands and options. The source file is included here, because the
+ * parts of the client are in no library. */
 #include "clients/cli/cli_args.c" /* NOLINT */
 
 #include <setjmp.h>
@@ -90,7 +90,7 @@ static void test_help(void **state)
     assert_true(args.help && !args.has_command);
     cli_help(&args, text, sizeof text);
     for (int i = 0; i < CLI_N_COMMAND; i++) assert_non_null(strstr(text, cli_command_name((enum cli_command_id)i)));
-    for (int i = 0; i < CLI_N_COMMAND; i++) { /* every command has its help, even when its operand lacks */
+    for (int i = 0; i < CLI_N_COMMAND; i++) { /* every command has its help, also when its operand is missing */
         char *const argv[] = {"selvedge", (char *)(uintptr_t)cli_command_name((enum cli_command_id)i), "--help", NULL};
         assert_int_equal(parse(argv), STATUS_OK);
         assert_true(args.help && args.has_command);

@@ -1,4 +1,5 @@
-/* Which files a job document names, and their SHA-256. Compiled in: the client's parts are in no library. */
+/* The files that a job document names, and their SHA-256. The source file is included here, because the parts of the
+ * client are in no library. */
 #include "clients/cli/cli_job_files.c" /* NOLINT */
 
 #include <setjmp.h>

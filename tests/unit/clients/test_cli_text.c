@@ -1,4 +1,5 @@
-/* Texts that the command line client shows. Compiled in: the client's parts are in no library. */
+/* Texts that the command line client shows. The source file is included here, because the parts of the client are in no
+ * library. */
 #include "clients/cli/cli_text.c" /* NOLINT */
 
 #include <setjmp.h>
@@ -82,13 +83,13 @@ static void test_no_terminal_escapes(void **state)
     char out[32];
     text_clean("twill\x1b[2J\r\n\x7f", out, sizeof out);
     assert_string_equal(out, "twill?[2J???");
-    text_clean("K\xc3\xb6per \xc2\x9b", out, sizeof out); /* UTF-8 stays, the C1 control goes */
+    text_clean("K\xc3\xb6per \xc2\x9b", out, sizeof out); /* UTF-8 is kept, the C1 control character is removed */
     assert_string_equal(out, "K\xc3\xb6per ??");
     text_clean("\xc3", out, sizeof out);
     assert_string_equal(out, "?");
     text_clean("\xf5\x80\x80\x80", out, sizeof out);
     assert_string_equal(out, "????");
-    text_clean("a\xc3\xb6", out, 3); /* no half character at the end */
+    text_clean("a\xc3\xb6", out, 3); /* no incomplete character at the end */
     assert_string_equal(out, "a");
 }
 

@@ -1,4 +1,5 @@
-/* Following a job while its server comes and goes, with the server, the clock and the pictures made up here. */
+/* Watching a job while its server is unreachable at times. Server, clock and pictures are replaced by functions of this
+ * test. */
 #include "base/clock.h"
 
 static double now_s;
@@ -12,7 +13,7 @@ static double now_s;
 
 enum { CUT_OFF = -1, RUNNING = 200, SUCCEEDED = 201 };
 
-/* what the server answers, call by call; the last one again and again */
+/* The answers of the server, one for each call; the last one repeats. */
 static const int *script;
 static size_t n_script, i_script;
 
@@ -62,7 +63,7 @@ void text_progress(const struct job_view *v, size_t n_column, char *out, size_t 
 }
 void text_clean(const char *in, char *out, size_t n_out) { snprintf(out, n_out, "%s", in); }
 
-/* Watches through a script; the text that it said is the caller's. */
+/* Watches a job with these answers. The caller frees *said, the text that was printed. */
 static status watch(const int *answer, size_t n, char **said, struct error *err)
 {
     size_t n_said = 0;

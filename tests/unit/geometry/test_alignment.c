@@ -1,4 +1,4 @@
-/* Main directions of cloths that were turned and sheared by known matrices, and the box that tiles. */
+/* Main directions of cloths that are turned and sheared by known matrices, and the choice of a box that tiles. */
 #include "base/angle.h"
 #include "base/scratch_space.h"
 #include "geometry/orientation/alignment.h"
@@ -77,7 +77,8 @@ static double angle_deg(const double a[3], const double b[3])
     return acos(fmin(1.0, fabs(ab) / sqrt(aa * bb))) / deg;
 }
 
-/* The cloth is moved by m: weft and warp are found where m takes x and y, and the matrix takes them back. */
+/* A cloth is transformed by m. Weft and warp must be found in the directions to which m moves x and y, and the matrix
+ * of the alignment must move them back. */
 static void check_moved(const struct volume *v, const double m[9], double within_deg)
 {
     struct volume x;
@@ -162,7 +163,7 @@ static void test_one_system_and_none(void **state)
     assert_int_equal(a.outcome, ALIGN_DONE);
     print_message("bundle: %.2f degrees off, standard error %.2f\n", angle_deg(m.direction[1], u), m.se_deg[1]);
     assert_true(angle_deg(m.direction[1], u) < 0.5);
-    double back[3]; /* of the true direction */
+    double back[3]; /* the true direction after the alignment */
     for (int i = 0; i < 3; i++)
         back[i] = a.matrix[3 * i] * u[0] + a.matrix[3 * i + 1] * u[1] + a.matrix[3 * i + 2] * u[2];
     assert_true(angle_deg(back, (const double[3]){0.0, 1.0, 0.0}) < 0.5);
@@ -190,7 +191,7 @@ static void test_one_system_and_none(void **state)
     volume_release(&v);
 }
 
-/* A weave that lies in the plane of x and z cannot be turned to x and y: the axes are wrong. */
+/* A weave in the plane of x and z cannot be turned to x and y. It is reported that the axes are wrong. */
 static void test_wrong_axes(void **state)
 {
     const struct cloth *c = *state;
@@ -241,8 +242,8 @@ static void test_known_period(void **state)
     volume_release(&v);
 }
 
-/* Turned by 8 degrees, aligned by what is found: the box holds no cell from outside of the scan, and has a whole number
- * of repeats. */
+/* A cloth that is turned by 8 degrees and aligned again. The box must have no voxel from outside of the scan, and a
+ * whole number of repeats. */
 static void test_align_and_crop(void **state)
 {
     const struct cloth *c = *state;

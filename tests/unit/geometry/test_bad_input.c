@@ -1,4 +1,4 @@
-/* Scans that are not what they should be, through the whole chain: each is a clear error or a clear warning. */
+/* Faulty scans through the whole reconstruction: each gives a clear error or a clear warning. */
 #include "base/option_id.h"
 #include "base/rng.h"
 #include "geometry/reconstruct.h"
@@ -89,7 +89,7 @@ static void assert_warned(const struct chain *c, const char *part)
     fail_msg("no warning with '%s'", part);
 }
 
-/* Fails at the stage that the field names, with a text that holds part. */
+/* Asserts the status, the field, and that the text contains `part`. */
 static void assert_refused(const struct chain *c, status got, status want, const char *field, const char *part)
 {
     print_outcome(c, got);
@@ -161,7 +161,7 @@ static void test_wrong_spacing(void **state)
     assert_warned(&c, "the job says 2 um along x, the file says 4 um");
     chain_release(&c);
     write_metaimage("spacing", "MET_USHORT", 0.00002, samples, N_VOXEL * 2);
-    chain_init(&c); /* micrometres written as if they were something else: fibers of 0.07 um */
+    chain_init(&c); /* a spacing in a wrong unit: fibers of 0.07 um */
     for (int a = 0; a < 3; a++) c.o.voxel_size_m[a] = NAN;
     assert_int_equal(chain_run(&c, path, 2), STATUS_OK);
     print_outcome(&c, STATUS_OK);
@@ -194,7 +194,7 @@ static void test_wrong_order_and_depth(void **state)
     c.o.raw = (struct volume_raw_declaration){.n = {N, N, N}, .type = "uint8"};
     assert_refused(&c, chain_run(&c, &path, 1), STATUS_FORMAT, OPTION_SCAN_FILES, "which fits uint16, int16");
     chain_release(&c);
-    chain_init(&c); /* the same, with a shape that hides it: every other byte is noise */
+    chain_init(&c); /* the same with a shape of matching size, so that every other sample is noise */
     c.o.raw = (struct volume_raw_declaration){.n = {2 * N, N, N}, .type = "uint8"};
     status s = chain_run(&c, &path, 1);
     print_outcome(&c, s);
@@ -316,7 +316,7 @@ static void test_empty_slice(void **state)
     free(samples);
 }
 
-/* None of the warnings fires without reason. */
+/* A good scan gives no warning. */
 static void test_good_scan_is_quiet(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* TIFF volumes that are not what they claim to be, or hold values that no scan has: the errors name the file. */
+/* TIFF volumes that are damaged, or have values that no scan has. The errors name the file. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 #include "tests/support/cloth/tiff_stack.h"
@@ -32,7 +32,7 @@ static void test_unlike_pages(void **state)
     free(p32);
 }
 
-/* Cut at every place: an error, never a crash, never silence about missing data. */
+/* A file that is cut at any place gives an error. It must not crash the reader, nor pass as a complete file. */
 static void test_truncated(void **state)
 {
     (void)state;
@@ -51,7 +51,7 @@ static void test_truncated(void **state)
     }
 }
 
-/* Flipped bytes: any outcome but a crash or an unlimited allocation. */
+/* Changed bytes may give an error or other values, but neither a crash nor an unlimited allocation. */
 static void test_damaged(void **state)
 {
     (void)state;
@@ -90,7 +90,8 @@ static void test_lying_header(void **state)
     stack_expect_open_error(path, STATUS_FORMAT, "cannot read volume 'liar.tif': page 1 states 400000 x 23 pixels");
 }
 
-/* Sums of rows of such a page wrap around. Little need be stored for it: deflate may shrink it a thousandfold. */
+/* Sizes of several rows of such a page overflow an integer. The file can be small, because deflate compresses up to a
+ * thousandfold. */
 static void test_enormous_pages(void **state)
 {
     (void)state;
@@ -113,7 +114,7 @@ static void test_enormous_pages(void **state)
     }
 }
 
-/* A compressed page of 2^40 bytes that a file of a MiB might hold. */
+/* A compressed page of 2^40 bytes in a file of one MiB. */
 static void test_compressed_pages_have_a_limit(void **state)
 {
     (void)state;
@@ -157,7 +158,7 @@ static void test_bad_values(void **state)
     test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
     assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
     assert_string_equal(err.text, "cannot use the volume: voxel (3, 1, 0) is NaN");
-    pixel[40] = -INFINITY; /* what cells from outside of the scan are marked with */
+    pixel[40] = -INFINITY; /* the mark of voxels from outside of the scan */
     test_write_tiff(path, page, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
     assert_int_equal(read_whole(path, &o, &err), STATUS_INVALID);
     assert_string_equal(err.text, "cannot use the volume: voxel (3, 1, 0) is infinite");

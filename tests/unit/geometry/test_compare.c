@@ -112,7 +112,7 @@ static void test_shifted_and_thicker(void **state)
     check_near(r.centerline_p95_voxel, 0.2, 1e-4);
     check_near(r.center_recall, 1.0, 0);
     check_near(r.radius_bias_percent, 10.0, 1e-4);
-    for (size_t i = 0; i < N_FIBER; i++) p[i].z += 4.0; /* beyond one radius: nothing matches */
+    for (size_t i = 0; i < N_FIBER; i++) p[i].z += 4.0; /* farther than one radius, so nothing matches */
     r = compare(p, N_FIBER);
     check_near(r.center_recall, 0.0, 0);
     check_near(r.center_precision, 0.0, 0);
@@ -140,8 +140,7 @@ static void test_cut_and_missing(void **state)
     (void)state;
     struct piece p[N_FIBER + 2];
     nine(p);
-    /* fiber 4 in three pieces with two gaps of 10 voxels, closed by the radius for 3.4 voxels from each side */
-    p[9] = p[10] = p[4];
+    p[9] = p[10] = p[4]; /* fiber 4 in three pieces; each gap of 10 voxels is closed by 3.4 voxels at both sides */
     p[4].to = 30;
     p[9].from = 40;
     p[9].to = 60;
@@ -177,8 +176,8 @@ static void test_merged(void **state)
     check_near(r.direction_p95_deg, slope_deg, 0.01);
 }
 
-/* A fiber that leaves through a face and comes in through the opposite one is two fibers in a scan; one that grazes the
- * face is not. */
+/* A fiber that leaves through a face and enters through the opposite one is two fibers in a scan. A fiber that only
+ * touches the face is one. */
 static void test_faces_cut_fibers(void **state)
 {
     (void)state;
@@ -238,7 +237,7 @@ static void test_orientation_tensor(void **state)
     assert_true(r.center_recall > 0.5);
     fiber_set_release(&f);
     f = build(truth, N_FIBER);
-    for (size_t k = 0; k < f.n_vertex; k++) /* walked backwards: the sign of a direction means nothing */
+    for (size_t k = 0; k < f.n_vertex; k++) /* in reverse order: the sign of a direction has no meaning */
         f.position_m[3 * k] = (float)(100 * voxel) - f.position_m[3 * k];
     assert_int_equal(compare_fibers(&t, &f, &o, &r, NULL), STATUS_OK);
     check_near(r.orientation_frobenius, 0.0, 1e-9);
@@ -266,8 +265,7 @@ static void test_margin_and_errors(void **state)
     check_near(r.missed, 0.0, 0);
     assert_int_equal(compare_fibers(&t, &empty, &o, &r, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "found fibers"));
-    assert_int_equal(compare_fibers(&t, &empty, &o, &r, NULL),
-                     STATUS_INVALID); /* the same when nobody wants the text */
+    assert_int_equal(compare_fibers(&t, &empty, &o, &r, NULL), STATUS_INVALID); /* the same without an error record */
     assert_int_equal(compare_fibers(&empty, &f, &o, &r, &err), STATUS_INVALID);
     o.voxel_size_m = 0.0;
     assert_int_equal(compare_fibers(&t, &f, &o, &r, &err), STATUS_INVALID);
@@ -275,7 +273,7 @@ static void test_margin_and_errors(void **state)
     fiber_set_release(&f);
 }
 
-/* The grid against looking at every segment. */
+/* The search by the grid against a search over all segments. */
 static void test_nearest_segment_by_brute_force(void **state)
 {
     (void)state;

@@ -121,7 +121,7 @@ static void test_longest_fiber(void **state)
         fiber_set_release(&f);
     }
     fiber_set_release(&g);
-    f = one_fiber(2); /* errors of writing do not tell the server's folders either */
+    f = one_fiber(2); /* errors of writing do not name the server's folders either */
     f.first_vertex[1] = 1;
     assert_int_equal(fiber_set_write_hair(&f, path, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "fibers 'long.hair'"));
@@ -238,7 +238,7 @@ static void test_damaged_files(void **state)
     assert_int_equal(fiber_set_read_hair(&f, scratch_path(state, "absent.hair"), &err), STATUS_NOT_FOUND);
 }
 
-/* Whatever one byte becomes, reading either fails or gives a valid set. */
+/* After any change of one byte, reading either fails or gives a valid set. */
 static void test_every_changed_byte(void **state)
 {
     unsigned char data[sizeof golden];

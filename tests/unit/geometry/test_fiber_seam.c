@@ -1,4 +1,4 @@
-/* Fibers across the seams of a tile: a phantom's continue exactly; shifted ends are counted and brought together. */
+/* Fibers across the seams of a tile: those of a phantom continue exactly, and shifted ends are counted and joined. */
 #include "geometry/fibers/fiber_seam.h"
 #include "geometry/phantom/phantom.h"
 
@@ -35,7 +35,7 @@ static void test_phantom(void **state)
     fiber_set_release(&f);
 }
 
-/* Everything in the upper half of x is moved in y and z by 0.6 radii: the seam across x opens by that much. */
+/* Shifts the upper half of x in z, by 0 in the middle of the tile and by `by` at the seam across x. */
 static void shift_half(struct fiber_set *f, float by)
 {
     float middle = 0.5f * (float)f->tile_size_m[0];
@@ -65,7 +65,7 @@ static void test_shifted(void **state)
     assert_true(after.share[1] > 0.97 && after.offset_m[1] < 1e-9);
     assert_int_equal(fiber_set_validate(&f, NULL), STATUS_OK);
     assert_true(fabs(fiber_set_length_m(&f) / length - 1.0) < 0.01);
-    shift_half(&f, 40.0f * by); /* beyond any reach: nothing continues */
+    shift_half(&f, 40.0f * by); /* farther than the reach, so that no end continues */
     assert_int_equal(fiber_seam_measure(&f, &after, NULL), STATUS_OK);
     assert_true(after.share[0] < 0.4);
     fiber_set_release(&f);

@@ -40,7 +40,7 @@ static void test_measures(void **state)
     assert_int_equal(f.axis_class[0], 0);
     assert_int_equal(f.axis_class[1], 2);
     fiber_set_release(&f);
-    fiber_set_release(&f); /* twice does no harm */
+    fiber_set_release(&f); /* a second call is allowed */
     fiber_set_release(NULL);
 }
 
@@ -155,7 +155,7 @@ static void test_text_errors_name_the_line(void **state)
         struct error err = {0};
         assert_int_equal(read_text(state, bad[i].text, strlen(bad[i].text), &f, &err), STATUS_FORMAT);
         if (strstr(err.text, bad[i].says) == NULL) fail_msg("%zu: '%s' does not say '%s'", i, err.text, bad[i].says);
-        if (strchr(err.text, '/') != NULL) fail_msg("%zu: '%s' tells a folder", i, err.text);
+        if (strchr(err.text, '/') != NULL) fail_msg("%zu: '%s' names a folder", i, err.text);
         assert_int_equal(f.n_fiber, 2); /* left as it was */
     }
     struct error err;

@@ -1,5 +1,5 @@
-/* Lines that change over to the neighbouring fiber are cut where they do; lines that bend as fibers do are not; ends
- * that run across the measured directions are trimmed. */
+/* Lines that change to the neighbouring fiber are cut at that place, and lines that bend like fibers are not cut.
+ * Ends that do not follow the measured directions are trimmed. */
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/kinks.h"
 #include "geometry/fibers/shape/axis_fit.h"
@@ -14,8 +14,8 @@
 enum { N_VERTEX = 100, N_LINE = 12 };
 static const double DIAMETER = 7.0;
 
-/* Crimped lines side by side, radius of curvature at the crests 2 diameters; line `hopper` changes over by one diameter
- * at vertex 50. */
+/* Crimped lines side by side, with a radius of curvature of 2 diameters at the crests. Line `hopper` changes to its
+ * neighbour, one diameter away, at vertex 50. */
 static void make_lines(struct polyline_set *even, size_t hopper)
 {
     struct polyline_set drawn, *lines = &drawn;

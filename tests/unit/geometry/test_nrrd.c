@@ -1,4 +1,4 @@
-/* NRRD scans: golden bytes of every type and order, compressed and detached data, and headers that lie. */
+/* NRRD scans: golden bytes of every type and order, compressed and detached data, and wrong headers. */
 #include "base/option_id.h"
 #include "tests/support/cloth/scan_expectation.h"
 #include "tests/support/scratch_folder.h"
@@ -85,8 +85,8 @@ static void test_nrrd_gzip_and_skips(void **state)
         path, file,
         scan_join_header(file, HEAD "uchar\ndimension: 3\nsizes: 999 999 999\nencoding: gzip\n\n", packed, n_packed));
     scan_expect_refused(path, NULL, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
-    static const char head[] = HEAD
-        "uchar" SIZES "encoding: gzip\n\n"; /* a row too much shows when the last slice is read, one byte is padding */
+    static const char head[] =
+        HEAD "uchar" SIZES "encoding: gzip\n\n"; /* one superfluous row is an error, one byte is padding */
     for (size_t more = 0; more <= 2; more++) {
         n_packed = scan_gzip(data + 2, 4 + more, packed, sizeof packed);
         scratch_write(path, file, scan_join_header(file, head, packed, n_packed));
@@ -97,7 +97,7 @@ static void test_nrrd_gzip_and_skips(void **state)
                                 "'z.nrrd' continues after the 2 x 1 x 2 uint8 voxels of its header");
     }
     n_packed = scan_gzip(data + 2, 4, packed,
-                         sizeof packed); /* a second member is part of the data, zeros behind the first are none */
+                         sizeof packed); /* a second member is part of the data, zeros after the first are not */
     scratch_write(path, file,
                   scan_join_header(file, head, packed,
                                    n_packed + scan_gzip(data, 2, packed + n_packed, sizeof packed - n_packed)));

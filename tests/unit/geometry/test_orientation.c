@@ -27,7 +27,7 @@ static double angle_deg(const float a[3], const double b[3])
     return angle_to_deg(acos(fmin(1.0, fabs(dot) / sqrt(norm))));
 }
 
-/* J by its definition, q over all voxels with |d.p| <= h / 2 (trapezoid ends), against the sum of samples along the
+/* J by its definition, with q over all voxels with |d.p| <= h / 2 and soft ends, against the sum of samples along the
  * line. */
 static void test_j_is_the_published_filter(void **state)
 {
@@ -70,8 +70,8 @@ static void test_j_is_the_published_filter(void **state)
     volume_release(&l);
 }
 
-/* The descent from the structure tensor finds what a search over a dense set finds: median difference under 1
- * degree. */
+/* The descent from the structure tensor agrees with a search over a dense set of directions to 1 degree, for most
+ * voxels. */
 static void test_search_agrees_with_brute_force(void **state)
 {
     (void)state;
@@ -130,7 +130,8 @@ static void test_search_agrees_with_brute_force(void **state)
     volume_release(&l);
 }
 
-/* Straight fibers of any direction, to the very faces of the volume, at signal-to-noise 5. */
+/* Straight fibers in several directions, at a signal-to-noise ratio of 5, including voxels at the faces of the
+ * volume. */
 static void test_straight_fibers(void **state)
 {
     (void)state;
@@ -166,8 +167,8 @@ static void test_straight_fibers(void **state)
     }
 }
 
-/* The diameter of fibers side by side is the same at signal-to-noise 2 (after clamping to 0..1, as scans are mapped) as
- * without noise. */
+/* The diameter of fibers side by side is the same at signal-to-noise 2 (after clamping to 0..1, as scans are mapped)
+ * as without noise. */
 static void test_diameter_in_strong_noise(void **state)
 {
     (void)state;

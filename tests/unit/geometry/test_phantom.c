@@ -1,4 +1,4 @@
-/* Fibers of phantoms: seamless tiles, fibers that do not interpenetrate and are not bent until they break. */
+/* Fibers of phantoms: tiles have no seams, and fibers neither penetrate each other nor bend until they break. */
 #include "base/angle.h"
 #include "geometry/phantom/phantom.h"
 #include "tests/support/cloth/make_phantom.h"
@@ -24,7 +24,7 @@ static void test_every_weave_is_a_valid_tile(void **state)
         assert_int_equal(phantom_weave_find(phantom_weave_name((enum phantom_weave)w), &found, NULL), STATUS_OK);
         assert_int_equal(found, w);
         phantom_option_default(&o, (enum phantom_weave)w);
-        o.n_relax = 50; /* quicker than a good phantom */
+        o.n_relax = 50; /* fewer than for a good phantom, to save time */
         make_phantom(&o, 2, &f, &r);
         assert_int_equal(fiber_set_validate(&f, NULL), STATUS_OK);
         fiber_set_z_range_m(&f, &low, &high);
@@ -67,8 +67,8 @@ static void test_same_fibers_for_any_number_of_threads(void **state)
     for (size_t i = 0; i < 3; i++) fiber_set_release(&f[i]);
 }
 
-/* Pushing apart alone leaves kinks that no fiber survives: strains of 0.51 in the plain weave, 0.46 in the velvet, 0.34
- * in the felt. */
+/* If fibers were only pushed apart, there would be kinks with strains of 0.51 in the plain weave, 0.46 in the velvet
+ * and 0.34 in the felt, at which fibers break. */
 static void test_no_fiber_is_bent_until_it_breaks(void **state)
 {
     (void)state;
@@ -90,7 +90,7 @@ static void test_no_fiber_is_bent_until_it_breaks(void **state)
     }
 }
 
-/* Distance in the other two coordinates, wrapped. */
+/* Distance of two points in the two coordinates other than `along`, with the period of the tile. */
 static double apart(const struct fiber_set *f, const float *a, const float *b, size_t along)
 {
     size_t across = 1 - along;
@@ -98,7 +98,7 @@ static double apart(const struct fiber_set *f, const float *a, const float *b, s
     return hypot(d - tile * round(d / tile), (double)a[2] - (double)b[2]);
 }
 
-/* Every fiber of a twill runs from face to face and goes on as exactly one fiber at the opposite face. */
+/* Every fiber of a twill runs from face to face and continues as exactly one fiber at the opposite face. */
 static void test_twill_has_no_seam(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Volumes of phantoms: the material, noise, rings and gradient that were asked for, as TIFF and MetaImage files. */
+/* Volumes of phantoms have the requested material, noise, rings and gradient, as TIFF and MetaImage files. */
 #include "geometry/phantom/phantom.h"
 #include "tests/support/scratch_folder.h"
 

@@ -1,4 +1,4 @@
-/* Plied yarns with the laws of real ones: files of yarn parameters, the material and the spread of their fibers. */
+/* Plied yarns with measured parameters: files of yarn parameters, the amount of material, and the spread of fibers. */
 #include "geometry/phantom/phantom.h"
 #include "tests/support/cloth/make_phantom.h"
 #include "tests/support/scratch_folder.h"
@@ -21,7 +21,8 @@ static const char yarn_text[] = "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]
                                 "flyaway_hair_re: 0.016 0.009\nflyaway_hair_pe: 0.39 0.34\nflyaway_loop_density: "
                                 "19\nflyaway_loop_r1: 0.025 0.005\n";
 
-/* A yarn file to a tile: every weave of yarns, twists that close it, a seam that every cut fiber crosses. */
+/* Tiles made from a yarn file, for every weave of yarns. The twist is a whole number of turns of the tile, and every
+ * fiber that is cut at a seam continues across it. */
 static void test_plied_yarns(void **state)
 {
     static const enum phantom_weave weave[] = {PHANTOM_PLAIN, PHANTOM_KNIT};
@@ -60,7 +61,7 @@ static void test_plied_yarns(void **state)
     }
 }
 
-/* Mean squared distance of the warp's fibers from the middle of their yarn, where they are cut by the face at y = 0. */
+/* Mean squared distance of the warp's fibers from the axis of their yarn, at the face y = 0. */
 static double spread_m2(const struct fiber_set *f, double spacing_m)
 {
     enum { YARN = 2 };
@@ -83,9 +84,9 @@ static double spread_m2(const struct fiber_set *f, double spacing_m)
     return square / (count[0] + count[1]);
 }
 
-/* The four measured yarns, true to the file's lengths or scaled, have the designed share of fiber: that of a ply's
- * section, in the material of the tile and in how far its fibers lie apart. As designed, before fibers push each other
- * apart. */
+/* The four measured yarns, with the lengths of the file or scaled, have the designed share of fiber in the section of
+ * a ply. It is measured by the material of the tile and by the spread of the fibers, before fibers are pushed apart.
+ * */
 static void test_real_yarn_files(void **state)
 {
     static const char *const name[] = {"cotton1", "polyester1", "rayon1", "silk1"};
@@ -138,7 +139,7 @@ static void test_real_yarn_files(void **state)
             fiber_set_release(&f);
         }
         assert_true(fabs(packed[1] / packed[0] - 1.0) <
-                    0.1); /* fibers that keep a diameter from each other spread a little more */
+                    0.1); /* fibers that stay a diameter apart have a slightly larger spread */
     }
 }
 

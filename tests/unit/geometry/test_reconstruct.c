@@ -1,4 +1,5 @@
-/* The whole chain on small volumes with straight fibers: from a TIFF to fibers, the same for any number of threads. */
+/* The whole reconstruction of small volumes with straight fibers, from a TIFF file to fibers. The result is the same
+ * for any number of threads. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 #include "tests/support/cloth/scan_files.h"
@@ -99,7 +100,7 @@ static int make_scan(void **state)
     return 0;
 }
 
-/* Distance of vertices of fiber l from the nearest cylinder's axis, root mean square, voxels. */
+/* Root mean square of the distances of all vertices from the nearest cylinder's axis, in voxels. */
 static double rms_from_axes(const struct fiber_set *f)
 {
     double square = 0.0;
@@ -157,8 +158,8 @@ static void test_chain(void **state)
     release(&x);
 }
 
-/* What is chosen from the data is written into the options; a run that is given these values does the same, one that is
- * given others takes them. */
+/* Values that are chosen from the data are written into the options. A run with these values as options gives the same
+ * result, and a run with other values uses those. */
 static void test_choices_are_reported_and_overridable(void **state)
 {
     (void)state;
@@ -209,8 +210,8 @@ static void take_advice(void *context, const char *option, const char *text)
     if (at != NULL && sscanf(at, "crop to x %zu..%zu, y %zu..%zu", &a->x0, &a->x1, &a->y0, &a->y1) == 4) a->n_said++;
 }
 
-/* The box that a warning names is of the whole volume, as the job takes it, also when the job has cropped it: given,
- * the warning goes. */
+/* The box that a warning names is in voxels of the whole volume, as in the job document, also when the job has a box.
+ * A job with the named box has no such warning. */
 static void test_advice_to_crop_can_be_followed(void **state)
 {
     (void)state;
@@ -240,7 +241,7 @@ static void test_advice_to_crop_can_be_followed(void **state)
     assert_int_equal(advice[1].n_said, 0);
 }
 
-/* A t that goes with no s that the data lead to: named, before anything is filtered. */
+/* A value of t that fits no s that the data can give is refused before the filter runs, and the error names it. */
 static void test_filter_that_finds_nothing(void **state)
 {
     (void)state;
@@ -285,8 +286,8 @@ static void test_threads(void **state)
     release(&three);
 }
 
-/* Slabs of a few slices and arrays in files give the bits that everything in memory gives; "zxy" writes across the
- * slices. */
+/* Processing in slabs of a few slices with arrays in files gives the same bits as processing in memory. The axes
+ * "zxy" make it write across the slices. */
 static void test_memory_limit(void **state)
 {
     (void)state;
@@ -309,7 +310,7 @@ static void test_memory_limit(void **state)
     }
 }
 
-/* A permuted file gives the permuted cloth: "zxy" takes file z for cloth x. */
+/* For the test of a permuted file, which must give the permuted cloth: "zxy" uses z of the file as x of the cloth. */
 static bool starts_and_ends_at_faces(const struct result *x, size_t fiber)
 {
     for (int last = 0; last < 2; last++) {
@@ -335,8 +336,8 @@ static void test_axes(void **state)
                 assert_true(plain.v.density[volume_index(plain.v.n, i, j, k)] ==
                             turned.v.density[volume_index(turned.v.n, k, i, NY - 1 - j)]);
     assert_int_equal(turned.f.n_fiber, N_CYLINDER);
-    /* All fibers end where their axes meet a face, at up to 48 degrees from its normal. Axes are found to a tenth of a
-     * voxel (test_chain), so each of the ten ends is, too: one voxel in all. */
+    /* All fibers end where their axes meet a face, at up to 48 degrees from its normal. Axes are found to a tenth of
+     * a voxel (test_chain), and so is each of the ten ends: one voxel in total. */
     print_message("length %.3f voxels, turned %.3f\n", plain.r.total_length_m / 2e-6, turned.r.total_length_m / 2e-6);
     assert_true(fabs(turned.r.total_length_m - plain.r.total_length_m) < 2e-6);
     for (size_t l = 0; l < N_CYLINDER; l++) {
@@ -363,7 +364,7 @@ static void test_cancel(void **state)
     release(&x);
 }
 
-/* As if the disk went away: no more arrays in files once the search has come so far. */
+/* Removes the folder during the search, so that no more arrays can be kept in files, as when a disk fails. */
 static void remove_folder(void *context, double fraction)
 {
     if (fraction > 0.85) rmdir(context);

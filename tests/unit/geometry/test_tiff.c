@@ -124,7 +124,7 @@ static void test_slices(void **state)
     assert_string_equal(err.field, OPTION_SCAN_FILES);
 }
 
-/* A slice without material is a few bytes in these codecs. */
+/* A slice without material is compressed to a few bytes by these codecs. */
 static void test_constant_slices(void **state)
 {
     (void)state;
@@ -159,7 +159,7 @@ static void test_constant_slices(void **state)
     }
 }
 
-/* Its values fall with density: neither taken as they are, nor turned round in silence. */
+/* Values of such a file decrease with density. They must neither be used as they are nor be inverted without notice. */
 static void test_white_is_zero(void **state)
 {
     (void)state;

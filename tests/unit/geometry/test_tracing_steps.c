@@ -48,7 +48,7 @@ static void test_smoothing(void **state)
     }
 }
 
-/* Fibers that touch and lean by almost a diameter a slice keep their identity. */
+/* Fibers that touch, and whose centers move by almost a diameter from slice to slice, are not confused. */
 static void test_linking_leaning_neighbours(void **state)
 {
     (void)state;
@@ -124,7 +124,7 @@ static void test_duplicates_and_joins(void **state)
     volume_release(&v);
 }
 
-/* Two touching fibers: lines that start a voxel off end on the axes, without being pulled together. */
+/* Two touching fibers: lines that start one voxel away from the axes end on them, and are not pulled together. */
 static void test_relax(void **state)
 {
     (void)state;
@@ -151,10 +151,10 @@ static void test_relax(void **state)
     volume_release(&v);
 }
 
-/* Three fibers, two of them touching, of which only two have lines: these end on their axes, whatever the third one
- * does, and with the true radius. A straight axis through N voxels of a surface that blur b spreads is known to sigma /
- * sqrt(A) per voxel of length, A = pi r / (2 sqrt(pi) b) (a quarter of a circle's surface pushes each way), some 0.1
- * voxel; the fit averages over a few. */
+/* Three fibers, two of which touch. Only two have lines, and these must end on their axes with the true radius,
+ * independent of the third fiber. With a blur b, the position of a straight axis is known to sigma / sqrt(A) per
+ * voxel of length with A = pi r / (2 sqrt(pi) b), because a quarter of a circle's surface determines each coordinate.
+ * That is some 0.1 voxel, and the fit averages over several voxels. */
 static void test_axis_fit(void **state)
 {
     (void)state;
@@ -189,7 +189,8 @@ static void test_axis_fit(void **state)
     volume_release(&v);
 }
 
-/* Histogram pass against counting by hand; both radii on a bundle of touching fibers, off-axis by a quarter voxel. */
+/* The histogram against a count in this test, and both estimates of the radius for a bundle of touching fibers whose
+ * lines are a quarter voxel away from the axes. */
 static void test_radius(void **state)
 {
     (void)state;
@@ -236,8 +237,8 @@ static void test_radius(void **state)
     free(part);
 }
 
-/* Fibers along x and along y: when their radii differ they get one each, with an error that says so; when not, or when
- * asked, one for all. */
+/* Fibers along x and along y. When their radii differ by more than their standard errors, each class has its own
+ * radius. Otherwise, or when the option says so, there is one radius for all. */
 static void test_radius_of_each_class(void **state)
 {
     (void)state;
@@ -314,7 +315,7 @@ static void test_alignment(void **state)
         for (size_t j = 0; j < n[1]; j++)
             for (size_t i = 0; i < n[0]; i++) {
                 float x = out.density[volume_index(n, i, j, k)];
-                if (!(x > 0.0f)) continue; /* what the shear brings in from outside is -infinity */
+                if (!(x > 0.0f)) continue; /* voxels from outside of the scan are -infinity */
                 sum += (double)x;
                 mean += (double)x * ((double)i + 0.5);
             }

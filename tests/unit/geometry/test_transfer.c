@@ -1,6 +1,6 @@
 /* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a
- * fiber takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels within
- * r. */
+ * fiber takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels
+ * within r. */
 #include "geometry/reconstruct.h"
 
 #include <math.h>
@@ -28,7 +28,7 @@ static void make_fibers(struct fiber_set *f)
     for (size_t i = 0; i < N_FIBER; i++) {
         for (size_t end = 0; end < 2; end++) {
             float *p = &f->position_m[3 * (2 * i + end)];
-            p[0] = (float)(((double)end * (NX + 20.0) - 10.0) * voxel_m[0]); /* its ends lie well outside */
+            p[0] = (float)(((double)end * (NX + 20.0) - 10.0) * voxel_m[0]); /* its ends lie far outside */
             p[1] = (float)(fiber[i][0] * voxel_m[1]);
             p[2] = (float)(fiber[i][1] * voxel_m[2]);
         }
@@ -38,7 +38,7 @@ static void make_fibers(struct fiber_set *f)
     }
 }
 
-/* Every voxel is material but for a slab at the bottom. */
+/* Every voxel is material, except in a slab at the bottom. */
 static bool is_kept(size_t z) { return z >= 10; }
 
 static void make_directions(struct direction_volume *d)
@@ -50,7 +50,7 @@ static void make_directions(struct direction_volume *d)
     }
 }
 
-/* Distance of a voxel's center from the axis of fiber i over its radius. */
+/* Distance of a voxel's center from the axis of fiber i, in radii of the fiber. */
 static double radii_away(size_t y, size_t z, size_t i)
 {
     return hypot((double)y + 0.5 - fiber[i][0], (double)z + 0.5 - fiber[i][1]) / fiber[i][2];

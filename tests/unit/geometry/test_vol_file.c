@@ -1,4 +1,4 @@
-/* `.vol` files: golden bytes, round trips, the quantised directions' error. */
+/* `.vol` files: golden bytes, round trips, and the error of quantised directions. */
 #include "base/angle.h"
 #include "base/rng.h"
 #include "geometry/volume/vol_file.h"

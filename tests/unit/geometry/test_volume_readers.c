@@ -1,4 +1,4 @@
-/* Readers of scans: golden bytes of raw, MetaImage and .vol, the registry of readers, and headers that lie. */
+/* Readers of scans: golden bytes of raw, MetaImage and .vol, the registry of readers, and wrong headers. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/vol_file.h"
@@ -36,7 +36,7 @@ static void test_raw(void **state)
     raw.header_bytes = (size_t)1 << 62;
     snprintf(raw.type, sizeof raw.type, "uint8");
     scan_expect_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "too short");
-    raw.header_bytes = SIZE_MAX; /* as an offset it would mean 'at the end of the file' */
+    raw.header_bytes = SIZE_MAX; /* as a signed offset it would mean the end of the file */
     scan_expect_refused(path, &raw, STATUS_INVALID, OPTION_RAW_HEADER, "is not possible");
     raw.header_bytes = 2;
     raw.n[1] = 0;
@@ -45,7 +45,7 @@ static void test_raw(void **state)
     scan_expect_refused(path, &raw, STATUS_INVALID, OPTION_RAW_SHAPE, "2 x 1048577 x 2");
 }
 
-/* How the files of each reader begin, and a file of none. */
+/* The first bytes of the files of each reader, and of a file that no reader takes. */
 static const struct {
     char id[16], byte[16];
 } beginning[] = {{"tiff.v1", "II*"},
@@ -62,8 +62,8 @@ static const char *beginning_of(const char *reader_id)
     return NULL;
 }
 
-/* Every reader of the registry has an id of its own with a version, takes its own kind of file only, and refuses that
- * cut short. */
+/* Every reader of the registry has a unique id with a version, takes only its own kind of file, and refuses a truncated
+ * one. */
 static void test_registry(void **state)
 {
     for (size_t i = 0; i < volume_reader_count(); i++) {
@@ -86,7 +86,8 @@ static void test_registry(void **state)
     }
 }
 
-/* A picture is noise when its bytes are swapped; noise and coarse values (multiples of 256) are no reason to refuse. */
+/* With swapped bytes a scan looks like noise and is refused. A scan that is noise in both byte orders, or has only
+ * multiples of 256, is not refused. */
 static void test_wrong_byte_order(void **state)
 {
     enum { N = 32 };
@@ -214,7 +215,8 @@ static void test_vol(void **state)
     free(d);
 }
 
-/* A declaration goes through to the step that reads for the job; a voxel that is not a number is named there. */
+/* The declaration of a raw file is used when a job reads its volume, and a voxel that is not a number is named in the
+ * error. */
 static void test_raw_in_a_job(void **state)
 {
     enum { N = 12 };

@@ -1,5 +1,5 @@
-/* Fibers into voxels: their volume is kept at any voxel size, directions are the tangents, the grid repeats, and the
- * result does not depend on threads. */
+/* Voxels of fibers: the volume of the fibers is preserved at any voxel size, directions are their tangents, the grid is
+ * periodic, and the result does not depend on the number of threads. */
 #include "base/angle.h"
 #include "geometry/fibers/voxelise.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -33,7 +33,7 @@ static double volume_of(const struct direction_volume *v)
     return sum * v->voxel_size_m[0] * v->voxel_size_m[1] * v->voxel_size_m[2];
 }
 
-/* Straight fibers through the tile in a direction that no grid shares; they do not touch. */
+/* Straight fibers through the tile, in a direction that is not aligned with the grid. They do not touch. */
 static void slanted(struct fiber_set *f, size_t n, double tile_m, double radius_m)
 {
     fiber_set_init(f);
@@ -95,7 +95,7 @@ static void test_directions_are_tangents(void **unused)
     direction_volume_release(&v);
 }
 
-/* Moved by whole voxels, the cloth gives the moved volume; a tile is cut where nobody sees it. */
+/* A cloth that is moved by whole voxels gives the moved volume, so that the edges of the tile leave no trace. */
 static void test_periodic(void **unused)
 {
     (void)unused;
@@ -157,7 +157,7 @@ static void test_limits(void **unused)
     assert_int_equal(fibers_voxelise(&f, &o, pool, NULL, &v, &used, &err), STATUS_TOO_LARGE);
     assert_non_null(strstr(err.text, "1 um"));
     assert_null(v.density);
-    o.voxel_size_m = NAN; /* chosen: as fine as the limit allows */
+    o.voxel_size_m = NAN; /* chosen automatically, as small as the limit allows */
     assert_int_equal(fibers_voxelise(&f, &o, pool, NULL, &v, &used, &err), STATUS_OK);
     assert_true(used > 5 * um && 5 * volume_n_voxel(v.n) <= o.limit_bytes &&
                 6 * volume_n_voxel(v.n) > o.limit_bytes / 2);

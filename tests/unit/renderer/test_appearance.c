@@ -1,5 +1,4 @@
-/* The list of models that a fit can choose from, and the estimates behind it: the same figures as from the tracers
- * themselves. */
+/* The list of models for fits, and their estimates, which must agree with direct use of the tracers. */
 #include "renderer/scattering/appearance.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -70,7 +69,7 @@ static void request_init(struct estimate_request *q, const struct appearance *a,
                                    .seed = SEED};
 }
 
-/* The paths of an estimate, traced one by one with the tracer itself. */
+/* The paths of an estimate, traced one by one by direct calls of the tracer. */
 struct by_hand {
     const struct scene *fibers;
     const struct volume_scene *volume;
@@ -136,7 +135,7 @@ static void trace_volume(void *context, size_t i_task, size_t i_thread)
     m->volume->release(parameters.state);
 }
 
-/* In a thread pool, which sets the rounding of small numbers that estimates have. */
+/* Compares inside a thread pool, because its threads round small numbers in the same way as estimates do. */
 static void same_by_hand(const struct estimate *e, const struct estimate_request *q, task_function trace)
 {
     struct by_hand h = {.fibers = q->input.scene.fibers,
@@ -191,7 +190,8 @@ static void test_same_figures_as_the_tracers(void **unused)
     direction_volume_release(&v);
 }
 
-/* The mean over rotations against the cloth turned by hand, and a plain configuration beside it that stays as it is. */
+/* The mean over rotations against estimates with the cloth turned by the test. A configuration without this option in
+ * the same request does not change. */
 static void test_mean_over_rotations(void **unused)
 {
     (void)unused;
@@ -232,7 +232,7 @@ static void test_mean_over_rotations(void **unused)
         sum += turned[k].mean[1] / N_ROTATION;
         var += turned[k].var[1] / (N_ROTATION * N_ROTATION);
     }
-    assert_true(most - least > 0.05 * sum); /* not one of them for all */
+    assert_true(most - least > 0.05 * sum); /* the rotations differ, so that one of them is not their mean */
     assert_true(fabs(mean[0].mean[1] - sum) < 1e-12 && fabs(mean[0].var[1] - var) < 1e-12 * var);
     size_t i_width = a.n_param + 6; /* green by beta_R */
     sum = 0.0;

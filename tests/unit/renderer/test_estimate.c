@@ -1,4 +1,4 @@
-/* estimate_run: the same bits for any number of threads, honest variances, cancellation, bad requests. */
+/* estimate_run: the same bits for any number of threads, right variances, cancellation, bad requests. */
 #include "base/clock.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -77,7 +77,7 @@ static void same_bits_for_any_threads(void **state)
         run(&q, t, more);
         assert_memory_equal(one, more, sizeof one);
     }
-    /* configurations are independent of what else is asked for; other keys give other numbers */
+    /* a configuration does not depend on the others of a request; other keys give other numbers */
     const size_t only_last[4] = {0, 0, 0, 2500};
     struct estimate_request alone = request(only_last, 4);
     run(&alone, 2, more);
@@ -92,7 +92,7 @@ static void same_bits_for_any_threads(void **state)
         assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
 }
 
-/* The stated variance of the mean against the scatter of repeated estimates. */
+/* The stated variance of the mean against the variance of repeated estimates. */
 static void variances_are_honest(void **state)
 {
     (void)state;
@@ -115,7 +115,7 @@ static void variances_are_honest(void **state)
     if (fabs(ratio - 1) > 0.65 || fabs(jac_ratio - 1) > 0.65) fail_msg("variance ratios %g, %g", ratio, jac_ratio);
 }
 
-/* The same random numbers: only rays that graze an edge may fare differently. */
+/* With the same random numbers, only rays that graze an edge may have another result. */
 static void agrees_without_avx512(void **state)
 {
     (void)state;
@@ -186,7 +186,7 @@ static void shared_paths_agree_with_separate_ones(void **state)
     assert_memory_equal(&again[0].jac, &separate[0].jac, sizeof again[0].jac);
 }
 
-/* Without a lamp there is nothing to share: an environment alone gives what separate paths give. */
+/* Without a lamp nothing is shared: the estimate for an environment alone agrees with that by separate paths. */
 static void shared_paths_without_a_lamp(void **state)
 {
     (void)state;
@@ -231,8 +231,8 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* White fibers: the longest paths there are. The median of five, so that one late turn of a loaded machine's scheduler
- * does not count. */
+/* White fibers have the longest paths. The median of five tries is used, so that a single delay by a busy machine has
+ * no effect. */
 static void cancels_within_100_ms(void **state)
 {
     (void)state;
@@ -284,7 +284,7 @@ static void bad_requests(void **state)
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
 }
 
-/* A model that fails in one direction in a thousand: found and named. */
+/* A model that returns NaN for one direction in a thousand is found and named. */
 static float broken_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3],
                              const float *weight, float rgb[3], float *score)
 {
@@ -314,8 +314,8 @@ static void nan_is_named(void **state)
     assert_string_equal(err.field, "C.g");
 }
 
-/* Numbers are rounded: one sample in 2^24 may come out along the fiber, where density and S are 0. That ends a path;
- * it is no failure of the model. */
+/* Because of rounding, one sample in 2^24 may be a direction along the fiber, where density and S are 0. It ends the
+ * path and is not an error of the model. */
 static float rounding_eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3],
                                const float *weight, float rgb[3], float *score)
 {

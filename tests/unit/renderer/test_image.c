@@ -1,4 +1,4 @@
-/* OpenEXR and PNG files: round trips, and files that are not what they should be. */
+/* OpenEXR and PNG files: round trips, and faulty files. */
 #include "base/rng.h"
 #include "renderer/image/image.h"
 
@@ -95,7 +95,7 @@ static uint16_t half_of(float x) /* exact values only */
     return (uint16_t)((b >> 16 & 0x8000) | (b == 0 ? 0 : (((b >> 23 & 255) - 112) << 10) | (b >> 13 & 0x3ff)));
 }
 
-/* A half-float file of one chunk kind, written with the library directly: scan lines (tile 0) or tiles. */
+/* Writes a half-float file directly with the library, either with scan lines (tile 0) or with tiles. */
 static void write_half(const char *path, const char *const *name, int n_channel, int width, int height, int tile)
 {
     exr_context_t file;
@@ -134,8 +134,8 @@ static void write_half(const char *path, const char *const *name, int n_channel,
     assert_int_equal(exr_finish(&file), EXR_ERR_SUCCESS);
 }
 
-/* Chunks of path-traced noise hardly shrink; a compressing writer damaged the one in some 200 whose sizes came out
- * equal. */
+/* Compression hardly reduces chunks of path-traced noise. A compressing writer damages the one chunk in some 200 whose
+ * compressed size equals its size. */
 static void exr_noise_survives(void **state)
 {
     (void)state;
@@ -194,8 +194,8 @@ static void bad_files(void **state)
     assert_int_equal(image_read_exr(&im, path_of("b.exr"), LIMIT, &err), STATUS_FORMAT);
 }
 
-/* Every truncation and a few thousand damaged bytes: an error or a picture, never a crash (run under the sanitizers).
- */
+/* Every truncation and a few thousand changed bytes must give an error or a picture, and never a crash. The sanitizer
+ * build runs this test too. */
 static void truncated_and_damaged(void **state)
 {
     (void)state;

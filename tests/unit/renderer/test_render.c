@@ -1,4 +1,4 @@
-/* render_run: agrees with estimate_run, the same bits for any number of threads, layers and names, back light. */
+/* render_run: agreement with estimate_run, the same bits for any number of threads, layers and names, back light. */
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -83,7 +83,7 @@ static void layers_and_threads(void **state)
     scene_free(scene);
 }
 
-/* Mean over the pixels = the crop's mean, within the two standard errors that both state. */
+/* The mean over the pixels is the mean of the crop, within the stated standard errors of both. */
 static void agrees_with_estimate(void **state)
 {
     (void)state;
@@ -111,7 +111,8 @@ static void agrees_with_estimate(void **state)
     scene_free(scene);
 }
 
-/* A lamp below: nothing through a black sheet, light through the cloth and between its fibers without it. */
+/* With a lamp below, the black sheet stops all light. Without it light passes through the cloth and between its
+ * fibers. */
 static void back_light(void **state)
 {
     (void)state;

@@ -33,7 +33,8 @@ static void random_direction(struct rng *r, float w[3])
     w[2] = c * sinf(phi);
 }
 
-/* Corners, bounds and random points of the parameter box. */
+/* Point k of the parameter ranges: lower bounds, upper bounds, the start, combinations of bounds, then random points.
+ * */
 static void box_point(const struct scattering_model *m, unsigned k, struct rng *r, double *param)
 {
     for (size_t p = 0; p < m->n_param; p++) {
@@ -143,8 +144,8 @@ static void agrees_with_reference(void **state)
                    dout[3] = {(double)wo[0], (double)wo[1], (double)wo[2]};
             for (int c = 0; c < 3; c++) {
                 double want = reference_s(param, di, dout, c);
-                /* float angles carry 1e-7, a 1 degree lobe turns that into up to 6 * 1e-7 / 0.0175; the table of G into
-                 * 2e-3 at the poles */
+                /* Angles have a rounding error of 1e-7, which a lobe of 1 degree amplifies to 6 * 1e-7 / 0.0175. The
+                 * table of G has an error of 2e-3 at the poles. */
                 double tolerance = fabs(asin(di[0])) > 80 * RAD_PER_DEG ? 3e-3 : 3e-4;
                 if (fabs((double)rgb[c] - want) > tolerance * want + 1e-12)
                     fail_msg("set %u: S = %.8g, reference %.8g", k, (double)rgb[c], want);

@@ -1,4 +1,4 @@
-/* The endless cloth: hits where geometry says, periodicity, back faces, camera and lamp. */
+/* The periodic cloth: positions of hits, periodicity, back faces, camera and lamp. */
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/light/lamp.h"
@@ -44,7 +44,7 @@ static void hits_are_where_they_should_be(void **state)
     assert_int_equal(scene_n_segment(s), 2);
     assert_true(fabs(scene_thickness_mm(s) - 0.14) < 1e-6);
     assert_true(scene_memory_bytes(s) > 1000);
-    /* straight down on the first fiber's crest, which is z = 0, seven tiles away */
+    /* straight down on the top of the first fiber, which is at z = 0, seven tiles away */
     struct scene_ray r = ray_to(0.2 + 7 * 0.5, 0.1 - 3 * 0.5, 0.001, 0, 0, -1);
     assert_true(scene_trace(s, &r, &h));
     assert_true(fabsf(h.position_mm[2]) < 1e-5f && fabsf(h.normal[2] - 1) < 1e-5f &&
@@ -52,10 +52,10 @@ static void hits_are_where_they_should_be(void **state)
     assert_true(fabsf(h.radius_mm - 0.02f) < 1e-7f);
     assert_int_equal(scene_fiber_of(s, h.i_segment), 0);
     assert_true(fabs(r.offset_mm[0] - 3.5) < 1e-9 && fabs(r.offset_mm[1] + 1.5) < 1e-9);
-    /* between the fibers: through to the sheet */
+    /* between the fibers the ray hits the sheet */
     r = ray_to(0.2, 0.2, 0.001, 0, 0, -1);
     assert_false(scene_trace(s, &r, &h));
-    /* near-horizontal, along y: meets the row of first fibers from the side; along x between them: nothing for ever */
+    /* horizontal along y, the ray hits the first fiber from the side; along x between the fibers it hits nothing */
     r = ray_to(0.2, 0.31, -0.02, 0, 1, 0);
     assert_true(scene_trace(s, &r, &h));
     assert_true(fabs((double)h.position_mm[1] + r.offset_mm[1] - 0.58) < 1e-4 && h.normal[1] < -0.99f);
@@ -77,7 +77,7 @@ static void back_faces_do_not_exist(void **state)
     assert_true(scene_occluded(s, &inside)); /* the next fiber ahead, not this one */
     assert_true(scene_trace(s, &inside, &h));
     assert_int_equal(scene_fiber_of(s, h.i_segment), 1);
-    /* leaving a hit into the fiber: starts behind it */
+    /* a ray that continues from a hit into the fiber starts after the hit */
     struct scene_ray down = ray_to(0.2, 0.1, 0.001, 0, 0, -1), through;
     assert_true(scene_trace(s, &down, &h));
     scene_ray_leave(&h, down.offset_mm, (const float[3]){0, 0, -1}, &through);
@@ -108,7 +108,7 @@ static void cloth_is_periodic(void **state)
         bool shadow = scene_occluded(s, &a), hit = scene_trace(s, &a, &ha);
         assert_true(shadow == hit);
         n_shadow += shadow;
-        if (scene_trace(s, &b, &hb) != hit) continue; /* an edge, decided by rounding */
+        if (scene_trace(s, &b, &hb) != hit) continue; /* rounding decides at an edge */
         if (!hit) continue;
         double dx =
             ((double)hb.position_mm[0] + b.offset_mm[0]) - ((double)ha.position_mm[0] + a.offset_mm[0]) - 5 * tile;
@@ -135,7 +135,7 @@ static void bad_fibers_are_refused(void **state)
     f.position_m[0] = -100 * (float)f.tile_size_m[0];
     assert_int_equal(scene_new(&f, &(struct scene_option){true}, &s, &err), STATUS_INVALID);
     fiber_set_release(&f);
-    hand_weave_small(&f); /* repeated points are no reason to refuse */
+    hand_weave_small(&f); /* repeated points are allowed */
     memcpy(f.position_m + 3, f.position_m, 3 * sizeof(float));
     assert_int_equal(scene_new(&f, &(struct scene_option){true}, &s, &err), STATUS_OK);
     assert_int_equal(scene_n_segment(s), 2 * 2 * 12 * 16 - 1);
@@ -143,8 +143,8 @@ static void bad_fibers_are_refused(void **state)
     fiber_set_release(&f);
 }
 
-/* Rays aimed at a band twice as wide as the fiber: half of them hit, whatever the fiber's share of the tile, and none
- * that leaves to the outside meets the fiber again. */
+/* Rays to a band twice as wide as the fiber: half of them hit, whatever the fiber's share of the tile. No ray that
+ * leaves the fiber to the outside hits it again. */
 static void thin_fibers_are_as_wide_as_thick_ones(void **state)
 {
     (void)state;
@@ -196,8 +196,8 @@ static void too_thin_fibers_are_refused(void **state)
     fiber_set_release(&f);
 }
 
-/* Two segments of 2^63 pieces each: as integers their sum wraps to one vertex. Along x such a fiber leaves the widest
- * block, along z nothing else limits it. Read from both kinds of file, as a job would. */
+/* Two segments of 2^63 pieces each, whose sum would overflow to one vertex. Along x such a fiber leaves the largest
+ * block, and along z there is no other limit. It is read from both kinds of file, as by a job. */
 static void segments_beyond_all_numbers_are_refused(void **state)
 {
     (void)state;
@@ -249,7 +249,7 @@ static void camera_looks_at_the_orbit_centre(void **state)
         double phi = c.camera_phi_rad - c.cloth_rotation_rad;
         assert_true(fabs((double)r.direction[2] + cos(c.camera_theta_rad)) < 1e-6);
         assert_true(fabs((double)r.direction[0] + sin(c.camera_theta_rad) * cos(phi)) < 1e-6);
-        /* top of the picture: farther up the normal */
+        /* the top of the picture is towards the normal */
         assert_true(m.up_mm[2] >= 0 && fabs(m.right_mm[2]) < 1e-12);
         assert_true(fabs(m.right_mm[0] * m.up_mm[0] + m.right_mm[1] * m.up_mm[1] + m.right_mm[2] * m.up_mm[2]) < 1e-9);
         /* the crop's edge is 10 mm */
@@ -266,7 +266,8 @@ static void camera_looks_at_the_orbit_centre(void **state)
     scene_free(s);
 }
 
-/* Irradiance pi at the orbit centre, by sampling; the two densities agree. */
+/* The lamp has an irradiance of pi at the orbit centre, measured by samples, and both functions give the same
+ * density. */
 static void lamp_is_calibrated(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* render_run for volumes: agrees with estimate_run, the same bits for any number of threads, layers and names, files,
- * progress and cancellation. */
+/* render_run for volumes: agreement with estimate_run, the same bits for any number of threads, layers and names,
+ * files, progress and cancellation. */
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_volume.h"
@@ -80,8 +80,9 @@ static void layers_and_threads(void **state)
     for (size_t i = 0; i < 3; i++) image_release(&im[i]);
 }
 
-/* Mean over the pixels = the crop's mean, within the standard errors that both state; derivatives by alpha and d too,
- * whose pixels state none: their estimate's error counts twice over, for its equal number of paths. */
+/* The mean over the pixels is the mean of the crop, within the stated standard errors of both. The same holds for the
+ * derivatives by alpha and d. Their pixels state no standard error, so that of the estimate is used for both, which
+ * has as many paths. */
 static void agrees_with_estimate(void **state)
 {
     (void)state;
@@ -156,7 +157,8 @@ static void *cancel_soon(void *context)
     return NULL;
 }
 
-/* A picture of many seconds, from a single pixel to many, ends within 100 ms (of three tries, for a busy machine). */
+/* The rendering of a picture with one pixel or many, which would take many seconds, ends within 100 ms after it is
+ * cancelled. Up to three tries are made, because the machine may be busy. */
 static void cancelled_soon(void **state)
 {
     (void)state;
