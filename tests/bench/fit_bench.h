@@ -1,5 +1,4 @@
-/* Common functions of the parts of bench_fit: options, one fit, output. Each function ends the program when it fails.
- * */
+/* Common functions of the parts of bench_fit: options, one fit, output. A function that fails ends the program. */
 #ifndef SELVEDGE_TESTS_BENCH_FIT_H
 #define SELVEDGE_TESTS_BENCH_FIT_H
 

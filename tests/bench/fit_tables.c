@@ -29,7 +29,7 @@ struct real_row {
     double error[BENCH_N_MODEL][2]; /* fitted, held out */
 };
 
-static void tell_rows(const struct fit_phantom *f, const double *param, size_t n_path)
+static void print_rows(const struct fit_phantom *f, const double *param, size_t n_path)
 {
     struct estimate e[FIT_MAX_OBSERVATION];
     const double deg = DEG_PER_RAD;
@@ -106,7 +106,7 @@ static void fit_table(const struct real *real, const struct fit_cloth *cloth, si
     fit_phantom_observe(&f, &row->observation);
     bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget > 0 ? b->path_budget : REAL_BUDGET, NULL, &r, NULL);
     bench_print_fit(&f, &r);
-    if (b->row_paths > 0) tell_rows(&f, r.param, b->row_paths);
+    if (b->row_paths > 0) print_rows(&f, r.param, b->row_paths);
     score_table(real, &f, r.param, k, row);
     fit_phantom_release(&f);
 }

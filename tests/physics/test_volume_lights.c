@@ -292,7 +292,7 @@ static void no_ray_leaves_where_it_enters(void **state)
 /* A path that reaches the limit of look-ups inside the cloth has no light from beyond it. A column of full voxels and a
  * large multiplier make the steps so short that no ray through the empty voxels beside it passes the cloth within that
  * limit. */
-static void a_lost_path_brings_nothing(void **state)
+static void a_lost_path_has_no_light(void **state)
 {
     (void)state;
     enum { EDGE = VOLUME_BRICK_EDGE };
@@ -332,7 +332,7 @@ int main(void)
         cmocka_unit_test(constant_picture_is_the_constant_environment),
         cmocka_unit_test(picture_on_the_slab),
         cmocka_unit_test(lights_add_up),
-        cmocka_unit_test(a_lost_path_brings_nothing),
+        cmocka_unit_test(a_lost_path_has_no_light),
         cmocka_unit_test(no_ray_leaves_where_it_enters),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

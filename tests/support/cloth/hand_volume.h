@@ -8,8 +8,7 @@
 /* The same density and direction everywhere. Like the other functions, it aborts the test when memory runs out. */
 void hand_volume_uniform(struct direction_volume *v, const size_t n[3], double voxel_m, uint8_t density,
                          const float direction[3]);
-/* Two crossed systems of wavy fibers with gaps between them. A share `occupancy` of the voxels has a density above 0.
- * */
+/* Two crossed systems of wavy fibers with gaps between them. A share `occupancy` of the voxels is not empty. */
 void hand_volume_weave(struct direction_volume *v, const size_t n[3], double voxel_m, double occupancy);
 /* Makes a volume of fibers far thinner than a voxel. The density of a voxel is the share of it that fibers fill, times
  * `scale`, so that a byte can represent it. Sample points along the fibers are counted, so the density is right on

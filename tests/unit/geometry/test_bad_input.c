@@ -317,7 +317,7 @@ static void test_empty_slice(void **state)
 }
 
 /* A good scan gives no warning. */
-static void test_good_scan_is_quiet(void **state)
+static void test_good_scan_gives_no_warning(void **state)
 {
     (void)state;
     struct chain c;
@@ -345,7 +345,7 @@ int main(void)
         cmocka_unit_test(test_wrong_spacing), cmocka_unit_test(test_wrong_order_and_depth),
         cmocka_unit_test(test_noise_only),    cmocka_unit_test(test_one_fiber),
         cmocka_unit_test(test_not_finite),    cmocka_unit_test(test_lying_header),
-        cmocka_unit_test(test_empty_slice),   cmocka_unit_test(test_good_scan_is_quiet),
+        cmocka_unit_test(test_empty_slice),   cmocka_unit_test(test_good_scan_gives_no_warning),
     };
     return cmocka_run_group_tests(tests, make_folder, NULL);
 }

@@ -85,8 +85,7 @@ static double spread_m2(const struct fiber_set *f, double spacing_m)
 }
 
 /* The four measured yarns, with the lengths of the file or scaled, have the designed share of fiber in the section of
- * a ply. It is measured by the material of the tile and by the spread of the fibers, before fibers are pushed apart.
- * */
+ * a ply. It is measured by the material of the tile and by the spread of the fibers, before fibers are pushed apart. */
 static void test_real_yarn_files(void **state)
 {
     static const char *const name[] = {"cotton1", "polyester1", "rayon1", "silk1"};

@@ -54,8 +54,8 @@ struct heard {
     size_t n_call;
 };
 
-static status telling_run(void *context, const struct estimator_call *call, const struct progress *progress,
-                          struct estimate *out, double *wall_s, struct error *err)
+static status run_with_progress(void *context, const struct estimator_call *call, const struct progress *progress,
+                                struct estimate *out, double *wall_s, struct error *err)
 {
     struct heard *h = context;
     progress_report(progress, 0.0);
@@ -83,7 +83,7 @@ static void test_progress(void **state)
             struct fit_result r;
             descent_fixture_init(&x, 1, budget[i]);
             struct heard h = {.inner = x.estimator};
-            struct estimator e = {&h, x.estimator.n_configuration, x.estimator.n_param, telling_run};
+            struct estimator e = {&h, x.estimator.n_configuration, x.estimator.n_param, run_with_progress};
             struct progress progress = {.report = hear, .context = &h};
             x.problem.estimator = &e;
             x.problem.progress = &progress;

@@ -107,8 +107,7 @@ static void append_parabola(struct linear_history *h, double x, uint64_t n_path)
 }
 
 /* An estimate at x = 0 is extrapolated to 0.1 by the derivative at 0.05, which comes from a second estimate of one
- * path, whose own mean has no weight. This is exact for a parabola; the derivative at 0 would give an error of 0.01.
- * */
+ * path, whose own mean has no weight. This is exact for a parabola; the derivative at 0 would give an error of 0.01. */
 static void test_carried_to_second_order(void **state)
 {
     (void)state;

@@ -30,8 +30,7 @@ static double magnified_contrast(const struct image *im)
 }
 
 /* Draws one of a series of square pictures in its first n_channel channels: a chess board of the contrast `chess`
- * with fields of BOARD_SIDE pixels, and a deviate of standard deviation sd for each block of `block` pixels a side.
- * */
+ * with fields of BOARD_SIDE pixels, and a deviate of standard deviation sd for each block of `block` pixels a side. */
 static void draw(struct image *im, const struct rng_key *key, size_t block, double chess, double sd, size_t n_channel)
 {
     const size_t px = im->width;

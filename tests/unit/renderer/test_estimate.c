@@ -93,7 +93,7 @@ static void same_bits_for_any_threads(void **state)
 }
 
 /* The stated variance of the mean against the variance of repeated estimates. */
-static void variances_are_honest(void **state)
+static void variances_agree_with_repetitions(void **state)
 {
     (void)state;
     enum { N = 60 };
@@ -345,7 +345,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(same_bits_for_any_threads),
-        cmocka_unit_test(variances_are_honest),
+        cmocka_unit_test(variances_agree_with_repetitions),
         cmocka_unit_test(shared_paths_agree_with_separate_ones),
         cmocka_unit_test(shared_paths_without_a_lamp),
         cmocka_unit_test(agrees_without_avx512),

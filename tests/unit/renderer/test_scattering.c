@@ -33,8 +33,7 @@ static void random_direction(struct rng *r, float w[3])
     w[2] = c * sinf(phi);
 }
 
-/* Point k of the parameter ranges: lower bounds, upper bounds, the start, combinations of bounds, then random points.
- * */
+/* Point k of the parameter ranges: the lower bounds, the upper bounds, the start, combinations, then random points. */
 static void box_point(const struct scattering_model *m, unsigned k, struct rng *r, double *param)
 {
     for (size_t p = 0; p < m->n_param; p++) {

@@ -198,7 +198,7 @@ static void too_thin_fibers_are_refused(void **state)
 
 /* Two segments of 2^63 pieces each, whose sum would overflow to one vertex. Along x such a fiber leaves the largest
  * block, and along z there is no other limit. It is read from both kinds of file, as by a job. */
-static void segments_beyond_all_numbers_are_refused(void **state)
+static void segments_of_enormous_length_are_refused(void **state)
 {
     (void)state;
     static const char *const text[2] = {"0 0 0 9.5367431640625e-4\n1.7592186044416e18 0 0 9.5367431640625e-4\n"
@@ -310,7 +310,7 @@ int main(void)
         cmocka_unit_test(bad_fibers_are_refused),
         cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
         cmocka_unit_test(too_thin_fibers_are_refused),
-        cmocka_unit_test(segments_beyond_all_numbers_are_refused),
+        cmocka_unit_test(segments_of_enormous_length_are_refused),
         cmocka_unit_test(camera_looks_at_the_orbit_centre),
         cmocka_unit_test(lamp_is_calibrated),
     };
