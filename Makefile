@@ -111,7 +111,7 @@ generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows fr
 
 include tests/tests.mk
 include tests/mutants/mutants.mk
-include tests/checks.mk
 include tests/bench/bench.mk
+include tests/checks.mk
 
 -include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)
