@@ -13,7 +13,7 @@ static const double relative_step = 2e-3;
 /* Least scale of a step, relative to the range of the parameter. Models also use 1 - C, which single precision rounds
  * to 3e-8 however small the colour C is: with steps proportional to C alone the error was 5 % at the bound 0.001. Above
  * 0.1 the error of the stencil itself shows in black cloth. */
-static const double least_scale = 1e-3, least_scale_of_colour = 0.1;
+static const double least_scale = 1e-3, least_scale_of_share = 0.1;
 
 /* Values at offset[k] h give the derivative sum coefficient[k] f / h. */
 struct stencil {
@@ -41,7 +41,8 @@ struct check {
 static void choose_stencil(struct check *k, size_t p)
 {
     const struct param_info *info = &k->q->input.model->param[p];
-    double v = k->q->input.param[p], least = info->channel >= 0 ? least_scale_of_colour : least_scale;
+    bool share = info->channel >= 0 || info->coordinate == PARAM_LOGIT; /* models use 1 - p */
+    double v = k->q->input.param[p], least = share ? least_scale_of_share : least_scale;
     k->h[p] = relative_step * fmax(fabs(v), least * (info->upper - info->lower));
     k->stencil[p] = v - 2.0 * k->h[p] < info->lower ? &upwards : v + 2.0 * k->h[p] > info->upper ? &downwards : &middle;
 }
