@@ -10,6 +10,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -230,7 +231,11 @@ static void nothing_is_nan(void **state)
                     float uu[3] = {corner[u % 3], corner[u / 3 % 3], corner[u / 9]}, wi[3], f[3];
                     m->sample(s, special[i], NULL, uu, wi);
                     assert_true(fabsf(wi[0] * wi[0] + wi[1] * wi[1] + wi[2] * wi[2] - 1) < 1e-5f);
-                    assert_true(m->eval_pdf(s, wi, special[i], NULL, f, NULL) > 0);
+                    /* a sample that is rounded to the fiber's axis has no azimuth and may have no density: the tracer
+                     * ends the path there */
+                    bool on_axis = wi[1] == 0 && wi[2] == 0;
+                    float pdf = m->eval_pdf(s, wi, special[i], NULL, f, NULL);
+                    assert_true(on_axis ? pdf >= 0 : pdf > 0);
                     check_finite(m, s, special[i], wi);
                 }
             }
