@@ -316,7 +316,7 @@ def test_form_edits_a_dropped_document(stub, browser):
     fill_in(browser, "volume.filter.h", "11")
     assert written(browser) == {**before, "volume": {**before["volume"], "voxel_size_um": [2, 2, 2.5], "filter": {"h": 11}}}
     fill_in(browser, "volume.voxel_size_um", "two")
-    assert "no number" in option(browser, "volume.voxel_size_um").text and "voxel_size_um" not in written(browser)["volume"]
+    assert "is not a number" in option(browser, "volume.voxel_size_um").text and "voxel_size_um" not in written(browser)["volume"]
     # a seed that JavaScript would round: the document is sent as it was written, and the form leaves it alone
     (sample / "job.json").write_text(json.dumps({**before, "fit": {"seed": 2**60 + 1}}))
     drop_in(browser, sample / "job.json")
