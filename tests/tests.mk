@@ -32,9 +32,11 @@ nightly:           ## asan, fuzz-smoke, coverage, test-long and mutants: too lon
 		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
 	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }
 
+# tests ask for more memory than there is, and for how much a daemon takes, which the sanitizers change
 asan: | deps-test  ## unit and quick API tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
-	@/usr/bin/python3 tests/run_tests.py --quick --programs --build build/asan
+	@ASAN_OPTIONS=allocator_may_return_null=1 SELVEDGE_SANITIZED=1 \
+		/usr/bin/python3 tests/run_tests.py --quick --programs --build build/asan
 
 asan-physics: | deps-test ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \

@@ -67,7 +67,7 @@ void http_reply_release(struct http_reply *reply)
 {
     free(reply->body);
     reply->body = NULL;
-    reply->n_body = 0;
+    reply->n_body = reply->n_room = 0;
 }
 
 /* ---- callbacks ---- */
@@ -77,9 +77,13 @@ static size_t take_body(char *data, size_t size, size_t n, void *context)
     struct http_reply *r = context;
     size_t n_new = size * n;
     if (n_new > MAX_REPLY_BYTES - r->n_body) return 0;
-    char *grown = realloc(r->body, r->n_body + n_new + 1);
-    if (grown == NULL) return 0;
-    r->body = grown;
+    if (r->n_body + n_new + 1 > r->n_room) { /* twice as much each time, or a large body is copied over and over */
+        size_t n_room = 2 * (r->n_body + n_new + 1);
+        char *grown = realloc(r->body, n_room);
+        if (grown == NULL) return 0;
+        r->body = grown;
+        r->n_room = n_room;
+    }
     memcpy(r->body + r->n_body, data, n_new);
     r->n_body += n_new;
     r->body[r->n_body] = '\0';

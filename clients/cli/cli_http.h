@@ -23,9 +23,9 @@ bool http_stopped(const struct http *http);
 void http_sleep(const struct http *http, double seconds);
 
 struct http_reply {
-    long code;  /* HTTP status */
-    char *body; /* NUL-terminated, at most 64 MiB */
-    size_t n_body;
+    long code;             /* HTTP status */
+    char *body;            /* NUL-terminated, at most 64 MiB */
+    size_t n_body, n_room; /* bytes of body, and bytes allocated for it */
     char etag[160], location[512];
     int64_t upload_offset; /* from tus; -1 if absent */
     int64_t log_next;      /* from the header Selvedge-Next-Offset; -1 if absent */

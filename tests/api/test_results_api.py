@@ -112,7 +112,8 @@ def test_long_series_costs_what_it_answers(daemon_maker):
     few, _ = ask("max_points=11")
     assert len(few["points"]) == 11 and few["models"] == whole["models"]
     # kB; the file alone has 12 MB, and its parsed records ten times as much
-    assert process_number(pid, "status", "VmHWM") - peak < 8 << 10
+    if not os.environ.get("SELVEDGE_SANITIZED"):  # the address sanitizer keeps freed memory for a while
+        assert process_number(pid, "status", "VmHWM") - peak < 8 << 10
     for after in [0, 7, 8, 450, 507, 508, 850]:
         some, _ = ask(f"after_step={after}&max_points=5000")
         assert some["points"] == whole["points"][after + 1:] and some["models"] == whole["models"], after
