@@ -3,6 +3,7 @@
 #include "geometry/fibers/fiber_set.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +21,7 @@ enum {
     HAIR_KNOWN = 31
 };
 
-static const char tile_key[] = "selvedge tile_mm=";
+static const char tile_key[] = "selvedge tile_mm=", group_key[] = " groups=rgb";
 
 static void put_u16(uint8_t *to, uint32_t v)
 {
@@ -76,18 +77,41 @@ static status count_strands(const struct fiber_set *f, const char *name, size_t 
     return STATUS_OK;
 }
 
-static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point)
+static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups)
 {
     memset(to, 0, HAIR_HEADER_BYTES);
     memcpy(to, "HAIR", 4);
     put_u32(to + 4, (uint32_t)n_strand);
     put_u32(to + 8, (uint32_t)n_point);
-    put_u32(to + 12, HAIR_SEGMENTS | HAIR_POINTS | HAIR_THICKNESS);
+    put_u32(to + 12, HAIR_SEGMENTS | HAIR_POINTS | HAIR_THICKNESS | (groups ? HAIR_COLOUR : 0));
     put_f32(to + 20, f->n_fiber > 0 ? 2000.0f * f->radius_m[0] : 0.0f);
     for (size_t c = 0; c < 3; c++) put_f32(to + 28 + 4 * c, 1.0f);
     char text[HAIR_TEXT_BYTES];
-    int n = snprintf(text, sizeof text, "%s%.17g,%.17g", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1]);
+    int n = snprintf(text, sizeof text, "%s%.17g,%.17g%s", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1],
+                     groups ? group_key : "");
     if (n > 0 && n < HAIR_TEXT_BYTES) memcpy(to + HAIR_TEXT_OFFSET, text, (size_t)n);
+}
+
+/* The colours of groups are the corners of the rgb cube: group 0 is white, and bit c of the group clears channel c. */
+static float group_channel(uint8_t group, size_t c) { return (group >> c & 1u) != 0 ? 0.0f : 1.0f; }
+
+/* to: the arrays of the file, after the header. */
+static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups)
+{
+    uint8_t *segments = to, *points = segments + 2 * n_strand, *thickness = points + 12 * n_point;
+    uint8_t *colour = thickness + 4 * n_point;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t from = f->first_vertex[i], last = f->first_vertex[i + 1] - 1; from < last;) {
+            size_t n = last - from < HAIR_MAX_SEGMENT ? last - from : HAIR_MAX_SEGMENT;
+            put_u16(segments, (uint32_t)n);
+            for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
+                for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);
+                put_f32(thickness, 2000.0f * f->radius_m[i]);
+                for (size_t c = 0; groups && c < 3; c++, colour += 4) put_f32(colour, group_channel(f->group[i], c));
+            }
+            segments += 2;
+            from += n;
+        }
 }
 
 status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err)
@@ -96,22 +120,12 @@ status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct 
     size_t n_strand = 0, n_point = 0;
     status s = count_strands(f, name, &n_strand, &n_point, err);
     if (s != STATUS_OK) return s;
-    size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + 16 * n_point;
+    bool groups = fiber_set_n_group(f) > 1;
+    size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + (groups ? 28 : 16) * n_point;
     uint8_t *data = malloc(n_bytes);
     if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
-    put_header(data, f, n_strand, n_point);
-    uint8_t *segments = data + HAIR_HEADER_BYTES, *points = segments + 2 * n_strand, *thickness = points + 12 * n_point;
-    for (size_t i = 0; i < f->n_fiber; i++)
-        for (size_t from = f->first_vertex[i], last = f->first_vertex[i + 1] - 1; from < last;) {
-            size_t n = last - from < HAIR_MAX_SEGMENT ? last - from : HAIR_MAX_SEGMENT;
-            put_u16(segments, (uint32_t)n);
-            for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
-                for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);
-                put_f32(thickness, 2000.0f * f->radius_m[i]);
-            }
-            segments += 2;
-            from += n;
-        }
+    put_header(data, f, n_strand, n_point, groups);
+    put_strands(data + HAIR_HEADER_BYTES, f, n_strand, n_point, groups);
     s = durable_replace(path, data, n_bytes, err);
     free(data);
     return s;
@@ -184,14 +198,40 @@ static status get_radii(struct fiber_set *f, const struct hair_header *h, const 
     return STATUS_OK;
 }
 
-/* Reads the tile size from the text of the header; 0 if another program wrote the file. */
-static void get_tile(struct fiber_set *f, const uint8_t *header)
+/* The group that a colour stands for, or FIBER_MAX_GROUP for any other colour. */
+static uint8_t get_group(const uint8_t *colour)
+{
+    uint8_t group = 0;
+    for (size_t c = 0; c < 3; c++) {
+        float v = get_f32(colour + 4 * c);
+        if (v != 0.0f && v != 1.0f) return FIBER_MAX_GROUP;
+        if (v == 0.0f) group |= (uint8_t)(1u << c);
+    }
+    return group;
+}
+
+static status get_groups(struct fiber_set *f, const uint8_t *colour, const char *name, struct error *err)
+{
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        f->group[i] = get_group(colour + 12 * f->first_vertex[i]);
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++)
+            if (f->group[i] >= FIBER_MAX_GROUP || get_group(colour + 12 * k) != f->group[i])
+                return error_set(err, STATUS_FORMAT,
+                                 "cannot read fibers '%s': the colours of fiber %zu do not state one group", name, i);
+    }
+    return STATUS_OK;
+}
+
+/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups: the text says that the
+ * colours are groups. */
+static void get_text(struct fiber_set *f, const uint8_t *header, bool *groups)
 {
     char text[HAIR_TEXT_BYTES + 1];
     memcpy(text, header + HAIR_TEXT_OFFSET, HAIR_TEXT_BYTES);
     text[HAIR_TEXT_BYTES] = '\0';
     f->tile_size_m[0] = f->tile_size_m[1] = 0.0;
     const char *at = strstr(text, tile_key);
+    *groups = at != NULL && strstr(at, group_key) != NULL;
     if (at == NULL) return;
     char *end;
     double x = strtod(at + sizeof tile_key - 1, &end);
@@ -226,9 +266,11 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
             return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", name,
                              k / 3);
     }
-    get_tile(f, data);
+    bool groups;
+    get_text(f, data, &groups);
     fiber_set_classify(f);
-    return STATUS_OK;
+    return groups && (h.flags & HAIR_COLOUR) != 0 ? get_groups(f, data + n_bytes - 12 * (size_t)h.n_point, name, err)
+                                                  : STATUS_OK;
 }
 
 /* Checks the header before the rest is read, so that a wrong count allocates nothing. */

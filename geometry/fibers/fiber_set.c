@@ -12,6 +12,7 @@ void fiber_set_release(struct fiber_set *f)
     free(f->position_m);
     free(f->radius_m);
     free(f->axis_class);
+    free(f->group);
     *f = (struct fiber_set){.tile_size_m = {f->tile_size_m[0], f->tile_size_m[1]}};
 }
 
@@ -23,8 +24,10 @@ status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, s
         f->position_m = malloc((n_vertex > 0 ? n_vertex : 1) * 3 * sizeof *f->position_m);
         f->radius_m = malloc((n_fiber > 0 ? n_fiber : 1) * sizeof *f->radius_m);
         f->axis_class = calloc(n_fiber > 0 ? n_fiber : 1, sizeof *f->axis_class);
+        f->group = calloc(n_fiber > 0 ? n_fiber : 1, sizeof *f->group);
     }
-    if (f->first_vertex == NULL || f->position_m == NULL || f->radius_m == NULL || f->axis_class == NULL) {
+    if (f->first_vertex == NULL || f->position_m == NULL || f->radius_m == NULL || f->axis_class == NULL ||
+        f->group == NULL) {
         fiber_set_release(f);
         return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu fibers with %zu vertices: out of memory", n_fiber,
                          n_vertex);
@@ -45,6 +48,9 @@ static status validate_fiber(const struct fiber_set *f, size_t i, struct error *
     if (f->axis_class[i] > 2)
         return error_set(err, STATUS_INVALID, "fiber %zu has axis class %u, it must be 0, 1 or 2", i,
                          (unsigned)f->axis_class[i]);
+    if (f->group[i] >= FIBER_MAX_GROUP)
+        return error_set(err, STATUS_INVALID, "fiber %zu has group %u, allowed are 0 to %d", i, (unsigned)f->group[i],
+                         FIBER_MAX_GROUP - 1);
     for (size_t k = 3 * first; k < 3 * end; k++)
         if (!isfinite(f->position_m[k]))
             return error_set(err, STATUS_INVALID, "vertex %zu of fiber %zu is not a finite point", k / 3 - first, i);
@@ -66,6 +72,14 @@ status fiber_set_validate(const struct fiber_set *f, struct error *err)
         if (s != STATUS_OK) return s;
     }
     return STATUS_OK;
+}
+
+size_t fiber_set_n_group(const struct fiber_set *f)
+{
+    size_t n = 1;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        if (f->group[i] >= n) n = (size_t)f->group[i] + 1;
+    return n;
 }
 
 double fiber_set_length_m(const struct fiber_set *f)

@@ -1,5 +1,5 @@
-/* Fibers as text: a line "x y z radius" in millimetres for each vertex, and a blank line between fibers
- * (docs/file-formats.md). */
+/* Fibers as text: a line "x y z radius" or "x y z radius group" in millimetres for each vertex, and a blank line
+ * between fibers (docs/file-formats.md). */
 #include "base/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
@@ -16,12 +16,15 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
     FILE *out = open_memstream(&text, &n_bytes);
     const char *name = path_file_name(path);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
+    bool groups = fiber_set_n_group(f) > 1;
     for (size_t i = 0; i < f->n_fiber; i++) {
         if (i > 0) fputc('\n', out);
         for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
             const float *p = f->position_m + 3 * k;
-            fprintf(out, "%.9g %.9g %.9g %.9g\n", 1e3 * (double)p[0], 1e3 * (double)p[1], 1e3 * (double)p[2],
+            fprintf(out, "%.9g %.9g %.9g %.9g", 1e3 * (double)p[0], 1e3 * (double)p[1], 1e3 * (double)p[2],
                     1e3 * (double)f->radius_m[i]);
+            if (groups) fprintf(out, " %u", (unsigned)f->group[i]);
+            fputc('\n', out);
         }
     }
     bool failed = ferror(out) != 0;
@@ -76,16 +79,37 @@ static size_t count_points(const char *data, size_t n_bytes, size_t *n_fiber)
     return n_vertex;
 }
 
-/* Parses four finite numbers. Returns false for anything else. */
-static bool parse_point(const char *line, double value[4])
+static bool is_end(const char *line) { return line[strspn(line, " \t\r")] == '\0'; }
+
+/* Parses four finite numbers, and after them a group or nothing, which is group 0. Returns false for anything else. */
+static bool parse_point(const char *line, double value[4], uint8_t *group)
 {
+    char *end;
     for (int a = 0; a < 4; a++) {
-        char *end;
         value[a] = strtod(line, &end);
         if (end == line || !isfinite(value[a])) return false;
         line = end;
     }
-    return line[strspn(line, " \t\r")] == '\0' && value[3] > 0.0;
+    *group = 0;
+    if (!is_end(line)) {
+        double number = strtod(line, &end);
+        if (end == line || !(number >= 0.0 && number < FIBER_MAX_GROUP) || number != floor(number)) return false;
+        *group = (uint8_t)number;
+        line = end;
+    }
+    return is_end(line) && value[3] > 0.0;
+}
+
+static status wrong_line(const char *name, size_t i_line, bool other_group, struct error *err)
+{
+    if (other_group)
+        return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu has another group than its fiber", name,
+                         i_line);
+    return error_set(
+        err, STATUS_FORMAT,
+        "cannot read fibers '%s': line %zu is not \"x y z radius\" or \"x y z radius group\" with a group of "
+        "0 to %d",
+        name, i_line, FIBER_MAX_GROUP - 1);
 }
 
 static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, double radius_sum, const char *name,
@@ -106,6 +130,7 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
     char line[LINE_BYTES];
     size_t i_fiber = 0, n_vertex = 0;
     double radius_sum = 0.0, value[4];
+    uint8_t group;
     for (;;) {
         enum line_kind kind = next_line(&r, line);
         bool inside = n_vertex > f->first_vertex[i_fiber];
@@ -116,9 +141,9 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
         }
         if (kind == LINE_END) return STATUS_OK;
         if (kind == LINE_BLANK) continue;
-        if (kind == LINE_TOO_LONG || !parse_point(line, value))
-            return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu is not \"x y z radius\"", name,
-                             r.i_line);
+        if (kind == LINE_TOO_LONG || !parse_point(line, value, &group)) return wrong_line(name, r.i_line, false, err);
+        if (inside && group != f->group[i_fiber]) return wrong_line(name, r.i_line, true, err);
+        f->group[i_fiber] = group;
         for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * value[a]);
         radius_sum += value[3];
         n_vertex++;

@@ -36,6 +36,7 @@ static void end_piece(struct emitter *e)
         if (e->f != NULL) {
             e->f->radius_m[e->n_fiber] = (float)e->strand->radius_m;
             e->f->axis_class[e->n_fiber] = e->strand->axis_class;
+            e->f->group[e->n_fiber] = e->strand->group;
             e->f->first_vertex[e->n_fiber + 1] = e->n_vertex;
         }
         e->n_fiber++;

@@ -17,6 +17,7 @@ struct strand {
     size_t n_period; /* 0: open */
     double radius_m;
     uint8_t axis_class;
+    uint8_t group; /* of its fibers (fiber_set.h) */
     enum strand_cut cut;
 };
 

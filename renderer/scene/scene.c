@@ -157,23 +157,14 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
     return STATUS_OK;
 }
 
-static status copy_groups(struct scene *s, const struct fiber_set *f, const struct scene_option *o, struct error *err)
+static status copy_groups(struct scene *s, const struct fiber_set *f, struct error *err)
 {
-    const uint8_t *group = o->fiber_group != NULL ? o->fiber_group : o->group_by_axis_class ? f->axis_class : NULL;
-    s->n_group = 1;
-    if (group == NULL) return STATUS_OK;
+    s->n_group = fiber_set_n_group(f);
+    if (s->n_group == 1) return STATUS_OK;
     s->segment_group = malloc(s->n_segment);
     if (s->segment_group == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu segments", s->n_segment);
-    for (size_t i = 0; i < s->n_segment; i++) {
-        uint8_t g = group[s->segment_fiber[i]];
-        if (g >= SCENE_MAX_GROUP)
-            return error_set_field(err, STATUS_INVALID, "fiber_group",
-                                   "cannot build scene: fiber %u has material group %u, allowed are 0 to %d",
-                                   s->segment_fiber[i], g, SCENE_MAX_GROUP - 1);
-        s->segment_group[i] = g;
-        if (g >= s->n_group) s->n_group = (size_t)g + 1;
-    }
+    for (size_t i = 0; i < s->n_segment; i++) s->segment_group[i] = f->group[s->segment_fiber[i]];
     return STATUS_OK;
 }
 
@@ -247,7 +238,7 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
     s->black_sheet = o->black_sheet;
     st = copy_fibers(s, f, err);
-    if (st == STATUS_OK) st = copy_groups(s, f, o, err);
+    if (st == STATUS_OK) st = copy_groups(s, f, err);
     if (st != STATUS_OK) goto out;
     st = choose_block(s, f, err);
     if (st != STATUS_OK) goto out;

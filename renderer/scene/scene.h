@@ -13,14 +13,9 @@
 
 struct scene;
 
-/* Fibers may belong to material groups (yarn classes), each with scattering parameters of its own. */
-enum { SCENE_MAX_GROUP = 8 };
-
 struct scene_option {
-    bool black_sheet;         /* true: light that passes the cloth downwards is absorbed and none comes from below */
-    bool group_by_axis_class; /* group = the fiber's axis class (weft, warp, pile); otherwise all fibers are group 0 */
-    const uint8_t *fiber_group; /* n_fiber groups below SCENE_MAX_GROUP instead; copied; NULL: none given */
-    bool no_avx512;             /* Embree may use AVX2 at most: what a machine without AVX-512 does */
+    bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
+    bool no_avx512;   /* Embree may use AVX2 at most: what a machine without AVX-512 does */
 };
 
 /* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_TOO_LARGE; STATUS_INVALID,
@@ -30,7 +25,7 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
 void scene_free(struct scene *scene);
 size_t scene_memory_bytes(const struct scene *scene);
 size_t scene_n_segment(const struct scene *scene);
-/* The highest group of any fiber, plus 1. */
+/* fiber_set_n_group of its fibers. */
 size_t scene_n_group(const struct scene *scene);
 
 #endif

@@ -37,7 +37,8 @@ static status make_cloth(struct thread_pool *pool, struct scene **scene, struct 
     if (st == STATUS_OK) {
         fprintf(stderr, "%zu fibers, tile %.2f mm, yarns every %.3f mm\n", f.n_fiber, 1e3 * f.tile_size_m[0],
                 1e3 * report.yarn_spacing_m[0]);
-        st = scene_new(&f, &(struct scene_option){.black_sheet = true, .group_by_axis_class = true}, scene, err);
+        memcpy(f.group, f.axis_class, f.n_fiber);
+        st = scene_new(&f, &(struct scene_option){.black_sheet = true}, scene, err);
     }
     fiber_set_release(&f);
     return st;

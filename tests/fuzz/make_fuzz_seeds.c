@@ -117,6 +117,9 @@ static void fiber_seeds(void)
     fiber_set_classify(&f);
     must(fiber_set_write_hair(&f, seed_path("hair", "two.hair"), NULL) == STATUS_OK, ".hair");
     must(fiber_set_write_text(&f, seed_path("fiber_text", "two.txt"), NULL) == STATUS_OK, "text");
+    f.group[1] = 5;
+    must(fiber_set_write_hair(&f, seed_path("hair", "groups.hair"), NULL) == STATUS_OK, ".hair");
+    must(fiber_set_write_text(&f, seed_path("fiber_text", "groups.txt"), NULL) == STATUS_OK, "text");
     fiber_set_release(&f);
 }
 

@@ -31,8 +31,8 @@ static int set_up(void **state)
     orbit_configurations_16(configuration);
     hand_weave_small(&f);
     status st = scene_new(&f, &(struct scene_option){.black_sheet = true}, &one, NULL);
-    if (st == STATUS_OK)
-        st = scene_new(&f, &(struct scene_option){.black_sheet = true, .group_by_axis_class = true}, &two, NULL);
+    memcpy(f.group, f.axis_class, f.n_fiber);
+    if (st == STATUS_OK) st = scene_new(&f, &(struct scene_option){.black_sheet = true}, &two, NULL);
     fiber_set_release(&f);
     return st != STATUS_OK;
 }
@@ -87,8 +87,8 @@ static void equal_sets_are_one_set(void **state)
     }
 }
 
-/* Groups can be given for each fiber, and sets that no fiber uses have no effect. */
-static void groups_by_fiber(void **state)
+/* Sets that no fiber uses have no effect. */
+static void unused_sets_have_no_effect(void **state)
 {
     (void)state;
     struct fiber_set f;
@@ -99,11 +99,8 @@ static void groups_by_fiber(void **state)
     memcpy(param + N_PARAM, set[0], sizeof set[0]);
     memcpy(param + 2 * N_PARAM, set[1], sizeof set[1]);
     hand_weave_small(&f);
-    uint8_t *group = malloc(f.n_fiber);
-    assert_non_null(group);
-    memset(group, 1, f.n_fiber);
-    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true, .fiber_group = group}, &scene, &err),
-                     STATUS_OK);
+    memset(f.group, 1, f.n_fiber);
+    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, &err), STATUS_OK);
     assert_int_equal(scene_n_group(scene), 2);
     struct estimate a = run(one, set[0], 1, 1, 2048), b = run(scene, param, 3, 1, 2048);
     assert_memory_equal(a.mean, b.mean, sizeof a.mean);
@@ -114,10 +111,9 @@ static void groups_by_fiber(void **state)
         }
     scene_free(scene);
     scene = NULL;
-    group[0] = SCENE_MAX_GROUP;
-    assert_int_equal(scene_new(&f, &(struct scene_option){.fiber_group = group}, &scene, &err), STATUS_INVALID);
-    assert_string_equal(err.field, "fiber_group");
-    free(group);
+    f.group[0] = FIBER_MAX_GROUP;
+    assert_int_equal(scene_new(&f, &(struct scene_option){0}, &scene, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "fiber 0 has group 8"));
     fiber_set_release(&f);
 }
 
@@ -132,8 +128,8 @@ static void bad_sets_are_refused(void **state)
     double param[8 * N_PARAM];
     for (int i = 0; i < 8; i++) memcpy(param + i * N_PARAM, set[0], sizeof set[0]);
     hand_weave_small(&f);
-    f.axis_class[3] = 2; /* a third group */
-    assert_int_equal(scene_new(&f, &(struct scene_option){.group_by_axis_class = true}, &scene, &err), STATUS_OK);
+    f.group[3] = 2; /* a third group */
+    assert_int_equal(scene_new(&f, &(struct scene_option){0}, &scene, &err), STATUS_OK);
     struct appearance model;
     struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
                                  .configuration = configuration,
@@ -288,7 +284,7 @@ static void pictures_name_their_layers(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(equal_sets_are_one_set),     cmocka_unit_test(groups_by_fiber),
+        cmocka_unit_test(equal_sets_are_one_set),     cmocka_unit_test(unused_sets_have_no_effect),
         cmocka_unit_test(bad_sets_are_refused),       cmocka_unit_test(recorded_paths_of_two_sets),
         cmocka_unit_test(pictures_name_their_layers),
     };

@@ -257,8 +257,9 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
                                      {f->first_vertex, (f->n_fiber + 1) * sizeof *f->first_vertex},
                                      {f->position_m, 3 * f->n_vertex * sizeof *f->position_m},
                                      {f->radius_m, f->n_fiber * sizeof *f->radius_m},
-                                     {f->axis_class, f->n_fiber}};
-    return work_file_write(path, "fibers.1", section, 9, err);
+                                     {f->axis_class, f->n_fiber},
+                                     {f->group, f->n_fiber}};
+    return work_file_write(path, "fibers.2", section, 10, err);
 }
 
 status stage_fibers_load(struct pipeline_context *c, struct error *err)
@@ -276,13 +277,15 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
                                      {NULL, 0},
                                      {NULL, 0},
                                      {NULL, 0},
+                                     {NULL, 0},
                                      {NULL, 0}};
-    s = work_file_read(path, "fibers.1", section, 9, err);
+    s = work_file_read(path, "fibers.2", section, 10, err);
     if (s != STATUS_OK) return s;
     f.first_vertex = section[5].data;
     f.position_m = section[6].data;
     f.radius_m = section[7].data;
     f.axis_class = section[8].data;
+    f.group = section[9].data;
     fiber_set_release(&c->fiber);
     c->fiber = f;
     return STATUS_OK;

@@ -89,6 +89,54 @@ static void test_round_trip_of_many(void **state)
     fiber_set_release(&g);
 }
 
+/* Bytes of a file of eight fibers of three vertices, fiber i in group group[i]; *f: the same, to be released. */
+static char *write_groups(const char *path, const uint8_t group[8], struct fiber_set *f, size_t *n)
+{
+    fiber_set_init(f);
+    f->tile_size_m[0] = f->tile_size_m[1] = 0.1234567890123456789e-3; /* the longest text */
+    assert_int_equal(fiber_set_reserve(f, 8, 24, NULL), STATUS_OK);
+    for (size_t i = 0; i < 8; i++) {
+        f->first_vertex[i + 1] = 3 * (i + 1);
+        f->radius_m[i] = 1e-5f;
+        f->group[i] = group[i];
+    }
+    for (size_t k = 0; k < 72; k++) f->position_m[k] = 1e-5f * (float)(k % 9 + k / 9);
+    assert_int_equal(fiber_set_write_hair(f, path, NULL), STATUS_OK);
+    return scratch_read(path, n);
+}
+
+static void test_groups_round_trip(void **state)
+{
+    static const uint8_t all[8] = {3, 0, 1, 2, 7, 6, 5, 4}, none[8] = {0};
+    const char *path = scratch_path(state, "groups.hair");
+    struct fiber_set f, g, plain;
+    size_t n, n_plain;
+    fiber_set_init(&g);
+    char *data = write_groups(path, all, &f, &n);
+    assert_int_equal(fiber_set_read_hair(&g, path, NULL), STATUS_OK);
+    assert_memory_equal(g.group, all, 8);
+    assert_true(g.tile_size_m[1] == f.tile_size_m[1]);
+    char *without = write_groups(path, none, &plain, &n_plain); /* no colours, and otherwise the same bytes */
+    assert_int_equal(n, n_plain + 24 * 12);
+    assert_memory_equal(data + HEADER, without + HEADER, n_plain - HEADER);
+    assert_int_equal(without[12], 7);
+    assert_null(strstr(without + 40, "groups"));
+    data[n - 1] = 0x3e; /* the last point's colour: neither 0 nor 1 */
+    scratch_write(path, data, n);
+    struct error err = {0};
+    assert_int_equal(fiber_set_read_hair(&g, path, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "the colours of fiber 7"));
+    memcpy(data + 40, "unknown", 7); /* without the text colours are only colours */
+    scratch_write(path, data, n);
+    assert_int_equal(fiber_set_read_hair(&g, path, NULL), STATUS_OK);
+    assert_memory_equal(g.group, none, 8);
+    free(data);
+    free(without);
+    fiber_set_release(&f);
+    fiber_set_release(&g);
+    fiber_set_release(&plain);
+}
+
 static void test_longest_fiber(void **state)
 {
     const char *path = scratch_path(state, "long.hair");
@@ -263,6 +311,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_golden_bytes),
         cmocka_unit_test(test_round_trip_of_many),
+        cmocka_unit_test(test_groups_round_trip),
         cmocka_unit_test(test_longest_fiber),
         cmocka_unit_test(test_files_of_other_programs),
         cmocka_unit_test(test_no_thickness_is_an_error),

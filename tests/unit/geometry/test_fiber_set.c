@@ -79,6 +79,9 @@ static void test_validation_names_the_fiber(void **state)
     f.first_vertex[2] = 5;
     f.axis_class[0] = 3;
     expect_invalid(&f, "axis class");
+    f.axis_class[0] = 0;
+    f.group[1] = FIBER_MAX_GROUP;
+    expect_invalid(&f, "fiber 1 has group 8");
     fiber_set_release(&f);
 }
 
@@ -104,10 +107,35 @@ static void test_text_round_trip(void **state)
     assert_int_equal(g.n_vertex, 5);
     assert_memory_equal(g.first_vertex, f.first_vertex, 3 * sizeof *f.first_vertex);
     assert_memory_equal(g.axis_class, f.axis_class, 2);
+    assert_memory_equal(g.group, f.group, 2);
     for (size_t i = 0; i < 15; i++)
         assert_true(fabsf(g.position_m[i] - f.position_m[i]) <= 1e-7f * fabsf(f.position_m[i]));
     assert_true(fabsf(g.radius_m[1] - 7e-6f) < 1e-12f);
     assert_true(g.tile_size_m[0] == 0.0 && g.tile_size_m[1] == 0.0);
+    fiber_set_release(&f);
+    fiber_set_release(&g);
+}
+
+static void test_text_keeps_groups(void **state)
+{
+    float p[4];
+    int n_read = 0;
+    const char *path = scratch_path(state, "groups.txt");
+    struct fiber_set f = two_fibers(), g;
+    size_t n;
+    fiber_set_init(&g);
+    assert_int_equal(fiber_set_n_group(&f), 1);
+    assert_int_equal(fiber_set_write_text(&f, path, NULL), STATUS_OK);
+    char *text = scratch_read(path, &n); /* without groups there is no fifth column */
+    assert_int_equal(sscanf(text, "%f %f %f %f%n", &p[0], &p[1], &p[2], &p[3], &n_read), 4);
+    assert_int_equal(text[n_read], '\n');
+    free(text);
+    f.group[1] = 6;
+    assert_int_equal(fiber_set_n_group(&f), 7);
+    assert_int_equal(fiber_set_write_text(&f, path, NULL), STATUS_OK);
+    assert_int_equal(fiber_set_read_text(&g, path, NULL), STATUS_OK);
+    assert_memory_equal(g.first_vertex, f.first_vertex, 3 * sizeof *f.first_vertex);
+    assert_memory_equal(g.group, f.group, 2);
     fiber_set_release(&f);
     fiber_set_release(&g);
 }
@@ -142,7 +170,13 @@ static void test_text_errors_name_the_line(void **state)
         {"0 0 0 1\n\n0 0 0 1\n0 0 1 1\n", "line 2"},
         {"0 0 0 1\n0 0 1\n", "line 2"},
         {"0 0 0 1\n0 0 1\n5\n", "line 2"}, /* must not read on in the next line */
-        {"0 0 0 1\n0 0 1 1 1\n", "line 2"},
+        {"0 0 0 1\n0 0 1 1 1\n", "line 2 has another group"},
+        {"0 0 0 1 1\n0 0 1 1 2\n", "line 2 has another group"},
+        {"0 0 0 1 2\n0 0 1 1 2 2\n", "line 2"},
+        {"0 0 0 1 2\n0 0 1 1 8\n", "line 2"},
+        {"0 0 0 1 -1\n0 0 1 1 -1\n", "line 1"},
+        {"0 0 0 1 0.5\n0 0 1 1 0.5\n", "line 1"},
+        {"0 0 0 1 nan\n0 0 1 1 nan\n", "line 1"},
         {"0 0 0 1\n0 nan 1 1\n", "line 2"},
         {"0 0 0 1\n0 0 1 inf\n", "line 2"},
         {"0 0 0 1\n0 0 1 0\n", "line 2"},
@@ -174,6 +208,7 @@ int main(void)
         cmocka_unit_test(test_validation_names_the_fiber),
         cmocka_unit_test(test_reserve_refuses_what_no_machine_has),
         cmocka_unit_test(test_text_round_trip),
+        cmocka_unit_test(test_text_keeps_groups),
         cmocka_unit_test(test_text_of_other_programs),
         cmocka_unit_test(test_text_errors_name_the_line),
     };
