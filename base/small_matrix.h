@@ -2,7 +2,7 @@
  *
  * LAPACK is not used for it. A result must have the same bits on every machine and with any number of threads;
  * OpenBLAS selects its kernels by processor, and which BLAS a Debian system runs is the administrator's choice. The
- * matrices have 3 to 16 rows (a few thousand in a band of 7), where plain loops in a fixed order cost nothing that
+ * matrices have 3 to 64 rows, mostly fewer than 16 (a few thousand in a band of 7), where plain loops in a fixed order cost nothing that
  * can be measured.
  */
 #ifndef SELVEDGE_BASE_SMALL_MATRIX_H
@@ -12,7 +12,7 @@
 #include <stddef.h>
 
 /* Largest n of small_eigen, small_clip_eigenvalues and small_invert, which keep copies on the stack. */
-enum { SMALL_MATRIX_MAX = 16 };
+enum { SMALL_MATRIX_MAX = 64 };
 
 /* Cholesky factor L of a symmetric n x n matrix, in place of its lower triangle; the upper triangle is neither read nor
  * written. Returns false when a pivot is not greater than least_pivot (0 accepts every positive definite matrix). */

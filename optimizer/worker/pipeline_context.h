@@ -44,7 +44,7 @@ struct pipeline_candidate {
 /* One model of the job: its parameters, and the results of its fit. */
 struct pipeline_model {
     struct appearance appearance;
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct fit_parameter parameter[FIT_MAX_PARAM];
     const struct job_fit_option *option; /* of the document */
     struct fit_result fit;
     struct validation validation;

@@ -20,7 +20,7 @@ enum { FIT_MAX_START = 16 };
 
 /* One of several starts. */
 struct fit_start {
-    double from[SCATTERING_MAX_PARAM], param[SCATTERING_MAX_PARAM]; /* internal unit */
+    double from[FIT_MAX_PARAM], param[FIT_MAX_PARAM]; /* internal unit */
     double objective, objective_se, prior_penalty;
     bool converged;
     bool kept;
@@ -66,7 +66,7 @@ struct fit_problem {
 };
 
 struct fit_result {
-    double param[SCATTERING_MAX_PARAM];
+    double param[FIT_MAX_PARAM];
     bool converged;
     enum stop_reason stop;
     char reason[240]; /* the stop reason as a sentence with numbers */
@@ -79,7 +79,7 @@ struct fit_result {
     /* The fields below are filled in by fit_run (fit_run.h). */
     struct fit_nuisance nuisance;
     /* values of the unknowns of fit_layout.h: leaders of ties and nuisance terms */
-    double unknown[SCATTERING_MAX_PARAM];
+    double unknown[FIT_MAX_PARAM];
     struct uncertainty unknown_uncertainty;
     size_t n_start; /* entries of start; 0 when there was only one start */
     struct fit_start start[FIT_MAX_START];

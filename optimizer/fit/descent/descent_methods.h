@@ -10,8 +10,8 @@
 /* A running fit: buffers and totals that every method needs. */
 struct descent_run {
     const struct fit_problem *problem;
-    struct coordinate coordinate[SCATTERING_MAX_PARAM];
-    bool fixed[SCATTERING_MAX_PARAM];
+    struct coordinate coordinate[FIT_MAX_PARAM];
+    bool fixed[FIT_MAX_PARAM];
     size_t *n_path;              /* per configuration, for the next call */
     struct estimate *replica[2]; /* of the last descent_estimate */
     uint64_t path_budget, n_path_total, n_path_step;
@@ -30,7 +30,7 @@ status descent_estimate(struct descent_run *run, const double *param, uint32_t i
                         struct error *err);
 /* Counts the step, fills the totals into it, and calls the problem's report function, whose error it returns. */
 status descent_report(struct descent_run *run, struct fit_step *step, struct error *err);
-/* STATUS_INVALID: fewer than one observation, a start outside its bounds, more parameters than SCATTERING_MAX_PARAM. */
+/* STATUS_INVALID: fewer than one observation, a start outside its bounds, more parameters than FIT_MAX_PARAM. */
 status descent_check(const struct fit_problem *problem, struct error *err);
 
 /* Minimises g.y + y'Hy/2 over lower <= y <= upper, with lower <= 0 <= upper and a positive semi-definite H (n x n),

@@ -7,9 +7,9 @@
 
 status descent_check(const struct fit_problem *problem, struct error *err)
 {
-    if (problem->n_param == 0 || problem->n_param > SCATTERING_MAX_PARAM)
+    if (problem->n_param == 0 || problem->n_param > FIT_MAX_PARAM)
         return error_set(err, STATUS_INVALID, "cannot fit %zu parameters: allowed are 1 to %d", problem->n_param,
-                         SCATTERING_MAX_PARAM);
+                         FIT_MAX_PARAM);
     if (problem->observation->n == 0 || problem->observation->n != problem->estimator->n_configuration)
         return error_set(err, STATUS_INVALID, "cannot fit %zu observations with an estimator of %zu configurations",
                          problem->observation->n, problem->estimator->n_configuration);

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM, KEY_STRIDE = 4096 }; /* iteration keys of one start, out of the 65536 of rng.h */
+enum { N = FIT_MAX_PARAM, KEY_STRIDE = 4096 }; /* iteration keys of one start, out of the 65536 of rng.h */
 
 struct fit {
     const struct fit_problem *problem; /* in the model's parameters */

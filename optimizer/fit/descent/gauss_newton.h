@@ -5,7 +5,7 @@
 
 #include "optimizer/fit/descent/descent_methods.h"
 
-enum { N = SCATTERING_MAX_PARAM };
+enum { N = FIT_MAX_PARAM };
 
 struct gauss_newton {
     struct descent_run run;

@@ -21,7 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM, N_RUN = 6, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5 };
+enum { N = FIT_MAX_PARAM, N_RUN = 6, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5 };
 
 static const uint64_t published_path = 64 * 64 * 64;
 static const double first_move = 0.005, factor = 3.0, turn_limit = 0.3;

@@ -113,7 +113,7 @@ struct measurement {
 static status measure_symbol(struct measurement *m, size_t first, size_t n_slot, struct rescale_curve *curve,
                              struct error *err)
 {
-    double param[SCATTERING_MAX_PARAM];
+    double param[FIT_MAX_PARAM];
     const struct fit_problem *problem = m->problem;
     const struct coordinate *k = m->k;
     const struct estimator *e = problem->estimator;

@@ -6,6 +6,10 @@
 
 #include "base/catalogue/param_info.h"
 
+/* Largest number of parameters of a fit. It may be larger than that of a scattering model, because the cloth may have
+ * numbers of its own and several sets of parameters. */
+enum { FIT_MAX_PARAM = 64 };
+
 struct coordinate {
     enum param_coordinate kind;
     double param_lower, param_upper; /* internal unit */

@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM };
+enum { N = FIT_MAX_PARAM };
 _Static_assert((int)SCATTERING_MAX_FLAT >= N, "estimates have room for derivatives by all unknowns");
 
 /* The range of a nuisance term, in standard deviations of its prior. */

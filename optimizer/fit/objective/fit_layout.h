@@ -29,29 +29,29 @@ struct fit_parameter {
 /* Ties, priors, nuisance terms and starts of a fit, in internal units; arrays have one slot for each parameter of the
  * model. */
 struct fit_option {
-    size_t leader[SCATTERING_MAX_PARAM];
-    double ratio[SCATTERING_MAX_PARAM];
-    double prior_mean[SCATTERING_MAX_PARAM], prior_se[SCATTERING_MAX_PARAM]; /* NaN: none */
-    double global_gain_sd;                                                   /* of ln gain; 0: no global gain */
-    double photograph_gain_sd; /* of ln gain, one for each observation; 0: none */
-    double stray_light_sd;     /* radiance; 0: none */
-    size_t n_start;            /* 1 or more */
+    size_t leader[FIT_MAX_PARAM];
+    double ratio[FIT_MAX_PARAM];
+    double prior_mean[FIT_MAX_PARAM], prior_se[FIT_MAX_PARAM]; /* NaN: none */
+    double global_gain_sd;                                     /* of ln gain; 0: no global gain */
+    double photograph_gain_sd;                                 /* of ln gain, one for each observation; 0: none */
+    double stray_light_sd;                                     /* radiance; 0: none */
+    size_t n_start;                                            /* 1 or more */
 };
 
 struct fit_layout {
     size_t n_full, n_unknown;
-    size_t owner[SCATTERING_MAX_PARAM]; /* index of the unknown that the parameter follows */
-    double ratio[SCATTERING_MAX_PARAM];
-    struct param_info info[SCATTERING_MAX_PARAM]; /* of the unknowns; the next three likewise */
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
-    struct gaussian_prior prior[SCATTERING_MAX_PARAM];
+    size_t owner[FIT_MAX_PARAM]; /* index of the unknown that the parameter follows */
+    double ratio[FIT_MAX_PARAM];
+    struct param_info info[FIT_MAX_PARAM]; /* of the unknowns; the next three likewise */
+    struct fit_parameter parameter[FIT_MAX_PARAM];
+    struct gaussian_prior prior[FIT_MAX_PARAM];
     bool has_prior;
     size_t i_gain, i_stray; /* index of the unknown, or SIZE_MAX when there is none */
 };
 
 /* Every parameter on its own, no priors, no nuisance terms, one start. */
 void fit_option_init(struct fit_option *o);
-/* STATUS_INVALID when ties and nuisance terms make more unknowns than SCATTERING_MAX_PARAM, or a prior lies outside the
+/* STATUS_INVALID when ties and nuisance terms make more unknowns than FIT_MAX_PARAM, or a prior lies outside the
  * model's range. */
 status fit_layout_init(struct fit_layout *l, const struct param_info *info, const struct fit_parameter *parameter,
                        size_t n_param, const struct fit_option *o, struct error *err);

@@ -20,15 +20,17 @@
 #include "optimizer/fit/photographs/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
+_Static_assert((int)FIT_MAX_PARAM <= (int)SCATTERING_MAX_FLAT, "an estimate has room for the derivatives of a fit");
+
 /* Prior of one unknown in its fit coordinate. precision: 1 / sd^2, 0 for no prior. */
 struct gaussian_prior {
     double mean, precision;
 };
 
 struct history_step {
-    double x[SCATTERING_MAX_PARAM];
-    double slope[SCATTERING_MAX_PARAM]; /* d param / d x there */
-    struct estimate *replica[2];        /* one per observation, owned */
+    double x[FIT_MAX_PARAM];
+    double slope[FIT_MAX_PARAM]; /* d param / d x there */
+    struct estimate *replica[2]; /* one per observation, owned */
 };
 
 struct linear_history {
@@ -41,7 +43,7 @@ struct linear_history {
 
 struct linear_model {
     size_t n_row, n_param;
-    double x_ref[SCATTERING_MAX_PARAM];
+    double x_ref[FIT_MAX_PARAM];
     double *r[2], *r_var[2]; /* n_row */
     double *j[2], *j_var[2]; /* n_row x n_param */
     /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */

@@ -105,7 +105,7 @@ static void add_residuals(struct linear_model *m, const struct linear_history *h
 /* Variance of one path's derivatives of configuration i, by channel and column and summed over both, and the square
  * of the mean derivatives, summed likewise. */
 struct derivative_scale {
-    double by[3][SCATTERING_MAX_PARAM];
+    double by[3][FIT_MAX_PARAM];
     double path_variance, square;
 };
 
@@ -156,7 +156,7 @@ static double derivative_weight(const struct linear_history *h, size_t i, size_t
 /* How a step is carried to x_ref: dx, its size, the change of the means by the derivatives of all steps, and the
  * inverse of the paths of these (1 / strength). */
 struct carried {
-    double dx[SCATTERING_MAX_PARAM], change[2][3], per_path;
+    double dx[FIT_MAX_PARAM], change[2][3], per_path;
     struct bend bend;
 };
 
@@ -165,7 +165,7 @@ struct carried {
 static void carry(const struct linear_history *h, const double *mean, size_t i, const struct derivative_scale *scale,
                   const double *x_ref, const double *x, struct carried *out)
 {
-    double sum = 0.0, away[SCATTERING_MAX_PARAM];
+    double sum = 0.0, away[FIT_MAX_PARAM];
     memset(out, 0, sizeof *out);
     for (size_t p = 0; p < h->n_param; p++) out->dx[p] = x_ref[p] - x[p];
     bent_change(mean, i, out->dx, h->n_param, &out->bend);
@@ -231,7 +231,7 @@ static void add_carried_noise(struct linear_model *m, const struct linear_histor
                               const struct derivative_scale *scale, const struct carried *carried,
                               const struct pool_weight *weight)
 {
-    double dx[SCATTERING_MAX_PARAM] = {0}, per_path = 0.0;
+    double dx[FIT_MAX_PARAM] = {0}, per_path = 0.0;
     for (size_t k = 0; k < h->n_step; k++) {
         per_path += weight[k].r * carried[k].per_path;
         for (size_t p = 0; p < h->n_param; p++) dx[p] += weight[k].r * carried[k].dx[p];

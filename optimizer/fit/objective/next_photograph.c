@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM };
+enum { N = FIT_MAX_PARAM };
 
 static const double least_var = 1e-6; /* of a residual: no photograph is more exact than 0.1 % */
 

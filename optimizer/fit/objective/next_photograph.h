@@ -25,9 +25,9 @@
 #include "optimizer/fit/objective/uncertainty.h"
 
 struct candidate_score {
-    double information;                    /* nats; 0 when the photograph adds nothing */
-    double se_after[SCATTERING_MAX_PARAM]; /* expected, internal units, every parameter of the model */
-    bool determines[SCATTERING_MAX_PARAM]; /* not determined now, determined with this photograph */
+    double information;             /* nats; 0 when the photograph adds nothing */
+    double se_after[FIT_MAX_PARAM]; /* expected, internal units, every parameter of the model */
+    bool determines[FIT_MAX_PARAM]; /* not determined now, determined with this photograph */
 };
 
 /* The result of fit_run that candidates are scored for. */

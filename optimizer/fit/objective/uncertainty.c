@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = SCATTERING_MAX_PARAM };
+enum { N = FIT_MAX_PARAM };
 _Static_assert((int)SMALL_MATRIX_MAX >= (int)N, "small_matrix.h takes matrices of all parameters");
 /* A positive quantity whose range spans decades counts as determined only if its standard error is below a factor of
  * 2. */

@@ -26,12 +26,12 @@
 
 struct uncertainty {
     size_t n_param;
-    double cov[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM]; /* fit coordinates; rows of fixed parameters are zero */
+    double cov[FIT_MAX_PARAM * FIT_MAX_PARAM]; /* fit coordinates; rows of fixed parameters are zero */
     /* 1 on the diagonal, 0 where a parameter is fixed */
-    double correlation[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM];
-    double se_param[SCATTERING_MAX_PARAM]; /* internal unit; 0 for fixed parameters */
-    bool at_bound[SCATTERING_MAX_PARAM];
-    bool determined[SCATTERING_MAX_PARAM]; /* uncertainty_determined; true for fixed ones */
+    double correlation[FIT_MAX_PARAM * FIT_MAX_PARAM];
+    double se_param[FIT_MAX_PARAM]; /* internal unit; 0 for fixed parameters */
+    bool at_bound[FIT_MAX_PARAM];
+    bool determined[FIT_MAX_PARAM]; /* uncertainty_determined; true for fixed ones */
     /* per residual of a mean (contrasts of a texture have a misfit of their own), in units of the objective: about
      * the squared relative error that the model leaves */
     double misfit_var;

@@ -27,7 +27,7 @@ static void warn_of(struct pipeline_context *c, const struct pipeline_model *m)
 static status certify(struct pipeline_context *c, struct pipeline_model *m, const struct configuration *configuration,
                       const double *weight, struct error *err)
 {
-    bool skip[SCATTERING_MAX_PARAM];
+    bool skip[FIT_MAX_PARAM];
     double start_s = clock_monotonic_s();
     for (size_t p = 0; p < m->appearance.n_param; p++) skip[p] = m->parameter[p].fixed;
     const struct derivative_check_request q = {

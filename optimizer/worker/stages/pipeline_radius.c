@@ -23,7 +23,7 @@ struct search {
     struct worker_series *series;
     float *radius_m; /* original radii of the cloth */
     size_t n_done;
-    double u[NOISY_MAX_POINT], param[NOISY_MAX_POINT][SCATTERING_MAX_PARAM];
+    double u[NOISY_MAX_POINT], param[NOISY_MAX_POINT][FIT_MAX_PARAM];
 };
 
 static double mean_radius_m(const struct fiber_set *f)
@@ -60,7 +60,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     const struct descent_method *method = descent_find(method_gauss_newton.id);
     uint64_t budget = c->doc->path_budget > 0 ? c->doc->path_budget : method->info->default_path_budget;
     double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)c->fitted.n);
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct fit_parameter parameter[FIT_MAX_PARAM];
     struct fit_option option;
     set_starts(q, u, parameter);
     pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);

@@ -40,7 +40,7 @@ static float volume_eval_pdf(const struct phase_state *s, const float wi[3], con
 static void fit(struct trace_estimator *t, long n_before, const char *model, const char *field)
 {
     struct observation_set o;
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct fit_parameter parameter[FIT_MAX_PARAM];
     struct fit_result r;
     observation_set_init(&o);
     for (size_t i = 0; i < N_ROW; i++) {

@@ -17,7 +17,7 @@
 
 /* ---- as many unknowns as there is room for ---- */
 
-enum { WIDE = SCATTERING_MAX_PARAM, WIDE_ROWS = 40 };
+enum { WIDE = FIT_MAX_PARAM, WIDE_ROWS = 40 };
 
 /* A pseudo-random factor, so that every parameter is determined. */
 static double wide_factor(size_t i, size_t c, size_t p)
@@ -132,7 +132,7 @@ static void test_every_model_has_room_for_nuisance_terms(void **state)
     o.stray_light_sd = 0.01;
     size_t i = 0;
     for (; appearance_at(i, &a); i++) {
-        struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+        struct fit_parameter parameter[FIT_MAX_PARAM];
         struct fit_layout l;
         struct error err = {0};
         for (size_t p = 0; p < a.n_param; p++)

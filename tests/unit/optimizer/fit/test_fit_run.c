@@ -254,16 +254,16 @@ static void test_too_many_unknowns(void **state)
     struct fit_option o;
     struct fit_layout l;
     struct error err = {0};
-    struct param_info info[SCATTERING_MAX_PARAM];
-    struct fit_parameter p[SCATTERING_MAX_PARAM];
+    struct param_info info[FIT_MAX_PARAM];
+    struct fit_parameter p[FIT_MAX_PARAM];
     fit_option_init(&o);
-    for (size_t i = 0; i < SCATTERING_MAX_PARAM; i++) {
+    for (size_t i = 0; i < FIT_MAX_PARAM; i++) {
         info[i] = fake_param[0];
         p[i] = (struct fit_parameter){0.1, 0.9, 0.5, false};
     }
-    assert_int_equal(fit_layout_init(&l, info, p, SCATTERING_MAX_PARAM, &o, &err), STATUS_OK);
+    assert_int_equal(fit_layout_init(&l, info, p, FIT_MAX_PARAM, &o, &err), STATUS_OK);
     o.global_gain_sd = 0.1;
-    assert_int_equal(fit_layout_init(&l, info, p, SCATTERING_MAX_PARAM, &o, &err), STATUS_INVALID);
+    assert_int_equal(fit_layout_init(&l, info, p, FIT_MAX_PARAM, &o, &err), STATUS_INVALID);
     assert_string_equal(err.field, OPTION_NUISANCE);
 }
 

@@ -18,7 +18,7 @@ enum { N = FAKE_N_PARAM };
 
 static double ln_det(const double *a, size_t n)
 {
-    double value[SCATTERING_MAX_PARAM], vector[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM], sum = 0.0;
+    double value[FIT_MAX_PARAM], vector[FIT_MAX_PARAM * FIT_MAX_PARAM], sum = 0.0;
     small_eigen(a, n, value, vector);
     for (size_t i = 0; i < n; i++) sum += log(value[i]);
     return sum;
@@ -28,7 +28,7 @@ static double ln_det(const double *a, size_t n)
 struct before {
     struct fit_layout layout;
     struct uncertainty u;
-    double unknown[SCATTERING_MAX_PARAM], slope[SCATTERING_MAX_PARAM];
+    double unknown[FIT_MAX_PARAM], slope[FIT_MAX_PARAM];
 };
 
 static void set_before(struct before *k, const struct fit_option *o)
@@ -70,9 +70,8 @@ static void check_against_the_whole_matrix(const struct fit_option *o)
     struct before k;
     struct candidate_score score;
     struct estimate e = {.n_path = 1};
-    double before[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM],
-        information[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM], after[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM],
-        j[3][SCATTERING_MAX_PARAM], v[9], v_inverse[9];
+    double before[FIT_MAX_PARAM * FIT_MAX_PARAM], information[FIT_MAX_PARAM * FIT_MAX_PARAM],
+        after[FIT_MAX_PARAM * FIT_MAX_PARAM], j[3][FIT_MAX_PARAM], v[9], v_inverse[9];
     struct configuration c = {.light_theta_rad = 0.7, .camera_theta_rad = 0.6, .camera_phi_rad = M_PI};
     set_before(&k, o);
     const size_t n = k.layout.n_unknown;
