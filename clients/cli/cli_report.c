@@ -144,25 +144,28 @@ static void percent(const json_t *of, const char *key, char *text, size_t n)
 }
 
 /* Prints one line for each model if there are several. */
-static void print_models(const json_t *models, FILE *out)
+static void print_models(const json_t *models, const char *chosen_by, FILE *out)
 {
     size_t i;
     const json_t *m;
     if (json_array_size(models) < 2) return;
     const bool gains = !isnan(member_number(json_array_get(models, 0), "fit_rel_rms_with_gains"));
-    fprintf(out, "%-24s %16s %16s %12s %8s\n", "model (rel. RMS error)", "fitted", "held out", "paths", "time");
+    fprintf(out, "%-24s %16s %16s %16s %12s %8s\n", "model (rel. RMS error)", "fitted", "left out in turn", "held out",
+            "paths", "time");
     json_array_foreach(models, i, m)
     {
-        char id[64], fitted[48], held_out[48], time[CLI_SHORT_TEXT];
+        char id[64], fitted[48], left_out[48], held_out[48], time[CLI_SHORT_TEXT];
         text_clean(member_text(m, "id"), id, sizeof id);
         percent(m, gains ? "fit_rel_rms_with_gains" : "fit_rel_rms", fitted, sizeof fitted);
         percent(m, gains ? "heldout_rel_rms_with_gains" : "heldout_rel_rms", held_out, sizeof held_out);
+        percent(json_object_get(m, "cross_validation"), "rel_rms", left_out, sizeof left_out);
         text_duration(member_number(m, "fit_wall_s"), time);
-        fprintf(out, "  %-22s %16s %16s %12.3g %8s  %s%s\n", id, fitted, held_out, member_number(m, "n_path_fit"), time,
-                json_is_true(json_object_get(m, "best")) ? "best " : "",
+        fprintf(out, "  %-22s %16s %16s %16s %12.3g %8s  %s%s\n", id, fitted, left_out, held_out,
+                member_number(m, "n_path_fit"), time, json_is_true(json_object_get(m, "best")) ? "best " : "",
                 json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
     }
-    fprintf(out, "%sof the best model:\n", gains ? "(errors: each photograph with its own gain)\n" : "");
+    fprintf(out, "%sof the best model%s:\n", gains ? "(errors: each photograph with its own gain)\n" : "",
+            strcmp(chosen_by, "cross_validation") == 0 ? ", chosen by the fitted rows left out in turn" : "");
 }
 
 static void print_radius(const json_t *radius, FILE *out)
@@ -182,7 +185,7 @@ void report_result(const json_t *job, FILE *out)
     } residual[] = {{"fit_rel_rms", "relative RMS error, fitted"}, {"heldout_rel_rms", "relative RMS error, held out"}};
     size_t i;
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
-    print_models(json_object_get(result, "models"), out);
+    print_models(json_object_get(result, "models"), member_text(result, "chosen_by"), out);
     print_radius(json_object_get(result, "radius"), out);
     if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
     json_array_foreach(parameters, i, parameter) print_parameter(parameter, out);
@@ -190,6 +193,11 @@ void report_result(const json_t *job, FILE *out)
         char text[48];
         percent(result, residual[i].key, text, sizeof text);
         if (strcmp(text, "-") != 0) fprintf(out, "%s: %s\n", residual[i].label, text);
+    }
+    if (json_is_object(json_object_get(result, "cross_validation"))) {
+        char text[48];
+        percent(json_object_get(result, "cross_validation"), "rel_rms", text, sizeof text);
+        fprintf(out, "relative RMS error, fitted rows left out in turn: %s\n", text);
     }
     json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, out);
     const json_t *converged = json_object_get(result, "converged");

@@ -6,7 +6,7 @@ import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
 import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
-import { configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
+import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 
 const SHOWN_WARNINGS = 2;
@@ -38,9 +38,11 @@ function factsOf(job) {
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
   const of = job.result ?? job; // after the end: of the best model, computed with fresh paths
   if (isNumber(of.objective)) facts.push(fact("objective", withError(of.objective, of.objective_se)));
-  const { fit, fitSe, held, heldSe } = residuals(job);
+  const { fit, fitSe, leftOut, leftOutSe, held, heldSe } = residuals(job);
   if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percentWithError(fit, fitSe)));
+  if (isNumber(leftOut)) facts.push(fact("left out in turn", percentWithError(leftOut, leftOutSe)));
   if (isNumber(held)) facts.push(fact("held out", percentWithError(held, heldSe)));
+  for (const { set, rgb } of channelErrors(job)) facts.push(fact(`red, green, blue apart, ${set}`, rgb.map(({ value, se }) => percentWithError(value, se)).join(", ")));
   const radius = radiusSearch(job);
   if (radius) facts.push(fact("fiber radius, fitted", `${withError(radius.value, radius.se)} µm ${radius.flags.join(", ")}`));
   if (isNumber(job.started_unix_s) && isNumber(job.finished_unix_s)) facts.push(fact("took", duration(job.finished_unix_s - job.started_unix_s)));
@@ -64,12 +66,13 @@ function notesOf(job) {
 }
 
 // Compares the models of a job that fits several.
-function modelTable(list) {
-  const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.fit, m.fitSe)), el("td", { class: "number" }, percentWithError(m.held, m.heldSe)),
+function modelTable(list, choice) {
+  const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.fit, m.fitSe)),
+    el("td", { class: "number" }, isNumber(m.leftOut) ? percentWithError(m.leftOut, m.leftOutSe) : "–"), el("td", { class: "number" }, percentWithError(m.held, m.heldSe)),
     el("td", { class: "number" }, isNumber(m.paths) ? `${(m.paths / 1e6).toPrecision(3)} M` : "–"), el("td", { class: "number" }, duration(m.seconds)),
     el("td", {}, m.best ? el("span", { class: "tag" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
-  return [el("p", { class: "hint" }, "Relative RMS errors of mean radiances; the best model has the lowest error over the held-out rows. The rest of this page shows the best model."),
-    el("table", { id: "models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Fitted"), el("th", { class: "number" }, "Held out"),
+  return [el("p", { class: "hint" }, `Relative RMS errors of mean radiances. ${choice} The rest of this page shows the best model.`),
+    el("table", { id: "models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Fitted"), el("th", { class: "number" }, "Left out in turn"), el("th", { class: "number" }, "Held out"),
       el("th", { class: "number" }, "Paths"), el("th", { class: "number" }, "Time"), el("th", {}, "Remarks"))), el("tbody", {}, rows)),
     ...list.filter((m) => !m.best).map((m) => el("details", {}, el("summary", {}, `Parameters of ${m.id}`), parameterTable(m.parameters)))];
 }
@@ -127,7 +130,7 @@ export function jobPage(page, id) {
     closeFibers = fibers?.close ?? null;
     const compete = models(job), radius = radiusSearch(job);
     results.append(
-      compete.length > 1 ? card("Models compared", modelTable(compete)) : "",
+      compete.length > 1 ? card("Models compared", modelTable(compete, choiceOf(job))) : "",
       el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
       details ? card("More results of the fit", details) : "",
       radius ? card("Fiber radius", radiusPlot(radius)) : "",

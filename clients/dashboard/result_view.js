@@ -30,10 +30,11 @@ function comparedErrors(m) {
   return { fit: m.fit_rel_rms_with_gains, fitSe: m.fit_rel_rms_with_gains_se, held: m.heldout_rel_rms_with_gains, heldSe: m.heldout_rel_rms_with_gains_se, withGains: true };
 }
 
-// Returns all models of the job: [{id, title, best, converged, fit, held, withGains, paths, seconds, parameters}]
+// Returns all models of the job: [{id, title, best, converged, fit, leftOut, held, withGains, paths, seconds,
+// parameters}]
 export function models(job) {
   return (job.result?.models ?? []).map((m) => ({
-    id: m.id, title: m.title, best: m.best, converged: m.converged, paths: m.n_path_fit, seconds: m.fit_wall_s, parameters: fitted(m), ...comparedErrors(m),
+    leftOut: m.cross_validation?.rel_rms, leftOutSe: m.cross_validation?.rel_rms_se, id: m.id, title: m.title, best: m.best, converged: m.converged, paths: m.n_path_fit, seconds: m.fit_wall_s, parameters: fitted(m), ...comparedErrors(m),
   }));
 }
 
@@ -81,6 +82,16 @@ export function configurations(job, urls) {
 export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
 export const fiberFile = (files) => files.find((f) => f.path.endsWith(".hair")) ?? null;
 export const residuals = (job) => ({
-  fit: job.result?.fit_rel_rms, fitSe: job.result?.fit_rel_rms_se, held: job.result?.heldout_rel_rms, heldSe: job.result?.heldout_rel_rms_se, converged: job.result?.converged,
+  fit: job.result?.fit_rel_rms, fitSe: job.result?.fit_rel_rms_se, held: job.result?.heldout_rel_rms, heldSe: job.result?.heldout_rel_rms_se,
+  leftOut: job.result?.cross_validation?.rel_rms, leftOutSe: job.result?.cross_validation?.rel_rms_se, converged: job.result?.converged,
 });
+// Relative RMS errors of the channels apart: [{set, rgb: [{value, se}]}], without sets that have no rows.
+export function channelErrors(job) {
+  const of = (set, key) => ({ set, rgb: (job.result?.[key] ?? []).map((value, c) => ({ value, se: job.result[`${key}_se`]?.[c] })) });
+  return [of("fitted", "fit_channel_rel_rms"), of("held out", "heldout_channel_rel_rms")].filter(({ rgb }) => rgb.length && rgb.every(({ value }) => isNumber(value)));
+}
+// By what the best of several models was chosen, as a sentence.
+export const choiceOf = (job) => (job.result?.chosen_by === "cross_validation"
+  ? "The best model has the lowest error over fitted rows that were left out in turn (cross-validation); held-out rows have no part in the choice."
+  : "The fitted rows are too few for cross-validation, so the best model has the lowest error over the fitted rows.");
 export const finite = (x) => (isNumber(x) ? x : null);

@@ -73,23 +73,6 @@ struct appearance_scene pipeline_scene(const struct pipeline_context *c)
     return (struct appearance_scene){.fibers = c->scene, .volume = c->has_volume_scene ? &c->volume_scene : NULL};
 }
 
-const struct objective_value *pipeline_judged_error(const struct pipeline_model *m)
-{
-    const struct validation *v = &m->validation;
-    const bool gains = m->option->gain == JOB_GAIN_PER_PHOTOGRAPH;
-    if (isfinite(v->held_out.rel_rms)) return gains ? &v->held_out_with_gains : &v->held_out;
-    return gains ? &v->fit_with_gains : &v->fit;
-}
-
-size_t pipeline_best_model(const struct pipeline_context *c)
-{
-    size_t best = 0;
-    for (size_t i = 1; i < c->n_model; i++)
-        if (pipeline_judged_error(&c->model[i])->rel_square < pipeline_judged_error(&c->model[best])->rel_square)
-            best = i;
-    return best;
-}
-
 void pipeline_warn(void *context, const char *option, const char *text)
 {
     struct pipeline_context *c = context;

@@ -31,6 +31,7 @@ struct validation {
     struct objective_value fit, held_out; /* held_out: NaN when there are no held-out rows */
     struct objective_value fit_with_gains,
         held_out_with_gains; /* with one gain per row; NaN unless the job asks for gains */
+    struct objective_channels fit_channels, held_out_channels; /* NaN without such rows */
     /* largest standard error of a rendered mean (both replicas), relative to the row's brightness */
     double worst_rel_se;
 };
@@ -148,10 +149,5 @@ status pipeline_model_path(const struct pipeline_context *c, const char *stage, 
 struct appearance_scene pipeline_scene(const struct pipeline_context *c);
 /* Number of unknowns of a model's fit: parameters that are neither fixed nor tied to another one. */
 size_t pipeline_n_free(const struct pipeline_model *m);
-/* After validation: the error by which models are compared, which is that over the held-out rows, or over the fitted
- * rows when none are held out. If the job gives every photograph a gain, each row has its own. pipeline_best_model
- * returns the model with the lowest one (rel_square). */
-const struct objective_value *pipeline_judged_error(const struct pipeline_model *m);
-size_t pipeline_best_model(const struct pipeline_context *c);
 
 #endif

@@ -32,11 +32,11 @@ def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
     return head + struct.pack(f"<{len(xyz)}f", *xyz) + struct.pack(f"<{len(thickness)}f", *thickness)
 
 
-def start_small_job(daemon, document):
-    """Uploads cloth.hair and rows.csv, which the document names, and starts the job."""
+def start_small_job(daemon, document, table=TABLE):
+    """Uploads cloth.hair and rows.csv (`table`), which the document names, and starts the job."""
     job = daemon.create(document)
     daemon.upload(job, "cloth.hair", hair(), "fibers")
-    daemon.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    daemon.upload(job, "rows.csv", table.encode(), "measurements")
     reply = daemon.post(f"/v1/jobs/{job}/start")
     assert reply.status_code == 202, reply.text
     return job

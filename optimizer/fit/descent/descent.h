@@ -9,6 +9,7 @@
 
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/stop_reason.h"
+#include "optimizer/fit/descent/cross_validation.h"
 #include "optimizer/fit/descent/estimator.h"
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/objective/fit_layout.h"
@@ -75,6 +76,7 @@ struct fit_result {
     double wall_s;
     struct objective_value objective; /* predicted at `param` by all estimates of the fit together */
     struct uncertainty uncertainty;
+    struct cross_validation cross_validation;
     double prior_penalty; /* what the priors add to the objective at `param` */
     /* The fields below are filled in by fit_run (fit_run.h). */
     struct fit_nuisance nuisance;

@@ -183,7 +183,8 @@ static status finish(struct gauss_newton *g, struct fit_result *result, struct e
     result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)g->model.n_row);
     result->prior_penalty = linear_model_penalty(&g->model, g->x);
     uncertainty_compute(&g->model, g->run.coordinate, g->run.fixed, &result->uncertainty);
-    return STATUS_OK;
+    return cross_validation_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed,
+                                    &result->cross_validation, err);
 }
 
 /* Paths of one iteration with the fewest paths. */

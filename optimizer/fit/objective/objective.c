@@ -31,17 +31,33 @@ double objective_image_difference(const double x_rgb[3], const double y_rgb[3])
     return sum;
 }
 
+/* Root of the mean square `square`, whose standard error is square_se, and the root's own standard error. */
+static double root_of_square(double square, double square_se, double *se)
+{
+    double rms = sqrt(fmax(0.0, square));
+    *se = sqrt(square_se); /* the delta method fails near 0 */
+    if (rms > 0.0) *se = fmin(*se, 0.5 * square_se / rms);
+    return rms;
+}
+
+/* (A - M)(B - M) of one channel, and its standard deviation. */
+static double square_of_channel(const struct observation *o, const struct estimate *a, const struct estimate *b, int c,
+                                double *sd)
+{
+    double ra = a->mean[c] - o->mean_rgb[c], rb = b->mean[c] - o->mean_rgb[c], va = a->var[c], vb = b->var[c];
+    *sd = sqrt(fmax(ra * ra * vb + rb * rb * va - va * vb, va * vb));
+    return ra * rb;
+}
+
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out)
 {
     double value = 0.0, var = 0.0, relative = 0.0, relative_var = 0.0, n_radiance = 0.0;
     for (size_t i = 0; i < o->n; i++) {
-        double product = 0.0, sd = 0.0;
+        double product = 0.0, sd = 0.0, channel_sd;
         for (int c = 0; c < 3; c++) {
-            double ra = a[i].mean[c] - o->item[i].mean_rgb[c], rb = b[i].mean[c] - o->item[i].mean_rgb[c];
-            double va = a[i].var[c], vb = b[i].var[c];
-            product += ra * rb;
-            sd += sqrt(fmax(ra * ra * vb + rb * rb * va - va * vb, va * vb));
+            product += square_of_channel(&o->item[i], &a[i], &b[i], c, &channel_sd);
+            sd += channel_sd;
         }
         double w = objective_weight(&o->item[i]);
         value += w * product;
@@ -57,9 +73,24 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
     n_radiance = fmax(n_radiance, 1.0);
     out->rel_square = relative / n_radiance;
     out->rel_square_se = sqrt(relative_var) / n_radiance;
-    out->rel_rms = sqrt(fmax(0.0, out->rel_square));
-    out->rel_rms_se = sqrt(out->rel_square_se); /* the delta method fails near 0 */
-    if (out->rel_rms > 0.0) out->rel_rms_se = fmin(out->rel_rms_se, 0.5 * out->rel_square_se / out->rel_rms);
+    out->rel_rms = root_of_square(out->rel_square, out->rel_square_se, &out->rel_rms_se);
+}
+
+void objective_evaluate_channels(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
+                                 struct objective_channels *out)
+{
+    for (int c = 0; c < 3; c++) {
+        double square = 0.0, var = 0.0, n = 0.0;
+        for (size_t i = 0; i < o->n; i++) {
+            double sd, unit = fmax(o->item[i].mean_rgb[c], OBJECTIVE_CHANNEL_TAU);
+            if (observation_is_contrast(&o->item[i]) || !(o->item[i].weight > 0.0)) continue;
+            square += square_of_channel(&o->item[i], &a[i], &b[i], c, &sd) / (unit * unit);
+            var += sd * sd / (unit * unit * unit * unit);
+            n += 1.0;
+        }
+        out->rel_rms[c] = out->rel_rms_se[c] = NAN;
+        if (n > 0.0) out->rel_rms[c] = root_of_square(square / n, sqrt(var) / n, &out->rel_rms_se[c]);
+    }
 }
 
 void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,

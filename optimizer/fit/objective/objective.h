@@ -35,6 +35,14 @@ struct objective_value {
     double rel_square, rel_square_se, rel_rms_se;
 };
 
+/* Relative errors of the channels apart: each residual is divided by the measured radiance of its own channel,
+ * sqrt(max(0, sum_i (A-M)(B-M) / max(M_ic, OBJECTIVE_CHANNEL_TAU)^2 / n)). The figure above divides by the mean of the
+ * channels, so an error of 100 % in a dark channel of a coloured cloth may count as a few per cent there. */
+#define OBJECTIVE_CHANNEL_TAU 0.002
+struct objective_channels {
+    double rel_rms[3], rel_rms_se[3]; /* NaN without rows */
+};
+
 /* 1 / max(a_i, tau)^2, without the observation's extra weight. */
 double objective_relative_weight(const struct observation *o);
 /* w_i */
@@ -47,6 +55,9 @@ double objective_mean_photograph_variance(const struct observation_set *o);
 /* a, b: one estimate per observation, from independent replicas. */
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out);
+/* The same for the channels apart. Contrasts and rows of weight 0 are left out. */
+void objective_evaluate_channels(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
+                                 struct objective_channels *out);
 /* gradient[n_param], by internal units. */
 void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         size_t n_param, double *gradient);

@@ -41,7 +41,8 @@ const struct job_option option_rows_fit[] = {
      .left_out = "`model` alone",
      .allowed = "1..8 of the same words, instead of `model`",
      .schema = "{\"type\": \"array\", \"items\": {\"type\": \"string\"}, \"minItems\": 1, \"maxItems\": 8}",
-     .meaning = "Several models in one job: each is fitted, all are compared on the held-out rows, and the best one "
+     .meaning = "Several models in one job: each is fitted, all are compared by cross-validation inside the fitted "
+                "rows, and the best one "
                 "gives the result. A warning says which models these rows do not tell apart."},
     {.path = "fit.method",
      .kind = OPTION_WORD,

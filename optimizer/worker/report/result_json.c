@@ -4,6 +4,7 @@
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_geometry.h"
 #include "optimizer/worker/report/result_options_json.h"
+#include "optimizer/worker/stages/pipeline_choice.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -108,6 +109,14 @@ static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[
     }
 }
 
+/* The error of fitted rows that were left out in turn; null when there are too few rows. */
+static json_t *cross_validation_json(const struct cross_validation *v)
+{
+    if (v->n_fold == 0) return json_null();
+    return json_pack("{s:o, s:o, s:I, s:I}", "rel_rms", json_number(v->rel_rms), "rel_rms_se",
+                     json_number(v->rel_rms_se), "n_fold", (json_int_t)v->n_fold, "n_row", (json_int_t)v->n_row);
+}
+
 /* Adds the results of a fit and of its validation. */
 static void put_fit(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
 {
@@ -125,6 +134,14 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
     json_object_set_new(json, "fit_rel_rms_se", json_number(m->validation.fit.rel_rms_se));
     json_object_set_new(json, "heldout_rel_rms", json_number(m->validation.held_out.rel_rms));
     json_object_set_new(json, "heldout_rel_rms_se", json_number(m->validation.held_out.rel_rms_se));
+    json_object_set_new(json, "fit_channel_rel_rms", json_number_list(m->validation.fit_channels.rel_rms, 3, 1.0));
+    json_object_set_new(json, "fit_channel_rel_rms_se",
+                        json_number_list(m->validation.fit_channels.rel_rms_se, 3, 1.0));
+    json_object_set_new(json, "heldout_channel_rel_rms",
+                        json_number_list(m->validation.held_out_channels.rel_rms, 3, 1.0));
+    json_object_set_new(json, "heldout_channel_rel_rms_se",
+                        json_number_list(m->validation.held_out_channels.rel_rms_se, 3, 1.0));
+    json_object_set_new(json, "cross_validation", cross_validation_json(&m->fit.cross_validation));
     json_object_set_new(json, "misfit_rel_rms", json_number(sqrt(m->fit.uncertainty.misfit_var)));
     json_object_set_new(json, "validation_worst_rel_se", json_number(m->validation.worst_rel_se));
     result_fit_options(c, m, json);
@@ -237,6 +254,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
     json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", c->doc->sample, "model",
                              best->appearance.id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed);
+    json_object_set_new(json, "chosen_by", json_string(pipeline_choice_id(pipeline_choice(c))));
     put_fit(json, c, best);
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);

@@ -3,12 +3,15 @@
  * docs/file-formats.md describes every key of result.json with its unit. The outline:
  *
  *   "format", "sample", "method", "seed"            version of this format, and what the job document says
- *   "model"                                         id of the best model, to which all keys but "models" refer
+ *   "model", "chosen_by"                            id of the best model, to which all keys but "models" refer, and
+ *                                                   the measure by which it was chosen
  *   "converged", "reason", "reason_code"            why the fit ended (stop_reason.h)
  *   "parameters"                                    value, standard error (with photograph noise, Monte-Carlo noise and
  *                                                   misfit), bounds, ties and prior of each parameter, in file units
  *   "correlation"                                   in fit coordinates; 0 for fixed parameters
  *   "objective", "fit_rel_rms", "heldout_rel_rms"   errors of the fit by fresh paths (objective.h), each with "..._se"
+ *   "..._channel_rel_rms"                           relative errors of the channels apart, each with "..._se"
+ *   "cross_validation"                              error of fitted rows left out in turn (cross_validation.h), or null
  *   "misfit_rel_rms"                                relative error of a residual that no noise explains
  *   "validation_worst_rel_se"                       largest relative standard error of a rendered mean
  *   "prior_penalty", "nuisance", "starts", "next_photograph", "certificate", "..._with_gains"
@@ -23,8 +26,8 @@
  *   "n_path_fit", "n_step", "fit_wall_s", "n_path_validation", "stages"   paths and wall time
  *   "warnings", "program"                           the job's warnings; the program and its version
  *
- * The best model has the lowest error over the held-out rows, or over the fitted rows when none are held out. Numbers
- * have 17 digits, so that equal fits give equal bytes.
+ * The best model has the lowest error by cross-validation inside the fitted rows (pipeline_choice.h). Numbers have 17
+ * digits, so that equal fits give equal bytes.
  */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_JSON_H
 #define SELVEDGE_OPTIMIZER_RESULT_JSON_H

@@ -3,6 +3,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_options_json.h"
+#include "optimizer/worker/stages/pipeline_choice.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -62,21 +63,58 @@ static void percent(const struct objective_value *v, char *text, size_t n)
         snprintf(text, n, "-");
 }
 
+/* The same for fitted rows that were left out in turn. */
+static void percent_left_out(const struct pipeline_model *m, char *text, size_t n)
+{
+    const struct cross_validation *v = &m->fit.cross_validation;
+    if (v->n_fold > 0)
+        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * v->rel_rms, 100.0 * v->rel_rms_se);
+    else
+        snprintf(text, n, "too few rows");
+}
+
+static void print_channels(const char *label, const struct objective_channels *v, FILE *out)
+{
+    if (!isfinite(v->rel_rms[0])) return;
+    fprintf(out, "%-43s", label);
+    for (int c = 0; c < 3; c++)
+        fprintf(out, "%s%.2f +- %.2f", c > 0 ? ", " : "", 100.0 * v->rel_rms[c], 100.0 * v->rel_rms_se[c]);
+    fprintf(out, " %%\n");
+}
+
+static void print_errors(const struct pipeline_model *m, FILE *out)
+{
+    const struct validation *v = &m->validation;
+    char text[80];
+    percent(&v->fit, text, sizeof text);
+    fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
+    percent_left_out(m, text, sizeof text);
+    fprintf(out, "fitted rows left out in turn               %s (cross-validation)\n", text);
+    percent(&v->held_out, text, sizeof text);
+    if (isfinite(v->held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
+    print_channels("red, green, blue apart, fitted rows", &v->fit_channels, out);
+    print_channels("red, green, blue apart, held-out rows", &v->held_out_channels, out);
+}
+
 /* Writes a table of all models when there are several. */
 static void print_comparison(const struct pipeline_context *c, FILE *out)
 {
     const bool gains = c->model[0].option->gain == JOB_GAIN_PER_PHOTOGRAPH;
-    fprintf(out, "%-24s %16s %16s %9s %9s  %s\n", "model", "fitted", "held out", "paths", "time", "");
+    fprintf(out, "%-24s %16s %16s %16s %9s %9s\n", "model", "fitted", "left out in turn", "held out", "paths", "time");
     for (size_t i = 0; i < c->n_model; i++) {
         const struct pipeline_model *m = &c->model[i];
-        char fitted[48], held_out[48];
+        char fitted[48], left_out[48], held_out[48];
         percent(gains ? &m->validation.fit_with_gains : &m->validation.fit, fitted, sizeof fitted);
         percent(gains ? &m->validation.held_out_with_gains : &m->validation.held_out, held_out, sizeof held_out);
-        fprintf(out, "%-24s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, held_out, (double)m->fit.n_path,
-                m->fit.wall_s, i == pipeline_best_model(c) ? "best" : "", m->fit.converged ? "" : " NOT CONVERGED");
+        percent_left_out(m, left_out, sizeof left_out);
+        fprintf(out, "%-24s %16s %16s %16s %9.3g %7.0f s  %s%s\n", m->appearance.id, fitted, left_out, held_out,
+                (double)m->fit.n_path, m->fit.wall_s, i == pipeline_best_model(c) ? "best" : "",
+                m->fit.converged ? "" : " NOT CONVERGED");
     }
-    fprintf(out, "relative RMS errors%s; what follows is of the best model\n\n",
-            gains ? ", each photograph with its own gain" : "");
+    fprintf(out, "relative RMS errors%s; the best model was chosen by %s; what follows is of the best model\n\n",
+            gains ? ", each photograph with its own gain" : "",
+            pipeline_choice(c) == CHOICE_CROSS_VALIDATION ? "fitted rows that were left out in turn (cross-validation)"
+                                                          : "the fitted rows, which are too few for cross-validation");
 }
 
 /* The plain BRDF beside the fit's own errors, where it was measured. */
@@ -109,10 +147,7 @@ static void print_summary(struct pipeline_context *c, FILE *out)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m, 1e6 * c->radius.se_m,
                 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
                 c->radius.curve.at_bound ? " (at the edge of its range)" : "");
-    percent(&m->validation.fit, text, sizeof text);
-    fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
-    percent(&m->validation.held_out, text, sizeof text);
-    if (isfinite(m->validation.held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
+    print_errors(m, out);
     print_skill(c, out);
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
             m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);

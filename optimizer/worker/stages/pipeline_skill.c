@@ -1,4 +1,5 @@
 #include "optimizer/worker/stages/pipeline_skill.h"
+#include "optimizer/worker/stages/pipeline_choice.h"
 
 #include <math.h>
 

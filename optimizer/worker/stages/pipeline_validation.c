@@ -1,5 +1,6 @@
 /* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
  * rows apart. */
+#include "optimizer/worker/stages/pipeline_choice.h"
 #include "optimizer/worker/stages/pipeline_contrast.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
 #include "optimizer/worker/work_file.h"
@@ -59,9 +60,10 @@ static void show_row(const struct pipeline_context *c, const struct pipeline_mod
                                 out);
 }
 
-/* Scores the rows of one set; NaN when it has none. */
+/* Scores the rows of one set; NaN when it has none. channels may be NULL. */
 static status evaluate_set(const struct pipeline_context *c, const struct pipeline_model *m, enum job_set set,
-                           bool own_gains, struct objective_value *value, struct error *err)
+                           bool own_gains, struct objective_value *value, struct objective_channels *channels,
+                           struct error *err)
 {
     struct observation_set part;
     size_t n = c->observation.n, n_part = 0;
@@ -77,6 +79,7 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
         show_row(c, m, i, 1, own_gains, &b[n_part++]);
     }
     if (s == STATUS_OK && part.n > 0) objective_evaluate(&part, a, b, value);
+    if (s == STATUS_OK && channels != NULL) objective_evaluate_channels(&part, a, b, channels);
     observation_set_release(&part);
     free(a);
     return s;
@@ -85,12 +88,12 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
 static status score_validation(const struct pipeline_context *c, struct pipeline_model *m, struct error *err)
 {
     struct validation *v = &m->validation;
-    status s = evaluate_set(c, m, JOB_SET_FIT, false, &v->fit, err);
-    if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, false, &v->held_out, err);
+    status s = evaluate_set(c, m, JOB_SET_FIT, false, &v->fit, &v->fit_channels, err);
+    if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, false, &v->held_out, &v->held_out_channels, err);
     v->fit_with_gains = v->held_out_with_gains = (struct objective_value){NAN, NAN, NAN, NAN, NAN, NAN};
     if (s == STATUS_OK && m->option->gain == JOB_GAIN_PER_PHOTOGRAPH) {
-        s = evaluate_set(c, m, JOB_SET_FIT, true, &v->fit_with_gains, err);
-        if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, true, &v->held_out_with_gains, err);
+        s = evaluate_set(c, m, JOB_SET_FIT, true, &v->fit_with_gains, NULL, err);
+        if (s == STATUS_OK) s = evaluate_set(c, m, JOB_SET_HELD_OUT, true, &v->held_out_with_gains, NULL, err);
     }
     v->worst_rel_se = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
@@ -134,29 +137,6 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
         s = e->run(e->context, &call, &progress, m->validation.replica[q], &wall_s, err);
     }
     return s;
-}
-
-/* Warns of models whose error equals that of the best one within the noise, so that the choice between them is
- * chance. */
-static void warn_of_equals(struct pipeline_context *c)
-{
-    size_t best = pipeline_best_model(c), used = 0, n;
-    const bool held_out = isfinite(c->model[best].validation.held_out.rel_rms);
-    char text[600];
-    for (size_t i = 0; i < c->n_model && used < sizeof text; i++) {
-        const struct objective_value *x = pipeline_judged_error(&c->model[best]),
-                                     *y = pipeline_judged_error(&c->model[i]);
-        if (i == best || !(y->rel_square - x->rel_square < 2.0 * hypot(x->rel_square_se, y->rel_square_se))) continue;
-        if (used == 0)
-            used =
-                (size_t)snprintf(text, sizeof text, "the %s rows, as rendered, do not tell %s (%.3g +- %.2g %%) from",
-                                 held_out ? "held-out" : "fitted", c->model[best].appearance.id, 100.0 * x->rel_rms,
-                                 100.0 * x->rel_rms_se);
-        n = used < sizeof text ? sizeof text - used : 0;
-        used += (size_t)snprintf(text + sizeof text - n, n, " %s (%.3g +- %.2g %%)", c->model[i].appearance.id,
-                                 100.0 * y->rel_rms, 100.0 * y->rel_rms_se);
-    }
-    if (used > 0) worker_status_warn(c->status, "%s", text);
 }
 
 static status validate_model(struct pipeline_context *c, size_t i_model, size_t *n_path, struct error *err)
@@ -217,7 +197,7 @@ status stage_validation_load(struct pipeline_context *c, struct error *err)
     estimate_sections(c, section);
     s = work_file_read(path, "validation.2", section, 4 * c->n_model, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = score_validation(c, &c->model[i], err);
-    if (s == STATUS_OK) warn_of_equals(c);
+    if (s == STATUS_OK) pipeline_warn_choice(c);
     return s;
 }
 
@@ -228,7 +208,7 @@ status stage_validation(struct pipeline_context *c, struct error *err)
                               : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = validate_model(c, i, n_path, err);
     if (s == STATUS_OK) s = store_validations(c, err);
-    if (s == STATUS_OK) warn_of_equals(c);
+    if (s == STATUS_OK) pipeline_warn_choice(c);
     free(n_path);
     return s;
 }

@@ -44,6 +44,28 @@ static void test_by_hand(void **state)
     assert_true(v.rel_rms == 0.0 && fabs(v.rel_square + f0 / 3.0) < 1e-12 && v.rel_rms_se == sqrt(v.rel_square_se));
 }
 
+/* Each residual of a channel is divided by the measured radiance of that channel; rows of weight 0 are left out. */
+static void test_channels_by_hand(void **state)
+{
+    (void)state;
+    struct observation item[3] = {{.mean_rgb = {0.1, 0.2, 0.001}, .weight = 1.0},
+                                  {.mean_rgb = {0.2, 0.1, 0.1}, .weight = 3.0},
+                                  {.mean_rgb = {1.0, 1.0, 1.0}, .weight = 0.0}};
+    struct observation_set o = {.n = 3, .item = item};
+    struct estimate a[3] = {{.mean = {0.11, 0.2, 0.003}}, {.mean = {0.2, 0.12, 0.1}}, {.n_path = 1}};
+    struct estimate b[3] = {{.mean = {0.12, 0.2, 0.003}}, {.mean = {0.2, 0.12, 0.1}}, {.n_path = 1}};
+    struct objective_channels v;
+    a[0].var[0] = 0.01 * 0.01;
+    objective_evaluate_channels(&o, a, b, &v);
+    assert_true(fabs(v.rel_rms[0] - sqrt(0.1 * 0.2 / 2.0)) < 1e-12);
+    assert_true(fabs(v.rel_rms_se[0] - 0.5 * (0.2 * 0.1 / 2.0) / v.rel_rms[0]) < 1e-12); /* rb sd_a / M^2 */
+    assert_true(fabs(v.rel_rms[1] - sqrt(0.2 * 0.2 / 2.0)) < 1e-12 && v.rel_rms_se[1] == 0.0);
+    assert_true(fabs(v.rel_rms[2] - sqrt(1.0 / 2.0)) < 1e-12); /* 0.002 / OBJECTIVE_CHANNEL_TAU */
+    o.n = 0;
+    objective_evaluate_channels(&o, a, b, &v);
+    assert_true(isnan(v.rel_rms[0]) && isnan(v.rel_rms_se[2]));
+}
+
 /* The product of two replicas has the mean of the true square, and its stated error is not too small. */
 static void test_unbiased(void **state)
 {
@@ -339,6 +361,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_by_hand),
+        cmocka_unit_test(test_channels_by_hand),
         cmocka_unit_test(test_unbiased),
         cmocka_unit_test(test_gradient),
         cmocka_unit_test(test_coordinates),

@@ -1,0 +1,165 @@
+#include "optimizer/fit/descent/cross_validation.h"
+#include "optimizer/fit/descent/descent_methods.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N = FIT_MAX_PARAM };
+
+/* Largest move of a parameter when a fold is left out, in step limits: within it the linear model means something. */
+static const double reach = 4.0;
+static const double same_angle_rad = 1e-6;
+
+static bool same_angle(double a, double b) { return fabs(a - b) < same_angle_rad; }
+
+static bool same_directions(const struct configuration *a, const struct configuration *b)
+{
+    return same_angle(a->light_theta_rad, b->light_theta_rad) && same_angle(a->light_phi_rad, b->light_phi_rad) &&
+           same_angle(a->camera_theta_rad, b->camera_theta_rad) && same_angle(a->camera_phi_rad, b->camera_phi_rad);
+}
+
+/* Writes the fold of each observation and returns the number of folds. */
+static size_t deal_folds(const struct observation_set *o, size_t *fold)
+{
+    size_t n_group = 0;
+    for (size_t i = 0; i < o->n; i++) {
+        size_t j = 0;
+        while (j < i && !same_directions(&o->item[j].configuration, &o->item[i].configuration)) j++;
+        fold[i] = j < i ? fold[j] : n_group++ % CROSS_VALIDATION_MAX_FOLD;
+    }
+    return n_group < CROSS_VALIDATION_MAX_FOLD ? n_group : CROSS_VALIDATION_MAX_FOLD;
+}
+
+static bool scored(const struct linear_model *m, size_t i)
+{
+    return m->extra[3 * i] > 0.0 && !(m->contrast[3 * i] > 0.0);
+}
+
+/* A fit without the rows of one fold: the free parameters in step limits. */
+struct fold_fit {
+    struct linear_model part; /* m with weights of its own */
+    size_t n, index[N];
+    double h[N * N], g[N], lower[N], upper[N];
+};
+
+/* Fills in the quadratic model of all rows that `part` weighs. residual_var: variance of a weighted residual. */
+static void quadratic_model(struct fold_fit *f, const struct coordinate *k, double residual_var)
+{
+    double h[N * N], g[N];
+    const size_t n_param = f->part.n_param;
+    linear_model_hessian(&f->part, false, h);
+    linear_model_gradient(&f->part, g);
+    for (size_t a = 0; a < f->n; a++) {
+        const size_t p = f->index[a];
+        const double limit = k[p].step_limit, range = (k[p].upper - k[p].lower) / limit;
+        for (size_t b = 0; b < f->n; b++)
+            f->h[a * f->n + b] = h[p * n_param + f->index[b]] * limit * k[f->index[b]].step_limit;
+        f->h[a * f->n + a] += 2.0 * residual_var * 12.0 / (range * range);
+        f->g[a] = g[p] * limit;
+        f->lower[a] = fmin(0.0, fmax(-reach, (k[p].lower - f->part.x_ref[p]) / limit));
+        f->upper[a] = fmax(0.0, fmin(reach, (k[p].upper - f->part.x_ref[p]) / limit));
+    }
+}
+
+/* Product of the residuals that both replicas predict for one row after a move dx, without its extra weight. */
+static double predicted_square(const struct linear_model *m, size_t row, const double *dx)
+{
+    double r[2];
+    for (int q = 0; q < 2; q++) {
+        r[q] = m->r[q][row];
+        for (size_t p = 0; p < m->n_param; p++) r[q] += m->j[q][row * m->n_param + p] * dx[p];
+    }
+    return r[0] * r[1] / m->extra[row];
+}
+
+static status leave_out(const struct linear_model *m, const struct coordinate *k, const size_t *fold, size_t i_fold,
+                        struct fold_fit *f, struct cross_validation *out, struct error *err)
+{
+    double y[N], dx[N] = {0};
+    for (size_t row = 0; row < m->n_row; row++) f->part.weight[row] = fold[row / 3] == i_fold ? 0.0 : m->weight[row];
+    quadratic_model(f, k, fmax(linear_model_weighted_objective(m), 0.0) / (double)m->n_row + linear_model_noise(m));
+    status s = bounded_quadratic(f->h, f->g, f->lower, f->upper, f->n, y, err);
+    if (s != STATUS_OK) return s;
+    for (size_t a = 0; a < f->n; a++) dx[f->index[a]] = y[a] * k[f->index[a]].step_limit;
+    for (size_t row = 0; row < m->n_row; row++) {
+        if (fold[row / 3] != i_fold || !scored(m, row / 3)) continue;
+        out->fold_square[i_fold] += predicted_square(m, row, dx);
+        out->fold_count[i_fold] += 1.0;
+    }
+    return STATUS_OK;
+}
+
+/* Standard error of the mean of sums `square` over counts `count`, by their scatter. */
+static double scatter_of_mean(const double *square, const double *count, size_t n_fold, double mean)
+{
+    double sum = 0.0, n = 0.0;
+    for (size_t f = 0; f < n_fold; f++) {
+        double off = square[f] - count[f] * mean;
+        sum += off * off;
+        n += count[f];
+    }
+    return sqrt(sum * (double)n_fold / ((double)n_fold - 1.0)) / n;
+}
+
+static void summarise(size_t n_fold, struct cross_validation *out)
+{
+    double sum = 0.0, n = 0.0;
+    for (size_t f = 0; f < n_fold; f++) {
+        sum += out->fold_square[f];
+        n += out->fold_count[f];
+    }
+    out->n_fold = n_fold;
+    out->n_row = (size_t)n / 3;
+    out->rel_square = sum / n;
+    out->rel_rms = sqrt(fmax(0.0, out->rel_square));
+    double se = scatter_of_mean(out->fold_square, out->fold_count, n_fold, out->rel_square);
+    out->rel_rms_se = out->rel_rms > 0.0 ? fmin(sqrt(se), 0.5 * se / out->rel_rms) : sqrt(se);
+}
+
+/* Whether the rows outside each fold have more numbers than there are free parameters. */
+static bool enough_rows(const struct linear_model *m, const size_t *fold, size_t n_fold, size_t n_free)
+{
+    size_t all = 0, largest = 0, in_fold[CROSS_VALIDATION_MAX_FOLD] = {0};
+    for (size_t i = 0; i < m->n_row / 3; i++) {
+        if (!scored(m, i)) continue;
+        all += 3;
+        in_fold[fold[i]] += 3;
+    }
+    for (size_t f = 0; f < n_fold; f++) largest = in_fold[f] > largest ? in_fold[f] : largest;
+    return n_fold >= CROSS_VALIDATION_LEAST_FOLD && all - largest > n_free;
+}
+
+status cross_validation_compute(const struct linear_model *m, const struct observation_set *o,
+                                const struct coordinate *k, const bool *fixed, struct cross_validation *out,
+                                struct error *err)
+{
+    struct fold_fit f = {.part = *m};
+    status s = STATUS_OK;
+    size_t *fold = malloc(o->n * sizeof *fold);
+    double *weight = malloc(m->n_row * sizeof *weight);
+    memset(out, 0, sizeof *out);
+    if (fold == NULL || weight == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot cross-validate %zu rows: out of memory", o->n);
+        goto out;
+    }
+    f.part.weight = weight;
+    for (size_t p = 0; p < m->n_param; p++)
+        if (!fixed[p]) f.index[f.n++] = p;
+    const size_t n_fold = deal_folds(o, fold);
+    if (!enough_rows(m, fold, n_fold, f.n)) goto out;
+    for (size_t i = 0; i < n_fold && s == STATUS_OK; i++) s = leave_out(m, k, fold, i, &f, out, err);
+    if (s == STATUS_OK) summarise(n_fold, out);
+out:
+    free(weight);
+    free(fold);
+    return s;
+}
+
+double cross_validation_difference(const struct cross_validation *a, const struct cross_validation *b, double *se)
+{
+    double square[CROSS_VALIDATION_MAX_FOLD];
+    for (size_t f = 0; f < a->n_fold; f++) square[f] = b->fold_square[f] - a->fold_square[f];
+    *se = scatter_of_mean(square, a->fold_count, a->n_fold, b->rel_square - a->rel_square);
+    return b->rel_square - a->rel_square;
+}

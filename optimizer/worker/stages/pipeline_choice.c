@@ -1,0 +1,90 @@
+#include "optimizer/worker/stages/pipeline_choice.h"
+
+#include <math.h>
+#include <stdio.h>
+
+enum pipeline_choice pipeline_choice(const struct pipeline_context *c)
+{
+    if (c->n_model < 2) return CHOICE_ONLY_MODEL;
+    for (size_t i = 0; i < c->n_model; i++)
+        if (c->model[i].fit.cross_validation.n_fold == 0) return CHOICE_FITTED_ROWS;
+    return CHOICE_CROSS_VALIDATION;
+}
+
+const char *pipeline_choice_id(enum pipeline_choice choice)
+{
+    static const char *const id[] = {
+        [CHOICE_ONLY_MODEL] = "only_model",
+        [CHOICE_CROSS_VALIDATION] = "cross_validation",
+        [CHOICE_FITTED_ROWS] = "fitted_rows",
+    };
+    return id[choice];
+}
+
+static const struct objective_value *fitted_error(const struct pipeline_model *m)
+{
+    return m->option->gain == JOB_GAIN_PER_PHOTOGRAPH ? &m->validation.fit_with_gains : &m->validation.fit;
+}
+
+static double judged_square(const struct pipeline_model *m, enum pipeline_choice choice)
+{
+    return choice == CHOICE_CROSS_VALIDATION ? m->fit.cross_validation.rel_square : fitted_error(m)->rel_square;
+}
+
+size_t pipeline_best_model(const struct pipeline_context *c)
+{
+    const enum pipeline_choice choice = pipeline_choice(c);
+    size_t best = 0;
+    for (size_t i = 1; i < c->n_model; i++)
+        if (judged_square(&c->model[i], choice) < judged_square(&c->model[best], choice)) best = i;
+    return best;
+}
+
+/* Error of b minus that of a as relative squares, and its standard error. */
+static double difference(const struct pipeline_model *a, const struct pipeline_model *b, enum pipeline_choice choice,
+                         double *se)
+{
+    if (choice == CHOICE_CROSS_VALIDATION)
+        return cross_validation_difference(&a->fit.cross_validation, &b->fit.cross_validation, se);
+    *se = hypot(fitted_error(a)->rel_square_se, fitted_error(b)->rel_square_se);
+    return fitted_error(b)->rel_square - fitted_error(a)->rel_square;
+}
+
+/* Writes "two_lobe.v1 (8.7 +- 0.3 %)". */
+static void describe(const struct pipeline_model *m, enum pipeline_choice choice, char text[120])
+{
+    bool folds = choice == CHOICE_CROSS_VALIDATION;
+    double rms = folds ? m->fit.cross_validation.rel_rms : fitted_error(m)->rel_rms,
+           se = folds ? m->fit.cross_validation.rel_rms_se : fitted_error(m)->rel_rms_se;
+    snprintf(text, 120, "%.64s (%.3g +- %.2g %%)", m->appearance.id, 100.0 * rms, 100.0 * se);
+}
+
+static void warn_of_equals(struct pipeline_context *c, enum pipeline_choice choice)
+{
+    size_t best = pipeline_best_model(c), used = 0;
+    char text[1200], model[120];
+    for (size_t i = 0; i < c->n_model && used < sizeof text; i++) {
+        double se, more = difference(&c->model[best], &c->model[i], choice, &se);
+        if (i == best || !(more < 2.0 * se)) continue;
+        if (used == 0) {
+            describe(&c->model[best], choice, model);
+            used = (size_t)snprintf(
+                text, sizeof text, "the %s do not tell %s from",
+                choice == CHOICE_CROSS_VALIDATION ? "fitted rows, left out in turn," : "fitted rows", model);
+        }
+        describe(&c->model[i], choice, model);
+        used += (size_t)snprintf(text + used, sizeof text - used, " %s", model);
+    }
+    if (used > 0) worker_status_warn(c->status, "%s", text);
+}
+
+void pipeline_warn_choice(struct pipeline_context *c)
+{
+    const enum pipeline_choice choice = pipeline_choice(c);
+    if (choice == CHOICE_ONLY_MODEL) return;
+    if (choice == CHOICE_FITTED_ROWS)
+        worker_status_warn(c->status,
+                           "there are too few fitted rows for cross-validation: the best model was chosen by its error "
+                           "over the rows to which it was fitted, which favours models with more parameters");
+    warn_of_equals(c, choice);
+}
