@@ -8,7 +8,9 @@
 #include "base/angle.h"
 #include "base/catalogue/param_info.h"
 
-enum { MODEL_MAX_PARAM = 16 };
+/* Parameters of one model, parameter sets of one model in a cloth of several groups of fibers, and parameters of all
+ * sets together. */
+enum { MODEL_MAX_PARAM = 16, MODEL_MAX_SET = 8, MODEL_MAX_FLAT = 64 };
 
 #define MODEL_DENSITY_MULTIPLIER "density_multiplier"
 

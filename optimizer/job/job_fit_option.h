@@ -19,7 +19,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { JOB_MAX_PARAM = MODEL_MAX_PARAM, JOB_MAX_START = 16 };
+enum { JOB_MAX_PARAM = MODEL_MAX_FLAT, JOB_MAX_START = 16 };
 
 enum job_gain { JOB_GAIN_NONE, JOB_GAIN_GLOBAL, JOB_GAIN_PER_PHOTOGRAPH };
 

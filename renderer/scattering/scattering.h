@@ -17,8 +17,8 @@
 
 enum {
     SCATTERING_MAX_PARAM = MODEL_MAX_PARAM, /* of one model */
-    SCATTERING_MAX_SET = 8,                 /* parameter sets in a mixed cloth (scene.h: material groups) */
-    SCATTERING_MAX_FLAT = 64                /* parameters of all sets together */
+    SCATTERING_MAX_SET = MODEL_MAX_SET,     /* parameter sets, one for each group of fibers (fiber_set.h) */
+    SCATTERING_MAX_FLAT = MODEL_MAX_FLAT    /* parameters of all sets together */
 };
 
 /* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by

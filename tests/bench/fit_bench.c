@@ -48,7 +48,7 @@ void bench_run_fit(const struct fit_phantom *f, const char *method, uint64_t see
 {
     struct error err = {0};
     struct estimate_journal *journal = NULL;
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
+    struct fit_parameter parameter[FIT_MAX_PARAM];
     struct configuration *configuration = trace_configurations(&f->fitted);
     struct trace_estimator trace = {
         .request = {.input = {.scene = {f->cloth.scene, f->cloth.has_volume ? &f->cloth.volume_scene : NULL},

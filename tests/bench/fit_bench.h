@@ -33,7 +33,7 @@ extern const struct bench_model_name {
 struct fit_curve {
     size_t n, n_param;
     double wall_s[BENCH_MAX_STEP], paths[BENCH_MAX_STEP], objective[BENCH_MAX_STEP],
-        param[BENCH_MAX_STEP][SCATTERING_MAX_PARAM];
+        param[BENCH_MAX_STEP][FIT_MAX_PARAM];
 };
 
 /* Prints one JSON object with the name fit.<of>.<what>, or fit.<of> when `what` is empty. */

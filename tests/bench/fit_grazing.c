@@ -68,7 +68,7 @@ static void print_brightest_microflake(const struct bench *b, const struct fit_c
     const double at_deg = 80.0;
     struct fit_phantom f;
     struct estimate e, brightest = {0};
-    double param[SCATTERING_MAX_PARAM];
+    double param[FIT_MAX_PARAM];
     fit_phantom_init_on(&f, b->folder, b->pool, cloth, "microflake.v1", NULL);
     observe_mirror(&f, at_deg, 1);
     size_t i_gamma = f.model.n_param - 2, i_d = f.model.n_param - 1;

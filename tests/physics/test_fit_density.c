@@ -74,8 +74,8 @@ static void fit(const struct volume_scene *scene, size_t n, uint64_t budget, str
     struct appearance model;
     struct thread_pool *pool = NULL;
     struct observation_set o;
-    struct fit_parameter parameter[SCATTERING_MAX_PARAM];
-    double truth[SCATTERING_MAX_PARAM] = {0.9, 0.7, 0.5, 0.2};
+    struct fit_parameter parameter[FIT_MAX_PARAM];
+    double truth[FIT_MAX_PARAM] = {0.9, 0.7, 0.5, 0.2};
     set_views(c);
     observation_set_init(&o);
     assert_true(appearance_find("microflake.v1", &model));

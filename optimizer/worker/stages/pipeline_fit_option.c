@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-_Static_assert((int)JOB_MAX_PARAM == (int)SCATTERING_MAX_PARAM && (int)JOB_MAX_START == (int)FIT_MAX_START,
+_Static_assert((int)JOB_MAX_PARAM == (int)FIT_MAX_PARAM && (int)JOB_MAX_START == (int)FIT_MAX_START,
                "a document's limits are those of the fit");
 
 void pipeline_fit_option(const struct job_fit_option *from, const struct param_info *info, size_t n_param,

@@ -3,13 +3,14 @@
 #define SELVEDGE_TESTS_FIT_FABRICS_H
 
 #include "geometry/phantom/phantom.h"
+#include "optimizer/fit/objective/coordinate.h"
 #include "renderer/scattering/scattering.h"
 
 struct fit_fabric {
     const char *name;
     enum phantom_weave weave;
     const char *model_id;
-    double truth[SCATTERING_MAX_PARAM]; /* file units */
+    double truth[FIT_MAX_PARAM]; /* file units */
 };
 
 /* Gabardine, Silk and Fleece with the parameters of the fiber model in Table 5.3 of the fabric thesis; three cloths

@@ -19,6 +19,7 @@
 
 #include "geometry/phantom/phantom.h"
 #include "optimizer/fit/descent/trace_estimator.h"
+#include "optimizer/fit/objective/coordinate.h"
 #include "renderer/transport/volume/volume_scene.h"
 
 enum { FIT_CHUNK = 100000, FIT_N_VIEW = 40, FIT_MAX_OBSERVATION = 64 };
@@ -37,7 +38,7 @@ struct fit_phantom {
     struct fit_cloth cloth;
     bool shares_cloth; /* true: the caller owns and releases the cloth */
     struct appearance model;
-    double truth[SCATTERING_MAX_PARAM];         /* internal units */
+    double truth[FIT_MAX_PARAM];                /* internal units */
     struct observation_set observation, fitted; /* all observations; those of the set "fit" */
     struct configuration *configuration;        /* of `observation` */
 };

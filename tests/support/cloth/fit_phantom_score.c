@@ -10,7 +10,7 @@
 struct scorer {
     struct observation_set part;
     struct configuration *configuration;
-    struct coordinate coordinate[SCATTERING_MAX_PARAM];
+    struct coordinate coordinate[FIT_MAX_PARAM];
     struct linear_history history;
     struct linear_model model;
     struct estimate *replica[2];
@@ -19,7 +19,7 @@ struct scorer {
 static void append_here(struct scorer *s, const struct fit_phantom *f, const double *param)
 {
     struct error err = {0};
-    double x[SCATTERING_MAX_PARAM];
+    double x[FIT_MAX_PARAM];
     for (size_t p = 0; p < f->model.n_param; p++) x[p] = coordinate_from_param(&s->coordinate[p], param[p]);
     fit_check(linear_history_append(&s->history, x, s->replica[0], s->replica[1], &err), &err);
 }
@@ -62,7 +62,7 @@ static void append_kept(struct scorer *s, const struct fit_phantom *f, const dou
 static void pool_at(struct scorer *s, const struct fit_phantom *f, const double *param)
 {
     struct error err = {0};
-    double x[SCATTERING_MAX_PARAM];
+    double x[FIT_MAX_PARAM];
     for (size_t p = 0; p < f->model.n_param; p++) x[p] = coordinate_from_param(&s->coordinate[p], param[p]);
     fit_check(linear_model_pool(&s->model, &s->history, x, &err), &err);
 }
@@ -169,7 +169,7 @@ double fit_phantom_expected(const struct fit_phantom *f, enum job_set set, size_
 double fit_phantom_first_order(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *param)
 {
     size_t n = f->model.n_param;
-    double dx[SCATTERING_MAX_PARAM], m[SCATTERING_MAX_PARAM * SCATTERING_MAX_PARAM];
+    double dx[FIT_MAX_PARAM], m[FIT_MAX_PARAM * FIT_MAX_PARAM];
     for (size_t p = 0; p < n; p++) {
         struct coordinate k;
         coordinate_init(&k, &f->model.param[p], f->model.param[p].lower, f->model.param[p].upper);

@@ -83,7 +83,7 @@ static void compare(void **state, const char *set_up, const char *fit, const str
     assert_int_equal(stage_fibers(&c, &err), STATUS_OK);
     assert_int_equal(pipeline_make_scene(&c, &err), STATUS_OK);
     assert_int_equal(c.fitted.n, N_ROW);
-    double param[SCATTERING_MAX_PARAM];
+    double param[FIT_MAX_PARAM];
     const struct appearance *model = &c.model[0].appearance;
     for (size_t p = 0; p < model->n_param; p++) param[p] = model->param[p].start;
     assert_int_equal(pipeline_trace_open(&trace, &c, "fit", "estimates.journal", 0, &c.fitted, &err), STATUS_OK);
