@@ -1,5 +1,6 @@
 #include "geometry/phantom/phantom.h"
 
+#include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom_strand.h"
 
 #include <math.h>
@@ -107,11 +108,12 @@ static status check(struct phantom_option *o, struct error *err)
     return STATUS_OK;
 }
 
-static status make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
+static status make(struct phantom_strands *s, const struct phantom_option *o, struct phantom_report *r,
+                   struct error *err)
 {
     switch (o->weave) {
     case PHANTOM_FELT:
-        return felt_make(s, o, err);
+        return felt_make(&s->set, o, err);
     case PHANTOM_KNIT:
         return knit_make(s, o, r, err);
     default:
@@ -138,23 +140,28 @@ static status report_fill(const struct phantom_option *o, const struct fiber_set
         r->n_fiber_per_yarn = o->yarn.n_ply * o->yarn.n_fiber;
     }
     size_t size[2];
-    return phantom_top_view(f, o->voxel_size_m, size, NULL, &r->cover, err);
+    return fiber_top_view(f, o->voxel_size_m, size, NULL, &r->cover, err);
 }
 
 status phantom_generate(const struct phantom_option *option, struct thread_pool *pool, const struct progress *progress,
                         struct fiber_set *f, struct phantom_report *report, struct error *err)
 {
     struct phantom_option o = *option;
-    struct strand_set s = {0};
+    struct phantom_strands s = {0};
+    struct strand_fit fit = {0};
     *report = (struct phantom_report){0};
     status st = check(&o, err);
     if (st == STATUS_OK) st = make(&s, &o, report, err);
     report->plied = s.plied;
-    if (st == STATUS_OK) st = strand_relax(&s, o.n_relax, pool, progress, report, err);
-    if (st == STATUS_OK) st = strand_emit(&s, o.vertex_spacing_m, o.margin_m, f, err);
+    if (st == STATUS_OK)
+        st = strand_relax(&s.set, &(struct strand_relax_option){.n_round = o.n_relax}, pool, progress, &fit, err);
+    report->overlap_mean = fit.overlap_mean;
+    report->overlap_max = fit.overlap_max;
+    report->strain_p95 = fit.strain_p95;
+    if (st == STATUS_OK) st = strand_emit(&s.set, o.vertex_spacing_m, o.margin_m, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK) st = report_fill(&o, f, report, err);
-    strand_set_release(&s);
+    strand_set_release(&s.set);
     return st;
 }
 

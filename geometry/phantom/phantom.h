@@ -132,11 +132,6 @@ status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struc
                        struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                        struct volume *v, struct error *err);
 
-/* Returns the share of the tile's area under a fiber, along z, at the given pixel size. grey (optional) gets one
- * byte per pixel, 255 for the highest fiber: nx x ny, row 0 at y = 0, freed by the caller. */
-status phantom_top_view(const struct fiber_set *f, double pixel_size_m, size_t size[2], uint8_t **grey, double *cover,
-                        struct error *err);
-
 /* The stored value is void_value + signal * (fiber_value - void_value), rounded and clamped to the type. */
 struct phantom_file_option {
     int bits; /* 8 or 16 */

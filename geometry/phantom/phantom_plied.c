@@ -101,8 +101,8 @@ static void draw_apart(const struct plied *p, double (*place)[2], size_t n, stru
 
 /* Adds a fiber of plies i, i + steps, ...: R varies with a whole number of waves over its period. loop_m > 0: it
  * stands out to that distance once, over a quarter of a turn. */
-static status add_fiber(struct strand_set *s, const struct plied *p, size_t i_ply, const double place[2], double loop_m,
-                        struct rng *rng, struct error *err)
+static status add_fiber(struct phantom_strands *s, const struct plied *p, size_t i_ply, const double place[2],
+                        double loop_m, struct rng *rng, struct error *err)
 {
     const struct phantom_yarn_law *y = &p->o->yarn;
     size_t per_tile = (size_t)ceil(p->section.length_m / p->path->radius_m), n = per_tile * p->n_period;
@@ -112,7 +112,7 @@ static status add_fiber(struct strand_set *s, const struct plied *p, size_t i_pl
                           .axis_class = p->path->axis_class,
                           .cut = p->path->cut};
     double(*node)[3], phase = 2.0 * M_PI * rng_double(rng), loop_at = rng_double(rng);
-    status st = strand_add(s, &like, n, &node, err);
+    status st = strand_add(&s->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     double waves = round(y->migration_waves * fabs(p->fiber_turns) * (double)p->n_period);
     double half = fmin(0.25, 0.25 * fabs(y->fiber_pitch_m) * p->scale / (p->section.length_m * (double)p->n_period));
@@ -135,7 +135,7 @@ static double normal_of(struct rng *rng, const double mean_sd[2])
 }
 
 /* A hair starts at distance r0 from its ply and ends r0 + re away, ze along the yarn and pe around it. */
-static status add_hair(struct strand_set *s, const struct plied *p, struct rng *rng, struct error *err)
+static status add_hair(struct phantom_strands *s, const struct plied *p, struct rng *rng, struct error *err)
 {
     const struct phantom_yarn_law *y = &p->o->yarn;
     double mean_m = sqrt(p->ellipse_m[0] * p->ellipse_m[1]);
@@ -149,7 +149,7 @@ static status add_hair(struct strand_set *s, const struct plied *p, struct rng *
     size_t n = (size_t)ceil(length_m / p->path->radius_m) + 2;
     struct strand like = {.radius_m = p->path->radius_m, .axis_class = p->path->axis_class, .cut = CUT_NONE};
     double(*node)[3];
-    status st = strand_add(s, &like, n, &node, err);
+    status st = strand_add(&s->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t k = 0; k < n; k++) {
         double w = (double)k / (double)(n - 1), at = from + w * along_m / p->section.length_m;
@@ -166,7 +166,8 @@ static size_t count_of(const struct plied *p, double per_m)
     return (size_t)llround(per_m * p->section.length_m / p->scale * (double)p->o->yarn.n_ply);
 }
 
-status plied_yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *path, struct error *err)
+status plied_yarn_add(struct phantom_strands *s, const struct phantom_option *o, const struct yarn *path,
+                      struct error *err)
 {
     const struct phantom_yarn_law *y = &o->yarn;
     const struct rng_key key = {.seed = o->seed, .iteration = STREAM_YARN},

@@ -39,7 +39,7 @@ struct weave {
 
 /* Makes yarn number i of class 0 (weft, along x) or 1 (warp, along y): level at each crossing, and half a cosine
  * between. */
-static status add_woven_yarn(struct strand_set *s, const struct weave *w, int class, size_t i, struct error *err)
+static status add_woven_yarn(struct phantom_strands *s, const struct weave *w, int class, size_t i, struct error *err)
 {
     size_t n_cross = w->n_yarn[1 - class];
     int along = class, across = 1 - class;
@@ -47,7 +47,7 @@ static status add_woven_yarn(struct strand_set *s, const struct weave *w, int cl
                      .axis_class = (uint8_t) class,
                      .cut = class == 0 ? CUT_FACE_X : CUT_FACE_Y,
                      .number = (uint32_t)(2 * i + (size_t) class)};
-    y.shift[along] = s->tile_m[along];
+    y.shift[along] = s->set.tile_m[along];
     status st = yarn_init(&y, n_cross * POINTS_PER_CROSSING, err);
     if (st != STATUS_OK) return st;
     for (size_t k = 0; k < y.n; k++) {
@@ -69,7 +69,8 @@ static status add_woven_yarn(struct strand_set *s, const struct weave *w, int cl
     return st;
 }
 
-status weave_make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
+status weave_make(struct phantom_strands *s, const struct phantom_option *o, struct phantom_report *r,
+                  struct error *err)
 {
     struct weave w = {.o = o, .n_yarn = {o->n_yarn[0], o->n_yarn[1]}};
     /* the pile of a velvet rises between ground yarns, which need gaps for it */
@@ -77,9 +78,9 @@ status weave_make(struct strand_set *s, const struct phantom_option *o, struct p
     for (int class = 0; class < 2; class ++) {
         double section_m = yarn_section_radius_m(o, o->fiber_radius_m[class]);
         int across = 1 - class;
-        s->tile_m[across] =
+        s->set.tile_m[across] =
             whole_voxels((double)o->n_yarn[class] * 2.0 * section_m * sqrt(o->flatness) / cover, o->voxel_size_m);
-        w.spacing_m[across] = s->tile_m[across] / (double)o->n_yarn[class];
+        w.spacing_m[across] = s->set.tile_m[across] / (double)o->n_yarn[class];
         height_m += section_m / sqrt(o->flatness);
         if (class == 0) r->yarn_width_m = 2.0 * section_m * sqrt(o->flatness);
         if (class == 0) r->yarn_height_m = 2.0 * section_m / sqrt(o->flatness);
@@ -93,24 +94,24 @@ status weave_make(struct strand_set *s, const struct phantom_option *o, struct p
             if (st != STATUS_OK) return st;
         }
     if (o->weave != PHANTOM_VELVET) return STATUS_OK;
-    return pile_add(s, o, 2.0 * w.amplitude_m, err);
+    return pile_add(&s->set, o, 2.0 * w.amplitude_m, err);
 }
 
 /* Jersey: x = t + a sin 2t, y = h cos t, z = d cos 2t, in units of a wale's width / 2 pi. Heads and feet are on one
  * side, legs on the other. Courses are 5 units apart, so each head hangs over the legs of the next course. */
-status knit_make(struct strand_set *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
+status knit_make(struct phantom_strands *s, const struct phantom_option *o, struct phantom_report *r, struct error *err)
 {
     static const double a = 1.5, h = 4.0, d = 1.0, course = 5.0, yarn = 0.8;
     double section_m = yarn_section_radius_m(o, o->fiber_radius_m[0]), unit_m = section_m / (yarn * o->cover);
-    s->tile_m[0] = whole_voxels((double)o->n_yarn[1] * 2.0 * M_PI * unit_m, o->voxel_size_m);
-    s->tile_m[1] = whole_voxels((double)o->n_yarn[0] * course * unit_m, o->voxel_size_m);
-    r->yarn_spacing_m[0] = s->tile_m[0] / (double)o->n_yarn[1];
-    r->yarn_spacing_m[1] = s->tile_m[1] / (double)o->n_yarn[0];
+    s->set.tile_m[0] = whole_voxels((double)o->n_yarn[1] * 2.0 * M_PI * unit_m, o->voxel_size_m);
+    s->set.tile_m[1] = whole_voxels((double)o->n_yarn[0] * course * unit_m, o->voxel_size_m);
+    r->yarn_spacing_m[0] = s->set.tile_m[0] / (double)o->n_yarn[1];
+    r->yarn_spacing_m[1] = s->set.tile_m[1] / (double)o->n_yarn[0];
     r->yarn_width_m = 2.0 * section_m * sqrt(o->flatness);
     r->yarn_height_m = 2.0 * section_m / sqrt(o->flatness);
     for (size_t i = 0; i < o->n_yarn[0]; i++) {
         struct yarn y = {.radius_m = o->fiber_radius_m[0], .axis_class = 0, .cut = CUT_PERIOD, .number = (uint32_t)i};
-        y.shift[0] = s->tile_m[0];
+        y.shift[0] = s->set.tile_m[0];
         status st = yarn_init(&y, o->n_yarn[1] * POINTS_PER_LOOP, err);
         if (st != STATUS_OK) return st;
         for (size_t k = 0; k < y.n; k++) {

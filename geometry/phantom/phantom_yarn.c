@@ -70,7 +70,7 @@ static void section_point(const struct yarn *y, const struct yarn_section *c, do
 
 /* Adds the strands of one orbit of lattice points. With a rotation by k sixths per tile a fiber meets itself after 6
  * / gcd(k, 6) tiles. */
-static status add_orbit(struct strand_set *s, const struct phantom_option *o, const struct yarn *y,
+static status add_orbit(struct phantom_strands *s, const struct phantom_option *o, const struct yarn *y,
                         const struct yarn_section *c, double rho_m, double angle, struct rng *rng, struct error *err)
 {
     size_t fold = rho_m > 0.0 ? LATTICE_FOLD : 1;
@@ -84,7 +84,7 @@ static status add_orbit(struct strand_set *s, const struct phantom_option *o, co
                           .cut = y->cut};
     for (size_t i = 0; i < fold / n_period; i++) {
         double(*node)[3];
-        status st = strand_add(s, &like, per_tile * n_period, &node, err);
+        status st = strand_add(&s->set, &like, per_tile * n_period, &node, err);
         if (st != STATUS_OK) return st;
         double phase = 2.0 * M_PI * rng_double(rng);
         double waves = (double)(n_period + 1) / (double)n_period;
@@ -99,7 +99,7 @@ static status add_orbit(struct strand_set *s, const struct phantom_option *o, co
 
 /* Adds a hair that leaves the surface of the yarn and bends away from it. Its lengths relative to the yarn follow
  * the fits in Zhao et al. 2016: its reach is about half a yarn radius, with a wide spread. */
-static status add_flyaway(struct strand_set *s, const struct yarn *y, const struct yarn_section *c,
+static status add_flyaway(struct phantom_strands *s, const struct yarn *y, const struct yarn_section *c,
                           double section_radius_m, struct rng *rng, struct error *err)
 {
     double normal[2];
@@ -111,7 +111,7 @@ static status add_flyaway(struct strand_set *s, const struct yarn *y, const stru
     size_t n = (size_t)ceil(fabs(along) * c->length_m / y->radius_m) + FLYAWAY_NODES_MIN;
     struct strand like = {.radius_m = y->radius_m, .axis_class = y->axis_class, .cut = CUT_NONE};
     double(*node)[3];
-    status st = strand_add(s, &like, n, &node, err);
+    status st = strand_add(&s->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t k = 0; k < n; k++) {
         double w = (double)k / (double)(n - 1);
@@ -121,7 +121,7 @@ static status add_flyaway(struct strand_set *s, const struct yarn *y, const stru
     return STATUS_OK;
 }
 
-status yarn_add(struct strand_set *s, const struct phantom_option *o, const struct yarn *y, struct error *err)
+status yarn_add(struct phantom_strands *s, const struct phantom_option *o, const struct yarn *y, struct error *err)
 {
     if (o->yarn.n_ply > 0) return plied_yarn_add(s, o, y, err);
     size_t n_orbit = n_orbit_of(o);

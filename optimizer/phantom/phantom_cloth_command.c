@@ -1,4 +1,5 @@
 #include "base/durable.h"
+#include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom.h"
 #include "optimizer/phantom/phantom_commands.h"
 #include "renderer/image/image.h"
@@ -194,7 +195,7 @@ static status write_pictures(struct cloth *c, struct error *err)
     char path[4096];
     uint8_t *grey = NULL;
     size_t size[2];
-    status st = phantom_top_view(&c->fibers, 0.5 * c->phantom.voxel_size_m, size, &grey, &c->cover, err);
+    status st = fiber_top_view(&c->fibers, 0.5 * c->phantom.voxel_size_m, size, &grey, &c->cover, err);
     if (st == STATUS_OK) st = path_in(c->out, "top.png", path, err);
     if (st == STATUS_OK) st = write_png_grey(grey, size[0], size[1], path, err);
     free(grey);

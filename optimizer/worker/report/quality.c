@@ -1,5 +1,6 @@
 #include "optimizer/worker/report/quality.h"
 #include "base/durable.h"
+#include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"
@@ -91,7 +92,7 @@ static status write_top(struct pipeline_context *c, struct error *err)
     size_t n[2];
     uint8_t *grey = NULL, *rgb = NULL;
     double cover, pixel_m = fmax(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]) / TOP_PIXELS;
-    status s = phantom_top_view(&c->fiber, pixel_m, n, &grey, &cover, err);
+    status s = fiber_top_view(&c->fiber, pixel_m, n, &grey, &cover, err);
     if (s != STATUS_OK) return s;
     rgb = malloc(3 * n[0] * n[1]);
     if (rgb == NULL) {

@@ -1,6 +1,6 @@
 /* Converts strands to fibers: a smooth curve through the nodes, cut where it leaves the tile, and moved to its
  * height. */
-#include "geometry/phantom/phantom_strand.h"
+#include "geometry/cloth/strand.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,9 +59,7 @@ static bool advance(struct emitter *e, const double a[3], const double b[3])
         int axis = -1;
         for (int k = 0; k < 2; k++) {
             long there = cell_of(e, b, k);
-            if ((e->strand->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 || e->strand->n_period == 0 ||
-                there == e->cell[k])
-                continue;
+            if ((e->strand->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 || there == e->cell[k]) continue;
             double face = (double)(there > e->cell[k] ? e->cell[k] + 1 : e->cell[k]) * e->tile_m[k];
             double w = b[k] != from[k] ? (face - from[k]) / (b[k] - from[k]) : 0.0;
             if (w < nearest) {

@@ -1,6 +1,7 @@
-#include "geometry/phantom/phantom.h"
+#include "geometry/fibers/fiber_view.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 
 /* Computes the height of the topmost fiber surface over each pixel of the tile (periodic). Pixels without a fiber
@@ -32,8 +33,8 @@ static void draw(const struct fiber_set *f, double pixel_size_m, const size_t n[
     }
 }
 
-status phantom_top_view(const struct fiber_set *f, double pixel_size_m, size_t size[2], uint8_t **grey, double *cover,
-                        struct error *err)
+status fiber_top_view(const struct fiber_set *f, double pixel_size_m, size_t size[2], uint8_t **grey, double *cover,
+                      struct error *err)
 {
     if (!(pixel_size_m > 0.0)) return error_set(err, STATUS_INVALID, "the pixel size must be positive");
     for (int a = 0; a < 2; a++) size[a] = (size_t)fmax(1.0, round(f->tile_size_m[a] / pixel_size_m));

@@ -1,7 +1,7 @@
 /* Pushes fibers apart. Overlapping nodes of different fibers each move by half of the overlap, across their fibers.
  * Then the displacements are smoothed along each strand (not the positions, so crimp and twist stay), and bends that
  * would break a fiber are straightened. These are Jacobi rounds: all nodes are evaluated before any node moves. */
-#include "geometry/phantom/phantom_strand.h"
+#include "geometry/cloth/strand.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,6 +21,7 @@ static const double UNBEND = 0.5;
 
 struct relax {
     struct strand_set *s;
+    enum strand_rule rule;
     uint32_t *strand_of;           /* node -> strand */
     double (*move)[3], (*step)[3]; /* wanted by the overlaps, and taken last */
     double *depth;                 /* deepest overlap of a node, over the sum of radii */
@@ -56,9 +57,9 @@ static size_t clamp_cell(double x, double cell_m, size_t n_cell)
     return c < 0.0 ? 0 : c >= (double)n_cell ? n_cell - 1 : (size_t)c;
 }
 
-static status relax_init(struct relax *r, struct strand_set *s, struct error *err)
+static status relax_init(struct relax *r, struct strand_set *s, enum strand_rule rule, struct error *err)
 {
-    *r = (struct relax){.s = s, .per_tile = {1.0 / s->tile_m[0], 1.0 / s->tile_m[1]}};
+    *r = (struct relax){.s = s, .rule = rule, .per_tile = {1.0 / s->tile_m[0], 1.0 / s->tile_m[1]}};
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < s->n_strand; i++) r->r_max = fmax(r->r_max, s->strand[i].radius_m);
     for (size_t k = 0; k < s->n_node; k++) {
@@ -80,7 +81,7 @@ static status relax_init(struct relax *r, struct strand_set *s, struct error *er
     r->cell_node = calloc(s->n_node, sizeof *r->cell_node);
     r->cell_of = calloc(s->n_node, sizeof *r->cell_of);
     if (!r->strand_of || !r->move || !r->step || !r->depth || !r->cell_first || !r->cell_node || !r->cell_of)
-        return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
+        return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
     for (size_t i = 0; i < s->n_strand; i++)
         for (size_t k = 0; k < s->strand[i].n; k++) r->strand_of[s->strand[i].first + k] = (uint32_t)i;
     return STATUS_OK;
@@ -128,8 +129,19 @@ static bool same_fiber(const struct strand_set *s, const uint32_t *strand_of, si
 
 struct push {
     double sum[3], depth;
-    size_t n;
+    double n; /* contacts; STRAND_SMOOTH: each counts by its depth */
 };
+
+/* Adds one contact without a step at first touch, and without a sudden turn when centres pass each other. */
+static void push_smoothly(struct push *push, const double d[3], double distance, double want)
+{
+    static const double full = 0.1, blunt = 0.2; /* of the sum of radii */
+    double depth = want - distance, share = fmin(1.0, depth / (full * want));
+    double length = sqrt(distance * distance + blunt * blunt * want * want);
+    for (int a = 0; a < 3; a++) push->sum[a] += 0.5 * depth * d[a] / length;
+    push->depth = fmax(push->depth, depth / want);
+    push->n += share * share * (3.0 - 2.0 * share);
+}
 
 static void push_from(const struct relax *r, size_t i, size_t j, struct push *push)
 {
@@ -142,6 +154,10 @@ static void push_from(const struct relax *r, size_t i, size_t j, struct push *pu
     double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     if (d2 >= want * want || same_fiber(s, r->strand_of, i, j)) return;
     double distance = sqrt(d2), depth = want - distance;
+    if (r->rule == STRAND_SMOOTH) {
+        push_smoothly(push, d, distance, want);
+        return;
+    }
     if (distance < 1e-9 * want) { /* on top of each other: the lower number goes down */
         d[0] = d[1] = 0.0;
         d[2] = i < j ? -1.0 : 1.0;
@@ -149,7 +165,7 @@ static void push_from(const struct relax *r, size_t i, size_t j, struct push *pu
     }
     for (int a = 0; a < 3; a++) push->sum[a] += 0.5 * depth * d[a] / distance;
     push->depth = fmax(push->depth, depth / want);
-    push->n++;
+    push->n += 1.0;
 }
 
 static void push_from_cell_row(const struct relax *r, size_t i, size_t z, size_t y, size_t at_x, struct push *push)
@@ -165,7 +181,7 @@ static void push_from_cell_row(const struct relax *r, size_t i, size_t z, size_t
 static void look_from(struct relax *r, size_t i)
 {
     const struct strand_set *s = r->s;
-    struct push push = {{0.0, 0.0, 0.0}, 0.0, 0};
+    struct push push = {{0.0, 0.0, 0.0}, 0.0, 0.0};
     size_t c = r->cell_of[i],
            at[3] = {c % r->n_cell[0], c / r->n_cell[0] % r->n_cell[1], c / (r->n_cell[0] * r->n_cell[1])};
     size_t reach = r->n_cell[1] >= 3 ? 3 : r->n_cell[1];
@@ -183,7 +199,7 @@ static void look_from(struct relax *r, size_t i)
         dot += along[a] * push.sum[a];
     }
     for (int a = 0; a < 3; a++) /* the part along the fiber would only shuffle nodes */
-        r->move[i][a] = push.n == 0 ? 0.0 : (push.sum[a] - dot * along[a] / length2) / (0.5 * (double)push.n + 0.5);
+        r->move[i][a] = push.n == 0.0 ? 0.0 : (push.sum[a] - dot * along[a] / length2) / (0.5 * push.n + 0.5);
     r->depth[i] = push.depth;
 }
 
@@ -283,13 +299,14 @@ static double strain_p95(struct relax *r)
     return n > 0 ? r->depth[(size_t)(0.95 * (double)(n - 1))] : 0.0;
 }
 
-status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *pool, const struct progress *progress,
-                    struct phantom_report *report, struct error *err)
+status strand_relax(struct strand_set *s, const struct strand_relax_option *o, struct thread_pool *pool,
+                    const struct progress *progress, struct strand_fit *fit, struct error *err)
 {
+    const size_t n_round = o->n_round;
     struct relax r;
     status st = STATUS_OK;
     memcpy(s->p, s->start, s->n_node * sizeof *s->p);
-    st = relax_init(&r, s, err);
+    st = relax_init(&r, s, o->rule, err);
     if (st != STATUS_OK) goto out;
     size_t n_task = (s->n_node + NODES_PER_TASK - 1) / NODES_PER_TASK;
     const struct progress quiet = progress_silent(progress);
@@ -313,13 +330,13 @@ status strand_relax(struct strand_set *s, size_t n_round, struct thread_pool *po
         if (st != STATUS_OK) goto out;
         progress_report(progress, (double)(i_round + 1) / (double)n_round);
     }
-    report->overlap_mean = report->overlap_max = 0.0;
+    fit->overlap_mean = fit->overlap_max = 0.0;
     for (size_t k = 0; k < s->n_node; k++) {
-        report->overlap_mean += r.depth[k] / (double)s->n_node;
-        report->overlap_max = fmax(report->overlap_max, r.depth[k]);
+        fit->overlap_mean += r.depth[k] / (double)s->n_node;
+        fit->overlap_max = fmax(fit->overlap_max, r.depth[k]);
     }
-    report->strain_p95 = strain_p95(&r);
+    fit->strain_p95 = strain_p95(&r);
 out:
     relax_release(&r);
-    return st == STATUS_CANCELLED ? error_set(err, st, "cancelled while making the phantom") : st;
+    return st == STATUS_CANCELLED ? error_set(err, st, "cancelled while making the fibers") : st;
 }

@@ -1,4 +1,4 @@
-#include "geometry/phantom/phantom_strand.h"
+#include "geometry/cloth/strand.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +19,7 @@ static status grow_nodes(struct strand_set *s, size_t n, struct error *err)
     if (start != NULL) s->start = start;
     void *p = realloc(s->p, capacity * sizeof *s->p);
     if (p != NULL) s->p = p;
-    if (start == NULL || p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
+    if (start == NULL || p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
     s->node_capacity = capacity;
     return STATUS_OK;
 }
@@ -31,7 +31,7 @@ status strand_add(struct strand_set *s, const struct strand *like, size_t n, dou
     if (s->n_strand == s->strand_capacity) {
         size_t capacity = 2 * s->strand_capacity + 64;
         void *grown = realloc(s->strand, capacity * sizeof *s->strand);
-        if (grown == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make phantom: out of memory");
+        if (grown == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
         s->strand = grown;
         s->strand_capacity = capacity;
     }

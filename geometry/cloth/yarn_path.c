@@ -1,5 +1,5 @@
 /* The path of a yarn: its length, and the map from points of its section to space. */
-#include "geometry/phantom/phantom_strand.h"
+#include "geometry/cloth/yarn_path.h"
 
 #include <math.h>
 

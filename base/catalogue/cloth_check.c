@@ -1,0 +1,126 @@
+/* Checks of a described cloth that need no geometry: the draft, the orders of the kinds, and the ranges of numbers. */
+#include "base/catalogue/cloth_description.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static size_t divisor(size_t a, size_t b) { return b == 0 ? a : divisor(b, a % b); }
+
+/* Returns whether yarn i of a direction passes from one face of the cloth to the other within the draft. */
+static bool crosses(const struct cloth_description *d, enum cloth_direction direction, size_t i)
+{
+    size_t n = direction == CLOTH_WEFT ? d->n_warp : d->n_weft;
+    for (size_t k = 1; k < n; k++)
+        if (direction == CLOTH_WEFT ? d->warp_over[i][k] != d->warp_over[i][0]
+                                    : d->warp_over[k][i] != d->warp_over[0][i])
+            return true;
+    return false;
+}
+
+static status check_draft(const struct cloth_description *d, struct error *err)
+{
+    for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++) {
+        size_t n = direction == CLOTH_WEFT ? d->n_weft : d->n_warp;
+        for (size_t i = 0; i < n; i++)
+            if (!crosses(d, direction, i))
+                return error_set_field(err, STATUS_INVALID, "draft",
+                                       "%s %zu of the draft never crosses to the other face, so it is not held",
+                                       direction == CLOTH_WEFT ? "weft" : "warp", i);
+    }
+    return STATUS_OK;
+}
+
+static status check_order(const struct cloth_description *d, enum cloth_direction direction, struct error *err)
+{
+    const char *field = direction == CLOTH_WEFT ? "weft" : "warp";
+    size_t n = d->n_order[direction];
+    if (n < 1 || n > CLOTH_MAX_ORDER)
+        return error_set_field(err, STATUS_INVALID, field, "the order of the %s has 1 to %d yarns", field,
+                               CLOTH_MAX_ORDER);
+    for (size_t i = 0; i < n; i++)
+        if (d->order[direction][i] >= d->n_kind || (int)d->order[direction][i] == d->pile_kind)
+            return error_set_field(err, STATUS_INVALID, field, "yarn %zu of the %s is of kind %d: 'yarns' has %zu, %s",
+                                   i, field, (int)d->order[direction][i], d->n_kind,
+                                   d->pile_kind < 0 ? "counted from 0" : "counted from 0, and the last is the pile");
+    return STATUS_OK;
+}
+
+/* Chooses the number of yarns in the tile: the least multiple of the draft and of the order that shows several
+ * repeats. */
+static status choose_yarns(struct cloth_description *d, enum cloth_direction direction, struct error *err)
+{
+    enum { LEAST_YARN = 8, LEAST_LOOP = 4 };
+    const char *field = direction == CLOTH_WEFT ? "weft" : "warp";
+    bool knit = d->structure == CLOTH_KNIT;
+    size_t draft = knit ? 1 : direction == CLOTH_WEFT ? d->n_weft : d->n_warp;
+    size_t order = knit && direction == CLOTH_WARP ? 1 : d->n_order[direction];
+    size_t repeat = draft / divisor(draft, order) * order, least = knit ? LEAST_LOOP : LEAST_YARN;
+    if (repeat > CLOTH_MAX_YARN)
+        return error_set_field(err, STATUS_INVALID, field,
+                               "draft and order of the %s repeat together after %zu yarns only, at most %d are allowed",
+                               field, repeat, CLOTH_MAX_YARN);
+    if (d->n_yarn[direction] == 0) d->n_yarn[direction] = (least + repeat - 1) / repeat * repeat;
+    if (d->n_yarn[direction] % repeat != 0 || d->n_yarn[direction] > CLOTH_MAX_YARN)
+        return error_set_field(err, STATUS_INVALID, "tile_yarns",
+                               "the tile has %zu yarns of the %s: it must be a multiple of %zu, at most %d",
+                               d->n_yarn[direction], field, repeat, CLOTH_MAX_YARN);
+    return STATUS_OK;
+}
+
+static status check_kinds(const struct cloth_description *d, struct error *err)
+{
+    if (d->n_kind < 1 || d->n_kind > CLOTH_MAX_KIND)
+        return error_set_field(err, STATUS_INVALID, "yarns", "a cloth has 1 to %d kinds of yarn", CLOTH_MAX_KIND);
+    for (size_t k = 0; k < d->n_kind; k++) {
+        const struct cloth_kind *kind = &d->kind[k];
+        size_t most = d->structure == CLOTH_FELT ? 100000 : CLOTH_MAX_FIBER;
+        char field[48];
+        snprintf(field, sizeof field, "yarns[%zu].fibers", k);
+        if (kind->n_fiber < 1 || kind->n_fiber > most)
+            return error_set_field(err, STATUS_INVALID, field, "'%s' is %zu, but must be between 1 and %zu", field,
+                                   kind->n_fiber, most);
+        snprintf(field, sizeof field, "yarns[%zu].plies", k);
+        if (kind->n_ply < 1 || kind->n_ply > CLOTH_MAX_PLY || kind->n_ply > kind->n_fiber)
+            return error_set_field(err, STATUS_INVALID, field,
+                                   "'%s' is %zu, but must be between 1 and %d, and at most the number of fibers", field,
+                                   kind->n_ply, CLOTH_MAX_PLY);
+        snprintf(field, sizeof field, "yarns[%zu].melange_with", k);
+        if (kind->melange_with >= (int)d->n_kind || kind->melange_with == (int)k)
+            return error_set_field(err, STATUS_INVALID, field, "'%s' is %d: it must be another kind, below %zu", field,
+                                   kind->melange_with, d->n_kind);
+    }
+    return STATUS_OK;
+}
+
+/* Checks value, bounds and prior of one number. */
+static status check_number(const struct cloth_number *n, struct error *err)
+{
+    const struct cloth_number_info *i = n->info;
+    if (!(n->value >= i->lower && n->value <= i->upper))
+        return error_set_field(err, STATUS_INVALID, n->name, "'%s' is %g, but must be between %g and %g", n->name,
+                               n->value, i->lower, i->upper);
+    if (!n->fitted) return STATUS_OK;
+    if (!(n->lower >= i->lower && n->upper <= i->upper && n->lower < n->upper))
+        return error_set_field(err, STATUS_INVALID, n->name,
+                               "the bounds of '%s' are %g and %g: they must rise, within %g and %g", n->name, n->lower,
+                               n->upper, i->lower, i->upper);
+    if (!(n->value >= n->lower && n->value <= n->upper))
+        return error_set_field(err, STATUS_INVALID, n->name, "'%s' starts at %g, outside of its bounds %g and %g",
+                               n->name, n->value, n->lower, n->upper);
+    if (!isnan(n->prior_sd) && !(n->prior_sd > 0.0 && isfinite(n->prior_mean)))
+        return error_set_field(err, STATUS_INVALID, n->name,
+                               "the prior of '%s' needs a mean and a positive standard deviation", n->name);
+    return STATUS_OK;
+}
+
+status cloth_description_check(struct cloth_description *d, struct error *err)
+{
+    status st = check_kinds(d, err);
+    if (st == STATUS_OK && (d->structure == CLOTH_WOVEN || d->structure == CLOTH_VELVET)) st = check_draft(d, err);
+    for (int a = CLOTH_WEFT; a <= CLOTH_WARP && d->structure != CLOTH_FELT && st == STATUS_OK; a++) {
+        st = check_order(d, a, err);
+        if (st == STATUS_OK) st = choose_yarns(d, a, err);
+    }
+    for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) st = check_number(&d->number[i], err);
+    return st;
+}

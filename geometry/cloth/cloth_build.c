@@ -1,0 +1,95 @@
+#include "geometry/cloth/cloth.h"
+
+#include "geometry/cloth/cloth_work.h"
+#include "geometry/fibers/fiber_view.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Rounds of pushing fibers apart, and vertices of the result per fiber radius. */
+enum { RELAX_ROUNDS = 12, VIEW_PIXELS = 400 };
+
+static status make(struct cloth_work *w, struct error *err)
+{
+    switch (w->d->structure) {
+    case CLOTH_KNIT:
+        return cloth_knit(w, err);
+    case CLOTH_FELT:
+        return cloth_felt(w, err);
+    default:
+        return cloth_weave(w, err);
+    }
+}
+
+static void report_kinds(const struct cloth_work *w, struct cloth_report *r)
+{
+    for (size_t k = 0; k < w->d->n_kind && w->d->structure != CLOTH_FELT; k++) {
+        const struct kind_shape *s = &w->kind[k];
+        if ((int)k == w->d->pile_kind) continue;
+        double turns = s->n_ply > 1 ? s->ply_twist_per_m : s->twist_per_m;
+        r->yarn_width_m[k] = 2.0 * s->half_m[0];
+        r->yarn_height_m[k] = 2.0 * s->half_m[1];
+        r->surface_angle_rad[k] = atan(2.0 * M_PI * turns * s->round_m);
+    }
+}
+
+static void report_fibers(const struct fiber_set *f, struct cloth_report *r)
+{
+    double low, high, volume = 0.0;
+    fiber_set_z_range_m(f, &low, &high);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        struct fiber_set one = {.n_fiber = 1, .first_vertex = f->first_vertex + i, .position_m = f->position_m};
+        double length_m = fiber_set_length_m(&one);
+        volume += M_PI * (double)f->radius_m[i] * (double)f->radius_m[i] * length_m;
+        r->n_fiber[f->group[i]]++;
+        r->length_m[f->group[i]] += length_m;
+    }
+    r->thickness_m = high - low;
+    r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * r->thickness_m);
+}
+
+static status report_fill(const struct cloth_work *w, const struct strand_fit *fit, const struct fiber_set *f,
+                          struct cloth_report *r, struct error *err)
+{
+    size_t size[2];
+    for (int a = 0; a < 2; a++) {
+        r->tile_m[a] = w->set.tile_m[a];
+        r->n_yarn[a] = w->d->structure == CLOTH_FELT ? 0 : w->d->n_yarn[a];
+        r->yarn_spacing_m[a] = w->spacing_m[a];
+    }
+    r->overlap_mean = fit->overlap_mean;
+    r->overlap_max = fit->overlap_max;
+    r->strain_p95 = fit->strain_p95;
+    report_kinds(w, r);
+    report_fibers(f, r);
+    return fiber_top_view(f, fmax(r->tile_m[0], r->tile_m[1]) / VIEW_PIXELS, size, NULL, &r->cover, err);
+}
+
+/* Emission at the nodes alone: they are near enough for the bends that fibers can have. */
+static double node_spacing_m(const struct strand_set *s)
+{
+    double most_m = 0.0;
+    for (size_t i = 0; i < s->n_strand; i++) most_m = fmax(most_m, s->strand[i].radius_m);
+    return most_m;
+}
+
+status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
+                   const struct progress *progress, struct fiber_set *f, struct cloth_report *report, struct error *err)
+{
+    double own[CLOTH_MAX_NUMBER];
+    for (size_t i = 0; i < d->n_number; i++) own[i] = number != NULL ? number[i] : d->number[i].value;
+    struct cloth_work w = {.d = d, .number = own};
+    const struct strand_relax_option relax = {.n_round = RELAX_ROUNDS, .rule = STRAND_SMOOTH};
+    struct strand_fit fit = {0};
+    memset(report, 0, sizeof *report);
+    status st = cloth_number_check(d, own, err);
+    if (st != STATUS_OK) return st;
+    kind_shapes(&w);
+    st = make(&w, err);
+    if (st == STATUS_OK) st = strand_relax(&w.set, &relax, pool, progress, &fit, err);
+    if (st == STATUS_OK) st = strand_emit(&w.set, node_spacing_m(&w.set), 0.0, f, err);
+    if (st == STATUS_OK) st = fiber_set_validate(f, err);
+    if (st == STATUS_OK) st = report_fill(&w, &fit, f, report, err);
+    strand_set_release(&w.set);
+    return st;
+}

@@ -1,0 +1,87 @@
+/* The kinds of yarn at given numbers: their sections; and smooth random waves. */
+#include "base/angle.h"
+#include "base/rng.h"
+#include "geometry/cloth/cloth_work.h"
+
+#include <math.h>
+
+static double of_kind(const struct cloth_work *w, const double *number, size_t k, const char *name, double none)
+{
+    double value = cloth_number_value(w->d, number, (int)k, name);
+    return isnan(value) ? none : value;
+}
+
+double work_number(const struct cloth_work *w, const char *name)
+{
+    return cloth_number_value(w->d, w->number, -1, name);
+}
+
+/* Area-preserving: an ellipse of the area of the round section. Its fibers circulate with a constant rate of the
+ * eccentric angle, which keeps their density even. The rate is lowered by round_m / half width, so that fibers on the
+ * flat side lie at the same angle to the yarn as on the surface of the round yarn. */
+static void flatten(struct kind_shape *s)
+{
+    s->half_m[0] = s->round_m * sqrt(s->flatness);
+    s->half_m[1] = s->round_m / sqrt(s->flatness);
+    s->turn_of_twist = 1.0 / sqrt(s->flatness);
+}
+
+static void shape(const struct cloth_work *w, const double *number, size_t k, struct kind_shape *s)
+{
+    const struct cloth_kind *kind = &w->d->kind[k];
+    *s = (struct kind_shape){.n_fiber = kind->n_fiber,
+                             .n_ply = kind->n_ply,
+                             .melange_with = kind->melange_with,
+                             .radius_m = 1e-6 * of_kind(w, number, k, "fiber_radius_um", 8.0),
+                             .radius_spread = of_kind(w, number, k, "radius_spread", 0.0),
+                             .packing = of_kind(w, number, k, "packing", 0.6),
+                             .flatness = of_kind(w, number, k, "flatness", 1.0),
+                             .twist_per_m = of_kind(w, number, k, "twist_per_m", 0.0),
+                             .ply_twist_per_m = of_kind(w, number, k, "ply_twist_per_m", 0.0),
+                             .migration = of_kind(w, number, k, "migration", 0.0),
+                             .fiber_angle_rad = RAD_PER_DEG * of_kind(w, number, k, "fiber_angle_deg", 0.0),
+                             .hairs_per_m = 1e3 * of_kind(w, number, k, "hairs_per_mm", 0.0),
+                             .hair_length_m = 1e-6 * of_kind(w, number, k, "hair_length_um", 0.0),
+                             .melange = of_kind(w, number, k, "melange", 0.0)};
+    double per_ply = (double)s->n_fiber / (double)s->n_ply;
+    s->ply_radius_m = s->radius_m * sqrt(per_ply / s->packing);
+    if (s->n_ply > 1) s->ply_distance_m = s->ply_radius_m / sin(M_PI / (double)s->n_ply);
+    s->round_m = s->ply_radius_m + s->ply_distance_m;
+    flatten(s);
+}
+
+void kind_shapes(struct cloth_work *w)
+{
+    for (size_t k = 0; k < w->d->n_kind; k++) {
+        shape(w, w->number, k, &w->kind[k]);
+        shape(w, NULL, k, &w->nominal[k]);
+    }
+}
+
+void wave_draw(struct wave *v, double n_least, struct rng *rng)
+{
+    for (int i = 0; i < N_WAVE; i++) {
+        double z[2];
+        rng_normal_pair(rng, z);
+        v->a[i] = z[0] / sqrt(N_WAVE);
+        v->b[i] = z[1] / sqrt(N_WAVE);
+        v->k[i] = n_least + i;
+    }
+}
+
+double wave_at(const struct wave *v, double s)
+{
+    double sum = 0.0;
+    for (int i = 0; i < N_WAVE; i++) {
+        double turn = 2.0 * M_PI * v->k[i] * s;
+        sum += v->a[i] * cos(turn) + v->b[i] * sin(turn);
+    }
+    return sum;
+}
+
+double wave_slope_sd(const struct wave *v)
+{
+    double sum = 0.0;
+    for (int i = 0; i < N_WAVE; i++) sum += 4.0 * M_PI * M_PI * v->k[i] * v->k[i] / N_WAVE;
+    return sqrt(sum);
+}

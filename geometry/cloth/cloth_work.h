@@ -1,0 +1,62 @@
+/* The parts of a described cloth while it is made (used only in this folder). Lengths are in metres. */
+#ifndef SELVEDGE_GEOMETRY_CLOTH_WORK_H
+#define SELVEDGE_GEOMETRY_CLOTH_WORK_H
+
+#include "geometry/cloth/cloth.h"
+#include "geometry/cloth/yarn_path.h"
+
+enum { POINTS_PER_CROSSING = 24, N_WAVE = 4 };
+
+/* One kind of yarn at the present numbers. */
+struct kind_shape {
+    size_t n_fiber, n_ply;
+    int melange_with;
+    double radius_m, radius_spread, packing, flatness, twist_per_m, ply_twist_per_m, migration, fiber_angle_rad;
+    double hairs_per_m, hair_length_m, melange;
+    double round_m;        /* radius of the yarn's round section */
+    double half_m[2];      /* of the flattened section: width, height */
+    double ply_radius_m;   /* of the section of a ply; round_m of a single yarn */
+    double ply_distance_m; /* between the centres of ply and yarn; 0 of a single yarn */
+    double turn_of_twist;  /* turns of the flattened section for each turn of the round one */
+};
+
+struct cloth_work {
+    const struct cloth_description *d;
+    const double *number; /* flat vector, never NULL */
+    struct kind_shape kind[CLOTH_MAX_KIND];
+    /* Sizes at the description's own values: they decide counts of nodes, which thus do not depend on the vector. */
+    struct kind_shape nominal[CLOTH_MAX_KIND];
+    double nominal_tile_m[2];
+    double spacing_m[2]; /* mean, along x (warps) and y (wefts) */
+    struct strand_set set;
+};
+
+/* Value of a number of the cloth; NaN if it has none. */
+double work_number(const struct cloth_work *w, const char *name);
+/* Fills w->kind and w->nominal. */
+void kind_shapes(struct cloth_work *w);
+
+/* A periodic random function of s with period 1, mean 0 and standard deviation 1: a few smooth waves. */
+struct wave {
+    double a[N_WAVE], b[N_WAVE];
+    double k[N_WAVE]; /* waves per period */
+};
+struct rng;
+/* n_least: waves per period of the longest; they follow each other. */
+void wave_draw(struct wave *v, double n_least, struct rng *rng);
+double wave_at(const struct wave *v, double s);
+/* Standard deviation of the slope by s. */
+double wave_slope_sd(const struct wave *v);
+
+/* Adds the staple fibers and hairs of one yarn. nominal_m: its length at the description's own values. yarn_number
+ * selects random streams. */
+status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, double nominal_m, struct error *err);
+
+/* Set tile_m and add all fibers. */
+status cloth_weave(struct cloth_work *w, struct error *err);
+status cloth_knit(struct cloth_work *w, struct error *err);
+status cloth_felt(struct cloth_work *w, struct error *err);
+/* Adds the pile of a velvet above the ground. x_m, y_m: borders between warps and between wefts. */
+status cloth_pile(struct cloth_work *w, const double *x_m, const double *y_m, double ground_m, struct error *err);
+
+#endif

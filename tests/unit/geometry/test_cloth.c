@@ -1,0 +1,213 @@
+/* The procedural cloth: it follows its numbers smoothly, closes at the faces, and refuses what cannot be. */
+#include "geometry/cloth/cloth.h"
+#include "geometry/fibers/fiber_seam.h"
+#include "geometry/phantom/compare.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct cloth_description small_cloth(const char *weave)
+{
+    struct cloth_description d;
+    struct error err = {0};
+    assert_int_equal(cloth_description_init(&d, weave, &err), STATUS_OK);
+    d.kind[0].n_fiber = d.structure == CLOTH_FELT ? 60 : 12;
+    if (d.structure != CLOTH_FELT) d.n_yarn[0] = d.n_yarn[1] = strcmp(weave, "satin") == 0 ? 5 : 4;
+    assert_int_equal(cloth_description_check(&d, &err), STATUS_OK);
+    return d;
+}
+
+static void set_number(struct cloth_description *d, const char *name, double value)
+{
+    int i = cloth_number_index(d, name);
+    assert_true(i >= 0);
+    d->number[i].value = value;
+}
+
+static void build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
+                  struct fiber_set *f, struct cloth_report *r)
+{
+    struct error err = {0};
+    fiber_set_init(f);
+    status st = cloth_build(d, number, pool, NULL, f, r, &err);
+    if (st != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
+}
+
+/* Every weave makes fibers that continue across the faces, and the same ones with two threads. */
+static void test_every_weave(void **state)
+{
+    (void)state;
+    struct thread_pool *pool = NULL;
+    assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
+    for (const char *const *weave = cloth_weave_names; *weave != NULL; weave++) {
+        struct cloth_description d = small_cloth(*weave);
+        struct fiber_set f, g;
+        struct cloth_report r, again;
+        struct fiber_seam seam;
+        build(&d, NULL, NULL, &f, &r);
+        build(&d, NULL, pool, &g, &again);
+        assert_int_equal(f.n_vertex, g.n_vertex);
+        assert_memory_equal(f.position_m, g.position_m, 3 * f.n_vertex * sizeof *f.position_m);
+        assert_memory_equal(&r, &again, sizeof r);
+        assert_int_equal(fiber_seam_measure(&f, &seam, NULL), STATUS_OK);
+        /* staples that end within a radius of a face by chance have no partner there */
+        if (d.structure != CLOTH_VELVET) assert_true(seam.n_end[0] > 80 && seam.share[0] > 0.88);
+        assert_true(r.cover > 0.3 && r.cover <= 1.0 && r.volume_fraction > 0.05 && r.volume_fraction < 0.75);
+        assert_true(r.overlap_mean < 0.06 && r.n_fiber[0] >= d.kind[0].n_fiber);
+        assert_int_equal(fiber_set_n_group(&f), d.n_kind);
+        fiber_set_release(&f);
+        fiber_set_release(&g);
+    }
+    thread_pool_free(pool);
+}
+
+/* Root mean square distance between the fibers at the description's values and with one number moved. */
+static double moved_m(const struct cloth_description *d, size_t i_number, double by)
+{
+    const struct compare_option o = {.voxel_size_m = 4e-6};
+    struct compare_report compared;
+    struct fiber_set f, g;
+    struct cloth_report r;
+    double number[CLOTH_MAX_NUMBER];
+    for (size_t i = 0; i < d->n_number; i++) number[i] = d->number[i].value;
+    build(d, number, NULL, &f, &r);
+    number[i_number] += by;
+    build(d, number, NULL, &g, &r);
+    assert_int_equal(compare_fibers(&f, &g, &o, &compared, NULL), STATUS_OK);
+    if (!(compared.center_recall > 0.97))
+        fail_msg("%s moved by %g loses fibers: recall %g", d->number[i_number].name, by, compared.center_recall);
+    fiber_set_release(&f);
+    fiber_set_release(&g);
+    return compared.centerline_rms_voxel * o.voxel_size_m;
+}
+
+/* A tenth of the change of a number moves the fibers by about a tenth, or by less than 5 % of their radius: there are no
+ * steps where something is rounded. */
+static void test_numbers_move_fibers_smoothly(void **state)
+{
+    (void)state;
+    static const char *const weave[] = {"plain", "felt", "jersey", "velvet"};
+    for (size_t w = 0; w < 4; w++) {
+        struct cloth_description d = small_cloth(weave[w]);
+        if (w == 0) set_number(&d, "yarns[0].hairs_per_mm", 6.03);
+        for (size_t i = 0; i < d.n_number; i++) {
+            const struct cloth_number_info *n = d.number[i].info;
+            double step = 2e-4 * (n->upper - n->lower), sign = d.number[i].value + step > n->upper ? -1.0 : 1.0;
+            double whole = moved_m(&d, i, sign * step), tenth = moved_m(&d, i, 0.1 * sign * step);
+            if (!(whole < 3e-6 && tenth < fmax(0.14 * whole, 0.4e-6)))
+                fail_msg("%s of %s: a step moves fibers by %g um, a tenth of it by %g um", d.number[i].name, weave[w],
+                         1e6 * whole, 1e6 * tenth);
+        }
+    }
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* 90 % of the length of the warp fibers lies at angles up to this one to the warp, seen from above. */
+static double steep_angle_rad(const struct fiber_set *f)
+{
+    double *angle = calloc(f->n_vertex, sizeof *angle);
+    size_t n = 0;
+    assert_non_null(angle);
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t k = f->first_vertex[i]; f->axis_class[i] == 1 && k + 1 < f->first_vertex[i + 1]; k++) {
+            const float *a = f->position_m + 3 * k, *b = a + 3;
+            angle[n++] = fabs(atan2((double)(b[0] - a[0]), (double)(b[1] - a[1])));
+        }
+    qsort(angle, n, sizeof *angle, ascending);
+    double steep = angle[(size_t)(0.9 * (double)n)];
+    free(angle);
+    return steep;
+}
+
+/* Flattening a yarn leaves the angle of its fibers on the flat side as the twist says. */
+static void test_flat_yarns_keep_the_angle_of_twist(void **state)
+{
+    (void)state;
+    double ratio[2];
+    for (int k = 0; k < 2; k++) {
+        struct cloth_description d = small_cloth("twill");
+        struct fiber_set f;
+        struct cloth_report r;
+        set_number(&d, "yarns[0].flatness", k == 0 ? 1.8 : 4.0);
+        set_number(&d, "yarns[0].twist_per_m", 1500.0);
+        set_number(&d, "yarns[0].fiber_angle_deg", 0.0);
+        set_number(&d, "yarns[0].packing", 0.4);
+        set_number(&d, "crimp", 0.0);
+        set_number(&d, "disorder", 0.0);
+        build(&d, NULL, NULL, &f, &r);
+        ratio[k] = tan(steep_angle_rad(&f)) / tan(r.surface_angle_rad[0]);
+        if (!(ratio[k] > 0.7 && ratio[k] < 1.15)) fail_msg("flatness %d: the tangents' ratio is %g", k, ratio[k]);
+        fiber_set_release(&f);
+    }
+    assert_true(fabs(ratio[1] / ratio[0] - 1.0) < 0.15);
+}
+
+static void refuse(const struct cloth_description *given, const char *field)
+{
+    struct cloth_description d = *given;
+    struct error err = {0};
+    struct fiber_set f;
+    struct cloth_report r;
+    fiber_set_init(&f);
+    status st = cloth_description_check(&d, &err);
+    if (st == STATUS_OK) st = cloth_build(&d, NULL, NULL, NULL, &f, &r, &err);
+    assert_int_equal(st, STATUS_INVALID);
+    assert_string_equal(err.field, field);
+    assert_true(strlen(err.text) > 20);
+}
+
+static void test_contradictions_are_named(void **state)
+{
+    (void)state;
+    static const char *const never[] = {"10", "10"}, *const uneven[] = {"10", "011"}, *const odd[] = {"1x", "01"};
+    struct cloth_description d = small_cloth("plain");
+    struct error err = {0};
+    set_number(&d, "crimp", 1.2);
+    refuse(&d, "crimp");
+    set_number(&d, "crimp", 0.0);
+    set_number(&d, "yarns[0].flatness", 1.0);
+    refuse(&d, "crimp");
+    d = small_cloth("plain");
+    set_number(&d, "yarns[0].packing", 0.95);
+    refuse(&d, "yarns[0].packing");
+    d = small_cloth("plain");
+    d.threads_per_cm[CLOTH_WARP] = 900.0;
+    cloth_description_number(&d);
+    refuse(&d, "warp_per_cm");
+    d = small_cloth("plain");
+    d.order[CLOTH_WEFT][0] = 1;
+    refuse(&d, "weft");
+    d = small_cloth("plain");
+    d.n_yarn[CLOTH_WEFT] = 3;
+    refuse(&d, "tile_yarns");
+    d = small_cloth("plain");
+    assert_int_equal(cloth_description_draft(&d, never, 2, &err), STATUS_OK);
+    refuse(&d, "draft");
+    assert_int_equal(cloth_description_draft(&d, uneven, 2, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "draft");
+    assert_int_equal(cloth_description_draft(&d, odd, 2, &err), STATUS_INVALID);
+    assert_int_equal(cloth_description_init(&d, "tweed", &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "twill31"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_every_weave),
+        cmocka_unit_test(test_numbers_move_fibers_smoothly),
+        cmocka_unit_test(test_flat_yarns_keep_the_angle_of_twist),
+        cmocka_unit_test(test_contradictions_are_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
