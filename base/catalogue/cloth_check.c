@@ -61,7 +61,7 @@ static status choose_yarns(struct cloth_description *d, enum cloth_direction dir
                                field, repeat, CLOTH_MAX_YARN);
     if (d->n_yarn[direction] == 0) d->n_yarn[direction] = (least + repeat - 1) / repeat * repeat;
     if (d->n_yarn[direction] % repeat != 0 || d->n_yarn[direction] > CLOTH_MAX_YARN)
-        return error_set_field(err, STATUS_INVALID, "tile_yarns",
+        return error_set_field(err, STATUS_INVALID, direction == CLOTH_WEFT ? "tile_wefts" : "tile_warps",
                                "the tile has %zu yarns of the %s: it must be a multiple of %zu, at most %d",
                                d->n_yarn[direction], field, repeat, CLOTH_MAX_YARN);
     return STATUS_OK;

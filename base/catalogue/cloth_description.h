@@ -86,6 +86,11 @@ struct cloth_description {
     struct cloth_number number[CLOTH_MAX_NUMBER];
 };
 
+/* Names that the builder of a cloth puts into err->field: of a number, and of the counted threads. */
+#define CLOTH_FIELD_CRIMP "crimp"
+#define CLOTH_FIELD_WARP_PER_CM "warp_per_cm"
+#define CLOTH_FIELD_WEFT_PER_CM "weft_per_cm"
+
 /* The rows of the catalogue, ended by a row without a name. */
 extern const struct cloth_number_info cloth_number_table[];
 
@@ -112,7 +117,7 @@ double cloth_number_value(const struct cloth_description *d, const double *numbe
 
 /* Completes d (n_yarn) and checks it. STATUS_INVALID with the field as in the job document after "cloth.": "draft" (a
  * yarn that never crosses), "warp", "weft" (orders that name no kind, or do not repeat within CLOTH_MAX_YARN yarns),
- * "yarns[k].plies", "crimp" and so on for values outside of their ranges. */
+ * "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns[k].plies", "crimp" and so on for values outside of their ranges. */
 status cloth_description_check(struct cloth_description *d, struct error *err);
 
 /* Checks a vector of d->n_number values against the ranges of the catalogue. STATUS_INVALID, field: the number. */

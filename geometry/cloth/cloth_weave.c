@@ -55,7 +55,7 @@ static status check_threads(const struct cloth_work *w, int direction, double ed
     double cover = sum / edge_m;
     if (cover >= LEAST_COVER && cover <= MOST_COVER) return STATUS_OK;
     return error_set_field(
-        err, STATUS_INVALID, direction == CLOTH_WARP ? "warp_per_cm" : "weft_per_cm",
+        err, STATUS_INVALID, direction == CLOTH_WARP ? CLOTH_FIELD_WARP_PER_CM : CLOTH_FIELD_WEFT_PER_CM,
         "%g threads per cm leave %.3g um for a yarn that is %.3g um wide: width over spacing must be "
         "between %g and %g",
         d->threads_per_cm[direction], 1e6 * edge_m / (double)d->n_yarn[direction],
@@ -140,7 +140,7 @@ static status check_bends(const struct weave *v, int direction, size_t i, const 
         double radius_m = h_m > 0.0 ? 2.0 * l_m * l_m / (M_PI * M_PI * h_m) : INFINITY;
         if (radius_m >= SHARPEST_BEND * half_m) continue;
         return error_set_field(
-            err, STATUS_INVALID, "crimp",
+            err, STATUS_INVALID, CLOTH_FIELD_CRIMP,
             "this crimp cannot be: %s %zu would have to bend to a radius of %.3g um, and half of its "
             "height is %.3g um; yarns must be flatter, further apart, or the crimp shared otherwise",
             direction == CLOTH_WEFT ? "weft" : "warp", i, 1e6 * radius_m, 1e6 * half_m);

@@ -30,6 +30,8 @@ void job_document_free(struct job_document *doc)
 {
     if (doc == NULL) return;
     free(doc->volume_file);
+    free(doc->cloth_yarn);
+    free(doc->cloth);
     free(doc->photograph);
     free(doc->candidate);
     free(doc);

@@ -8,6 +8,7 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 
+#include "base/catalogue/cloth_description.h"
 #include "base/status.h"
 #include "optimizer/job/job_fit_option.h"
 
@@ -47,6 +48,11 @@ struct job_candidate {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
 };
 
+/* What a kind of yarn in the document counts or names; 0 fibers: not given. */
+struct job_cloth_yarn {
+    size_t n_fiber, n_ply, melange_with;
+};
+
 struct job_document {
     char sample[256];
     /* volume */
@@ -73,6 +79,14 @@ struct job_document {
     char fiber_file[JOB_MAX_NAME_BYTES];
     double tile_mm[2]; /* NaN: from the file */
     double voxel_um;   /* NaN: chosen from the radius */
+    /* cloth, as given; `cloth` is the checked description, NULL without the section */
+    char cloth_weave[16];
+    size_t cloth_tile_yarn[2];      /* of enum cloth_direction; 0: not given */
+    double cloth_threads_per_cm[2]; /* NaN: not given */
+    uint64_t cloth_seed;
+    size_t n_cloth_yarn;
+    struct job_cloth_yarn *cloth_yarn;
+    struct cloth_description *cloth;
     /* set-up */
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
     bool lamp_directional, camera_far_field;
@@ -109,6 +123,9 @@ struct job_document {
  * job_document_free. */
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
+
+/* Puts the section "cloth" before the field that a check or the builder of a described cloth named. */
+void job_cloth_name_field(struct error *err);
 
 struct param_info;
 /* Bounds, start and fixed flag of each parameter of a model, with ties, bounds and priors taken into account. out has

@@ -8,6 +8,7 @@
 #include "base/progress.h"
 #include "base/scratch_space.h"
 #include "base/thread_pool.h"
+#include "geometry/cloth/cloth.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume.h"
@@ -96,6 +97,7 @@ struct pipeline_context {
     struct volume volume; /* empty when not in memory: pipeline_need_volume */
     struct direction_volume direction;
     struct fiber_set fiber;
+    struct cloth_report cloth; /* of a described cloth */
     struct scene *scene;
     struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */
     bool has_volume_scene;

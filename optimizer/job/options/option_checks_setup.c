@@ -69,13 +69,19 @@ static bool given(const struct option_value *document, const char *key)
 
 static status check_one_cloth(const struct option_value *v, struct error *err)
 {
-    if (given(v, "volume") && given(v, "fibers"))
-        return error_set_field(err, STATUS_INVALID, "fibers",
-                               "'volume' and 'fibers' are both given: a job takes one of them");
-    if (!given(v, "volume") && !given(v, "fibers"))
-        return error_set_field(err, STATUS_INVALID, "volume",
-                               "'volume' is missing: give a scan ('volume') or a fiber file ('fibers')");
-    return STATUS_OK;
+    static const char *const key[] = {"volume", "fibers", "cloth"};
+    const char *first = NULL;
+    for (size_t i = 0; i < 3; i++) {
+        if (!given(v, key[i])) continue;
+        if (first != NULL)
+            return error_set_field(err, STATUS_INVALID, key[i], "'%s' and '%s' are both given: a job takes one of them",
+                                   first, key[i]);
+        first = key[i];
+    }
+    if (first != NULL) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "volume",
+                           "'volume' is missing: give a scan ('volume'), a fiber file ('fibers') or a description "
+                           "('cloth')");
 }
 
 static status check_one_measurement(const struct option_value *v, struct error *err)

@@ -7,7 +7,7 @@
 #include "optimizer/job/options/option_table.h"
 
 /* Each ends with a row without a path. */
-extern const struct job_option option_rows_cloth[], option_rows_setup[], option_rows_fit[];
+extern const struct job_option option_rows_cloth[], option_rows_described[], option_rows_setup[], option_rows_fit[];
 
 #define INTO_OF(type, member) .stored = true, .at = offsetof(type, member)
 #define TEXT_INTO_OF(type, member) INTO_OF(type, member), .n = sizeof((type *)NULL)->member

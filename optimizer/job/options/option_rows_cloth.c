@@ -6,14 +6,17 @@ static const char *const sample_type[] = {"uint8", "int8",    "uint16",  "int16"
 static const char *const byte_order[] = {"little", "big", NULL};
 static const char *const none_auto[] = {"none", "auto", NULL};
 
-/* Schema of a pair of keys of which exactly one must be given. */
+/* Schemas of two or three keys of which exactly one must be given. */
+#define ONE_OF_THREE(a, b, c)                                                                                          \
+    "{\"oneOf\": [{\"required\": [\"" a "\"]}, {\"required\": [\"" b "\"]}, {\"required\": [\"" c "\"]}]}"
 #define ONE_OF(a, b) "{\"oneOf\": [{\"required\": [\"" a "\"]}, {\"required\": [\"" b "\"]}]}"
 
 const struct job_option option_rows_cloth[] = {
     {.path = "",
      .kind = OPTION_SECTION,
      .check = job_check_document,
-     .schema = "{\"allOf\": [" ONE_OF("volume", "fibers") ", " ONE_OF("measurements", "photographs") "]}",
+     .schema =
+         "{\"allOf\": [" ONE_OF_THREE("volume", "fibers", "cloth") ", " ONE_OF("measurements", "photographs") "]}",
      .meaning = "Units, defaults and meaning: docs/sample-preparation.md, section 4. The daemon checks every field and "
                 "names the one at fault."},
     {.path = "sample",
@@ -29,7 +32,7 @@ const struct job_option option_rows_cloth[] = {
      .kind = OPTION_SECTION,
      INTO(has_volume),
      .check = job_check_volume,
-     .left_out = "this or `fibers`",
+     .left_out = "this, `fibers` or `cloth`",
      .meaning = "The cloth as a micro-CT scan."},
     {.path = "volume.files",
      .kind = OPTION_FILE_NAMES,
@@ -235,7 +238,7 @@ const struct job_option option_rows_cloth[] = {
 
     {.path = "fibers",
      .kind = OPTION_SECTION,
-     .left_out = "this or `volume`",
+     .left_out = "this, `volume` or `cloth`",
      .meaning = "The cloth as a file of fibers."},
     {.path = "fibers.file",
      .kind = OPTION_FILE_NAME,

@@ -205,7 +205,10 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
     fputs("</title>\n</head>\n<body>\n<h1>Geometry of ", out);
     escaped(c->doc->sample, out);
     fprintf(out, "</h1>\n<p>%zu fibers from %s. The same in numbers: <a href=\"quality.json\">quality.json</a>.</p>\n",
-            c->fiber.n_fiber, c->doc->has_volume ? "a scan" : "a fiber file");
+            c->fiber.n_fiber,
+            c->doc->has_volume      ? "a scan"
+            : c->doc->cloth != NULL ? "a description of the cloth"
+                                    : "a fiber file");
     for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) {
         fputs("<p class=\"warning\">", out);
         escaped(text, out);

@@ -1,5 +1,6 @@
 #include "optimizer/worker/report/result_geometry.h"
 #include "optimizer/worker/report/json_number.h"
+#include "optimizer/worker/report/result_cloth.h"
 
 static json_t *alignment_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
 {
@@ -64,14 +65,18 @@ json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
     const double um = 1e6, mm = 1e3;
-    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input", c->doc->has_volume ? "volume" : "fibers", "n_fiber",
-                             json_count(c->fiber.n_fiber), "n_vertex", json_count(c->fiber.n_vertex), "tile_mm",
-                             json_number_list(c->fiber.tile_size_m, 2, mm));
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input",
+                             c->doc->has_volume      ? "volume"
+                             : c->doc->cloth != NULL ? "cloth"
+                                                     : "fibers",
+                             "n_fiber", json_count(c->fiber.n_fiber), "n_vertex", json_count(c->fiber.n_vertex),
+                             "tile_mm", json_number_list(c->fiber.tile_size_m, 2, mm));
     json_object_set_new(json, "total_length_mm", json_number(g->total_length_m * mm));
     double radius = 0.0;
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
     json_object_set_new(json, "mean_radius_um", json_number(radius * um));
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
+    if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, NULL, &c->cloth));
     if (!c->doc->has_volume) return json;
     const struct reconstruct_option *o = &c->option;
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));

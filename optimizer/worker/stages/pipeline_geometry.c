@@ -1,5 +1,6 @@
 /* Stages "volume" to "scene": from the scan, or from a fiber file, to a cloth ready for ray tracing. */
 #include "base/option_id.h"
+#include "geometry/cloth/cloth.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
@@ -224,6 +225,14 @@ static status read_fiber_file(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? check_radii(&c->fiber, name, err) : s;
 }
 
+/* Makes the described cloth at the values of the document. */
+static status build_cloth(struct pipeline_context *c, struct error *err)
+{
+    status s = cloth_build(c->doc->cloth, NULL, c->pool, &c->progress, &c->fiber, &c->cloth, err);
+    if (s == STATUS_INVALID) job_cloth_name_field(err);
+    return s;
+}
+
 status stage_fibers(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -238,7 +247,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
         if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
         if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
     } else {
-        s = read_fiber_file(c, err);
+        s = c->doc->cloth != NULL ? build_cloth(c, err) : read_fiber_file(c, err);
         c->geometry.n_fiber = c->fiber.n_fiber;
         c->geometry.n_vertex = c->fiber.n_vertex;
         if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
@@ -251,6 +260,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
     struct fiber_set *f = &c->fiber;
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
+                                     {&c->cloth, sizeof c->cloth},
                                      {&f->n_fiber, sizeof f->n_fiber},
                                      {&f->n_vertex, sizeof f->n_vertex},
                                      {f->tile_size_m, sizeof f->tile_size_m},
@@ -259,7 +269,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
                                      {f->radius_m, f->n_fiber * sizeof *f->radius_m},
                                      {f->axis_class, f->n_fiber},
                                      {f->group, f->n_fiber}};
-    return work_file_write(path, "fibers.2", section, 10, err);
+    return work_file_write(path, "fibers.3", section, 11, err);
 }
 
 status stage_fibers_load(struct pipeline_context *c, struct error *err)
@@ -271,6 +281,7 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
     if (s != STATUS_OK) return s;
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
+                                     {&c->cloth, sizeof c->cloth},
                                      {&f.n_fiber, sizeof f.n_fiber},
                                      {&f.n_vertex, sizeof f.n_vertex},
                                      {f.tile_size_m, sizeof f.tile_size_m},
@@ -279,13 +290,13 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
                                      {NULL, 0},
                                      {NULL, 0},
                                      {NULL, 0}};
-    s = work_file_read(path, "fibers.2", section, 10, err);
+    s = work_file_read(path, "fibers.3", section, 11, err);
     if (s != STATUS_OK) return s;
-    f.first_vertex = section[5].data;
-    f.position_m = section[6].data;
-    f.radius_m = section[7].data;
-    f.axis_class = section[8].data;
-    f.group = section[9].data;
+    f.first_vertex = section[6].data;
+    f.position_m = section[7].data;
+    f.radius_m = section[8].data;
+    f.axis_class = section[9].data;
+    f.group = section[10].data;
     fiber_set_release(&c->fiber);
     c->fiber = f;
     return STATUS_OK;

@@ -191,7 +191,7 @@ static void test_contradictions_are_named(void **state)
     refuse(&d, "weft");
     d = small_cloth("plain");
     d.n_yarn[CLOTH_WEFT] = 3;
-    refuse(&d, "tile_yarns");
+    refuse(&d, "tile_wefts");
     d = small_cloth("plain");
     assert_int_equal(cloth_description_draft(&d, never, 2, &err), STATUS_OK);
     refuse(&d, "draft");

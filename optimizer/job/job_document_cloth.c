@@ -1,0 +1,176 @@
+/* The section "cloth": from its keys to a checked description of the cloth. */
+#include "base/catalogue/cloth_description.h"
+#include "optimizer/job/job_document.h"
+#include "optimizer/job/json_field.h"
+#include "optimizer/job/options/option_checks.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void job_cloth_name_field(struct error *err)
+{
+    char field[sizeof err->field];
+    if (err == NULL || strncmp(err->field, "cloth.", 6) == 0) return;
+    snprintf(field, sizeof field, "cloth.%.100s", err->field);
+    memcpy(err->field, field, sizeof field);
+}
+
+static status read_draft(const json_t *list, struct cloth_description *d, struct error *err)
+{
+    const char *row[CLOTH_MAX_DRAFT];
+    size_t n = json_array_size(list);
+    if (!json_is_array(list) || n == 0 || n > CLOTH_MAX_DRAFT)
+        return error_set_field(err, STATUS_INVALID, "cloth.draft", "'cloth.draft' must be a list of 1 to %d texts",
+                               CLOTH_MAX_DRAFT);
+    for (size_t i = 0; i < n; i++) {
+        row[i] = json_string_value(json_array_get(list, i));
+        if (row[i] == NULL)
+            return error_set_field(err, STATUS_INVALID, "cloth.draft", "row %zu of 'cloth.draft' is no text", i);
+    }
+    return cloth_description_draft(d, row, n, err);
+}
+
+static status read_order(const json_t *section, enum cloth_direction direction, struct cloth_description *d,
+                         struct error *err)
+{
+    const char *key = direction == CLOTH_WARP ? "warp" : "weft";
+    const json_t *list = json_object_get(section, key);
+    size_t n = json_array_size(list);
+    if (list == NULL) return STATUS_OK;
+    if (!json_is_array(list) || n == 0 || n > CLOTH_MAX_ORDER)
+        return error_set_field(err, STATUS_INVALID, key, "'cloth.%s' must be a list of 1 to %d kinds of yarn", key,
+                               CLOTH_MAX_ORDER);
+    d->n_order[direction] = n;
+    for (size_t i = 0; i < n; i++) {
+        const json_t *kind = json_array_get(list, i);
+        if (!json_is_integer(kind) || json_integer_value(kind) < 0 || json_integer_value(kind) >= (int)d->n_kind)
+            return error_set_field(err, STATUS_INVALID, key,
+                                   "element %zu of 'cloth.%s' must be one of the %zu kinds 0..%zu", i, key, d->n_kind,
+                                   d->n_kind - 1);
+        d->order[direction][i] = (uint8_t)json_integer_value(kind);
+    }
+    return STATUS_OK;
+}
+
+/* Reads a number given as an object: {value, lower, upper, prior, fit}. */
+static status read_searched(const struct json_field *f, struct cloth_number *n, struct error *err)
+{
+    static const char *const key[] = {"value", "lower", "upper", "prior", "fit", NULL};
+    double prior[2] = {NAN, NAN};
+    n->fitted = true;
+    status st = json_field_check_keys(f, key, err);
+    if (st == STATUS_OK) st = json_field_number(f, "value", n->info->lower, n->info->upper, &n->value, err);
+    if (st == STATUS_OK) st = json_field_number(f, "lower", n->info->lower, n->info->upper, &n->lower, err);
+    if (st == STATUS_OK) st = json_field_number(f, "upper", n->info->lower, n->info->upper, &n->upper, err);
+    if (st == STATUS_OK) st = json_field_number_array(f, "prior", 2, -1e9, 1e9, prior, err);
+    if (st == STATUS_OK) st = json_field_bool(f, "fit", &n->fitted, err);
+    n->prior_mean = prior[0];
+    n->prior_sd = prior[1];
+    if (json_object_get(f->object, "value") == NULL) n->value = fmin(fmax(n->value, n->lower), n->upper);
+    return st;
+}
+
+static status read_number(const struct json_field *f, struct cloth_number *n, struct error *err)
+{
+    struct json_field sub = {.object = json_object_get(f->object, n->info->name)};
+    if (sub.object == NULL) return STATUS_OK;
+    json_field_path(f, n->info->name, sub.path);
+    if (json_is_object(sub.object)) return read_searched(&sub, n, err);
+    return json_field_required_number(f, n->info->name, n->info->lower, n->info->upper, &n->value, err);
+}
+
+/* Refuses numbers of the catalogue that this cloth, or this kind of yarn, does not have. */
+static status check_surplus(const struct json_field *f, int kind, const struct cloth_description *d, struct error *err)
+{
+    for (const struct cloth_number_info *i = cloth_number_table; i->name != NULL; i++) {
+        if (i->of_yarn != (kind >= 0) || json_object_get(f->object, i->name) == NULL) continue;
+        if (!isnan(cloth_number_value(d, NULL, kind, i->name))) continue;
+        char path[JSON_PATH_BYTES];
+        json_field_path(f, i->name, path);
+        return error_set_field(err, STATUS_INVALID, path,
+                               "this cloth has no number '%s': its structure, its plies or other keys do not allow it",
+                               path);
+    }
+    return STATUS_OK;
+}
+
+static struct json_field field_of(const json_t *section, int kind)
+{
+    struct json_field f = {.object = section, .path = "cloth"};
+    if (kind < 0) return f;
+    f.object = json_array_get(json_object_get(section, "yarns"), (size_t)kind);
+    snprintf(f.path, sizeof f.path, "cloth.yarns[%d]", kind);
+    return f;
+}
+
+static status read_numbers(const json_t *section, struct cloth_description *d, struct error *err)
+{
+    status st = STATUS_OK;
+    for (int k = -1; k < (int)d->n_kind && st == STATUS_OK; k++) {
+        struct json_field f = field_of(section, k);
+        if (f.object != NULL) st = check_surplus(&f, k, d, err);
+    }
+    for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) {
+        struct json_field f = field_of(section, d->number[i].kind);
+        if (f.object != NULL) st = read_number(&f, &d->number[i], err);
+    }
+    return st;
+}
+
+static void take_kinds(const struct job_document *doc, const json_t *section, struct cloth_description *d)
+{
+    const json_t *yarns = json_object_get(section, "yarns");
+    if (doc->n_cloth_yarn == 0) return;
+    struct cloth_kind ground = d->kind[0], pile = d->kind[1];
+    d->n_kind = doc->n_cloth_yarn;
+    if (d->pile_kind >= 0) d->pile_kind = (int)d->n_kind - 1;
+    for (size_t k = 0; k < d->n_kind; k++) {
+        const struct job_cloth_yarn *y = &doc->cloth_yarn[k];
+        d->kind[k] = (int)k == d->pile_kind ? pile : ground;
+        if (y->n_fiber > 0) d->kind[k].n_fiber = y->n_fiber;
+        d->kind[k].n_ply = y->n_ply;
+        if (json_object_get(json_array_get(yarns, k), "melange_with") != NULL)
+            d->kind[k].melange_with = (int)y->melange_with;
+    }
+}
+
+static status read_weave(const struct option_value *v, struct cloth_description *d, struct error *err)
+{
+    const json_t *draft = json_object_get(v->value, "draft");
+    if ((json_object_get(v->value, "weave") != NULL) == (draft != NULL))
+        return error_set_field(err, STATUS_INVALID, "cloth.weave",
+                               "a described cloth takes either 'cloth.weave' or 'cloth.draft'");
+    status st = cloth_description_init(d, draft != NULL ? "plain" : v->doc->cloth_weave, err);
+    return st == STATUS_OK && draft != NULL ? read_draft(draft, d, err) : st;
+}
+
+static status read_cloth(const struct option_value *v, struct cloth_description *d, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    status st = read_weave(v, d, err);
+    if (st != STATUS_OK) return st;
+    take_kinds(doc, v->value, d);
+    if (d->pile_kind == 0)
+        return error_set_field(err, STATUS_INVALID, "cloth.yarns",
+                               "a velvet has at least two kinds of yarn: the ground, and last the pile");
+    d->seed = doc->cloth_seed;
+    for (int a = CLOTH_WEFT; a <= CLOTH_WARP && st == STATUS_OK; a++) {
+        d->n_yarn[a] = doc->cloth_tile_yarn[a];
+        if (!isnan(doc->cloth_threads_per_cm[a])) d->threads_per_cm[a] = doc->cloth_threads_per_cm[a];
+        st = read_order(v->value, a, d, err);
+    }
+    cloth_description_number(d);
+    if (st == STATUS_OK) st = read_numbers(v->value, d, err);
+    return st == STATUS_OK ? cloth_description_check(d, err) : st;
+}
+
+status job_check_cloth(const struct option_value *v, struct error *err)
+{
+    v->doc->cloth = calloc(1, sizeof *v->doc->cloth);
+    if (v->doc->cloth == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
+    status st = read_cloth(v, v->doc->cloth, err);
+    if (st == STATUS_INVALID) job_cloth_name_field(err);
+    return st;
+}

@@ -1,0 +1,132 @@
+/* Rows of the option table: the described cloth. Its numbers are those of base/catalogue/cloth_numbers.def. */
+#include "base/catalogue/cloth_description.h"
+#include "optimizer/job/options/option_rows.h"
+
+#define OF_YARN(member) INTO_OF(struct job_cloth_yarn, member)
+/* A number is a value, or an object for a number that is searched. */
+#define NUMBER_SCHEMA(lower, upper)                                                                                    \
+    "{\"anyOf\": [{\"type\": \"number\", \"minimum\": " lower ", \"maximum\": " upper                                  \
+    "}, {\"type\": \"object\", \"properties\": {\"value\": {\"type\": \"number\"}, \"lower\": {\"type\": "             \
+    "\"number\"}, "                                                                                                    \
+    "\"upper\": {\"type\": \"number\"}, \"prior\": {\"type\": \"array\", \"items\": {\"type\": \"number\"}, "          \
+    "\"minItems\": 2, \"maxItems\": 2}, \"fit\": {\"type\": \"boolean\"}}, \"additionalProperties\": false}]}"
+#define NUMBER_ROW(where, name, units, lower, upper, value, text)                                                      \
+    {.path = where #name,                                                                                              \
+     .kind = OPTION_OWN,                                                                                               \
+     .unit = units,                                                                                                    \
+     .standard = #value,                                                                                               \
+     .allowed = #lower ".." #upper ", or an object",                                                                   \
+     .schema = NUMBER_SCHEMA(#lower, #upper),                                                                          \
+     .meaning = text},
+#define CLOTH_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)                              \
+    NUMBER_ROW("cloth.", name, unit, lower, upper, standard, meaning)
+#define YARN_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)
+
+static const char *weave_name(size_t i) { return cloth_weave_names[i]; }
+
+#define ORDER_SCHEMA                                                                                                   \
+    "{\"type\": \"array\", \"items\": {\"type\": \"integer\", \"minimum\": 0, \"maximum\": 3}, \"minItems\": 1, "      \
+    "\"maxItems\": 64}"
+
+const struct job_option option_rows_described[] = {
+    {.path = "cloth",
+     .kind = OPTION_SECTION,
+     .check = job_check_cloth,
+     .left_out = "this, `volume` or `fibers`",
+     .meaning =
+         "The cloth described by its weave and yarns. Each number is a value, or an object `{value, lower, upper, "
+         "prior: [mean, sd], fit}` for a number that is searched together with the scattering parameters "
+         "(`fit` is true unless it is given). docs/described-cloth.md shows what each number does."},
+    {.path = "cloth.weave",
+     .kind = OPTION_WORD,
+     TEXT_INTO(cloth_weave),
+     .choice_at = weave_name,
+     .left_out = "this or `draft`",
+     .meaning = "Name of the weave."},
+    {.path = "cloth.draft",
+     .kind = OPTION_OWN,
+     .left_out = "from `weave`",
+     .allowed = "1 to 32 texts of 1 to 32 signs 0 and 1",
+     .schema =
+         "{\"type\": \"array\", \"items\": {\"type\": \"string\", \"pattern\": \"^[01]{1,32}$\"}, \"minItems\": 1, "
+         "\"maxItems\": 32}",
+     .meaning = "One repeat of the weave, a text for each weft, the upper one first: 1 where the warp lies above."},
+    {.path = "cloth.warp",
+     .kind = OPTION_OWN,
+     .standard = "[0]",
+     .allowed = "1 to 64 kinds of yarn",
+     .schema = ORDER_SCHEMA,
+     .meaning = "Kinds of the warp yarns from left to right, as places in `yarns`; the order repeats."},
+    {.path = "cloth.weft",
+     .kind = OPTION_OWN,
+     .standard = "[0]",
+     .allowed = "1 to 64 kinds of yarn",
+     .schema = ORDER_SCHEMA,
+     .meaning = "Kinds of the weft yarns from below; of a knit, its courses."},
+    {.path = "cloth.tile_warps",
+     .kind = OPTION_COUNT,
+     INTO(cloth_tile_yarn[1]),
+     RANGE(1, 128),
+     .left_out = "whole repeats, at least 8; wales: 4",
+     .meaning = "Warp yarns, or wales, in the tile that is repeated."},
+    {.path = "cloth.tile_wefts",
+     .kind = OPTION_COUNT,
+     INTO(cloth_tile_yarn[0]),
+     RANGE(1, 128),
+     .left_out = "whole repeats, at least 8; courses: 4",
+     .meaning = "Weft yarns, or courses, in the tile."},
+    {.path = "cloth.warp_per_cm",
+     .kind = OPTION_NUMBER,
+     INTO(cloth_threads_per_cm[1]),
+     RANGE(1, 400),
+     .unit = "1/cm",
+     .left_out = "from `cover_warp`",
+     .meaning = "Warp yarns in a centimetre, where they were counted. Replaces `cover_warp`."},
+    {.path = "cloth.weft_per_cm",
+     .kind = OPTION_NUMBER,
+     INTO(cloth_threads_per_cm[0]),
+     RANGE(1, 400),
+     .unit = "1/cm",
+     .left_out = "from `cover_weft`",
+     .meaning = "Weft yarns in a centimetre. Replaces `cover_weft`."},
+    {.path = "cloth.seed",
+     .kind = OPTION_LARGE_COUNT,
+     INTO(cloth_seed),
+     .standard = "1",
+     .meaning = "Selects the random places of the fibers. All values of the numbers use the same."},
+#include "base/catalogue/cloth_numbers.def"
+#undef CLOTH_NUMBER
+#undef YARN_NUMBER
+    {.path = "cloth.yarns",
+     .kind = OPTION_LIST,
+     LIST_INTO(cloth_yarn, n_cloth_yarn),
+     RANGE(1, CLOTH_MAX_KIND),
+     .items = "kinds of yarn",
+     .left_out = "one kind; velvet: ground and pile",
+     .meaning = "The kinds of yarn. Each is a group of fibers and may have scattering parameters of its own. The last "
+                "kind of a velvet is its pile."},
+    {.path = "cloth.yarns[].fibers",
+     .kind = OPTION_COUNT,
+     OF_YARN(n_fiber),
+     RANGE(1, 100000),
+     .left_out = "40; pile: 16; felt: 600",
+     .allowed = "1..1000, felt 1..100000",
+     .meaning = "Fibers in a section of the yarn, in a tuft of the pile, or in the tile of a felt."},
+    {.path = "cloth.yarns[].plies",
+     .kind = OPTION_COUNT,
+     OF_YARN(n_ply),
+     RANGE(1, CLOTH_MAX_PLY),
+     .standard = "1",
+     .meaning = "Plies that are twisted together."},
+    {.path = "cloth.yarns[].melange_with",
+     .kind = OPTION_COUNT,
+     OF_YARN(melange_with),
+     RANGE(0, 3),
+     .left_out = "pure yarn",
+     .meaning = "Kind that a share of this yarn's fibers belongs to; the number `melange` is the share."},
+#define CLOTH_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)
+#define YARN_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)                               \
+    NUMBER_ROW("cloth.yarns[].", name, unit, lower, upper, standard, meaning)
+#include "base/catalogue/cloth_numbers.def"
+    {.path = NULL},
+};

@@ -1,0 +1,13 @@
+/* A described cloth in result.json: its numbers and what was made of them. */
+#ifndef SELVEDGE_OPTIMIZER_RESULT_CLOTH_H
+#define SELVEDGE_OPTIMIZER_RESULT_CLOTH_H
+
+#include "geometry/cloth/cloth.h"
+
+#include <jansson.h>
+
+/* {weave, seed, numbers: [{name, value, unit, fitted, lower, upper}], made: {...}}. number: the values, NULL for those of
+ * d. */
+json_t *result_cloth_json(const struct cloth_description *d, const double *number, const struct cloth_report *r);
+
+#endif

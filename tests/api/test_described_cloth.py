@@ -1,0 +1,52 @@
+"""Jobs whose cloth is described: from the document to results, and what cannot be."""
+import os
+
+import pytest
+from daemon_under_test import Daemon, problem, program
+from small_cloth import TABLE
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
+FIT = {"max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1}
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    with Daemon(tmp_path_factory.mktemp("described") / "data", worker=program("selvedge-worker")) as d:
+        yield d
+
+
+def start(d, cloth):
+    job = d.create({"sample": "described", "cloth": cloth, "measurements": {"file": "rows.csv"}, "fit": FIT})
+    d.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    assert d.post(f"/v1/jobs/{job}/start").status_code == 202
+    return job
+
+
+def test_from_description_to_results(real):
+    job = start(real, {"weave": "twill", "tile_warps": 4, "tile_wefts": 4, "warp": [0], "weft": [1], "crimp": 0.4,
+                       "yarns": [{"fibers": 12}, {"fibers": 9, "flatness": 2.5, "hairs_per_mm": 3}]})
+    state = real.wait_state(job, "succeeded", timeout_s=120)
+    geometry = state["result"]["geometry"]
+    assert geometry["input"] == "cloth"
+    cloth = geometry["cloth"]
+    numbers = {n["name"]: n for n in cloth["numbers"]}
+    assert cloth["weave"] == "twill" and cloth["draft"] == ["0110", "1100", "1001", "0011"]
+    assert numbers["crimp"]["value"] == 0.4 and not numbers["crimp"]["fitted"]
+    assert numbers["yarns[1].flatness"]["value"] == 2.5 and numbers["yarns[0].fiber_radius_um"]["unit"] == "um"
+    made = cloth["made"]
+    assert 0.5 < made["cover"] <= 1 and 0.1 < made["volume_fraction"] < 0.7 and made["thickness_um"] > 50
+    assert made["tile_yarns"] == [4, 4] and all(yarn["n_fiber"] > 30 for yarn in made["yarns"])
+    assert state["result"]["parameters"]
+    files = [f["path"] for f in real.get(f"/v1/jobs/{job}/results").json()["files"]]
+    assert "fibers.hair" in files and "quality.html" in files
+
+
+def test_a_crimp_that_cannot_be(real):
+    job = start(real, {"weave": "plain", "tile_warps": 2, "tile_wefts": 2, "crimp": 0, "yarns": [{"fibers": 9, "flatness": 1}]})
+    error = real.wait_state(job, "failed", timeout_s=60)["error"]
+    assert error["field"] == "cloth.crimp" and "half of its height" in error["text"]
+
+
+def test_a_mistake_is_refused_at_once(real):
+    reply = real.post("/v1/jobs", json={"sample": "s", "cloth": {"weave": "plain", "crimp": 2}, "measurements": {"file": "rows.csv"}})
+    problem(reply, 422, "invalid", "cloth.crimp")

@@ -1,0 +1,103 @@
+/* The section "cloth" of the job document: descriptions are read with their defaults, and mistakes are named. */
+#include "optimizer/job/job_document.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/support/job_document_text.h"
+
+#define CLOTH(members) "{\"sample\":\"s\",\"cloth\":{" members "},\"measurements\":{\"file\":\"a.csv\"}}"
+
+static const struct cloth_number *number(const struct job_document *doc, const char *name)
+{
+    int i = cloth_number_index(doc->cloth, name);
+    if (i < 0) fail_msg("the cloth has no number '%s'", name);
+    return &doc->cloth->number[i];
+}
+
+static void test_a_name_is_enough(void **state)
+{
+    (void)state;
+    for (const char *const *weave = cloth_weave_names; *weave != NULL; weave++) {
+        char text[200];
+        snprintf(text, sizeof text, CLOTH("\"weave\":\"%s\""), *weave);
+        struct job_document *doc = parse(text);
+        assert_string_equal(doc->cloth->weave, *weave);
+        assert_int_equal(doc->cloth->seed, 1);
+        for (size_t i = 0; i < doc->cloth->n_number; i++) {
+            assert_false(doc->cloth->number[i].fitted);
+            assert_true(doc->cloth->number[i].value == doc->cloth->number[i].info->standard);
+        }
+        assert_true(cloth_number_index(doc->cloth, "yarns[0].fiber_radius_um") >= 0);
+        assert_int_equal(cloth_number_index(doc->cloth, "density") >= 0, strcmp(*weave, "felt") == 0);
+        job_document_free(doc);
+    }
+}
+
+static void test_everything_given(void **state)
+{
+    (void)state;
+    struct job_document *doc = parse(CLOTH(
+        "\"draft\":[\"1000\",\"0011\",\"0110\"],\"warp\":[0,1,1],\"weft\":[1],\"warp_per_cm\":40,\"seed\":7,\"tile_"
+        "warps\":"
+        "24,\"crimp\":{\"lower\":0.4,\"upper\":0.6,\"prior\":[0.5,0.1]},\"disorder\":0.02,\"yarns\":[{\"fibers\":30,"
+        "\"packing\":0.55},{\"fibers\":20,\"plies\":2,\"ply_twist_per_m\":-700,\"melange_with\":0,\"melange\":0.3,"
+        "\"flatness\":{\"value\":2,\"fit\":false}}]"));
+    const struct cloth_description *d = doc->cloth;
+    assert_true(d->n_weft == 3 && d->n_warp == 4 && d->n_kind == 2 && d->seed == 7);
+    assert_true(d->warp_over[2][0] && !d->warp_over[2][1] && d->warp_over[0][1]); /* the upper row first */
+    assert_true(d->n_yarn[CLOTH_WARP] == 24 && d->n_yarn[CLOTH_WEFT] == 9);
+    assert_true(d->n_order[CLOTH_WARP] == 3 && d->order[CLOTH_WARP][2] == 1 && d->order[CLOTH_WEFT][0] == 1);
+    assert_true(cloth_number_index(d, "cover_warp") < 0 && d->threads_per_cm[CLOTH_WARP] == 40.0);
+    const struct cloth_number *crimp = number(doc, "crimp");
+    assert_true(crimp->fitted && crimp->lower == 0.4 && crimp->upper == 0.6 && crimp->prior_mean == 0.5 &&
+                crimp->prior_sd == 0.1 && crimp->value == 0.5);
+    assert_true(!number(doc, "yarns[1].flatness")->fitted && number(doc, "yarns[1].flatness")->value == 2.0);
+    assert_true(number(doc, "yarns[0].packing")->value == 0.55 && number(doc, "yarns[1].packing")->value == 0.6);
+    assert_true(number(doc, "yarns[1].ply_twist_per_m")->value == -700.0);
+    assert_true(d->kind[1].n_ply == 2 && d->kind[1].melange_with == 0 && d->kind[0].melange_with == -1);
+    job_document_free(doc);
+}
+
+static void test_mistakes_are_named(void **state)
+{
+    (void)state;
+    check_error(CLOTH("\"weave\":\"tweed\""), "cloth.weave", "twill31");
+    check_error(CLOTH("\"seed\":1"), "cloth.weave", "either");
+    check_error(CLOTH("\"weave\":\"plain\",\"draft\":[\"10\",\"01\"]"), "cloth.weave", "either");
+    check_error(CLOTH("\"draft\":[\"10\",\"011\"]"), "cloth.draft", "does not repeat");
+    check_error(CLOTH("\"draft\":[\"10\",\"10\"]"), "cloth.draft", "never crosses");
+    check_error(CLOTH("\"weave\":\"plain\",\"warp\":[0,1]"), "cloth.warp", "one of the 1 kinds");
+    check_error(CLOTH("\"weave\":\"twill\",\"tile_wefts\":6"), "cloth.tile_wefts", "multiple of 4");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1.5"), "cloth.crimp", "1");
+    check_error(CLOTH("\"weave\":\"felt\",\"crimp\":0.5"), "cloth.crimp", "has no number");
+    check_error(CLOTH("\"weave\":\"plain\",\"warp_per_cm\":30,\"cover_warp\":1"), "cloth.cover_warp", "has no number");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"packing\":0.95}]"), "cloth.yarns[0].packing", "0.85");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange\":0.5}]"), "cloth.yarns[0].melange", "has no number");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange_with\":0}]"), "cloth.yarns[0].melange_with",
+                "another");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"fibers\":5000}]"), "cloth.yarns[0].fibers", "1000");
+    check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{}]"), "cloth.yarns", "pile");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"lower\":0.6,\"upper\":0.4}"), "cloth.crimp", "rise");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"value\":0.9,\"upper\":0.6}"), "cloth.crimp", "starts");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5,0]}"), "cloth.crimp", "prior");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"mean\":1}"), "cloth.crimp.mean", "unknown");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"cloth\":{\"weave\":\"plain\"},\"measurements\":{\"file\":\"a.csv\"}}",
+                "cloth", "one of them");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_name_is_enough),
+        cmocka_unit_test(test_everything_given),
+        cmocka_unit_test(test_mistakes_are_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
