@@ -31,6 +31,7 @@
 #define OPTION_FIBER_FILE "fiber_file"
 #define OPTION_TILE "tile"
 #define OPTION_DENSITY_VOXEL "density_voxel"
+#define OPTION_GROUPS "groups"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
 /* the measurements */

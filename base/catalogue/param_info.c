@@ -37,6 +37,20 @@ double param_to_file_unit(const struct param_info *p, double value)
     return value * unit_table[p->unit].multiplier / unit_table[p->unit].divisor;
 }
 
+static const char *without_set(const struct param_info *p, const char *text)
+{
+    return p->set != NULL ? text + strlen(p->set) + 1 : text;
+}
+
+const char *param_own_name(const struct param_info *p) { return without_set(p, p->name); }
+const char *param_own_symbol(const struct param_info *p) { return without_set(p, p->symbol); }
+
+bool param_is_named(const struct param_info *p, const char *key)
+{
+    return strcmp(p->name, key) == 0 || strcmp(p->symbol, key) == 0 || strcmp(param_own_name(p), key) == 0 ||
+           strcmp(param_own_symbol(p), key) == 0;
+}
+
 int param_index(const struct param_info *info, size_t n_param, const char *name)
 {
     for (size_t p = 0; p < n_param; p++)

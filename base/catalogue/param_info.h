@@ -10,6 +10,7 @@
 
 #include "base/status.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* The unit of a parameter in files. Inside: dimensionless, radians, 1/m. */
@@ -37,6 +38,7 @@ struct param_info {
     double lower, upper, start; /* internal unit */
     enum param_coordinate coordinate;
     const char *meaning; /* one sentence */
+    const char *set;     /* name of the parameter set that it belongs to; NULL: the cloth has one set (model_sets.h) */
 };
 
 /* "", "deg" or "1/cm"; "linear", "log" or "logit"; "colour", "lobe_width", "shape", "density" or "nuisance". */
@@ -47,6 +49,13 @@ const char *param_kind_name(enum param_kind kind);
 /* A value in the unit of files -> internal unit, and back. */
 double param_from_file_unit(const struct param_info *p, double value);
 double param_to_file_unit(const struct param_info *p, double value);
+
+/* The name without that of the set: "C_R.r" for "warp.C_R.r". */
+const char *param_own_name(const struct param_info *p);
+const char *param_own_symbol(const struct param_info *p);
+/* True when key names the parameter: its name ("warp.C_R.r"), its symbol ("warp.C_R"), or one of them without the set
+ * ("C_R.r", "C_R"), which names the parameter in every set. */
+bool param_is_named(const struct param_info *p, const char *key);
 
 /* Index of a flat parameter by name, or -1. */
 int param_index(const struct param_info *info, size_t n_param, const char *name);

@@ -9,6 +9,7 @@
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 
 #include "base/catalogue/cloth_description.h"
+#include "base/catalogue/model_sets.h"
 #include "base/status.h"
 #include "optimizer/job/job_fit_option.h"
 
@@ -87,6 +88,9 @@ struct job_document {
     size_t n_cloth_yarn;
     struct job_cloth_yarn *cloth_yarn;
     struct cloth_description *cloth;
+    /* The groups of fibers that have scattering parameters of their own; 0: one set of parameters for all fibers. */
+    size_t n_group;
+    char group[MODEL_MAX_SET][MODEL_SET_NAME_BYTES];
     /* set-up */
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
     bool lamp_directional, camera_far_field;

@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { MAX_LISTED = 31 };
@@ -66,15 +67,22 @@ static status parse_models(const struct json_field *f, struct job_document *doc,
     return parse_model_list(f, name, doc, err);
 }
 
+/* Number of the first slots that are of the same set of parameters. */
+static size_t slots_of_one_set(const struct model_info *m, const size_t *slot, size_t n_slot)
+{
+    size_t n = 1;
+    while (n < n_slot && m->param[slot[n]].set == m->param[slot[0]].set) n++;
+    return n;
+}
+
 /* Reads one key of "fixed" or "start": a colour ("C_TT", one number for all channels, or three) or one parameter
- * ("C_TT.r"). Sets *known when the model has it. */
+ * ("C_TT.r"). Without the name of a set it applies to all sets. Sets *known when the model has it. */
 static status parse_value(const struct json_field *f, const char *key, const json_t *value, const struct model_info *m,
                           double *out, bool *known, struct error *err)
 {
-    size_t slot[JOB_MAX_PARAM], n_slot = 0;
-    for (size_t p = 0; p < job_n_named_parameter(m); p++)
-        if (strcmp(m->param[p].symbol, key) == 0 || strcmp(m->param[p].name, key) == 0) slot[n_slot++] = p;
+    size_t slot[JOB_MAX_PARAM], n_slot = job_parameter_slots(m, job_n_named_parameter(m), key, slot);
     if (n_slot == 0) return STATUS_OK;
+    size_t n_own = slots_of_one_set(m, slot, n_slot);
     *known = true;
     char path[JSON_PATH_BYTES];
     json_field_path(f, key, path);
@@ -84,17 +92,17 @@ static status parse_value(const struct json_field *f, const char *key, const jso
     double v[JOB_MAX_PARAM];
     status s;
     if (json_is_array(value)) {
-        s = json_field_number_array(f, key, n_slot, lower - slack, upper + slack, v, err);
+        s = json_field_number_array(f, key, n_own, lower - slack, upper + slack, v, err);
     } else {
         s = json_field_required_number(f, key, lower - slack, upper + slack, &v[0], err);
-        for (size_t i = 1; i < n_slot; i++) v[i] = v[0];
+        for (size_t i = 1; i < n_own; i++) v[i] = v[0];
     }
     if (s != STATUS_OK) return s;
     for (size_t i = 0; i < n_slot; i++) {
         if (!isnan(out[slot[i]]))
             return error_set_field(err, STATUS_INVALID, path, "'%s' sets '%s' a second time", path,
                                    m->param[slot[i]].name);
-        out[slot[i]] = fmin(fmax(v[i], lower), upper);
+        out[slot[i]] = fmin(fmax(v[i % n_own], lower), upper);
     }
     return STATUS_OK;
 }
@@ -174,14 +182,29 @@ static status check_free_parameters(const struct model_info *m, const struct job
     return STATUS_OK;
 }
 
-/* Reads the parameters of all models of the document. */
-static status parse_parameters(const struct json_field *f, struct job_document *doc, struct error *err)
+/* Finds the models of the document, each with one set of parameters for each group of fibers. */
+static status find_models(const struct job_document *doc, struct model_sets *sets, const struct model_info **model,
+                          struct error *err)
 {
-    const struct model_info *model[JOB_MAX_MODEL];
-    for (size_t i = 0; i < doc->n_model; i++)
-        if ((model[i] = model_catalogue_find(doc->model[i].id)) == NULL)
+    for (size_t i = 0; i < doc->n_model; i++) {
+        const struct model_info *m = model_catalogue_find(doc->model[i].id);
+        if (m == NULL)
             return error_set_field(err, STATUS_INVALID, "fit.model", "the model '%s' is not in this program",
                                    doc->model[i].id);
+        status s = model_sets_init(&sets[i], m, doc->group, doc->n_group, err);
+        if (s != STATUS_OK) {
+            snprintf(err->field, sizeof err->field, "fit.model");
+            return s;
+        }
+        model[i] = &sets[i].info;
+    }
+    return STATUS_OK;
+}
+
+/* Reads the parameters of all models of the document. */
+static status parse_parameters(const struct json_field *f, const struct model_info *const *model,
+                               struct job_document *doc, struct error *err)
+{
     status s = parse_values(f, true, model, doc, err);
     if (s == STATUS_OK) s = parse_values(f, false, model, doc, err);
     if (s == STATUS_OK) s = set_density(f, model, doc, err);
@@ -195,6 +218,12 @@ status job_check_fit(const struct option_value *v, struct error *err)
 {
     struct json_field f = {.object = v->value};
     snprintf(f.path, sizeof f.path, "%s", v->path);
+    const struct model_info *model[JOB_MAX_MODEL];
+    struct model_sets *sets = malloc(JOB_MAX_MODEL * sizeof *sets);
+    if (sets == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     status s = parse_models(&f, v->doc, err);
-    return s == STATUS_OK ? parse_parameters(&f, v->doc, err) : s;
+    if (s == STATUS_OK) s = find_models(v->doc, sets, model, err);
+    if (s == STATUS_OK) s = parse_parameters(&f, model, v->doc, err);
+    free(sets);
+    return s;
 }

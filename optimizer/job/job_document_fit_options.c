@@ -22,20 +22,11 @@ struct reader {
     struct job_document *doc;
 };
 
-/* Indices of the parameters of one model that a key names: a colour ("C_TT") or one parameter ("C_TT.r"). */
-static size_t find_slots(const struct model_info *m, const char *key, size_t slot[JOB_MAX_PARAM])
-{
-    size_t n = 0;
-    for (size_t p = 0; p < m->n_param; p++)
-        if (strcmp(m->param[p].symbol, key) == 0 || strcmp(m->param[p].name, key) == 0) slot[n++] = p;
-    return n;
-}
-
 static status check_known(const struct reader *r, const char *path, const char *key, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM];
     for (size_t i = 0; i < r->doc->n_model; i++)
-        if (find_slots(r->model[i], key, slot) > 0) return STATUS_OK;
+        if (job_parameter_slots(r->model[i], r->model[i]->n_param, key, slot) > 0) return STATUS_OK;
     return job_unknown_parameter(r->model, r->doc->n_model, path, key, err);
 }
 
@@ -78,11 +69,11 @@ static status read_tie(const struct json_field *f, struct tie *t, struct error *
 static status apply_tie(const struct tie *t, const struct model_info *m, struct job_fit_option *o, size_t *n_slot,
                         struct error *err)
 {
-    size_t slot[JOB_MAX_PARAM * 3], leader = SIZE_MAX;
+    size_t slot[JOB_MAX_PARAM], leader = SIZE_MAX;
     double leader_share = 1.0;
     *n_slot = 0;
     for (size_t i = 0; i < t->n_name; i++) {
-        size_t n = find_slots(m, t->name[i], slot);
+        size_t n = job_parameter_slots(m, m->n_param, t->name[i], slot);
         for (size_t k = 0; k < n; k++) {
             size_t p = slot[k];
             bool first = leader == SIZE_MAX;
@@ -138,7 +129,7 @@ static status parse_tied(const struct reader *r, const struct json_field *fit, s
 static status parse_bound(const struct json_field *f, const char *key, const struct model_info *m,
                           struct job_fit_option *o, struct error *err)
 {
-    size_t slot[JOB_MAX_PARAM], n_slot = find_slots(m, key, slot);
+    size_t slot[JOB_MAX_PARAM], n_slot = job_parameter_slots(m, m->n_param, key, slot);
     char path[JSON_PATH_BYTES];
     double v[2];
     if (n_slot == 0) return STATUS_OK;
@@ -167,7 +158,7 @@ static status parse_prior(const struct json_field *f, const char *key, const str
                           struct job_fit_option *o, struct error *err)
 {
     static const char *const allowed[] = {"mean", "se", NULL};
-    size_t slot[JOB_MAX_PARAM], n_slot = find_slots(m, key, slot);
+    size_t slot[JOB_MAX_PARAM], n_slot = job_parameter_slots(m, m->n_param, key, slot);
     struct json_field sub;
     bool present;
     double mean = 0.0, se = 0.0;

@@ -19,7 +19,9 @@ static const char photograph_usage[] =
     "\n"
     "  --fibers FILE           .hair, or text \"x y z radius\" together with --tile-mm X,Y\n"
     "  --model ID              scattering model                                            [two_lobe.v1]\n"
+    "  --groups A,B,...        names of the groups of fibers: each has parameters of its own [one set for all]\n"
     "  --param NAME=v          or NAME=r,g,b; repeat it. Angles in degrees                 [the model's start values]\n"
+    "                          A.NAME=v: of group A only\n"
     "  --table CSV             configurations (columns as in a table of measurements)      [16 to fit + 24 held out]\n"
     "  --paths N               light paths for each photograph                             [131072]\n"
     "  --px N                  edge of a photograph in pixels                              [64]\n"
@@ -64,10 +66,27 @@ static bool wants_help(int argc, char **argv, const char *usage)
     return false;
 }
 
+/* Sets the model with a set of parameters for each of the comma-separated groups; NULL: one set for all fibers. */
+static status set_model(struct phantom_photograph_option *o, const char *model, const char *groups, struct error *err)
+{
+    static char name[MODEL_MAX_SET][MODEL_SET_NAME_BYTES]; /* the parameters' descriptions point to it */
+    size_t n_group = 0;
+    for (const char *at = groups; at != NULL; n_group++) {
+        size_t n = strcspn(at, ",");
+        if (n_group == MODEL_MAX_SET || n == 0 || n >= MODEL_SET_NAME_BYTES)
+            return error_set(err, STATUS_INVALID, "--groups '%s' must be 1 to %d names of at most %d bytes", groups,
+                             MODEL_MAX_SET, MODEL_SET_NAME_BYTES - 1);
+        memcpy(name[n_group], at, n);
+        name[n_group][n] = '\0';
+        at = at[n] == ',' ? at + n + 1 : NULL;
+    }
+    return phantom_photograph_model(o, model, (const char(*)[MODEL_SET_NAME_BYTES])name, n_group, err);
+}
+
 static status parse_photograph(struct phantom_photograph_option *o, size_t *n_thread, bool *quiet, int argc,
                                char **argv, struct error *err)
 {
-    const char *model = "two_lobe.v1";
+    const char *model = "two_lobe.v1", *groups = NULL;
     struct param_text param = {.n = 0};
     phantom_photograph_option_default(o);
     const struct command_option option[] = {
@@ -75,6 +94,7 @@ static status parse_photograph(struct phantom_photograph_option *o, size_t *n_th
         {.name = "tile-mm", .kind = OPTION_NUMBER_LIST, .to = o->tile_mm, .n = 2},
         {.name = "out", .kind = OPTION_TEXT, .to = &o->folder},
         {.name = "model", .kind = OPTION_TEXT, .to = &model},
+        {.name = "groups", .kind = OPTION_TEXT, .to = &groups},
         {.name = "param", .kind = OPTION_CALL, .to = &param, .call = keep_param},
         {.name = "table", .kind = OPTION_TEXT, .to = &o->table_file},
         {.name = "paths", .kind = OPTION_U64, .to = &o->n_path},
@@ -93,11 +113,9 @@ static status parse_photograph(struct phantom_photograph_option *o, size_t *n_th
     if (st != STATUS_OK) return st;
     if (o->fiber_file == NULL || o->folder == NULL)
         return error_set(err, STATUS_INVALID, "--fibers and --out are needed");
-    o->model = scattering_find(model);
-    if (o->model == NULL) return error_set(err, STATUS_INVALID, "unknown scattering model '%s'", model);
-    for (size_t i = 0; i < o->model->n_param; i++) o->param[i] = o->model->param[i].start;
+    st = set_model(o, model, groups, err);
     for (size_t i = 0; i < param.n && st == STATUS_OK; i++)
-        st = phantom_param_parse(o->model, param.text[i], o->param, err);
+        st = phantom_param_parse(&o->sets.info, param.text[i], o->param, err);
     return st;
 }
 

@@ -39,7 +39,28 @@ static size_t parse_numbers(const char *text, double value[3])
     return 0;
 }
 
-status phantom_param_parse(const struct scattering_model *model, const char *text, double *param, struct error *err)
+status phantom_photograph_model(struct phantom_photograph_option *o, const char *model_id,
+                                const char (*group)[MODEL_SET_NAME_BYTES], size_t n_group, struct error *err)
+{
+    o->model = scattering_find(model_id);
+    if (o->model == NULL) return error_set(err, STATUS_INVALID, "unknown scattering model '%s'", model_id);
+    status st = model_sets_init(&o->sets, model_catalogue_find(model_id), group, n_group, err);
+    for (size_t i = 0; i < o->sets.info.n_param && st == STATUS_OK; i++) o->param[i] = o->sets.param[i].start;
+    return st;
+}
+
+/* Whether the n bytes of key name the parameter, and whether they name the whole colour that it belongs to. */
+static bool is_named(const struct param_info *p, const char *key, size_t n, bool *colour)
+{
+    char name[MODEL_SET_TEXT_BYTES];
+    if (n >= sizeof name) return false;
+    memcpy(name, key, n);
+    name[n] = '\0';
+    *colour = p->channel >= 0 && strcmp(name, p->name) != 0 && strcmp(name, param_own_name(p)) != 0;
+    return param_is_named(p, name);
+}
+
+status phantom_param_parse(const struct model_info *model, const char *text, double *param, struct error *err)
 {
     size_t n_name = strcspn(text, "="), n_match = 0;
     double value[3];
@@ -48,10 +69,9 @@ status phantom_param_parse(const struct scattering_model *model, const char *tex
         return error_set_field(err, STATUS_INVALID, "param", "parameter '%s' is not NAME=value or NAME=r,g,b", text);
     for (size_t i = 0; i < model->n_param; i++) {
         const struct param_info *p = &model->param[i];
-        bool whole = strlen(p->name) == n_name && strncmp(p->name, text, n_name) == 0;
-        bool group = strlen(p->symbol) == n_name && strncmp(p->symbol, text, n_name) == 0;
-        if (!whole && !group) continue;
-        size_t wanted = group && p->channel >= 0 ? 3 : 1;
+        bool colour;
+        if (!is_named(p, text, n_name, &colour)) continue;
+        size_t wanted = colour ? 3 : 1;
         if (n_value != 1 && n_value != wanted)
             return error_set_field(err, STATUS_INVALID, "param", "parameter '%s': it takes %s", text,
                                    wanted == 3 ? "1 or 3 values" : "1 value");
@@ -95,7 +115,7 @@ static status load_scene(const struct phantom_photograph_option *o, struct scene
     return st;
 }
 
-static json_t *param_json(const struct scattering_model *model, const double *param)
+static json_t *param_json(const struct model_info *model, const double *param)
 {
     json_t *out = json_object();
     for (size_t i = 0; i < model->n_param; i++)
@@ -180,13 +200,14 @@ static status make_photograph(const struct phantom_photograph_option *o, const s
     const size_t n_pixel = o->px * o->px, n_sample = (size_t)((o->n_path + n_pixel - 1) / n_pixel);
     struct appearance model;
     appearance_from_surface(o->model, &model);
-    const struct render_request q = {.input = {.scene = {.fibers = scene}, .model = &model, .param = o->param},
-                                     .configuration = &c,
-                                     .width = o->px,
-                                     .height = o->px,
-                                     .n_sample = n_sample > 2 ? n_sample : 2, /* one sample has no standard error */
-                                     .seed = o->seed,
-                                     .stream = (uint32_t)number};
+    const struct render_request q = {
+        .input = {.scene = {.fibers = scene}, .model = &model, .param = o->param, .n_set = o->sets.n_set},
+        .configuration = &c,
+        .width = o->px,
+        .height = o->px,
+        .n_sample = n_sample > 2 ? n_sample : 2, /* one sample has no standard error */
+        .seed = o->seed,
+        .stream = (uint32_t)number};
     status st = render_run(&q, pool, progress, &im, err);
     if (st != STATUS_OK) return st;
     json_t *row =
@@ -249,7 +270,7 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
     }
     if (st != STATUS_OK) goto out;
     json_object_set_new(truth, "model", json_string(o->model->id));
-    json_object_set_new(truth, "parameter", param_json(o->model, o->param));
+    json_object_set_new(truth, "parameter", param_json(&o->sets.info, o->param));
     json_object_set_new(truth, "seed", json_integer((json_int_t)o->seed));
     json_object_set_new(truth, "n_path", json_integer((json_int_t)o->n_path));
     json_object_set_new(truth, "noise", json_real(o->noise));

@@ -84,6 +84,6 @@ void pipeline_warn(void *context, const char *option, const char *text)
 size_t pipeline_n_free(const struct pipeline_model *m)
 {
     size_t n = 0;
-    for (size_t p = 0; p < m->appearance.n_param; p++) n += !m->parameter[p].fixed && m->option->leader[p] == p;
+    for (size_t p = 0; p < m->sets.info.n_param; p++) n += !m->parameter[p].fixed && m->option->leader[p] == p;
     return n;
 }

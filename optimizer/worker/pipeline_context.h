@@ -4,6 +4,7 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
 
+#include "base/catalogue/model_sets.h"
 #include "base/log.h"
 #include "base/progress.h"
 #include "base/scratch_space.h"
@@ -46,6 +47,7 @@ struct pipeline_candidate {
 /* One model of the job: its parameters, and the results of its fit. */
 struct pipeline_model {
     struct appearance appearance;
+    struct model_sets sets; /* its parameters: one set, or one for each group of fibers */
     struct fit_parameter parameter[FIT_MAX_PARAM];
     const struct job_fit_option *option; /* of the document */
     struct fit_result fit;

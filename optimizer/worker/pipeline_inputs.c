@@ -65,11 +65,11 @@ static status load_environment(struct pipeline_context *c, struct error *err)
 static status set_parameters(const struct job_model *given, struct pipeline_model *m, struct error *err)
 {
     struct job_fit_parameter k[JOB_MAX_PARAM];
-    status s = job_fit_resolve(m->appearance.param, m->appearance.n_param, given, k, err);
+    status s = job_fit_resolve(m->sets.info.param, m->sets.info.n_param, given, k, err);
     if (s != STATUS_OK) return s;
     m->option = &given->option;
-    for (size_t p = 0; p < m->appearance.n_param; p++) {
-        const struct param_info *info = &m->appearance.param[p];
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
+        const struct param_info *info = &m->sets.info.param[p];
         /* degrees to radians may step over a bound by one rounding */
         double lower = fmin(fmax(param_from_file_unit(info, k[p].lower), info->lower), info->upper);
         double upper = fmin(fmax(param_from_file_unit(info, k[p].upper), lower), info->upper);
@@ -80,18 +80,23 @@ static status set_parameters(const struct job_model *given, struct pipeline_mode
     return STATUS_OK;
 }
 
+static status set_model(const struct job_document *doc, size_t i, struct pipeline_model *m, struct error *err)
+{
+    if (!appearance_find(doc->model[i].id, &m->appearance))
+        return error_set_field(err, STATUS_INVALID, OPTION_MODEL, "unknown model '%s'", doc->model[i].id);
+    status s = model_sets_init(&m->sets, model_catalogue_find(doc->model[i].id), doc->group, doc->n_group, err);
+    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_GROUPS);
+    return s == STATUS_OK ? set_parameters(&doc->model[i], m, err) : s;
+}
+
 static status set_models(struct pipeline_context *c, struct error *err)
 {
     c->model = calloc(c->doc->n_model, sizeof *c->model);
     if (c->model == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
     c->n_model = c->doc->n_model;
-    for (size_t i = 0; i < c->n_model; i++) {
-        if (!appearance_find(c->doc->model[i].id, &c->model[i].appearance))
-            return error_set_field(err, STATUS_INVALID, OPTION_MODEL, "unknown model '%s'", c->doc->model[i].id);
-        status s = set_parameters(&c->doc->model[i], &c->model[i], err);
-        if (s != STATUS_OK) return s;
-    }
-    return STATUS_OK;
+    status s = STATUS_OK;
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = set_model(c->doc, i, &c->model[i], err);
+    return s;
 }
 
 static status check_density(const struct pipeline_context *c, struct error *err)

@@ -79,19 +79,20 @@ void worker_series_close(struct worker_series *s)
 static json_t *parameters_json(const struct worker_series_model *model)
 {
     json_t *list = json_array();
-    for (size_t p = 0; p < model->appearance->n_param; p++) {
-        const struct param_info *info = &model->appearance->param[p];
+    for (size_t p = 0; p < model->info->n_param; p++) {
+        const struct param_info *info = &model->info->param[p];
         const struct fit_parameter *k = &model->parameter[p];
-        json_array_append_new(list, json_pack("{s:s, s:s, s:f, s:f, s:b}", "name", info->name, "unit",
-                                              param_unit_name(info->unit), "lower", param_to_file_unit(info, k->lower),
-                                              "upper", param_to_file_unit(info, k->upper), "fixed", (int)k->fixed));
+        json_array_append_new(list, json_pack("{s:s, s:s, s:s?, s:f, s:f, s:b}", "name", info->name, "unit",
+                                              param_unit_name(info->unit), "set", info->set, "lower",
+                                              param_to_file_unit(info, k->lower), "upper",
+                                              param_to_file_unit(info, k->upper), "fixed", (int)k->fixed));
     }
     return list;
 }
 
 static char *record_text(const struct fit_step *step, const struct worker_series_model *model)
 {
-    const struct param_info *info = model->appearance->param;
+    const struct param_info *info = model->info->param;
     json_t *parameter = json_array(), *parameter_se = step->param_se != NULL ? json_array() : json_null(),
            *rendered = json_array();
     for (size_t p = 0; p < step->n_param; p++) {
@@ -107,9 +108,9 @@ static char *record_text(const struct fit_step *step, const struct worker_series
     }
     json_t *json = json_pack(
         "{s:I, s:s, s:I, s:I, s:s, s:f, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:s}", "step",
-        (json_int_t)(model->step_base + step->step), "model", model->appearance->id, "i_model",
-        (json_int_t)model->i_model, "model_step", (json_int_t)step->step, "phase", step->phase, "wall_s", step->wall_s,
-        "n_path", (json_int_t)step->n_path, "n_path_total", (json_int_t)step->n_path_total, "objective",
+        (json_int_t)(model->step_base + step->step), "model", model->info->id, "i_model", (json_int_t)model->i_model,
+        "model_step", (json_int_t)step->step, "phase", step->phase, "wall_s", step->wall_s, "n_path",
+        (json_int_t)step->n_path, "n_path_total", (json_int_t)step->n_path_total, "objective",
         json_number(step->objective.value), "objective_se", json_number(step->objective.se), "parameter", parameter,
         "parameter_se", parameter_se, "rel_rms", json_number(step->objective.rel_rms), "rendered", rendered, "damping",
         json_number(step->damping), "noise", json_number(step->noise), "note", step->note != NULL ? step->note : "");

@@ -4,15 +4,15 @@
 #ifndef SELVEDGE_OPTIMIZER_WORKER_SERIES_H
 #define SELVEDGE_OPTIMIZER_WORKER_SERIES_H
 
+#include "base/catalogue/model_catalogue.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/worker/worker_folder.h"
-#include "renderer/scattering/appearance.h"
 
 struct worker_series;
 
 /* The model that a step belongs to. Steps are numbered through all models. */
 struct worker_series_model {
-    const struct appearance *appearance;
+    const struct model_info *info;
     const struct fit_parameter *parameter;
     size_t i_model, step_base; /* number of steps of the models before this one */
 };

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_POINT = 4, MAX_ENTRY = 32768, MAX_BOUNCE_CONFIGURATION = 4096, N_VALUE = 3 + 3 * SCATTERING_MAX_PARAM };
+enum { N_POINT = 4, MAX_ENTRY = 32768, MAX_BOUNCE_CONFIGURATION = 4096, N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT };
 
 /* Relative step. With it, rounding of the float factors of a path (1e-6) stays below 1e-3 of the difference. */
 static const double relative_step = 2e-3;
@@ -26,21 +26,28 @@ static const struct stencil middle = {{-2, -1, 1, 2}, {1 / 12.0, -8 / 12.0, 8 / 
 struct check {
     const struct derivative_check_request *q;
     struct derivative_check *out;
-    struct radiance_source here, *point; /* at the parameters in question; at moved ones, n_param x N_POINT */
-    double h[SCATTERING_MAX_PARAM];
-    const struct stencil *stencil[SCATTERING_MAX_PARAM];
+    struct radiance_source here, *point; /* at the parameters in question; at moved ones, n_flat x N_POINT */
+    size_t n_flat;                       /* parameters of all sets */
+    double h[SCATTERING_MAX_FLAT];
+    const struct stencil *stencil[SCATTERING_MAX_FLAT];
     struct radiance_record record; /* of one path */
     /* of one configuration: sums over paths of the channels' sum */
-    double radiance, jac[SCATTERING_MAX_PARAM], miss[SCATTERING_MAX_PARAM], miss2[SCATTERING_MAX_PARAM];
+    double radiance, jac[SCATTERING_MAX_FLAT], miss[SCATTERING_MAX_FLAT], miss2[SCATTERING_MAX_FLAT];
     /* over configurations */
-    double total, slope[SCATTERING_MAX_PARAM], error[SCATTERING_MAX_PARAM], var[SCATTERING_MAX_PARAM];
+    double total, slope[SCATTERING_MAX_FLAT], error[SCATTERING_MAX_FLAT], var[SCATTERING_MAX_FLAT];
 };
+
+static const struct param_info *info_of(const struct check *k, size_t p)
+{
+    const struct appearance *m = k->q->input.model;
+    return &m->param[p % m->n_param];
+}
 
 /* ---- the model at moved parameters ---- */
 
 static void choose_stencil(struct check *k, size_t p)
 {
-    const struct param_info *info = &k->q->input.model->param[p];
+    const struct param_info *info = info_of(k, p);
     bool share = info->channel >= 0 || info->coordinate == PARAM_LOGIT; /* models use 1 - p */
     double v = k->q->input.param[p], least = share ? least_scale_of_share : least_scale;
     k->h[p] = relative_step * fmax(fabs(v), least * (info->upper - info->lower));
@@ -50,17 +57,16 @@ static void choose_stencil(struct check *k, size_t p)
 static status prepare_points(struct check *k, struct error *err)
 {
     const struct derivative_check_request *q = k->q;
-    size_t n_param = q->input.model->n_param;
-    double moved[SCATTERING_MAX_PARAM];
+    double moved[SCATTERING_MAX_FLAT];
     struct radiance_input in = q->input;
     in.want_derivative = true;
     status s = radiance_source_init(&k->here, &in, q->configuration, q->n_configuration, err);
     in.param = moved;
-    for (size_t p = 0; p < n_param && s == STATUS_OK; p++) {
+    for (size_t p = 0; p < k->n_flat && s == STATUS_OK; p++) {
         choose_stencil(k, p);
         if (q->skip != NULL && q->skip[p]) continue;
         k->out->checked[p] = true;
-        memcpy(moved, q->input.param, n_param * sizeof *moved);
+        memcpy(moved, q->input.param, k->n_flat * sizeof *moved);
         for (size_t i = 0; i < N_POINT && s == STATUS_OK; i++) {
             moved[p] = q->input.param[p] + k->stencil[p]->offset[i] * k->h[p];
             s = radiance_source_init(&k->point[p * N_POINT + i], &in, NULL, 0, err);
@@ -86,14 +92,14 @@ static status add_path(struct check *k, const float value[N_VALUE], struct error
 {
     const struct appearance *m = k->q->input.model;
     for (int c = 0; c < 3; c++) k->radiance += (double)value[c];
-    for (size_t p = 0; p < m->n_param; p++) {
+    for (size_t p = 0; p < k->n_flat; p++) {
         if (!k->out->checked[p]) continue;
         double own = 0, other = difference(k, p);
-        for (size_t c = 0; c < 3; c++) own += (double)value[3 + c * m->n_param + p];
+        for (size_t c = 0; c < 3; c++) own += (double)value[3 + c * k->n_flat + p];
         if (!isfinite(own) || !isfinite(other))
-            return error_set_field(err, STATUS_NUMERIC, m->param[p].name,
+            return error_set_field(err, STATUS_NUMERIC, info_of(k, p)->name,
                                    "model '%s' gave a value that is not finite (parameter '%s')", m->id,
-                                   m->param[p].name);
+                                   info_of(k, p)->name);
         k->jac[p] += own;
         k->miss[p] += own - other;
         k->miss2[p] += (own - other) * (own - other);
@@ -129,7 +135,7 @@ static status check_configuration(struct check *k, size_t i, size_t n_path, stru
     }
     double n = (double)n_done, weight = (q->weight != NULL ? q->weight[i] : 1.0) / n;
     k->total += weight * k->radiance;
-    for (size_t p = 0; p < q->input.model->n_param; p++) {
+    for (size_t p = 0; p < k->n_flat; p++) {
         k->slope[p] += weight * fabs(k->jac[p]);
         k->error[p] += weight * fabs(k->miss[p]);
         k->var[p] += weight * weight * fmax(0.0, k->miss2[p] - k->miss[p] * k->miss[p] / n);
@@ -142,7 +148,7 @@ static status check_configuration(struct check *k, size_t i, size_t n_path, stru
 static void judge(struct check *k)
 {
     const struct radiance_input *in = &k->q->input;
-    for (size_t p = 0; p < in->model->n_param; p++) {
+    for (size_t p = 0; p < k->n_flat; p++) {
         if (!k->out->checked[p]) continue;
         double scale = fmax(k->slope[p], 1e-3 * k->total / fmax(fabs(in->param[p]), k->h[p]));
         if (!(scale > 0.0)) continue; /* a cloth that shows nothing */
@@ -172,12 +178,12 @@ static status check_all(struct check *k, const struct progress *progress, struct
 status derivative_check_run(const struct derivative_check_request *q, const struct progress *progress,
                             struct derivative_check *out, struct error *err)
 {
-    size_t n_point = q->input.model->n_param * N_POINT;
+    size_t n_flat = (q->input.n_set > 1 ? q->input.n_set : 1) * q->input.model->n_param, n_point = n_flat * N_POINT;
     memset(out, 0, sizeof *out);
-    out->n_param = q->input.model->n_param;
-    status s = q->input.n_set > 1 ? error_set_field(err, STATUS_INVALID, "n_set",
-                                                    "cannot check derivatives of %zu parameter sets", q->input.n_set)
-                                  : configuration_check(q->configuration, q->n_configuration, err);
+    out->n_param = n_flat;
+    status s = n_flat > SCATTERING_MAX_FLAT
+                   ? error_set_field(err, STATUS_INVALID, "n_set", "cannot check derivatives by %zu parameters", n_flat)
+                   : configuration_check(q->configuration, q->n_configuration, err);
     if (s == STATUS_OK) s = estimate_check_key(q->iteration, q->replica, err);
     if (s != STATUS_OK) return s;
     struct check *k = calloc(1, sizeof *k);
@@ -186,6 +192,7 @@ status derivative_check_run(const struct derivative_check_request *q, const stru
         k->q = q;
         k->out = out;
         k->point = point;
+        k->n_flat = n_flat;
         s = check_all(k, progress, err);
         radiance_source_release(&k->here);
         for (size_t i = 0; i < n_point; i++) radiance_source_release(&point[i]);

@@ -17,8 +17,8 @@
 #include "renderer/transport/radiance_source.h"
 
 struct derivative_check_request {
-    struct radiance_input input; /* parameters inside the model's bounds; one set; want_derivative is taken as true */
-    const bool *skip;            /* parameters that are not looked at; NULL: none */
+    struct radiance_input input; /* parameters inside the model's bounds; want_derivative is taken as true */
+    const bool *skip;            /* parameters of all sets that are not looked at; NULL: none */
     const struct configuration *configuration;
     const double *weight; /* of each configuration, > 0; NULL: all 1 */
     size_t n_configuration;
@@ -28,9 +28,9 @@ struct derivative_check_request {
 };
 
 struct derivative_check {
-    size_t n_param;
-    double error[SCATTERING_MAX_PARAM], error_se[SCATTERING_MAX_PARAM]; /* 0 for skipped ones */
-    bool checked[SCATTERING_MAX_PARAM];
+    size_t n_param;                                                   /* of all sets together */
+    double error[SCATTERING_MAX_FLAT], error_se[SCATTERING_MAX_FLAT]; /* 0 for skipped ones */
+    bool checked[SCATTERING_MAX_FLAT];
     size_t worst;            /* parameter with the largest error */
     uint64_t n_path, n_step; /* paths, and their scattering events */
 };

@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 struct fixture {
-    struct scene *scene;
+    struct scene *scene, *two_groups; /* of the same fibers: in one group; warp and weft apart */
     struct direction_volume v;
     struct volume_scene volume;
     struct configuration c[16];
@@ -28,6 +28,8 @@ static int setup(void **state)
     assert_non_null(x);
     hand_weave_small(&f);
     assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &x->scene, NULL), STATUS_OK);
+    memcpy(f.group, f.axis_class, f.n_fiber);
+    assert_int_equal(scene_new(&f, &(struct scene_option){.black_sheet = true}, &x->two_groups, NULL), STATUS_OK);
     fiber_set_release(&f);
     hand_volume_weave(&x->v, n, 10e-6, 0.4);
     assert_int_equal(volume_scene_init(&x->volume, &x->v, &(struct volume_scene_option){.black_sheet = true}, NULL),
@@ -41,6 +43,7 @@ static int teardown(void **state)
 {
     struct fixture *x = *state;
     scene_free(x->scene);
+    scene_free(x->two_groups);
     volume_scene_release(&x->volume);
     direction_volume_release(&x->v);
     free(x);
@@ -84,6 +87,35 @@ static void every_model(void **state)
             for (size_t p = 0; p < m.n_param; p++)
                 if (check.error[p] > 2e-3 + 2.0 * check.error_se[p])
                     fail_msg("%s, %s: %.2g +- %.1g", m.id, m.param[p].name, check.error[p], check.error_se[p]);
+        }
+    }
+}
+
+/* Two sets of different values, for the warp and the weft. */
+static void every_model_with_two_sets(void **state)
+{
+    const struct fixture *x = *state;
+    struct appearance m;
+    for (size_t i = 0; appearance_at(i, &m); i++) {
+        double param[2 * SCATTERING_MAX_PARAM];
+        static struct derivative_check check;
+        struct error err = {0};
+        for (size_t p = 0; p < m.n_param; p++) {
+            param[p] = m.param[p].start;
+            param[m.n_param + p] = 0.8 * m.param[p].start + 0.2 * m.param[p].lower;
+        }
+        struct derivative_check_request q = request(x, &m, param);
+        q.input.scene.fibers = x->two_groups;
+        q.input.n_set = 2;
+        status s = derivative_check_run(&q, NULL, &check, &err);
+        assert_int_equal(s, m.kind == MODEL_SURFACE ? STATUS_OK : STATUS_INVALID);
+        if (s != STATUS_OK) continue;
+        assert_int_equal(check.n_param, 2 * m.n_param);
+        for (size_t p = 0; p < 2 * m.n_param; p++) {
+            assert_true(check.checked[p] && check.error_se[p] > 0.0);
+            if (check.error[p] > 2e-3 + 2.0 * check.error_se[p])
+                fail_msg("%s, set %zu, %s: %.2g +- %.1g", m.id, p / m.n_param, m.param[p % m.n_param].name,
+                         check.error[p], check.error_se[p]);
         }
     }
 }
@@ -157,7 +189,7 @@ static void bad_requests(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_model), cmocka_unit_test(wrong_scores_are_found),
-                                       cmocka_unit_test(bad_requests)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_model), cmocka_unit_test(every_model_with_two_sets),
+                                       cmocka_unit_test(wrong_scores_are_found), cmocka_unit_test(bad_requests)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -9,6 +9,11 @@
 #define FIT_OF(fit) "{\"sample\":\"s\"," VOLUME ",\"photographs\":[" PHOTO "],\"fit\":" fit "}"
 #define VOLUME_OF(extra)                                                                                               \
     "{\"sample\":\"s\",\"volume\":{\"files\":[\"scan.tif\"]," extra "},\"photographs\":[" PHOTO "]}"
+/* A fiber file of the groups warp and weft. */
+#define GROUPS_OF(fit)                                                                                                 \
+    "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\",\"groups\":[\"warp\",\"weft\"]},\"photographs\":[" PHOTO        \
+    "],\"fit\":" fit "}"
+#define FIBERS_OF(extra) "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\"," extra "},\"photographs\":[" PHOTO "]}"
 #define PHOTO_OF(extra)                                                                                                \
     "{\"sample\":\"s\"," VOLUME                                                                                        \
     ",\"photographs\":[{\"file\":\"p0.exr\",\"light_phi_deg\":0,\"camera_phi_deg\":180," extra "}]}"

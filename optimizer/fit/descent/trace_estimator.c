@@ -23,9 +23,10 @@ static status trace(void *context, const struct estimator_call *call, const stru
 
 struct estimator trace_estimator(struct trace_estimator *t)
 {
+    const struct radiance_input *in = &t->request.input;
     return (struct estimator){.context = t,
                               .n_configuration = t->request.n_configuration,
-                              .n_param = t->request.input.model->n_param,
+                              .n_param = (in->n_set > 1 ? in->n_set : 1) * in->model->n_param,
                               .run = trace};
 }
 

@@ -3,6 +3,7 @@
 #include "optimizer/job/options/option_checks.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* A value that the document gives replaces one that is chosen from the data. A job can therefore be repeated with the
@@ -83,4 +84,37 @@ status job_check_filter(const struct option_value *v, struct error *err)
             "'volume.filter.t' is %g: it must be above half of s (%g), or the filter does not respond to fibers",
             doc->filter_t, doc->filter_s);
     return STATUS_OK;
+}
+
+static bool group_name_valid(const char *name)
+{
+    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
+    size_t n = name != NULL ? strlen(name) : 0;
+    return n > 0 && n <= 20 && strspn(name, letters) == n;
+}
+
+static status read_groups(const json_t *list, const char *path, struct job_document *doc, struct error *err)
+{
+    size_t n = json_array_size(list);
+    if (n < 2 || n > MODEL_MAX_SET)
+        return error_set_field(err, STATUS_INVALID, path, "'%s' must be a list of 2 to %d names", path, MODEL_MAX_SET);
+    for (size_t i = 0; i < n; i++) {
+        const char *name = json_string_value(json_array_get(list, i));
+        if (!group_name_valid(name))
+            return error_set_field(err, STATUS_INVALID, path,
+                                   "'%s' has an element %zu that is no name: allowed are 1 to 20 of A-Z a-z 0-9 _ -",
+                                   path, i);
+        for (size_t k = 0; k < i; k++)
+            if (strcmp(doc->group[k], name) == 0)
+                return error_set_field(err, STATUS_INVALID, path, "'%s' has the name '%s' twice", path, name);
+        snprintf(doc->group[i], sizeof doc->group[i], "%s", name);
+    }
+    doc->n_group = n;
+    return STATUS_OK;
+}
+
+status job_check_fibers(const struct option_value *v, struct error *err)
+{
+    const json_t *groups = json_object_get(v->value, "groups");
+    return groups != NULL ? read_groups(groups, "fibers.groups", v->doc, err) : STATUS_OK;
 }

@@ -238,6 +238,7 @@ const struct job_option option_rows_cloth[] = {
 
     {.path = "fibers",
      .kind = OPTION_SECTION,
+     .check = job_check_fibers,
      .left_out = "this, `volume` or `cloth`",
      .meaning = "The cloth as a file of fibers."},
     {.path = "fibers.file",
@@ -245,7 +246,7 @@ const struct job_option option_rows_cloth[] = {
      .id = OPTION_FIBER_FILE,
      INTO(fiber_file),
      .required = true,
-     .allowed = "`NAME.txt`: text, `x y z radius`; any other name: `.hair`",
+     .allowed = "`NAME.txt`: text, `x y z radius` or `x y z radius group`; any other name: `.hair`",
      .meaning = "Fibers in millimetres. A radius above half of the tile's shorter edge is refused, because the unit is "
                 "wrong."},
     {.path = "fibers.tile_mm",
@@ -264,5 +265,15 @@ const struct job_option option_rows_cloth[] = {
      .unit = "um",
      .left_out = "half the mean radius",
      .meaning = "Voxels of the density that volume models see. They are larger when memory asks for it."},
+    {.path = "fibers.groups",
+     .kind = OPTION_OWN,
+     .id = OPTION_GROUPS,
+     .left_out = "one set of parameters for all fibers",
+     .allowed = "2..8 different names of 1..20 characters `A-Z a-z 0-9 _ -`",
+     .schema = "{\"type\": \"array\", \"minItems\": 2, \"maxItems\": 8, \"uniqueItems\": true, \"items\": {\"type\": "
+               "\"string\", \"pattern\": \"^[A-Za-z0-9_-]{1,20}$\"}}",
+     .meaning =
+         "`[\"warp\", \"weft\"]`: names of the groups of fibers in the file (docs/file-formats.md), group 0 first. "
+         "Surface models then fit a set of parameters for each group, named `warp.C_R.r`."},
     {.path = NULL},
 };

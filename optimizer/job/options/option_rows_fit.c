@@ -95,8 +95,10 @@ const struct job_option option_rows_fit[] = {
      .left_out = "none",
      .allowed = "inside the model's bounds",
      .schema = VALUES,
-     .meaning = "`{\"beta_R\": 5}`: parameters that are not fitted, and not in `start`. A colour takes one number or "
-                "`[r, g, b]`, or one channel as `\"C_R.g\"`. With several models: in all that have the parameter."},
+     .meaning =
+         "`{\"beta_R\": 5}`: parameters that are not fitted, and not in `start`. A colour takes one number or "
+         "`[r, g, b]`, or one channel as `\"C_R.g\"`. With several models: in all that have the parameter. With "
+         "groups of fibers: `\"warp.C_R\"` of one group, `\"C_R\"` of all; so in `start`, `bounds`, `priors`, `tied`."},
     {.path = "fit.start",
      .kind = OPTION_OWN,
      .id = OPTION_START,
@@ -152,7 +154,8 @@ const struct job_option option_rows_fit[] = {
      .allowed = "list of groups",
      .schema = TIES,
      .meaning = "`[[\"C_R.r\", \"C_R.g\", \"C_R.b\"]]` (or `[[\"C_R\"]]`): equal values. `[{\"beta_TT\": 1, "
-                "\"gamma_TT\": 2}]`: values in these proportions. Only parameters of the same unit can be tied."},
+                "\"gamma_TT\": 2}]`: values in these proportions. Only parameters of the same unit can be tied. "
+                "With groups of fibers `[\"beta_R\"]` ties the widths of all groups."},
     {.path = "fit.bounds",
      .kind = OPTION_OWN,
      .unit = "degrees for angles",

@@ -71,16 +71,16 @@ static json_t *at_bound(const struct pipeline_model *m, size_t p)
 static json_t *parameters_json(const struct pipeline_model *m)
 {
     json_t *list = json_array();
-    for (size_t p = 0; p < m->appearance.n_param; p++) {
-        const struct param_info *info = &m->appearance.param[p];
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
+        const struct param_info *info = &m->sets.info.param[p];
         const struct fit_parameter *k = &m->parameter[p];
-        json_t *parameter =
-            json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit",
-                      param_unit_name(info->unit), "value", json_number(param_to_file_unit(info, m->fit.param[p])),
-                      "standard_error", json_number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
-                      param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",
-                      param_to_file_unit(info, k->start), "at_bound", at_bound(m, p), "determined",
-                      (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);
+        json_t *parameter = json_pack("{s:s, s:s, s:s?, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name,
+                                      "unit", param_unit_name(info->unit), "set", info->set, "value",
+                                      json_number(param_to_file_unit(info, m->fit.param[p])), "standard_error",
+                                      json_number(param_to_file_unit(info, m->fit.uncertainty.se_param[p])), "lower",
+                                      param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper),
+                                      "start", param_to_file_unit(info, k->start), "at_bound", at_bound(m, p),
+                                      "determined", (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);
         result_parameter_options(m, p, parameter);
         json_array_append_new(list, parameter);
     }
@@ -89,7 +89,7 @@ static json_t *parameters_json(const struct pipeline_model *m)
 
 static json_t *correlation_json(const struct pipeline_model *m)
 {
-    size_t n = m->appearance.n_param;
+    size_t n = m->sets.info.n_param;
     json_t *list = json_array();
     for (size_t p = 0; p < n; p++)
         json_array_append_new(list, json_number_list(m->fit.uncertainty.correlation + p * n, n, 1.0));

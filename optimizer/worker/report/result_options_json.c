@@ -10,7 +10,7 @@ void result_parameter_options(const struct pipeline_model *m, size_t p, json_t *
 {
     const struct job_fit_option *o = m->option;
     bool tied = o->leader[p] != p;
-    json_object_set_new(parameter, "tied_to", tied ? json_string(m->appearance.param[o->leader[p]].name) : json_null());
+    json_object_set_new(parameter, "tied_to", tied ? json_string(m->sets.info.param[o->leader[p]].name) : json_null());
     json_object_set_new(parameter, "ratio", tied ? json_real(o->ratio[p]) : json_null());
     json_object_set_new(parameter, "prior",
                         isnan(o->prior_mean[p])
@@ -65,8 +65,8 @@ static json_t *nuisance_json(const struct fit_nuisance *n)
 static json_t *values_json(const struct pipeline_model *m, const double *param)
 {
     json_t *list = json_array();
-    for (size_t p = 0; p < m->appearance.n_param; p++)
-        json_array_append_new(list, json_number(param_to_file_unit(&m->appearance.param[p], param[p])));
+    for (size_t p = 0; p < m->sets.info.n_param; p++)
+        json_array_append_new(list, json_number(param_to_file_unit(&m->sets.info.param[p], param[p])));
     return list;
 }
 
@@ -89,14 +89,14 @@ static json_t *certificate_json(const struct pipeline_model *m)
 {
     const struct derivative_check *k = &m->certificate;
     json_t *list = json_array();
-    for (size_t p = 0; p < m->appearance.n_param; p++)
+    for (size_t p = 0; p < m->sets.info.n_param; p++)
         if (k->checked[p])
             json_array_append_new(list,
-                                  json_pack("{s:s, s:o, s:o}", "name", m->appearance.param[p].name, "rel_error",
+                                  json_pack("{s:s, s:o, s:o}", "name", m->sets.info.param[p].name, "rel_error",
                                             json_number(k->error[p]), "rel_error_se", json_number(k->error_se[p])));
     return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", json_number(k->error[k->worst]),
                      "worst_rel_error_se", json_number(k->error_se[k->worst]), "worst_parameter",
-                     m->appearance.param[k->worst].name, "n_path", (json_int_t)k->n_path, "parameters", list);
+                     m->sets.info.param[k->worst].name, "n_path", (json_int_t)k->n_path, "parameters", list);
 }
 
 static json_t *candidate_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t rank)
@@ -104,8 +104,8 @@ static json_t *candidate_json(const struct pipeline_context *c, const struct pip
     const struct pipeline_candidate *k = &m->candidate[rank];
     const struct job_candidate *g = &c->doc->candidate[k->i_candidate];
     json_t *determines = json_array();
-    for (size_t p = 0; p < m->appearance.n_param; p++)
-        if (k->score.determines[p]) json_array_append_new(determines, json_string(m->appearance.param[p].name));
+    for (size_t p = 0; p < m->sets.info.n_param; p++)
+        if (k->score.determines[p]) json_array_append_new(determines, json_string(m->sets.info.param[p].name));
     return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:o, s:o, s:o}", "candidate", (json_int_t)k->i_candidate,
                      "light_theta_deg", g->light_theta_deg, "light_phi_deg", g->light_phi_deg, "camera_theta_deg",
                      g->camera_theta_deg, "camera_phi_deg", g->camera_phi_deg, "cloth_rotation_deg",
@@ -165,7 +165,7 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
     const struct derivative_check *check = &m->certificate;
     const struct validation *v = &m->validation;
     fprintf(out, "gradient certificate: the derivatives on this cloth are right to %.1g (+- %.1g), worst by %s\n",
-            check->error[check->worst], check->error_se[check->worst], m->appearance.param[check->worst].name);
+            check->error[check->worst], check->error_se[check->worst], m->sets.info.param[check->worst].name);
     if (m->candidate != NULL) {
         const struct job_candidate *best = &c->doc->candidate[m->candidate[0].i_candidate];
         fprintf(out,

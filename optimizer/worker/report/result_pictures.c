@@ -138,7 +138,7 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
     if (exists(path)) return STATUS_OK;
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
     const struct render_request q = {
-        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param},
+        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set},
         .configuration = &c->observation.item[i].configuration,
         .width = c->doc->render_px,
         .height = c->doc->render_px,

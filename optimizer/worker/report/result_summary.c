@@ -13,15 +13,17 @@
 static void print_parameters(const struct pipeline_model *m, FILE *out)
 {
     fprintf(out, "%-18s %10s %10s  %-22s %s\n", "parameter", "value", "std error", "allowed", "remarks");
-    for (size_t p = 0; p < m->appearance.n_param; p++) {
-        const struct param_info *info = &m->appearance.param[p];
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
+        const struct param_info *info = &m->sets.info.param[p];
         const struct fit_parameter *k = &m->parameter[p];
         const struct uncertainty *u = &m->fit.uncertainty;
         char allowed[64];
+        bool begins = info->set != NULL && (p == 0 || info->set != m->sets.info.param[p - 1].set);
+        if (begins) fprintf(out, "%s%s\n", p > 0 ? "\n" : "", info->set);
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
                  param_to_file_unit(info, k->upper), param_unit_name(info->unit));
-        fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", info->name, param_to_file_unit(info, m->fit.param[p]),
-                param_to_file_unit(info, u->se_param[p]), allowed,
+        fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", param_own_name(info),
+                param_to_file_unit(info, m->fit.param[p]), param_to_file_unit(info, u->se_param[p]), allowed,
                 k->fixed                    ? "fixed "
                 : m->option->leader[p] != p ? "tied "
                                             : "",

@@ -15,8 +15,8 @@ static status least_budget(const struct pipeline_context *c, const struct pipeli
     struct fit_option option;
     struct fit_layout *layout = calloc(1, sizeof *layout);
     if (layout == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
-    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
-    status s = fit_layout_init(layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
+    pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
+    status s = fit_layout_init(layout, m->sets.info.param, m->parameter, m->sets.info.n_param, &option, err);
     const struct fit_problem problem = {.n_param = layout->n_unknown,
                                         .info = layout->info,
                                         .parameter = layout->parameter,

@@ -41,11 +41,11 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
     struct fit_option option;
     struct fit_layout layout;
     double wall_s;
-    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
     const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty,
                                             option.photograph_gain_sd};
     struct progress quiet = {.cancel = c->progress.cancel};
-    status s = fit_layout_init(&layout, m->appearance.param, m->parameter, m->appearance.n_param, &option, err);
+    status s = fit_layout_init(&layout, m->sets.info.param, m->parameter, m->sets.info.n_param, &option, err);
     if (s != STATUS_OK) return s;
     s = pipeline_trace_open(&trace, c, "report", "candidates.journal", i_model, o, err);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {

@@ -21,7 +21,7 @@ static void warn_of(struct pipeline_context *c, const struct pipeline_model *m)
         c->status,
         "the derivatives by '%s' of model '%s' are off by %.2g +- %.1g of themselves on this cloth: do not trust "
         "the fit's standard errors, and report this",
-        m->appearance.param[k->worst].name, m->appearance.id, k->error[k->worst], k->error_se[k->worst]);
+        m->sets.info.param[k->worst].name, m->appearance.id, k->error[k->worst], k->error_se[k->worst]);
 }
 
 static status certify(struct pipeline_context *c, struct pipeline_model *m, const struct configuration *configuration,
@@ -29,9 +29,9 @@ static status certify(struct pipeline_context *c, struct pipeline_model *m, cons
 {
     bool skip[FIT_MAX_PARAM];
     double start_s = clock_monotonic_s();
-    for (size_t p = 0; p < m->appearance.n_param; p++) skip[p] = m->parameter[p].fixed;
+    for (size_t p = 0; p < m->sets.info.n_param; p++) skip[p] = m->parameter[p].fixed;
     const struct derivative_check_request q = {
-        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param},
+        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set},
         .skip = skip,
         .configuration = configuration,
         .weight = weight,
@@ -43,7 +43,7 @@ static status certify(struct pipeline_context *c, struct pipeline_model *m, cons
     if (s != STATUS_OK) return s;
     const struct derivative_check *k = &m->certificate;
     log_info(c->log, "gradient certificate of %s: worst relative error %.2g +- %.1g (%s), %zu paths, %.1f s",
-             m->appearance.id, k->error[k->worst], k->error_se[k->worst], m->appearance.param[k->worst].name,
+             m->appearance.id, k->error[k->worst], k->error_se[k->worst], m->sets.info.param[k->worst].name,
              (size_t)k->n_path, clock_monotonic_s() - start_s);
     warn_of(c, m);
     return STATUS_OK;

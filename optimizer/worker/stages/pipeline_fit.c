@@ -31,7 +31,7 @@ static status on_step(void *context, const struct fit_step *step, struct error *
         log_info(c->log, "step %zu (%s): objective %.5g +- %.2g, relative RMS error %.3f, %.0f thousand paths in all",
                  step->step, step->phase, step->objective.value, step->objective.se, step->objective.rel_rms,
                  (double)step->n_path_total / 1e3);
-    const struct worker_series_model model = {&m->appearance, m->parameter, l->i_model, l->step_base};
+    const struct worker_series_model model = {&m->sets.info, m->parameter, l->i_model, l->step_base};
     return worker_series_add(l->series, step, &model, replayed, err);
 }
 
@@ -42,8 +42,8 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
     struct pipeline_model *m = &c->model[listener->i_model];
     if (method == NULL)
         return error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
-    struct fit_problem problem = {.n_param = m->appearance.n_param,
-                                  .info = m->appearance.param,
+    struct fit_problem problem = {.n_param = m->sets.info.n_param,
+                                  .info = m->sets.info.param,
                                   .parameter = m->parameter,
                                   .observation = &c->row,
                                   .estimator = estimator,
@@ -53,7 +53,7 @@ static status run_method(struct pipeline_context *c, const struct estimator *est
                                   .report_context = listener,
                                   .progress = progress};
     struct fit_option option;
-    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
     return fit_run(method, &problem, &option, &m->fit, err);
 }
 
@@ -94,10 +94,10 @@ static bool list_names(const struct pipeline_model *m, const bool *flag, size_t 
 {
     size_t used = 0;
     text[0] = '\0';
-    for (size_t p = 0; p < m->appearance.n_param && used < n_text; p++)
+    for (size_t p = 0; p < m->sets.info.n_param && used < n_text; p++)
         if (flag[p])
             used +=
-                (size_t)snprintf(text + used, n_text - used, "%s%s", used > 0 ? ", " : "", m->appearance.param[p].name);
+                (size_t)snprintf(text + used, n_text - used, "%s%s", used > 0 ? ", " : "", m->sets.info.param[p].name);
     return used > 0;
 }
 
@@ -105,8 +105,8 @@ static void warn_parameters(struct pipeline_context *c, const struct pipeline_mo
 {
     bool at_bound[FIT_MAX_PARAM], unknown[FIT_MAX_PARAM];
     char names[300];
-    for (size_t p = 0; p < m->appearance.n_param; p++) {
-        bool density = m->appearance.param[p].kind == PARAM_DENSITY; /* warn_density */
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
+        bool density = m->sets.info.param[p].kind == PARAM_DENSITY; /* warn_density */
         at_bound[p] = !m->parameter[p].fixed && m->fit.uncertainty.at_bound[p];
         unknown[p] = !m->parameter[p].fixed && !m->fit.uncertainty.determined[p] && !density;
     }

@@ -233,6 +233,32 @@ static status build_cloth(struct pipeline_context *c, struct error *err)
     return s;
 }
 
+/* Compares the groups of the fibers with those that the job names. */
+static status check_groups(struct pipeline_context *c, struct error *err)
+{
+    size_t n_fiber[FIBER_MAX_GROUP] = {0}, n_group = fiber_set_n_group(&c->fiber);
+    for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
+    if (c->doc->n_group == 0) {
+        if (n_group > 1)
+            worker_status_warn(
+                c->status,
+                "the fibers belong to %zu groups, but are fitted with one set of parameters: name the groups "
+                "in '%s' to give each its own",
+                n_group, job_option_key(OPTION_GROUPS));
+        return STATUS_OK;
+    }
+    if (n_group > c->doc->n_group)
+        return error_set_field(err, STATUS_INVALID, OPTION_GROUPS,
+                               "'%s' names %zu groups, but the fibers belong to %zu", job_option_key(OPTION_GROUPS),
+                               c->doc->n_group, n_group);
+    for (size_t g = 0; g < c->doc->n_group; g++)
+        if (n_fiber[g] == 0)
+            return error_set_field(err, STATUS_INVALID, OPTION_GROUPS,
+                                   "'%s' names the group %zu '%s', but no fiber belongs to it",
+                                   job_option_key(OPTION_GROUPS), g, c->doc->group[g]);
+    return STATUS_OK;
+}
+
 status stage_fibers(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -253,6 +279,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
         if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
     }
     if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
+    if (s == STATUS_OK) s = check_groups(c, err);
     if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);

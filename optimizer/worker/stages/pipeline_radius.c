@@ -45,7 +45,7 @@ static void set_starts(const struct search *q, double u, struct fit_parameter *p
     for (size_t k = 1; k < q->n_done; k++)
         if (fabs(q->u[k] - u) < fabs(q->u[nearest] - u)) nearest = k;
     const struct pipeline_model *m = &q->c->model[q->c->radius.i_model];
-    for (size_t p = 0; p < m->appearance.n_param; p++) {
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
         parameter[p] = m->parameter[p];
         if (q->n_done > 0 && !parameter[p].fixed)
             parameter[p].start = fmin(fmax(q->param[nearest][p], parameter[p].lower), parameter[p].upper);
@@ -63,10 +63,10 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     struct fit_parameter parameter[FIT_MAX_PARAM];
     struct fit_option option;
     set_starts(q, u, parameter);
-    pipeline_fit_option(m->option, m->appearance.param, m->appearance.n_param, &option);
+    pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
     option.n_start = 1;
-    const struct fit_problem problem = {.n_param = m->appearance.n_param,
-                                        .info = m->appearance.param,
+    const struct fit_problem problem = {.n_param = m->sets.info.n_param,
+                                        .info = m->sets.info.param,
                                         .parameter = parameter,
                                         .observation = &c->fitted,
                                         .estimator = e,
@@ -88,11 +88,11 @@ static status report(struct search *q, const struct fit_result *r, double radius
                                   .n_path = r->n_path,
                                   .n_path_total = c->radius.n_path,
                                   .objective = r->objective,
-                                  .n_param = m->appearance.n_param,
+                                  .n_param = m->sets.info.n_param,
                                   .param = r->param,
                                   .param_se = r->uncertainty.se_param,
                                   .note = note};
-    const struct worker_series_model model = {&m->appearance, m->parameter, c->radius.i_model, 0};
+    const struct worker_series_model model = {&m->sets.info, m->parameter, c->radius.i_model, 0};
     worker_status_objective(c->status, step.step, r->objective.value, r->objective.se);
     if (replayed)
         worker_status_restart_eta(c->status);

@@ -11,6 +11,7 @@ static uint64_t fingerprint(const struct pipeline_context *c, size_t i_model)
     const char *id = c->model[i_model].appearance.id;
     uint32_t sum = (uint32_t)crc32_z(0, (const void *)f->position_m, 3 * f->n_vertex * sizeof *f->position_m);
     sum = (uint32_t)crc32_z(sum, (const void *)f->radius_m, f->n_fiber * sizeof *f->radius_m);
+    sum = (uint32_t)crc32_z(sum, (const void *)f->group, f->n_fiber);
     sum = (uint32_t)crc32_z(sum, (const void *)id, strlen(id));
     if (c->model[i_model].appearance.kind == MODEL_VOLUME)
         sum = (uint32_t)crc32_z(sum, (const void *)c->direction.density, volume_n_voxel(c->direction.n));
@@ -31,12 +32,13 @@ static status may_write(void *context, struct error *err)
 status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
                            size_t i_model, const struct observation_set *o, struct error *err)
 {
+    const struct pipeline_model *m = &c->model[i_model];
     char path[WORKER_PATH_BYTES];
     *t = (struct pipeline_trace){.configuration = trace_configurations(o)};
     if (t->configuration == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
     t->live = (struct trace_estimator){
-        .request = {.input = {.scene = pipeline_scene(c), .model = &c->model[i_model].appearance},
+        .request = {.input = {.scene = pipeline_scene(c), .model = &m->appearance, .n_set = m->sets.n_set},
                     .configuration = t->configuration,
                     .n_configuration = o->n,
                     .seed = c->doc->seed,

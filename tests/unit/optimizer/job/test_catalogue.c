@@ -1,6 +1,6 @@
 /* Conditions that each row of the catalogues of models and methods must satisfy, also against the registries. */
 #include "base/catalogue/method_catalogue.h"
-#include "base/catalogue/model_catalogue.h"
+#include "base/catalogue/model_sets.h"
 #include "base/catalogue/stop_reason.h"
 #include "optimizer/fit/descent/descent.h"
 #include "renderer/scattering/appearance.h"
@@ -133,12 +133,39 @@ static void units_convert(void **unused)
     assert_string_equal(param_unit_name(PARAM_UNIT_NONE), "");
 }
 
+static void sets_name_their_parameters(void **state)
+{
+    (void)state;
+    static const char set[MODEL_MAX_SET][MODEL_SET_NAME_BYTES] = {"warp", "weft"};
+    const struct model_info *m = model_catalogue_find("two_lobe.v1");
+    static struct model_sets s;
+    struct error err = {0};
+    assert_int_equal(model_sets_init(&s, m, set, 2, NULL), STATUS_OK);
+    assert_int_equal(s.info.n_param, 2 * m->n_param);
+    const struct param_info *p = &s.info.param[m->n_param + 1];
+    assert_string_equal(p->name, "weft.C_R.g");
+    assert_string_equal(p->symbol, "weft.C_R");
+    assert_string_equal(param_own_name(p), "C_R.g");
+    assert_true(p->set == set[1] && p->upper == m->param[1].upper && p->channel == 1);
+    assert_true(param_is_named(p, "weft.C_R.g") && param_is_named(p, "weft.C_R") && param_is_named(p, "C_R.g") &&
+                param_is_named(p, "C_R"));
+    assert_true(!param_is_named(p, "warp.C_R.g") && !param_is_named(p, "C_R.r") && !param_is_named(p, "R.g"));
+    for (size_t n = 0; n < 2; n++) { /* one set has the names of the model */
+        assert_int_equal(model_sets_init(&s, m, set, n, NULL), STATUS_OK);
+        assert_true(s.n_set == 1 && s.info.n_param == m->n_param && s.info.param[1].set == NULL);
+        assert_string_equal(s.info.param[1].name, "C_R.g");
+    }
+    assert_int_equal(model_sets_init(&s, model_catalogue_find("microflake.v1"), set, 2, NULL), STATUS_OK);
+    assert_int_equal(s.n_set, 1);
+    assert_int_equal(model_sets_init(&s, m, set, MODEL_MAX_SET, &err), STATUS_INVALID);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(models_are_sound),       cmocka_unit_test(registries_follow_the_catalogue),
         cmocka_unit_test(methods_are_sound),      cmocka_unit_test(units_convert),
-        cmocka_unit_test(stop_reasons_are_sound),
+        cmocka_unit_test(stop_reasons_are_sound), cmocka_unit_test(sets_name_their_parameters),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

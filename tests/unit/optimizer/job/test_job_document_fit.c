@@ -1,6 +1,6 @@
 /* The section fit of the job document: models, methods, parameters, ties, bounds, priors, textures. */
 #include "base/catalogue/method_catalogue.h"
-#include "base/catalogue/model_catalogue.h"
+#include "base/catalogue/model_sets.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/options/option_table.h"
 #include "renderer/scattering/appearance.h"
@@ -8,6 +8,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,11 +38,69 @@ static void test_fit(void **state)
 
 static void resolve(const char *fit, struct job_fit_parameter k[JOB_MAX_PARAM])
 {
-    struct job_document *d = parse(fit);
-    struct appearance m;
+    const struct job_document *d = parse(fit);
+    static struct model_sets m;
     struct error err = {0};
-    assert_true(appearance_find(d->model[0].id, &m));
-    if (job_fit_resolve(m.param, m.n_param, &d->model[0], k, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(model_sets_init(&m, model_catalogue_find(d->model[0].id), d->group, d->n_group, &err), STATUS_OK);
+    if (job_fit_resolve(m.info.param, m.info.n_param, &d->model[0], k, &err) != STATUS_OK) fail_msg("%s", err.text);
+    job_document_free((struct job_document *)(uintptr_t)d);
+}
+
+static void test_names_of_groups(void **state)
+{
+    (void)state;
+    struct job_document *d = parse(FIBERS_OF("\"groups\":[\"warp\",\"we-ft_2\"]"));
+    assert_int_equal(d->n_group, 2);
+    assert_string_equal(d->group[1], "we-ft_2");
+    job_document_free(d);
+    check_error(FIBERS_OF("\"groups\":[\"warp\"]"), "fibers.groups", "2 to 8");
+    check_error(FIBERS_OF("\"groups\":\"warp\""), "fibers.groups", "2 to 8");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",\"warp\"]"), "fibers.groups", "twice");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",\"a.b\"]"), "fibers.groups", "no name");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",3]"), "fibers.groups", "no name");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",\"abcdefghijabcdefghijk\"]"), "fibers.groups", "no name");
+    check_error("{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\",\"groups\":[\"a\",\"b\",\"c\",\"d\",\"e\",\"f\","
+                "\"g\",\"h\"]},"
+                "\"photographs\":[" PHOTO "],\"fit\":{}}",
+                "fit.model", "72");
+}
+
+/* Names with that of a group concern its set, names without it concern all sets. */
+static void test_parameters_of_groups(void **state)
+{
+    (void)state;
+    struct job_fit_parameter k[JOB_MAX_PARAM];
+    resolve(GROUPS_OF("{\"start\":{\"C_R\":[0.1,0.2,0.3],\"warp.C_TT\":0.5,\"weft.C_TT\":[0.6,0.7,0.8]},"
+                      "\"fixed\":{\"beta_R\":5,\"weft.gamma_TT\":19},\"bounds\":{\"warp.beta_TT\":[12,30]},"
+                      "\"priors\":{\"weft.beta_TT\":{\"mean\":21,\"se\":1}}}"),
+            k);
+    for (size_t s = 0; s < 2; s++)
+        for (size_t c = 0; c < 3; c++) {
+            assert_true(k[9 * s + c].start == 0.1 * (double)(c + 1) || fabs(k[9 * s + c].start - 0.3) < 1e-12);
+            assert_true(fabs(k[9 * s + 3 + c].start - (s == 0 ? 0.5 : 0.6 + 0.1 * (double)c)) < 1e-12);
+        }
+    assert_true(k[6].fixed && k[15].fixed && !k[8].fixed && k[17].fixed && k[17].start == 19.0);
+    assert_true(k[7].lower == 12.0 && k[7].upper == 30.0 && k[16].upper == 45.0 && k[16].start == 21.0);
+    resolve(GROUPS_OF("{\"tied\":[[\"beta_TT\"],{\"warp.C_R\":1,\"weft.C_R\":0.5}],\"start\":{\"weft.beta_TT\":17}}"),
+            k);
+    assert_true(k[7].start == 17.0 && k[16].start == 17.0 && k[9].start == 0.5 * k[0].start);
+    const struct job_document *d = parse(GROUPS_OF("{\"tied\":[[\"beta_TT\"]]}"));
+    assert_true(d->model[0].option.leader[16] == 7 && d->model[0].option.leader[17] == 17);
+    job_document_free((struct job_document *)(uintptr_t)d);
+    check_error(GROUPS_OF("{\"fixed\":{\"pile.C_R\":0.1}}"), "fit.fixed.pile.C_R", "or weft.C_R ...");
+    check_error(GROUPS_OF("{\"start\":{\"C_R\":[0.1,0.2,0.3,0.1,0.2,0.3]}}"), "fit.start.C_R", "3 numbers");
+    check_error(GROUPS_OF("{\"start\":{\"C_R\":0.1,\"weft.C_R\":0.2}}"), "fit.start.weft.C_R", "second time");
+    check_error(GROUPS_OF("{\"tied\":[[\"warp.beta_TT\"]]}"), "fit.tied[0]", "at least two");
+    check_error(FIT_OF("{\"fixed\":{\"warp.C_R\":0.1}}"), "fit.fixed.warp.C_R", "C_R");
+}
+
+/* A volume model has one set in any cloth, and keys that name a group then concern the surface models. */
+static void test_groups_and_volume_models(void **state)
+{
+    (void)state;
+    struct job_document *d =
+        parse(GROUPS_OF("{\"models\":[\"microflake.v1\",\"two_lobe.v1\"],\"start\":{\"weft.C_R\":0.2}}"));
+    assert_true(d->model[1].start[9] == 0.2 && isnan(d->model[0].start[9]));
     job_document_free(d);
 }
 
@@ -270,6 +329,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fit),
         cmocka_unit_test(test_fit_options),
+        cmocka_unit_test(test_names_of_groups),
+        cmocka_unit_test(test_parameters_of_groups),
+        cmocka_unit_test(test_groups_and_volume_models),
         cmocka_unit_test(test_start_of_density),
         cmocka_unit_test(test_texture),
         cmocka_unit_test(test_fit_option_errors),

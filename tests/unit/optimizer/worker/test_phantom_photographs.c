@@ -77,22 +77,41 @@ static void test_bad_tables(void **state)
 static void test_parameters(void **state)
 {
     (void)state;
-    const struct scattering_model *m = scattering_find("two_lobe.v1");
+    const struct model_info *m = model_catalogue_find("two_lobe.v1");
     double param[SCATTERING_MAX_PARAM] = {0};
     struct error err;
     assert_non_null(m);
     assert_int_equal(phantom_param_parse(m, "C_TT=0.1,0.2,0.3", param, NULL), STATUS_OK);
-    assert_true(param[scattering_param_index(m, "C_TT.g")] == 0.2);
+    assert_true(param[param_index(m->param, m->n_param, "C_TT.g")] == 0.2);
     assert_int_equal(phantom_param_parse(m, "C_R=0.25", param, NULL), STATUS_OK);
-    assert_true(param[scattering_param_index(m, "C_R.r")] == 0.25 && param[scattering_param_index(m, "C_R.b")] == 0.25);
+    assert_true(param[param_index(m->param, m->n_param, "C_R.r")] == 0.25 &&
+                param[param_index(m->param, m->n_param, "C_R.b")] == 0.25);
     assert_int_equal(phantom_param_parse(m, "C_R.b=0.5", param, NULL), STATUS_OK);
-    assert_true(param[scattering_param_index(m, "C_R.b")] == 0.5);
+    assert_true(param[param_index(m->param, m->n_param, "C_R.b")] == 0.5);
     assert_int_equal(phantom_param_parse(m, "beta_R=6", param, NULL), STATUS_OK);
-    assert_true(fabs(param[scattering_param_index(m, "beta_R")] - 6.0 * RAD_PER_DEG) < 1e-12);
+    assert_true(fabs(param[param_index(m->param, m->n_param, "beta_R")] - 6.0 * RAD_PER_DEG) < 1e-12);
     const char *const bad[] = {"C_R",   "C_R=", "C_R=1,2", "C_R=0.1,0.2,0.3,0.4", "C_R=x", "beta_R=5,5,5", "C_X=1",
                                "C_R=2", "=1",   ""};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(phantom_param_parse(m, bad[i], param, &err), STATUS_INVALID);
+}
+
+static void test_parameters_of_groups(void **state)
+{
+    (void)state;
+    static const char group[2][MODEL_SET_NAME_BYTES] = {"warp", "weft"};
+    struct phantom_photograph_option o;
+    struct error err;
+    phantom_photograph_option_default(&o);
+    assert_int_equal(phantom_photograph_model(&o, "two_lobe.v1", group, 2, NULL), STATUS_OK);
+    assert_int_equal(o.sets.info.n_param, 18);
+    assert_int_equal(phantom_param_parse(&o.sets.info, "C_R=0.25", o.param, NULL), STATUS_OK);
+    assert_int_equal(phantom_param_parse(&o.sets.info, "weft.C_R=0.1,0.2,0.3", o.param, NULL), STATUS_OK);
+    assert_int_equal(phantom_param_parse(&o.sets.info, "warp.C_R.b=0.5", o.param, NULL), STATUS_OK);
+    static const double want[6] = {0.25, 0.25, 0.5, 0.1, 0.2, 0.3};
+    for (size_t k = 0; k < 6; k++) assert_true(o.param[k % 3 + k / 3 * 9] == want[k]);
+    assert_int_equal(phantom_param_parse(&o.sets.info, "pile.C_R=0.1", o.param, &err), STATUS_INVALID);
+    assert_int_equal(phantom_photograph_model(&o, "three_lobe.v1", group, 2, &err), STATUS_INVALID);
 }
 
 /* Sixteen touching fibers along x. */
@@ -134,8 +153,7 @@ static void request_init(void **state, const char *views, struct request *q)
     q->o.fiber_file = q->fibers;
     q->o.table_file = q->csv;
     q->o.folder = q->folder;
-    q->o.model = scattering_find("two_lobe.v1");
-    for (size_t i = 0; i < q->o.model->n_param; i++) q->o.param[i] = q->o.model->param[i].start;
+    assert_int_equal(phantom_photograph_model(&q->o, "two_lobe.v1", NULL, 0, NULL), STATUS_OK);
     q->o.px = 8;
     q->o.n_path = 64 * 20;
     q->o.noise = 0.01;
@@ -224,10 +242,10 @@ static void test_fewest_paths(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_builtin_views),   cmocka_unit_test(test_builtin_views_are_those_of_the_measurements),
-        cmocka_unit_test(test_bad_tables),      cmocka_unit_test(test_parameters),
-        cmocka_unit_test(test_what_is_written), cmocka_unit_test(test_refused_requests),
-        cmocka_unit_test(test_fewest_paths),
+        cmocka_unit_test(test_builtin_views),        cmocka_unit_test(test_builtin_views_are_those_of_the_measurements),
+        cmocka_unit_test(test_bad_tables),           cmocka_unit_test(test_parameters),
+        cmocka_unit_test(test_parameters_of_groups), cmocka_unit_test(test_what_is_written),
+        cmocka_unit_test(test_refused_requests),     cmocka_unit_test(test_fewest_paths),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

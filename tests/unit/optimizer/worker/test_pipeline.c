@@ -114,9 +114,9 @@ static void add_steps(struct worker_series *s, size_t first, size_t n, bool repl
 {
     static struct estimate estimate[2];
     double param[FAKE_N_PARAM] = {0};
-    const struct appearance appearance = {.id = "fake", .n_param = FAKE_N_PARAM, .param = fake_param};
+    const struct model_info info = {.id = "fake", .n_param = FAKE_N_PARAM, .param = fake_param};
     struct fit_parameter parameter[FAKE_N_PARAM] = {{0.0, 1.0, 0.5, false}};
-    const struct worker_series_model model = {&appearance, parameter, 0, 0};
+    const struct worker_series_model model = {&info, parameter, 0, 0};
     for (size_t i = first; i < first + n; i++) {
         struct fit_step step = {.step = i,
                                 .phase = "p",
