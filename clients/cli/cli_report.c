@@ -118,15 +118,41 @@ static void print_flags(const json_t *parameter, FILE *out)
     if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined", out);
 }
 
+/* The name of a parameter without that of its set: "C_R.r" for "warp.C_R.r". */
+static const char *own_name(const json_t *parameter)
+{
+    const char *name = member_text(parameter, "name"), *set = member_text(parameter, "set");
+    size_t n = strlen(set);
+    return n > 0 && strncmp(name, set, n) == 0 && name[n] == '.' ? name + n + 1 : name;
+}
+
 static void print_parameter(const json_t *parameter, FILE *out)
 {
     char name[64], unit[24], value[CLI_SHORT_TEXT];
-    text_clean(member_text(parameter, "name"), name, sizeof name);
+    text_clean(own_name(parameter), name, sizeof name);
     text_clean(member_text(parameter, "unit"), unit, sizeof unit);
     text_with_error(member_number(parameter, "value"), member_number(parameter, "standard_error"), value);
     fprintf(out, "  %-18s %-24s %-5s", name, value, unit);
     print_flags(parameter, out);
     fputc('\n', out);
+}
+
+/* Prints the parameters set by set, each under the name of its group of fibers when there are several. */
+static void print_parameters(const json_t *parameters, FILE *out)
+{
+    const char *before = "";
+    size_t i;
+    const json_t *parameter;
+    if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
+    json_array_foreach(parameters, i, parameter)
+    {
+        const char *set = member_text(parameter, "set");
+        char heading[64];
+        text_clean(set, heading, sizeof heading);
+        if (strcmp(set, before) != 0) fprintf(out, " %s\n", heading);
+        before = set;
+        print_parameter(parameter, out);
+    }
 }
 
 /* Writes "2.41 +- 0.05 %", "2.41 %" for an older result without an error, or "-" if there is no value. */
@@ -187,8 +213,7 @@ void report_result(const json_t *job, FILE *out)
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
     print_models(json_object_get(result, "models"), member_text(result, "chosen_by"), out);
     print_radius(json_object_get(result, "radius"), out);
-    if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
-    json_array_foreach(parameters, i, parameter) print_parameter(parameter, out);
+    print_parameters(parameters, out);
     for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {
         char text[48];
         percent(result, residual[i].key, text, sizeof text);

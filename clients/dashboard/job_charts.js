@@ -89,7 +89,9 @@ export class JobCharts {
       const labels = group.flat.map((f) => (f.channel < 0 ? f.name : "rgb"[f.channel]));
       return { group, box: part.box, chart: new CurveChart(part.node, part.legend, labels, colours, { digits: 4 }) };
     });
-    this.parameterCard.replaceChildren(el("div", { class: "charts" }, this.parameterCharts.map((c) => c.box)));
+    const sets = [...new Set(this.parameterCharts.map((c) => c.group.set))];
+    this.parameterCard.replaceChildren(...sets.flatMap((set) => [set === "" ? "" : el("h3", {}, set),
+      el("div", { class: "charts" }, this.parameterCharts.filter((c) => c.group.set === set).map((c) => c.box))]));
     this.charts = [this.objective, this.rms, ...this.parameterCharts.map((c) => c.chart)];
   }
 

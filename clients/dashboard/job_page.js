@@ -78,9 +78,9 @@ function modelTable(list, choice) {
 }
 
 function parameterTable(list, id) {
-  const rows = list.map((p) => el("tr", {}, el("td", { class: "mono" }, p.name), el("td", { class: "number" }, withError(p.value, p.se)),
+  const rows = list.flatMap((p, i) => [p.set !== "" && p.set !== list[i - 1]?.set ? el("tr", {}, el("th", { colspan: 5, class: "set" }, p.set)) : null, el("tr", {}, el("td", { class: "mono" }, p.name), el("td", { class: "number" }, withError(p.value, p.se)),
     el("td", {}, p.unit === "deg" ? "°" : p.unit), el("td", { class: "number hint" }, isNumber(p.lower) ? `${Number(p.lower.toPrecision(4))} … ${Number(p.upper.toPrecision(4))}` : ""),
-    el("td", {}, p.flags.map((f) => el("span", { class: "tag warn" }, f)))));
+    el("td", {}, p.flags.map((f) => el("span", { class: "tag warn" }, f))))]).filter((row) => row !== null);
   return el("table", { id }, el("thead", {}, el("tr", {}, el("th", {}, "Parameter"), el("th", { class: "number" }, "Value ± standard error"), el("th", {}, ""),
     el("th", { class: "number" }, "Allowed"), el("th", {}, "Remarks"))), el("tbody", {}, rows));
 }

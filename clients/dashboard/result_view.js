@@ -4,14 +4,18 @@ import { isNumber } from "./page_parts.js";
 
 const CHANNEL = { r: 0, g: 1, b: 2 };
 
-// Returns [{symbol, unit, flat: [{i, name, channel}]}] from parameter names such as "C_R.r", "beta_TT".
+// The name of a parameter without that of its set: "C_R.r" for "warp.C_R.r".
+const ownName = (p) => (p.set ? p.name.slice(p.set.length + 1) : p.name);
+
+// Returns [{set, symbol, unit, flat: [{i, name, channel}]}] from parameters with names such as "C_R.r", "beta_TT". set:
+// the group of fibers that they belong to, "" when there is one set.
 export function parameterGroups(parameters) {
   const groups = [];
   parameters.forEach((p, i) => {
-    const [symbol, channel] = p.name.split(".");
-    let group = groups.find((g) => g.symbol === symbol);
-    if (!group) groups.push(group = { symbol, unit: p.unit ?? "", flat: [] });
-    group.flat.push({ i, name: p.name, channel: channel in CHANNEL ? CHANNEL[channel] : -1 });
+    const [symbol, channel] = ownName(p).split("."), set = p.set ?? "";
+    let group = groups.find((g) => g.symbol === symbol && g.set === set);
+    if (!group) groups.push(group = { set, symbol, unit: p.unit ?? "", flat: [] });
+    group.flat.push({ i, name: ownName(p), channel: channel in CHANNEL ? CHANNEL[channel] : -1 });
   });
   return groups;
 }
@@ -38,8 +42,8 @@ export function models(job) {
   }));
 }
 
-// Returns the fitted parameters of a job or of one of its models: [{name, unit, value, se, flags: [text], lower,
-// upper}]
+// Returns the fitted parameters of a job or of one of its models: [{set, name, unit, value, se, flags: [text], lower,
+// upper}], the name without that of the set
 export function fitted(of) {
   return (of.parameters ?? []).map((p) => {
     const flags = [];
@@ -51,7 +55,7 @@ export function fitted(of) {
       if (p.tied_to) flags.push(p.ratio === 1 ? `tied to ${p.tied_to}` : `${Number(p.ratio.toPrecision(3))} × ${p.tied_to}`);
       if (p.prior) flags.push(`prior ${p.prior.mean} ± ${p.prior.se}`);
     }
-    return { name: p.name, unit: p.unit ?? "", value: p.value, se: p.standard_error, flags, lower: p.lower, upper: p.upper };
+    return { set: p.set ?? "", name: ownName(p), unit: p.unit ?? "", value: p.value, se: p.standard_error, flags, lower: p.lower, upper: p.upper };
   });
 }
 

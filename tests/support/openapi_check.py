@@ -35,7 +35,8 @@ def names_a_key(field, schema=None):
     for key, member in schema.get("properties", {}).items():
         if re.match(re.escape(key) + r"($|[.\[])", rest) and names_a_key(rest[len(key):], member):
             return True
-    free = re.match(r"\w+(\.[rgb]\b)?", rest)
+    # a parameter such as C_R or C_R.g, of one group of fibers such as warp.C_R
+    free = re.match(r"([\w-]+\.(?=[A-Za-z]+_[A-Z]))?\w+(\.[rgb]\b)?", rest)
     more = schema.get("additionalProperties")
     return isinstance(more, dict) and free is not None and names_a_key(rest[free.end():], more)
 
