@@ -17,6 +17,7 @@ static const double FIRST_FLATTEN_PX = 12.0, LATTICE_GAIN = 10.0, WORTH = 0.8;
 struct piece {
     struct weave_picture picture; /* owns its pixels */
     double px;                    /* pixels of the photograph in one of the piece */
+    double corner_px[2];          /* of the piece, in the photograph */
     float *grey, *flat, *power, *background;
 };
 
@@ -37,7 +38,7 @@ static status piece_init(struct piece *p, const struct weave_picture *from, size
     height = (height < EDGE_PX ? height : EDGE_PX) / MULTIPLE_PX * MULTIPLE_PX;
     size_t n = width * height, x0 = (from->width - width * shrink) / 2, y0 = (from->height - height * shrink) / 2;
     float *rgb = calloc(3 * n, sizeof *rgb);
-    *p = (struct piece){.picture = {rgb, width, height}, .px = (double)shrink};
+    *p = (struct piece){.picture = {rgb, width, height}, .px = (double)shrink, .corner_px = {(double)x0, (double)y0}};
     p->grey = calloc(n, sizeof *p->grey);
     p->flat = malloc(n * sizeof *p->flat);
     p->power = malloc(n * sizeof *p->power);
@@ -131,6 +132,15 @@ static void fill_guess(const struct piece *p, const struct finding *f, struct we
     g->draft_confidence = g->yarns_confidence * odds_to_confidence(d->score, d->score_other_draft);
 }
 
+/* Where the crossing of warp 0 and weft 0 is in the photograph. A pixel counts at its center. */
+static void fill_middle(const struct piece *p, const struct finding *f, const struct weave_repeat *repeat,
+                        struct weave_guess *g)
+{
+    double at_px[2];
+    weave_repeat_middle(repeat, &f->lattice[f->i_best], at_px);
+    for (int a = 0; a < 2; a++) g->middle_px[a] = p->px * (at_px[a] + f->draft.origin_px[a] + 0.5) + p->corner_px[a];
+}
+
 static status detect_in(struct piece *p, struct weave_guess *guess, struct error *err)
 {
     struct finding f = {.n_lattice = 0};
@@ -144,6 +154,7 @@ static status detect_in(struct piece *p, struct weave_guess *guess, struct error
     s = weave_average_repeat(p->flat, p->picture.width, p->picture.height, &f.lattice[f.i_best], &repeat, err);
     if (s != STATUS_OK) return s;
     fill_guess(p, &f, guess);
+    fill_middle(p, &f, &repeat, guess);
     s = weave_measure_yarns(&p->picture, &f.draft, &repeat, guess, err);
     weave_repeat_release(&repeat);
     if (s != STATUS_OK) return s;

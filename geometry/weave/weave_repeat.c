@@ -202,6 +202,7 @@ static status average_windows(struct windows *w, struct weave_repeat *r, bool *c
     if (s != STATUS_OK) return s;
     r->n_window = w->n[0] * w->n[1];
     r->edge_px = w->edge;
+    r->n_across = w->n[0];
     free(r->phase);
     r->phase = malloc(2 * r->n_window * sizeof *r->phase);
     double complex *value = transform_windows(w, r);
@@ -247,6 +248,16 @@ status weave_average_again(const float *picture, size_t width, size_t height, st
     free(value);
     free(w.taper);
     return s;
+}
+
+void weave_repeat_middle(const struct weave_repeat *repeat, const struct weave_lattice *lattice, double at_px[2])
+{
+    size_t x = repeat->n_across / 2, y = repeat->n_window / repeat->n_across / 2;
+    const double *phase = repeat->phase + 2 * (y * repeat->n_across + x);
+    at_px[0] = (double)(x * (repeat->edge_px / 2));
+    at_px[1] = (double)(y * (repeat->edge_px / 2));
+    for (int i = 0; i < 2; i++)
+        for (int a = 0; a < 2; a++) at_px[a] -= phase[i] / (2.0 * M_PI) * lattice->shift_px[i][a];
 }
 
 void weave_repeat_release(struct weave_repeat *repeat)

@@ -22,8 +22,9 @@ struct weave_coefficient {
 struct weave_repeat {
     struct weave_coefficient coefficient[WEAVE_COEFFICIENT_MAX]; /* one of each pair f, -f; lowest frequency first */
     size_t n_coefficient, n_window;
-    size_t edge_px; /* of a window; windows overlap by half */
-    double *phase;  /* n_window x 2: the turn of each window along the lattice's basis, which aligns it */
+    size_t edge_px;  /* of a window; windows overlap by half */
+    size_t n_across; /* windows in a row */
+    double *phase;   /* n_window x 2: the turn of each window along the lattice's basis, which aligns it */
 };
 
 /* Averages the repeat of an even picture (vision_flatten). Frequencies up to half a cycle per pixel take part. Windows
@@ -35,6 +36,8 @@ status weave_average_repeat(const float *flat, size_t width, size_t height, cons
  * values of the coefficients. STATUS_NO_MEMORY. */
 status weave_average_again(const float *picture, size_t width, size_t height, struct weave_repeat *repeat,
                            struct error *err);
+/* Where the place 0 of the repeat is in the window in the middle of the picture, in its pixels. */
+void weave_repeat_middle(const struct weave_repeat *repeat, const struct weave_lattice *lattice, double at_px[2]);
 void weave_repeat_release(struct weave_repeat *repeat);
 
 /* Value of the averaged repeat at a place in pixels. */

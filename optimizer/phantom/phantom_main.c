@@ -14,6 +14,8 @@ static const char usage[] =
     "                                                    render photographs with known parameters\n"
     "  selvedge-phantom compare --truth FILE --fibers FILE [options]\n"
     "                                                    measure reconstructed fibers against true ones\n"
+    "  selvedge-phantom detect --photograph FILE [options]\n"
+    "                                                    find the weave of a real cloth in photographs\n"
     "\n"
     "  selvedge-phantom --version                        print the version\n"
     "\n"
@@ -26,6 +28,7 @@ static const struct {
     {"cloth", phantom_command_cloth},
     {"photograph", phantom_command_photograph},
     {"compare", phantom_command_compare},
+    {"detect", phantom_command_detect},
 };
 
 int main(int argc, char **argv)
