@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Rounds of pushing fibers apart, and vertices of the result per fiber radius. */
+/* Rounds of pushing fibers apart; pixels along the tile where the cover is measured. */
 enum { RELAX_ROUNDS = 12, VIEW_PIXELS = 400 };
 
 static status make(struct cloth_work *w, struct error *err)
@@ -48,6 +48,13 @@ static void report_fibers(const struct fiber_set *f, struct cloth_report *r)
     r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * r->thickness_m);
 }
 
+static double thickest_m(const struct strand_set *s)
+{
+    double most_m = 0.0;
+    for (size_t i = 0; i < s->n_strand; i++) most_m = fmax(most_m, s->strand[i].radius_m);
+    return most_m;
+}
+
 static status report_fill(const struct cloth_work *w, const struct strand_fit *fit, const struct fiber_set *f,
                           struct cloth_report *r, struct error *err)
 {
@@ -62,15 +69,8 @@ static status report_fill(const struct cloth_work *w, const struct strand_fit *f
     r->strain_p95 = fit->strain_p95;
     report_kinds(w, r);
     report_fibers(f, r);
-    return fiber_top_view(f, fmax(r->tile_m[0], r->tile_m[1]) / VIEW_PIXELS, size, NULL, &r->cover, err);
-}
-
-/* Emission at the nodes alone: they are near enough for the bends that fibers can have. */
-static double node_spacing_m(const struct strand_set *s)
-{
-    double most_m = 0.0;
-    for (size_t i = 0; i < s->n_strand; i++) most_m = fmax(most_m, s->strand[i].radius_m);
-    return most_m;
+    return fiber_top_view(f, fmax(fmax(r->tile_m[0], r->tile_m[1]) / VIEW_PIXELS, 0.4 * thickest_m(&w->set)), size,
+                          NULL, &r->cover, err);
 }
 
 status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
@@ -87,7 +87,8 @@ status cloth_build(const struct cloth_description *d, const double *number, stru
     kind_shapes(&w);
     st = make(&w, err);
     if (st == STATUS_OK) st = strand_relax(&w.set, &relax, pool, progress, &fit, err);
-    if (st == STATUS_OK) st = strand_emit(&w.set, node_spacing_m(&w.set), 0.0, f, err);
+    /* vertices at the nodes alone: they are near enough for the bends that fibers can have */
+    if (st == STATUS_OK) st = strand_emit(&w.set, thickest_m(&w.set), 0.0, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK) st = report_fill(&w, &fit, f, report, err);
     strand_set_release(&w.set);

@@ -1,4 +1,5 @@
 /* The fibers of one yarn: staples on a golden-angle spiral in the section, which turns with the twist; and its hairs. */
+#include "base/angle.h"
 #include "base/rng.h"
 #include "geometry/cloth/cloth_work.h"
 
@@ -25,6 +26,7 @@ struct filling {
     double phase_rad;     /* of the whole section */
     struct wave thick;    /* of the section's size along the yarn */
     double disorder;
+    double nap[2]; /* shift of hairs over their height above the yarn */
     size_t kind;
 };
 
@@ -96,6 +98,17 @@ static void draw_wander(const struct filling *y, struct wander *v, struct rng *r
     v->migration_rad = 2.0 * M_PI * rng_double(rng);
 }
 
+/* Share of fiber i that belongs to the other kind of a melange. Fibers change over one after the other, in an order that
+ * is spread over the section; the last one changes in part, so that the share moves smoothly. */
+static double melange_share(const struct kind_shape *k, size_t i)
+{
+    static const double step = 0.5698402909980532; /* the second step of R2 */
+    double own = step * (double)(i + 1) - floor(step * (double)(i + 1));
+    size_t rank = 0;
+    for (size_t j = 0; j < k->n_fiber; j++) rank += step * (double)(j + 1) - floor(step * (double)(j + 1)) < own;
+    return fmax(0.0, fmin(1.0, k->melange * (double)k->n_fiber - (double)rank));
+}
+
 static status add_staple(struct filling *y, size_t i, double start, struct error *err)
 {
     const struct rng_key key = {.seed = y->w->d->seed, .iteration = STREAM_STAPLE};
@@ -113,6 +126,10 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
                           .axis_class = y->path->axis_class,
                           .group = (uint8_t)y->kind,
                           .cut = y->path->cut};
+    if (k->melange_with >= 0) {
+        like.start_share = melange_share(k, i);
+        like.group_of_start = (uint8_t)k->melange_with;
+    }
     status st = strand_add(&y->w->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t j = 0; j < n; j++) {
@@ -135,8 +152,9 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
     struct rng rng;
     rng_start(&rng, &key, y->path->number, (uint32_t)i);
     double from = rng_double(&rng), angle = 2.0 * M_PI * rng_double(&rng), side = rng_double(&rng) < 0.5 ? -1.0 : 1.0;
-    double length_m = grown * k->hair_length_m * -log(1.0 - 0.95 * rng_double(&rng)), rise = 0.2 + rng_double(&rng);
-    double curl = 2.0 * (rng_double(&rng) - 0.5), bend = 1.0 + rng_double(&rng), (*node)[3];
+    double length_m = grown * k->hair_length_m * -log(1.0 - 0.87 * rng_double(&rng)),
+           rise = 0.1 + 0.7 * rng_double(&rng);
+    double curl = 2.0 * (rng_double(&rng) - 0.5), bend = 0.6 + rng_double(&rng), (*node)[3];
     if (length_m < 2.0 * k->radius_m) return STATUS_OK;
     struct strand like = {
         .radius_m = k->radius_m, .axis_class = y->path->axis_class, .group = (uint8_t)y->kind, .cut = CUT_NONE};
@@ -149,6 +167,7 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
         const struct yarn_section as_is = {.wide = 1.0, .high = 1.0};
         yarn_point(y->path, &as_is, from + along * t, (k->half_m[0] + above_m) * cos(turned),
                    (k->half_m[1] + above_m) * sin(turned), node[j]);
+        for (int a = 0; a < 2; a++) node[j][a] += above_m * y->nap[a];
     }
     return STATUS_OK;
 }
@@ -172,6 +191,10 @@ status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, dou
     y.nominal_radii = nominal_m / w->nominal[kind].radius_m;
     y.phase_rad = 2.0 * M_PI * rng_double(&rng);
     y.disorder = work_number(w, "disorder");
+    double lean = tan(RAD_PER_DEG * work_number(w, "nap_tilt_deg")),
+           towards = RAD_PER_DEG * work_number(w, "nap_direction_deg");
+    y.nap[0] = lean * cos(towards);
+    y.nap[1] = lean * sin(towards);
     wave_draw(&y.thick, 1.0, &rng);
     double start = rng_double(&rng);
     status st = measure_path(&y, err);

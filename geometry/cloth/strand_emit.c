@@ -10,6 +10,7 @@ struct emitter {
     double tile_m[2];
     double z_shift_m;
     const struct strand *strand;
+    uint8_t group;       /* of the present piece */
     struct fiber_set *f; /* NULL: count */
     size_t n_fiber, n_vertex;
     size_t n_here; /* vertices of the present piece */
@@ -36,7 +37,7 @@ static void end_piece(struct emitter *e)
         if (e->f != NULL) {
             e->f->radius_m[e->n_fiber] = (float)e->strand->radius_m;
             e->f->axis_class[e->n_fiber] = e->strand->axis_class;
-            e->f->group[e->n_fiber] = e->strand->group;
+            e->f->group[e->n_fiber] = e->group;
             e->f->first_vertex[e->n_fiber + 1] = e->n_vertex;
         }
         e->n_fiber++;
@@ -112,9 +113,24 @@ static size_t first_cut(struct emitter *e, const struct strand_set *s, const str
     return 0;
 }
 
+/* Continues from a to b; the part up to the share `cut` of the way belongs to the former group. */
+static void advance_past_change(struct emitter *e, const double a[3], const double b[3], double cut)
+{
+    double at[3];
+    for (int x = 0; x < 3; x++) at[x] = a[x] + cut * (b[x] - a[x]);
+    advance(e, a, at);
+    put_vertex(e, at);
+    end_piece(e);
+    e->group = e->strand->group;
+    put_vertex(e, at);
+    advance(e, at, b);
+}
+
 static void emit_strand(struct emitter *e, const struct strand_set *s, const struct strand *t, double spacing_m)
 {
     e->strand = t;
+    bool changes = t->n_period == 0 && t->start_share > 0.0;
+    e->group = changes ? t->group_of_start : t->group;
     size_t from = first_cut(e, s, t), n_interval = t->n_period > 0 ? t->n : t->n - 1;
     size_t n_sub = (size_t)fmax(1.0, ceil(t->radius_m / spacing_m)),
            per_period = t->n_period > 0 ? t->n / t->n_period : t->n;
@@ -129,7 +145,9 @@ static void emit_strand(struct emitter *e, const struct strand_set *s, const str
     for (size_t i = 0; i < n_interval + (faces ? 1 : 0); i++) {
         for (size_t k = 1; k <= n_sub; k++) {
             curve_point(s, t, from + i, (double)k / (double)n_sub, b);
-            bool cut = advance(e, a, b);
+            double step = (double)n_interval * t->start_share * (double)n_sub - (double)(i * n_sub + k - 1);
+            bool here = changes && step >= 0.0 && step < 1.0, cut = !here && advance(e, a, b);
+            if (here) advance_past_change(e, a, b, step);
             if (cut && started && faces && i == n_interval) { /* closed: what advance began is the first piece again */
                 e->n_vertex -= e->n_here;
                 e->n_here = 0;

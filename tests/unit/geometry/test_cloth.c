@@ -17,8 +17,9 @@ static struct cloth_description small_cloth(const char *weave)
     struct cloth_description d;
     struct error err = {0};
     assert_int_equal(cloth_description_init(&d, weave, &err), STATUS_OK);
-    d.kind[0].n_fiber = d.structure == CLOTH_FELT ? 60 : 12;
-    if (d.structure != CLOTH_FELT) d.n_yarn[0] = d.n_yarn[1] = strcmp(weave, "satin") == 0 ? 5 : 4;
+    d.kind[0].n_fiber = d.structure == CLOTH_FELT ? 60 : 8;
+    if (d.structure != CLOTH_FELT)
+        d.n_yarn[0] = d.n_yarn[1] = strcmp(weave, "satin") == 0 ? 5 : strcmp(weave, "plain") == 0 ? 2 : 4;
     assert_int_equal(cloth_description_check(&d, &err), STATUS_OK);
     return d;
 }
@@ -57,7 +58,7 @@ static void test_every_weave(void **state)
         assert_memory_equal(&r, &again, sizeof r);
         assert_int_equal(fiber_seam_measure(&f, &seam, NULL), STATUS_OK);
         /* staples that end within a radius of a face by chance have no partner there */
-        if (d.structure != CLOTH_VELVET) assert_true(seam.n_end[0] > 80 && seam.share[0] > 0.88);
+        if (d.structure != CLOTH_VELVET) assert_true(seam.n_end[0] > 20 && seam.share[0] > 0.8);
         assert_true(r.cover > 0.3 && r.cover <= 1.0 && r.volume_fraction > 0.05 && r.volume_fraction < 0.75);
         assert_true(r.overlap_mean < 0.06 && r.n_fiber[0] >= d.kind[0].n_fiber);
         assert_int_equal(fiber_set_n_group(&f), d.n_kind);
@@ -70,7 +71,7 @@ static void test_every_weave(void **state)
 /* Root mean square distance between the fibers at the description's values and with one number moved. */
 static double moved_m(const struct cloth_description *d, size_t i_number, double by)
 {
-    const struct compare_option o = {.voxel_size_m = 4e-6};
+    const struct compare_option o = {.voxel_size_m = 8e-6};
     struct compare_report compared;
     struct fiber_set f, g;
     struct cloth_report r;
