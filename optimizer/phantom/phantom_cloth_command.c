@@ -1,7 +1,10 @@
 #include "base/durable.h"
 #include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom.h"
+#include "optimizer/job/cloth_json.h"
+#include "optimizer/job/job_document.h"
 #include "optimizer/phantom/phantom_commands.h"
+#include "optimizer/phantom/phantom_described.h"
 #include "renderer/image/image.h"
 
 #include <jansson.h>
@@ -17,7 +20,12 @@ static const char usage[] =
     "numbers), and the pictures\n"
     "DIR/top.png (heights from above) and DIR/slice-x.png, slice-y.png, slice-z.png (through the middle).\n"
     "\n"
-    "cloth\n"
+    "DIR/cloth.json describes the cloth as the section \"cloth\" of a job document does (not for --yarn).\n"
+    "\n"
+    "  --description FILE      the cloth that this section \"cloth\" describes, in place of the next group of "
+    "options;\n"
+    "                          the tile is stretched to whole voxels (docs/described-cloth.md)\n"
+    "cloth with twists that are rounded so that the tile closes\n"
     "  --weave NAME            plain, twill (2/2), twill31, satin, velvet, knit, felt                     [twill]\n"
     "  --voxel-um V            edge of a voxel                                                            [2]\n"
     "  --diameter-voxel D      fiber diameter in voxels; WEFT,WARP,PILE where they differ                 [7]\n"
@@ -55,7 +63,9 @@ static const char usage[] =
     "  --memory-mib N          limit of resident memory; a larger volume is kept in a file in DIR         [2048]\n";
 
 struct cloth {
-    const char *out, *yarn; /* yarn: NULL or a file of parameters */
+    const char *out, *yarn;  /* yarn: NULL or a file of parameters */
+    const char *description; /* NULL or a file */
+    struct job_document *described;
     struct phantom_option phantom;
     struct phantom_scan_option scan;
     struct phantom_file_option file;
@@ -123,6 +133,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "twist", .kind = OPTION_NUMBER, .to = &c->phantom.twist_turns},
         {.name = "migration", .kind = OPTION_NUMBER, .to = &c->phantom.migration},
         {.name = "yarn", .kind = OPTION_TEXT, .to = &c->yarn},
+        {.name = "description", .kind = OPTION_TEXT, .to = &c->description},
         {.name = "yarn-true-size", .kind = OPTION_FLAG, .to = &c->phantom.yarn_true_size},
         {.name = "flyaways", .kind = OPTION_COUNT, .to = &c->phantom.n_flyaway_per_yarn},
         {.name = "pile-um", .kind = OPTION_NUMBER, .to = &in.pile_um},
@@ -154,6 +165,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
     phantom_file_option_default(&c->file);
     st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st == STATUS_OK && c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
+    if (st == STATUS_OK && c->description != NULL) st = phantom_described_read(c->description, &c->described, err);
     if (st != STATUS_OK) return st;
     return take_input(c, &in, err);
 }
@@ -246,7 +258,32 @@ static json_t *describe(const struct cloth *c)
                                       p->wanted_ply_turns[0], p->wanted_ply_turns[1], "fiber_turns", p->fiber_turns[0],
                                       p->fiber_turns[1], "hairs", (int)p->n_hair, "loops", (int)p->n_loop));
     }
+    if (c->described != NULL) {
+        json_decref(cloth);
+        cloth = cloth_section_json(c->described->cloth, NULL);
+        json_object_set_new(cloth, "voxel_size_um", json_real(um * o->voxel_size_m));
+    }
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
+}
+
+/* cloth.json: what a job takes as its section "cloth" for the same cloth, or for the nearest that can be described. */
+static status write_description(const struct cloth *c, struct error *err)
+{
+    char path[4096];
+    struct cloth_description nearest;
+    const struct cloth_description *d = c->described != NULL ? c->described->cloth : &nearest;
+    if (c->described == NULL && c->yarn != NULL) return STATUS_OK;
+    status st = path_in(c->out, "cloth.json", path, err);
+    if (st == STATUS_OK && c->described == NULL)
+        st = phantom_described_as(&c->phantom, &c->report, &c->fibers, &nearest, err);
+    if (st != STATUS_OK) return st;
+    json_t *json = cloth_section_json(d, NULL);
+    char *text = json_dumps(json, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(9));
+    json_decref(json);
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    st = durable_replace(path, text, strlen(text), err);
+    free(text);
+    return st;
 }
 
 static status write_files(struct cloth *c, struct error *err)
@@ -261,6 +298,7 @@ static status write_files(struct cloth *c, struct error *err)
     if (st == STATUS_OK) st = path_in(c->out, "truth.txt", path, err);
     if (st == STATUS_OK) st = fiber_set_write_text(&c->fibers, path, err);
     if (st == STATUS_OK) st = write_pictures(c, err);
+    if (st == STATUS_OK) st = write_description(c, err);
     if (st == STATUS_OK) st = path_in(c->out, "phantom.json", path, err);
     if (st != STATUS_OK) return st;
     json_t *j = describe(c);
@@ -271,6 +309,13 @@ static status write_files(struct cloth *c, struct error *err)
     if (st == STATUS_OK) puts(text);
     free(text);
     return st;
+}
+
+static status make_fibers(struct cloth *c, struct thread_pool *pool, struct error *err)
+{
+    if (c->described == NULL) return phantom_generate(&c->phantom, pool, NULL, &c->fibers, &c->report, err);
+    return phantom_described_make(c->described->cloth, c->phantom.voxel_size_m, c->phantom.margin_m, pool, &c->fibers,
+                                  &c->report, err);
 }
 
 int phantom_command_cloth(int argc, char **argv)
@@ -291,7 +336,7 @@ int phantom_command_cloth(int argc, char **argv)
     }
     status st = thread_pool_new(c.n_thread, &pool, &err);
     if (st == STATUS_OK) st = durable_make_folder(c.out, &err);
-    if (st == STATUS_OK) st = phantom_generate(&c.phantom, pool, NULL, &c.fibers, &c.report, &err);
+    if (st == STATUS_OK) st = make_fibers(&c, pool, &err);
     if (st == STATUS_OK && c.n_slice > 0)
         st = phantom_pad(&c.fibers, &c.report, c.phantom.voxel_size_m, c.n_slice, &err);
     if (st == STATUS_OK) st = scratch_space_new(c.out, c.memory_mib << 20, &space, &err);
@@ -299,6 +344,7 @@ int phantom_command_cloth(int argc, char **argv)
     if (st == STATUS_OK) st = write_files(&c, &err);
     if (st != STATUS_OK) fprintf(stderr, "selvedge-phantom cloth: %s\n", err.text);
     volume_release(&c.volume);
+    job_document_free(c.described);
     scratch_space_free(space);
     fiber_set_release(&c.fibers);
     thread_pool_free(pool);

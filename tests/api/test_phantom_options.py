@@ -42,3 +42,29 @@ def test_weave_and_yarn_in_both_spellings(tmp_path):
     assert cloth(tmp_path / "d", f"--yarn={yarn}", "--weave=plain") == plied
     given = cloth(tmp_path / "e", "--flatness=1.2", "--weave=plain", f"--yarn={yarn}")
     assert given["cloth"]["flatness"] == 1.2 and given["cloth"]["packing"] == 0.5
+
+
+def test_a_described_cloth_and_its_description(tmp_path):
+    """The description that a phantom writes is one that it takes, and it makes the same cloth again."""
+    given = tmp_path / "given.json"
+    given.write_text(json.dumps({"draft": ["10", "01"], "crimp": 0.6, "tile_warps": 2, "tile_wefts": 4, "yarns": [{"fibers": 9, "twist_per_m": 700}]}))
+    made = cloth(tmp_path / "a", "--description", str(given))
+    assert made["cloth"]["crimp"] == 0.6 and made["cloth"]["yarns"][0]["twist_per_m"] == 700 and made["result"]["volume_fraction"] > 0.1
+    again = cloth(tmp_path / "b", f"--description={tmp_path}/a/cloth.json")
+    assert again["result"] == made["result"] and (tmp_path / "a" / "truth.hair").read_bytes() == (tmp_path / "b" / "truth.hair").read_bytes()
+
+
+@pytest.mark.parametrize("weave", ["plain", "knit", "felt"])
+def test_a_phantom_describes_itself(tmp_path, weave):
+    phantom = cloth(tmp_path / "a", "--weave", weave, *(["--felt-tile-um", "160", "--felt-thickness-um", "60"] if weave == "felt" else []))
+    described = cloth(tmp_path / "b", "--description", str(tmp_path / "a" / "cloth.json"))
+    per_area = [r["length_mm"] / (r["tile_mm"][0] * r["tile_mm"][1]) for r in (described["result"], phantom["result"])]
+    assert abs(per_area[0] / per_area[1] - 1) < 0.3
+    assert abs(described["result"]["volume_fraction"] / phantom["result"]["volume_fraction"] - 1) < 0.35
+
+
+def test_a_wrong_description(tmp_path):
+    given = tmp_path / "given.json"
+    given.write_text('{"weave": "plain", "crimp": 3}')
+    p = subprocess.run([program("selvedge-phantom"), "cloth", "--out", str(tmp_path), "--description", str(given)], capture_output=True, timeout=60)
+    assert p.returncode == 2 and b"cloth.crimp" in p.stderr

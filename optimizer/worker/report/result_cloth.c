@@ -1,6 +1,7 @@
 #include "optimizer/worker/report/result_cloth.h"
 
 #include "base/angle.h"
+#include "optimizer/job/cloth_json.h"
 #include "optimizer/worker/report/json_number.h"
 
 static json_t *numbers_json(const struct cloth_description *d, const double *number)
@@ -29,17 +30,6 @@ static json_t *kinds_json(const struct cloth_description *d, const struct cloth_
     return list;
 }
 
-static json_t *draft_json(const struct cloth_description *d)
-{
-    json_t *list = json_array();
-    for (size_t i = d->n_weft; i-- > 0;) {
-        char row[CLOTH_MAX_DRAFT + 1] = "";
-        for (size_t j = 0; j < d->n_warp; j++) row[j] = d->warp_over[i][j] ? '1' : '0';
-        json_array_append_new(list, json_string(row));
-    }
-    return list;
-}
-
 json_t *result_cloth_json(const struct cloth_description *d, const double *number, const struct cloth_report *r)
 {
     json_t *made =
@@ -50,6 +40,7 @@ json_t *result_cloth_json(const struct cloth_description *d, const double *numbe
                   json_number(r->overlap_max), "strain_p95", json_number(r->strain_p95), "yarns", kinds_json(d, r));
     json_t *json = json_pack("{s:s, s:I, s:o, s:o}", "weave", d->weave[0] != '\0' ? d->weave : "draft", "seed",
                              (json_int_t)d->seed, "numbers", numbers_json(d, number), "made", made);
-    if (d->n_weft > 0) json_object_set_new(json, "draft", draft_json(d));
+    if (d->n_weft > 0) json_object_set_new(json, "draft", cloth_draft_json(d));
+    json_object_set_new(json, "description", cloth_section_json(d, number));
     return json;
 }

@@ -6,7 +6,8 @@
 
 #include <jansson.h>
 
-/* {weave, seed, numbers: [{name, value, unit, fitted, lower, upper}], made: {...}}. number: the values, NULL for those of
+/* {weave, seed, numbers: [{name, value, unit, fitted, lower, upper}], made: {...}, description: the section
+ * "cloth" of a job that takes this cloth}. number: the values, NULL for those of
  * d. */
 json_t *result_cloth_json(const struct cloth_description *d, const double *number, const struct cloth_report *r);
 

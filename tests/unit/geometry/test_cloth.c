@@ -18,6 +18,7 @@ static struct cloth_description small_cloth(const char *weave)
     struct error err = {0};
     assert_int_equal(cloth_description_init(&d, weave, &err), STATUS_OK);
     d.kind[0].n_fiber = d.structure == CLOTH_FELT ? 60 : 8;
+    if (d.pile_kind >= 0) d.kind[d.pile_kind].n_fiber = 4;
     if (d.structure != CLOTH_FELT)
         d.n_yarn[0] = d.n_yarn[1] = strcmp(weave, "satin") == 0 ? 5 : strcmp(weave, "plain") == 0 ? 2 : 4;
     assert_int_equal(cloth_description_check(&d, &err), STATUS_OK);
@@ -60,7 +61,7 @@ static void test_every_weave(void **state)
         /* staples that end within a radius of a face by chance have no partner there */
         if (d.structure != CLOTH_VELVET) assert_true(seam.n_end[0] > 20 && seam.share[0] > 0.8);
         assert_true(r.cover > 0.3 && r.cover <= 1.0 && r.volume_fraction > 0.05 && r.volume_fraction < 0.75);
-        assert_true(r.overlap_mean < 0.06 && r.n_fiber[0] >= d.kind[0].n_fiber);
+        assert_true(r.overlap_mean < 0.1 && r.n_fiber[0] >= d.kind[0].n_fiber);
         assert_int_equal(fiber_set_n_group(&f), d.n_kind);
         fiber_set_release(&f);
         fiber_set_release(&g);
