@@ -34,6 +34,8 @@
  *   fit.<fabric>.wall_s, .paths          of one fit by the default method from the default start
  *   fit.<fabric>.heldout_rel_rms         relative RMS error of 24 held-out means at the fitted parameters
  *   fit.<fabric>.truth_rel_rms           the same at the true parameters
+ *   fit.<fabric>.true_rel_rms            relative RMS error of the held-out means against those at the true parameters,
+ *                                        without the photographs' noise
  *   fit.<fabric>.first_order_ratio       held-out error over that of the truth, by derivatives, without noise of paths
  *   fit.<fabric>.published_paths         path budget of the published method
  *   fit.coverage_2sigma                  share of determined parameters within two standard errors
@@ -134,7 +136,10 @@ static void bench_fabric(const struct bench *b, const char *name)
         bench_print(name, "first_order_ratio", first_order_ratio(b, &f, &r), "1", "lower");
         bench_print(name, "wall_s", r.wall_s, "s", "lower");
         bench_print(name, "paths", (double)r.n_path, "path", "lower");
+        double own = fit_phantom_true_error(&f, JOB_SET_HELD_OUT, b->kept_paths, r.param, b->score_paths);
+        fprintf(stderr, "  against means without noise %.4f\n", own);
         bench_print(name, "heldout_rel_rms", s.rel_rms, "1", "lower");
+        bench_print(name, "true_rel_rms", own, "1", "lower");
         bench_print(name, "truth_rel_rms", truth.rel_rms, "1", "lower");
         bench_print(name, "published_paths", published_paths(), "path", "lower");
     }

@@ -75,18 +75,41 @@ static struct fit_score score_of(const struct linear_model *m)
     return score;
 }
 
+static void append_score_paths(struct scorer *s, const struct fit_phantom *f, const double *param, size_t n_path)
+{
+    for (uint32_t q = 0; q < 2; q++)
+        kept_run(f, &(struct kept_call){param, s->configuration, s->part.n, SEED_SCORE, q, true}, 0, n_path,
+                 s->replica[q]);
+    append_here(s, f, param);
+}
+
+double fit_phantom_true_error(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *param,
+                              size_t n_path)
+{
+    struct scorer s;
+    scorer_start(&s, f, set);
+    append_kept(&s, f, f->truth, n_kept);
+    append_score_paths(&s, f, param, n_path);
+    const size_t n_row = s.model.n_row;
+    double *at_truth = malloc(2 * n_row * sizeof *at_truth), square = 0.0;
+    fit_check_memory(at_truth);
+    pool_at(&s, f, f->truth);
+    for (size_t q = 0; q < 2; q++) memcpy(at_truth + q * n_row, s.model.r[q], n_row * sizeof *at_truth);
+    pool_at(&s, f, param);
+    for (size_t row = 0; row < n_row; row++)
+        square += (s.model.r[0][row] - at_truth[row]) * (s.model.r[1][row] - at_truth[n_row + row]);
+    free(at_truth);
+    scorer_release(&s);
+    return sqrt(fmax(0.0, square / (double)n_row));
+}
+
 struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
                                    const double *param, size_t n_path)
 {
     struct scorer s;
     scorer_start(&s, f, set);
     if (at != NULL) append_kept(&s, f, at, n_kept);
-    if (n_path > 0) {
-        for (uint32_t q = 0; q < 2; q++)
-            kept_run(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, true}, 0, n_path,
-                     s.replica[q]);
-        append_here(&s, f, param);
-    }
+    if (n_path > 0) append_score_paths(&s, f, param, n_path);
     pool_at(&s, f, param);
     struct fit_score score = score_of(&s.model);
     scorer_release(&s);
