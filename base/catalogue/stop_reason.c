@@ -5,6 +5,8 @@ static const struct stop_reason_info table[STOP_N_REASON] = {
     [STOP_ARRIVED_WITHIN_PHOTOGRAPHS] =
         {"arrived_within_photographs",
          "Further steps would gain too little, and tracing adds less to the errors than the photographs' own noise."},
+    [STOP_MISFIT] = {"misfit",
+                     "What is left is a difference between model and measurements that more paths do not lower."},
     [STOP_PATH_BUDGET] = {"path_budget", "The path budget was used up."},
     [STOP_ITERATIONS] = {"iterations", "The iterations were used up."},
     [STOP_STEP_TAKEN_BACK] = {"step_taken_back",

@@ -88,12 +88,14 @@ static status judge_step(struct gauss_newton *g, bool *failed, struct error *err
     double best = g->best_f + linear_model_penalty(&g->model, g->best_x) + gauss_newton_pull_penalty(g, g->best_x);
     bool first = g->history.n_step == 1;
     *failed = !first && f + penalty - best > 3.0 * doubt && f + penalty > 1.1 * best && g->limit_scale > least_limit;
+    *failed = *failed || gauss_newton_in_noise_trap(g);
     bool fell_short = !first && best - f - penalty < 0.25 * g->predicted && g->predicted > 2.0 * doubt;
     if (*failed || fell_short)
         g->limit_scale = fmax(least_limit, 0.5 * g->limit_scale);
     else
         g->limit_scale = fmin(1.0, 1.5 * g->limit_scale);
     if (*failed) {
+        g->n_stalled++;
         memcpy(g->x, g->best_x, sizeof g->x);
         status s = linear_model_pool(&g->model, &g->history, g->x, err);
         if (s == STATUS_OK) linear_model_weigh(&g->model, g->n_free);
@@ -102,6 +104,7 @@ static status judge_step(struct gauss_newton *g, bool *failed, struct error *err
     memcpy(g->best_x, g->x, sizeof g->x);
     g->best_f = f;
     g->best_se = se;
+    if (!g->pulls) gauss_newton_judge_progress(g, f + penalty, se);
     return STATUS_OK;
 }
 
@@ -125,6 +128,20 @@ static void release_pull(struct gauss_newton *g, size_t max_iteration)
     bool half = 2 * g->run.n_path_total >= g->run.path_budget || 2 * (g->run.n_step + 1) > max_iteration, silent = true;
     for (size_t row = 0; row < g->model.n_row; row++) silent = silent && !(g->model.weight[row] > 0.0);
     if (g->model.n_effective >= pull_until || half || silent) g->pulls = false;
+}
+
+/* Ends the fit at the point with the lowest objective, because the last step has not been tried. */
+static status end_at_misfit(struct gauss_newton *g, struct fit_result *result, struct error *err)
+{
+    double se;
+    memcpy(g->x, g->lowest_x, sizeof g->x);
+    status s = linear_model_pool(&g->model, &g->history, g->x, err);
+    if (s != STATUS_OK) return s;
+    linear_model_weigh(&g->model, g->n_free);
+    double f = linear_model_objective(&g->model, &se);
+    result->converged = true;
+    gauss_newton_explain_misfit(g, f, se, result);
+    return STATUS_OK;
 }
 
 static status iterate(struct gauss_newton *g, struct fit_result *result, struct error *err)
@@ -157,7 +174,9 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
             gauss_newton_explain_end(g, precise, f, se, result);
             return STATUS_OK;
         }
-        if (result->converged && precise)
+        if (gauss_newton_ends_at_misfit(g)) return end_at_misfit(g, result, err);
+        g->at_misfit = g->at_misfit || (!failed && gauss_newton_pulled_to_misfit(g));
+        if ((result->converged && precise) || g->at_misfit)
             g->pulls = false; /* the fit has arrived with the pull, and goes on without it */
         bool paths_left = plan_paths(g, clear, problem->observation->n);
         if (g->run.n_step < max_iteration && paths_left) continue;

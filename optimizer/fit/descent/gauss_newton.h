@@ -18,13 +18,19 @@ struct gauss_newton {
     double n_path_mean;     /* paths of a configuration and replica in the next iteration */
     double predicted;       /* decrease of f by the last step, as the model predicted it */
     /* Of gauss_newton_step: */
-    double decrease;     /* of f, by the step */
-    double far_decrease; /* of f, by several steps without damping */
-    double noise;        /* mean Monte-Carlo variance of a residual */
-    double damping;      /* added to the diagonal, per squared step limit */
-    double largest_step; /* largest move of a parameter, in step limits */
-    bool pulls;          /* whether there is a pull */
-    size_t n_free;       /* free parameters */
+    double decrease;       /* of f, by the step */
+    double far_decrease;   /* of f, by several steps without damping */
+    double noise;          /* mean Monte-Carlo variance of a residual */
+    double damping;        /* added to the diagonal, per squared step limit */
+    double largest_step;   /* largest move of a parameter, in step limits */
+    double noise_decrease; /* expected decrease of the weighted f by a step that follows noise alone */
+    bool pulls;            /* whether there is a pull */
+    bool at_misfit;        /* the pull ended because the fit had arrived at misfit */
+    /* Of gauss_newton_judge_progress: the accepted point with the lowest objective since the pull ended, f with priors
+     * there, and the iterations since f last fell by more than its noise and a small share. */
+    double lowest_x[N], lowest_f;
+    size_t n_stalled;
+    size_t n_free; /* free parameters */
 };
 
 /* Finds the next step dx[n_param] in fit coordinates, and fills in the fields above. far_decrease distinguishes a fit
@@ -43,6 +49,18 @@ bool gauss_newton_arrived(const struct gauss_newton *g);
 bool gauss_newton_precise(const struct gauss_newton *g, double f, double se);
 /* Whether the noise is small beside the photographs' own errors; false when the job states a budget. */
 bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g);
+
+/* Whether the fit has arrived with the pull, and misfit, not noise, makes the residuals there. */
+bool gauss_newton_pulled_to_misfit(const struct gauss_newton *g);
+/* Whether a step from such a place has led to where the noise is far larger: narrow lobes, whose few rare bright paths
+ * make renderings too dark and the objective too low. */
+bool gauss_newton_in_noise_trap(const struct gauss_newton *g);
+/* Counts an accepted point with the objective f +- se, priors included, in lowest_x, lowest_f and n_stalled. */
+void gauss_newton_judge_progress(struct gauss_newton *g, double f, double se);
+/* Whether what is left is misfit: it rules, and further steps promise too little or have brought nothing. */
+bool gauss_newton_ends_at_misfit(const struct gauss_newton *g);
+/* Fills in stop and reason of such a fit. */
+void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double se, struct fit_result *result);
 
 /* Fills in stop and reason of a fit that ended because it had arrived. precise: gauss_newton_precise; otherwise it is
  * as good as the photographs. */

@@ -128,6 +128,7 @@ status gauss_newton_step(struct gauss_newton *g, double *dx, struct error *err)
     struct scaled_model m;
     double y[N];
     g->noise = linear_model_noise(&g->model);
+    g->noise_decrease = uncertainty_noise_decrease(&g->model, g->run.coordinate, g->run.fixed);
     g->damping = 2.0 * g->noise * fmax(1.0, early_caution * fmin(1.0, cautious_until / g->model.n_effective));
     scale_model(g, true, &m);
     status s = lowest(g, &m, far_reach, 0.0, y, &g->far_decrease, err);

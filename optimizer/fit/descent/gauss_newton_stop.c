@@ -14,6 +14,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 /* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is, and
  * the share of the objective that is. */
@@ -24,6 +25,14 @@ static const double target_rel_rms = 0.0007, target_share = 0.002;
 static const double photograph_share = 0.6, least_effective = 120000.0;
 /* Share of the objective below which the curvature of the model does not determine a predicted decrease. */
 static const double arrived_share = 0.02;
+
+/* Where misfit makes the residuals: the share of the weighted objective that the noise of the parameters may add to it
+ * when the pull ends and at the end (5 % of it are 2.5 % of the relative RMS error), the share that shows a place where
+ * paths are too noisy, the share by which f must fall for an iteration to count as progress, and the iterations without
+ * progress that end the fit. The steps of Gauss-Newton promise too much where residuals are large, because the
+ * curvature of the renderings is not in J'J. */
+static const double end_noise_share = 0.05, trap_noise_share = 0.15, progress_share = 0.02;
+enum { MOST_STALLED = 3 };
 
 double gauss_newton_noise(const struct gauss_newton *g) { return 2.0 * (double)g->n_free * g->noise; }
 
@@ -60,6 +69,53 @@ bool gauss_newton_arrived(const struct gauss_newton *g)
     return g->far_decrease <= fmax(gauss_newton_noise(g), fmax(arrived_share * weighted, good_enough(g, weighted)));
 }
 
+/* Whether misfit, not noise, makes the residuals: it is larger than the photographs' own variance, and the noise of the
+ * parameters adds next to nothing to the objective. */
+static bool misfit_rules(const struct gauss_newton *g)
+{
+    const struct linear_model *m = &g->model;
+    double photograph = 0.0, n = 0.0;
+    for (size_t row = 0; row < m->n_row; row++) {
+        if (!(m->extra[row] > 0.0)) continue;
+        photograph += m->photograph_var[row] / m->extra[row];
+        n += 1.0;
+    }
+    return n > 0.0 && linear_model_misfit(m, g->n_free) > photograph / n &&
+           g->noise_decrease <= end_noise_share * linear_model_weighted_objective(m);
+}
+
+/* Whether further steps promise no more than those that follow noise alone, or next to nothing. */
+static bool arrived_at_misfit(const struct gauss_newton *g)
+{
+    return g->far_decrease <= g->noise_decrease + arrived_share * linear_model_weighted_objective(&g->model);
+}
+
+bool gauss_newton_pulled_to_misfit(const struct gauss_newton *g)
+{
+    return g->pulls && arrived_at_misfit(g) && misfit_rules(g);
+}
+
+bool gauss_newton_in_noise_trap(const struct gauss_newton *g)
+{
+    double noise = uncertainty_noise_decrease(&g->model, g->run.coordinate, g->run.fixed);
+    return g->at_misfit && noise > trap_noise_share * linear_model_weighted_objective(&g->model);
+}
+
+void gauss_newton_judge_progress(struct gauss_newton *g, double f, double se)
+{
+    const bool first = g->lowest_f <= 0.0, lower = first || f < g->lowest_f;
+    const bool progress = first || f < g->lowest_f - fmax(progress_share * g->lowest_f, se);
+    g->n_stalled = progress ? 0 : g->n_stalled + 1;
+    if (!lower) return;
+    g->lowest_f = f;
+    memcpy(g->lowest_x, g->model.x_ref, sizeof g->lowest_x);
+}
+
+bool gauss_newton_ends_at_misfit(const struct gauss_newton *g)
+{
+    return !g->pulls && misfit_rules(g) && (arrived_at_misfit(g) || g->n_stalled >= MOST_STALLED);
+}
+
 /* Share of the weighted objective, in percent, that further steps are predicted to remove, rounded to two digits. The
  * prediction is of first order, so it is cut at 100. */
 static double promised_percent(const struct gauss_newton *g)
@@ -85,6 +141,15 @@ void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double
             "further steps promise to lower the objective by %g %%, and tracing adds %.1f times the photographs' own "
             "variance; exact renderings would narrow the errors by some %.0f %%",
             promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
+}
+
+void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double se, struct fit_result *result)
+{
+    result->stop = STOP_MISFIT;
+    snprintf(result->reason, sizeof result->reason,
+             "what is left is a difference between model and measurements of about %.2g %%, more paths will not lower "
+             "it: the objective is %.3g with a noise of %.1g",
+             100.0 * sqrt(linear_model_misfit(&g->model, g->n_free)), f, se);
 }
 
 void gauss_newton_explain_early_end(const struct gauss_newton *g, const struct gauss_newton_end *end,

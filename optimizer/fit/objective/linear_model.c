@@ -81,8 +81,8 @@ static bool counts(const struct linear_model *m, size_t row, enum row_kind kind)
     return m->extra[row] > 0.0 && (kind == ROWS_OF_BOTH || (m->contrast[row] > 0.0) == (kind == ROWS_OF_CONTRASTS));
 }
 
-/* freedom: degrees of freedom per row. */
-static double misfit_of(const struct linear_model *m, double freedom, enum row_kind kind)
+/* freedom: degrees of freedom per row. Rows have the weights 1 / variance^power. */
+static double misfit_of(const struct linear_model *m, double freedom, enum row_kind kind, int power)
 {
     enum { ROUND = 8 };
     double misfit = 0.0, n = 0.0;
@@ -97,7 +97,7 @@ static double misfit_of(const struct linear_model *m, double freedom, enum row_k
         double sum = 0.0, square = 0.0, photograph = 0.0;
         for (size_t row = 0; row < m->n_row; row++) {
             if (!counts(m, row, kind)) continue;
-            double var = misfit + known_variance(m, row) + 1e-12, weight = 1.0 / (var * var);
+            double var = misfit + known_variance(m, row) + 1e-12, weight = 1.0 / (power == 2 ? var * var : var);
             square += weight * m->r[0][row] * m->r[1][row] / m->extra[row];
             photograph += weight * m->photograph_var[row] / m->extra[row];
             sum += weight;
@@ -116,14 +116,14 @@ static double freedom_of_row(const struct linear_model *m, size_t n_free)
 
 double linear_model_misfit(const struct linear_model *m, size_t n_free)
 {
-    return misfit_of(m, freedom_of_row(m, n_free), ROWS_OF_BOTH);
+    return misfit_of(m, freedom_of_row(m, n_free), ROWS_OF_BOTH, 2);
 }
 
 void linear_model_misfits(const struct linear_model *m, size_t n_free, double misfit[2])
 {
     double freedom = freedom_of_row(m, n_free);
-    misfit[0] = misfit_of(m, freedom, ROWS_OF_MEANS);
-    misfit[1] = misfit_of(m, freedom, ROWS_OF_CONTRASTS);
+    misfit[0] = misfit_of(m, freedom, ROWS_OF_MEANS, 1);
+    misfit[1] = misfit_of(m, freedom, ROWS_OF_CONTRASTS, 1);
 }
 
 void linear_model_weigh(struct linear_model *m, size_t n_free)

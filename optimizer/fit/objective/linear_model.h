@@ -87,8 +87,9 @@ double linear_model_row_noise(const struct linear_model *m, size_t row);
  * variance)^2, found by iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows
  * of weight 0 are left out. */
 double linear_model_misfit(const struct linear_model *m, size_t n_free);
-/* The same for the rows of means ([0]) and of contrasts ([1], 0 without any) apart, because a model that is right in
- * brightness to 1 % may be off by half in texture. */
+/* The same for the errors of the result: with weights 1 / (all of their variance), by which it does not hang on the few
+ * rows that are known best (Paule and Mandel 1982). For the rows of means ([0]) and of contrasts ([1], 0 without any)
+ * apart, because a model that is right in brightness to 1 % may be off by half in texture. */
 void linear_model_misfits(const struct linear_model *m, size_t n_free, double misfit[2]);
 /* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without
  * extra weights, which act as they are. While noise rules, rows that are known well count more (bright channels have

@@ -2,8 +2,9 @@
  *
  * The covariance in fit coordinates is a sandwich, over the parameters that are not fixed:
  *   cov = (H + L)^-1 (B + s2 L) (H + L)^-1,   H = J'J,  B = J' V J + D.
- * J'J, J' V J and D are mirrored products of two independent replicas, so the noise of J does not make H larger; one
- * set of paths alone understates the errors.
+ * J' V J is a mirrored product of two independent replicas, so the noise of J does not make it larger. From J'J of the
+ * mean of both, the noise that their difference shows is subtracted, which is the same in the mean, but in no direction
+ * more than three quarters: where noise and information are alike, their difference is chance, and the errors with it.
  *   V    variance of a residual: that of the photograph, that of the misfit (the part of f per degree of freedom that
  *        no noise explains), and the Monte-Carlo variance of the pooled mean, which is fully correlated between
  *        channels, because they share their paths;
@@ -44,6 +45,11 @@ struct uncertainty {
  * parameter (se_param) and in its fit coordinate (sd), and for parameters that move in the logarithm below a factor of
  * 2. */
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param);
+
+/* Expected decrease of the weighted objective by a step that follows nothing but the noise of tracing,
+ * tr((H + L)^-1 (B of tracing)). The noise of the parameters adds as much to the objective at the end of such a step. The
+ * prior's unit is m->row_var. */
+double uncertainty_noise_decrease(const struct linear_model *m, const struct coordinate *k, const bool *fixed);
 
 /* m: pooled at the result. fixed: n_param flags. */
 void uncertainty_compute(const struct linear_model *m, const struct coordinate *k, const bool *fixed,

@@ -45,6 +45,57 @@ static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double 
     observation_set_release(&o);
 }
 
+static const double unstated_error = 0.04;
+
+static void observe_unstated(const double *file_unit, uint64_t seed, double *truth, struct fake_cloth *f,
+                             struct observation_set *o)
+{
+    fake_cloth_init(f, seed, FAKE_N_FIT);
+    fake_param_set(file_unit, truth);
+    observation_set_init(o);
+    assert_int_equal(fake_observe(f, truth, unstated_error, seed, o), STATUS_OK);
+    for (size_t i = 0; i < o->n; i++) memset(o->item[i].se_rgb, 0, sizeof o->item[i].se_rgb);
+}
+
+/* Fits photographs with an error of unstated_error, of which they state nothing. */
+static void fit_unstated(const double *file_unit, uint64_t seed, uint64_t budget, double noise, double *truth,
+                         struct fake_cloth *f, struct fit_result *r)
+{
+    struct observation_set o;
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct error err = {0};
+    observe_unstated(file_unit, seed, truth, f, &o);
+    f->noise = noise;
+    struct estimator e = fake_estimator(f);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
+    struct fit_problem problem = {.n_param = FAKE_N_PARAM,
+                                  .info = fake_param,
+                                  .parameter = parameter,
+                                  .observation = &o,
+                                  .estimator = &e,
+                                  .path_budget = budget};
+    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    observation_set_release(&o);
+}
+
+/* Relative RMS error of the exact means at param against these photographs. */
+static double unstated_rel_rms(const double *file_unit, uint64_t seed, const double *param)
+{
+    struct observation_set o;
+    struct fake_cloth f;
+    double truth[FAKE_N_PARAM], rgb[3], sum = 0.0;
+    observe_unstated(file_unit, seed, truth, &f, &o);
+    for (size_t i = 0; i < o.n; i++) {
+        fake_radiance(&o.item[i].configuration, param, rgb, NULL);
+        for (size_t c = 0; c < 3; c++)
+            sum += objective_relative_weight(&o.item[i]) * pow(rgb[c] - o.item[i].mean_rgb[c], 2.0);
+    }
+    sum /= 3.0 * (double)o.n;
+    observation_set_release(&o);
+    return sqrt(sum);
+}
+
 /* Without any noise the fit finds the truth, also for parameters at their bounds. */
 static void test_exact(void **state)
 {
@@ -93,6 +144,29 @@ static void test_recovery_and_errors(void **state)
     print_message("the truth lies within two standard errors for %.1f %% of %zu determined parameters\n", 100.0 * share,
                   n_judged);
     assert_true(share > 0.9 && share < 0.99);
+}
+
+/* Differences of 4 % that the photographs do not state are misfit: fits end as soon as noise adds little to them, and
+ * fit the means nearly as well as with all of the budget. */
+static void test_ends_at_misfit(void **state)
+{
+    (void)state;
+    enum { SEEDS = 6, CLOTH = 2 };
+    double ended = 0.0, exact = 0.0, paths = 0.0;
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        struct fake_cloth f;
+        struct fit_result r;
+        double truth[FAKE_N_PARAM];
+        fit_unstated(cloth[CLOTH], seed, 6000000, 1.0, truth, &f, &r);
+        assert_int_equal(r.stop, STOP_MISFIT);
+        assert_true(r.converged && strstr(r.reason, "more paths will not lower it") != NULL);
+        ended += unstated_rel_rms(cloth[CLOTH], seed, r.param) / SEEDS;
+        paths += (double)r.n_path / SEEDS;
+        fit_unstated(cloth[CLOTH], seed, 6000000, 0.0, truth, &f, &r);
+        exact += unstated_rel_rms(cloth[CLOTH], seed, r.param) / SEEDS;
+    }
+    print_message("misfit: %.4f after %.3g paths, %.4f without noise of tracing\n", ended, paths, exact);
+    assert_true(paths < 5.4e6 && ended < 1.2 * exact);
 }
 
 /* Photographs with errors of 2 %: fits without a stated budget end when tracing is about as precise as the
@@ -302,6 +376,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact),
                                        cmocka_unit_test(test_recovery_and_errors),
+                                       cmocka_unit_test(test_ends_at_misfit),
                                        cmocka_unit_test(test_ends_at_the_noise_of_the_photographs),
                                        cmocka_unit_test(test_errors_where_a_width_ends_at_its_bound),
                                        cmocka_unit_test(test_exact_renderings_of_noisy_photographs),
