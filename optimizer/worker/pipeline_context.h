@@ -14,6 +14,7 @@
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
+#include "optimizer/fit/cloth/cloth_search.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/objective/next_photograph.h"
 #include "optimizer/fit/objective/noisy_minimum.h"
@@ -51,6 +52,7 @@ struct pipeline_model {
     struct fit_parameter parameter[FIT_MAX_PARAM];
     const struct job_fit_option *option; /* of the document */
     struct fit_result fit;
+    struct cloth_search_result cloth; /* when numbers of the cloth are fitted; `fit` is its part without the numbers */
     struct validation validation;
     struct derivative_check certificate;  /* of the free parameters at the result; filled in before the report */
     struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */
@@ -64,6 +66,21 @@ struct pipeline_radius {
     struct noisy_minimum curve; /* u = ln of the radius in metres; f: objective of the fit there */
     uint64_t n_path;
     double wall_s;
+};
+
+/* The numbers of the cloth that are fitted together with the scattering parameters (pipeline_cloth.h). Values are in the
+ * units of files. */
+struct pipeline_numbers {
+    size_t n; /* 0: the cloth is taken as it is */
+    struct param_info info[CLOTH_MAX_FITTED];
+    struct fit_parameter range[CLOTH_MAX_FITTED];
+    struct pipeline_number {
+        const char *unit;
+        size_t index;                /* of the number in the description of the cloth */
+        double prior_mean, prior_sd; /* NaN: no prior */
+    } item[CLOTH_MAX_FITTED];
+    size_t i_shown; /* model whose cloth is in `fiber` and `scene`, plus 1; 0: that of the start values */
+    double shown[CLOTH_MAX_NUMBER]; /* all numbers of that cloth; unset while i_shown is 0 */
 };
 
 /* What a plain BRDF makes of the same rows (pipeline_skill.h). */
@@ -90,7 +107,8 @@ struct pipeline_context {
     struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */
     struct observation_set contrast;    /* of all observations, in their order; empty when not asked for */
     size_t n_model;
-    struct pipeline_model *model;  /* in the order of the document */
+    struct pipeline_model *model; /* in the order of the document */
+    struct pipeline_numbers number;
     struct pipeline_radius radius; /* when the job has the radius fitted */
     struct pipeline_skill skill;   /* filled in before the report */
 
@@ -145,6 +163,9 @@ status pipeline_work_path(const struct pipeline_context *c, const char *stage, c
  * it for surface models only. */
 status pipeline_make_scene(struct pipeline_context *c, struct error *err);
 status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err);
+/* The scene of other fibers, with the options of the job; the caller frees it. */
+status pipeline_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, struct scene **scene,
+                            struct error *err);
 /* The same as pipeline_work_path, with a number in the name for all models but the first: "estimates.journal",
  * "estimates-1.journal". */
 status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,

@@ -7,7 +7,7 @@
 /* Share of the range by which a number moves for its derivative. Radiance is noisy and bends slowly with the numbers of
  * a cloth, so a wide difference is the better one: its noise falls with the width, and the central difference of a wide
  * one is off by its square only. */
-static const double difference_share = 0.12;
+static const double difference_share = 0.25;
 
 status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source *source, size_t n_scattering,
                             size_t n_configuration, const struct param_info *info,
@@ -45,13 +45,13 @@ static void widen(size_t n_scattering, size_t n_number, double *matrix)
     }
 }
 
-/* Moves number k to the side of the replica, or to the other one where the bound is too near. Returns the distance in
+/* Moves number k to the side of the iteration, or to the other one where the bound is too near. Returns the distance in
  * the fit coordinate with its sign; 0 where the bounds leave no room. */
-static double move_number(const struct cloth_estimator *e, size_t k, uint32_t replica, double *number)
+static double move_number(const struct cloth_estimator *e, size_t k, uint32_t iteration, double *number)
 {
     const struct coordinate *c = &e->coordinate[k];
     double x = coordinate_from_param(c, number[k]), width = e->difference * (c->upper - c->lower);
-    double side = replica == REPLICA_FIT_B ? -1.0 : 1.0, to = x + side * width;
+    double side = iteration % 2 == 1 ? -1.0 : 1.0, to = x + side * width;
     if (to > c->upper || to < c->lower) to = x - side * width;
     to = fmin(fmax(to, c->lower), c->upper);
     number[k] = coordinate_to_param(c, to);
@@ -80,7 +80,7 @@ static status add_column(const struct cloth_estimator *e, size_t k, const struct
     double number[CLOTH_MAX_FITTED], seconds = 0.0;
     memcpy(number, call->param + e->n_scattering, e->source.n_number * sizeof *number);
     double slope = coordinate_slope(&e->coordinate[k], number[k]);
-    double distance = move_number(e, k, call->replica, number);
+    double distance = move_number(e, k, call->iteration, number);
     if (distance == 0.0) return STATUS_OK;
     struct estimator_call moved = *call;
     moved.want_jacobian = false;

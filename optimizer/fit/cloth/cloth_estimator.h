@@ -3,9 +3,10 @@
  *
  * Paths have no derivative by a number of the cloth, because moving a fiber changes what a path hits. These columns are
  * therefore differences between two cloths: the mean radiance at number k moved by `difference` of its range in the fit
- * coordinate, minus that of the cloth itself, over the distance. Replica A moves up and replica B moves down, so that
- * the mean of the two replicas is a central difference (error of second order) for the price of a one-sided one. Where
- * a move would leave the bounds it goes to the other side. All cloths are traced with the same random numbers, and the
+ * coordinate, minus that of the cloth itself, over the distance. Even iterations move up and odd ones down, and a fit
+ * averages the derivatives of all its iterations: that is a central difference (error of second order) for the price of
+ * a one-sided one. Both replicas of an iteration see the same cloths, so each cloth is built once. Where a move would
+ * leave the bounds it goes to the other side. All cloths are traced with the same random numbers, and the
  * variance of a difference is stated as if the two means were independent, which is an upper limit where they are
  * positively correlated.
  *

@@ -1,19 +1,23 @@
 #include "optimizer/fit/cloth/cloth_search.h"
+#include "base/small_matrix.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Steps of the fit to one cloth of the screening: the first starts far from its parameters, the others at those of the
- * best cloth so far. */
-enum { FIRST_SCREEN_STEPS = 8, SCREEN_STEPS = 4 };
+/* Steps of the fit to one cloth of the screening. */
+enum { SCREEN_STEPS = 6, KIND_BYTES = 40 };
+/* Steps that the budget of the joint fit is for. Each step builds several cloths, so its paths are many from the first
+ * step on. */
+enum { JOINT_STEPS = 14 };
 
-struct screening {
+struct search {
     const struct cloth_search *search;
     struct fit_layout layout;                      /* of the numbers alone, for the spread of the cloths */
-    struct fit_parameter parameter[FIT_MAX_PARAM]; /* with the best parameters so far as start */
+    struct fit_parameter parameter[FIT_MAX_PARAM]; /* of all unknowns, with the start of the next fit */
     struct cloth_search_result *result;
-    size_t i_cloth, n_step; /* present cloth; steps of the fits before it */
+    char kind[KIND_BYTES]; /* of the present fit: "cloth 3 of 8" */
 };
 
 static size_t n_scattering(const struct cloth_search *q) { return q->cloth->n_scattering; }
@@ -32,7 +36,7 @@ static status spread_layout(const struct cloth_search *q, struct fit_layout *l, 
                            &option, err);
 }
 
-static void choose_cloth(struct screening *s, size_t i, double *number)
+static void choose_cloth(struct search *s, size_t i, double *number)
 {
     if (i == 0)
         for (size_t k = 0; k < s->layout.n_unknown; k++) number[k] = s->layout.parameter[k].start;
@@ -42,93 +46,150 @@ static void choose_cloth(struct screening *s, size_t i, double *number)
 
 static status report_step(void *context, const struct fit_step *step, struct error *err)
 {
-    const struct screening *s = context;
+    const struct search *s = context;
     const struct fit_problem *problem = s->search->problem;
     struct fit_step outer = *step;
-    char phase[64];
-    if (s->i_cloth < s->search->n_screen) {
-        snprintf(phase, sizeof phase, "cloth %zu of %zu: %.30s", s->i_cloth + 1, s->search->n_screen, step->phase);
-        outer.phase = phase;
-    }
-    outer.step += s->n_step;
+    char phase[80];
+    snprintf(phase, sizeof phase, "%s: %.30s", s->kind, step->phase);
+    outer.phase = phase;
+    outer.step += s->result->n_step;
     outer.wall_s += s->result->wall_s;
     outer.n_path_total += s->result->n_path;
     return problem->report(problem->report_context, &outer, err);
 }
 
 /* Runs one of the fits and adds what it took. */
-static status run_fit(struct screening *s, struct fit_problem *problem, const struct fit_option *option,
+static status run_fit(struct search *s, struct fit_problem *problem, const struct fit_option *option,
                       struct fit_result *fit, struct error *err)
 {
     problem->report = s->search->problem->report != NULL ? report_step : NULL;
     problem->report_context = s;
     status st = fit_run(s->search->method, problem, option, fit, err);
     if (st != STATUS_OK) return st;
-    s->n_step += fit->n_step;
+    s->result->n_step += fit->n_step;
     s->result->n_path += fit->n_path;
     s->result->wall_s += fit->wall_s;
     return STATUS_OK;
 }
 
+/* Fits the scattering parameters to the cloth of `number`, from `start`. */
+static status fit_on_cloth(struct search *s, const double *number, const double *start, struct fit_problem *problem,
+                           struct fit_result *fit, struct error *err)
+{
+    const struct cloth_search *q = s->search;
+    struct fit_parameter parameter[FIT_MAX_PARAM];
+    struct fit_option option = *q->option;
+    memcpy(parameter, s->parameter, sizeof parameter);
+    for (size_t p = 0; p < n_scattering(q); p++)
+        if (start != NULL && !parameter[p].fixed) parameter[p].start = start[p];
+    for (size_t k = 0; k < n_number(q); k++) {
+        parameter[n_scattering(q) + k].start = number[k];
+        parameter[n_scattering(q) + k].fixed = true;
+    }
+    option.n_start = 1;
+    problem->parameter = parameter;
+    q->cloth->differences = false;
+    status st = run_fit(s, problem, &option, fit, err);
+    q->cloth->differences = true;
+    return st;
+}
+
 /* Fits the scattering parameters to cloth i, and keeps them as the start of what follows when it is the best so far. */
-static status screen_cloth(struct screening *s, size_t i, struct fit_result *fit, struct error *err)
+static status screen_cloth(struct search *s, size_t i, double *best_param, struct fit_result *fit, struct error *err)
 {
     const struct cloth_search *q = s->search;
     struct cloth_screened *to = &s->result->screened[i];
     struct progress_part part;
     const double share = q->screen_share / (double)q->n_screen;
     struct progress progress = progress_begin_part(&part, q->problem->progress, share * (double)i, share);
-    struct fit_parameter parameter[FIT_MAX_PARAM];
-    struct fit_option option = *q->option;
     struct fit_problem problem = *q->problem;
-    memcpy(parameter, s->parameter, sizeof parameter);
+    snprintf(s->kind, sizeof s->kind, "cloth %zu of %zu", i + 1, q->n_screen);
     choose_cloth(s, i, to->number);
-    for (size_t k = 0; k < n_number(q); k++) {
-        parameter[n_scattering(q) + k].start = to->number[k];
-        parameter[n_scattering(q) + k].fixed = true;
-    }
-    option.n_start = 1;
-    problem.parameter = parameter;
     problem.path_budget = q->screen_budget;
-    problem.max_iteration = i == 0 ? FIRST_SCREEN_STEPS : SCREEN_STEPS;
+    problem.max_iteration = SCREEN_STEPS;
     problem.progress = &progress;
-    s->i_cloth = i;
-    status st = run_fit(s, &problem, &option, fit, err);
+    status st = fit_on_cloth(s, to->number, NULL, &problem, fit, err);
     if (st != STATUS_OK) return st;
     to->objective = fit->objective.value + fit->prior_penalty;
     to->objective_se = fit->objective.se;
     to->n_path = fit->n_path;
     if (i > 0 && !(to->objective < s->result->screened[s->result->i_best].objective)) return STATUS_OK;
     s->result->i_best = i;
+    memcpy(best_param, fit->param, n_scattering(q) * sizeof *best_param);
+    return STATUS_OK;
+}
+
+static status run_screening(struct search *s, struct error *err)
+{
+    const struct cloth_search *q = s->search;
+    struct cloth_search_result *r = s->result;
+    double best[FIT_MAX_PARAM];
+    status st = STATUS_OK;
+    if (q->n_screen < 2) return STATUS_OK;
+    for (; st == STATUS_OK && r->n_screen < q->n_screen; r->n_screen++)
+        st = screen_cloth(s, r->n_screen, best, &r->joint, err); /* its memory is free until the joint fit */
+    if (st != STATUS_OK) return st;
     for (size_t p = 0; p < n_scattering(q); p++)
-        if (!parameter[p].fixed) s->parameter[p].start = fit->param[p];
+        if (!s->parameter[p].fixed) s->parameter[p].start = best[p];
+    for (size_t k = 0; k < n_number(q); k++) s->parameter[n_scattering(q) + k].start = r->screened[r->i_best].number[k];
     return STATUS_OK;
 }
 
 /* The fit of all unknowns, from the best cloth. */
-static status run_joint(struct screening *s, struct error *err)
+static status run_joint(struct search *s, struct error *err)
 {
     const struct cloth_search *q = s->search;
     const double done = q->n_screen > 1 ? q->screen_share : 0.0;
     struct progress_part part;
-    struct progress progress = progress_begin_part(&part, q->problem->progress, done, 1.0 - done);
+    struct progress progress = progress_begin_part(&part, q->problem->progress, done, 1.0 - done - q->final_share);
     struct fit_problem problem = *q->problem;
-    if (q->n_screen > 1)
-        for (size_t k = 0; k < n_number(q); k++)
-            s->parameter[n_scattering(q) + k].start = s->result->screened[s->result->i_best].number[k];
-    s->i_cloth = q->n_screen;
+    snprintf(s->kind, sizeof s->kind, "numbers of the cloth");
+    problem.first_path = problem.path_budget / (JOINT_STEPS * 2 * problem.observation->n);
     problem.parameter = s->parameter;
     problem.progress = &progress;
     return run_fit(s, &problem, q->option, &s->result->joint, err);
 }
 
+static status run_final(struct search *s, const double *number, const double *start, double from,
+                        struct fit_result *fit, struct error *err)
+{
+    const struct cloth_search *q = s->search;
+    struct progress_part part;
+    struct progress progress =
+        progress_begin_part(&part, q->problem->progress, 1.0 - q->final_share * (1.0 - from), 0.5 * q->final_share);
+    struct fit_problem problem = *q->problem;
+    snprintf(s->kind, sizeof s->kind, "chosen cloth");
+    problem.path_budget = q->final_budget;
+    problem.progress = &progress;
+    return fit_on_cloth(s, number, start, &problem, fit, err);
+}
+
+/* Fits the cloth of the joint fit, and that of the screening where the joint fit ended worse. */
+static status choose_final(struct search *s, struct fit_result *other, struct error *err)
+{
+    const size_t n = n_scattering(s->search);
+    struct cloth_search_result *r = s->result;
+    memcpy(r->number, r->joint.param + n, n_number(s->search) * sizeof *r->number);
+    status st = run_final(s, r->number, r->joint.param, 0.0, &r->final, err);
+    if (st != STATUS_OK || r->n_screen == 0) return st;
+    const struct cloth_screened *best = &r->screened[r->i_best];
+    double f = r->final.objective.value + r->final.prior_penalty;
+    if (f - best->objective < 2.0 * hypot(r->final.objective.se, best->objective_se)) return STATUS_OK;
+    st = run_final(s, best->number, NULL, 0.5, other, err);
+    if (st != STATUS_OK || other->objective.value + other->prior_penalty >= f) return st;
+    r->took_screened = true;
+    r->final = *other;
+    memcpy(r->number, best->number, sizeof r->number);
+    return STATUS_OK;
+}
+
 status cloth_search_run(const struct cloth_search *q, struct cloth_search_result *r, struct error *err)
 {
-    struct screening *s = calloc(1, sizeof *s);
-    struct fit_result *fit = malloc(sizeof *fit);
+    struct search *s = calloc(1, sizeof *s);
+    struct fit_result *other = malloc(sizeof *other);
     memset(r, 0, sizeof *r);
     status st =
-        s != NULL && fit != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
+        s != NULL && other != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
     if (st == STATUS_OK && q->n_screen > CLOTH_MAX_SCREEN)
         st = error_set(err, STATUS_INVALID, "cannot screen %zu cloths: at most %d are allowed", q->n_screen,
                        CLOTH_MAX_SCREEN);
@@ -137,18 +198,16 @@ status cloth_search_run(const struct cloth_search *q, struct cloth_search_result
     s->result = r;
     memcpy(s->parameter, q->problem->parameter, q->problem->n_param * sizeof *s->parameter);
     st = spread_layout(q, &s->layout, err);
-    q->cloth->differences = false;
-    for (; st == STATUS_OK && q->n_screen > 1 && r->n_screen < q->n_screen; r->n_screen++)
-        st = screen_cloth(s, r->n_screen, fit, err);
-    q->cloth->differences = true;
+    if (st == STATUS_OK) st = run_screening(s, err);
     if (st == STATUS_OK) st = run_joint(s, err);
+    if (st == STATUS_OK) st = choose_final(s, other, err);
 out:
-    free(fit);
+    free(other);
     free(s);
     return st;
 }
 
-/* ---- the scattering parameters of a joint fit ---- */
+/* ---- the result for the scattering parameters ---- */
 
 /* Leaves out of u the n_out entries from `first` on: of vectors and of rows and columns of matrices. */
 static void leave_out(const struct uncertainty *u, size_t first, size_t n_out, struct uncertainty *out)
@@ -169,14 +228,65 @@ static void leave_out(const struct uncertainty *u, size_t first, size_t n_out, s
     }
 }
 
-void cloth_search_marginal(const struct fit_result *joint, const struct fit_option *option, size_t n_scattering_param,
-                           size_t n_numbers, struct fit_result *out)
+/* Adds C_px C_xx^-1 C_xp to the covariance of out, which lacks the n_number entries from `first` on that the joint
+ * covariance C has. Standard errors grow in the same proportion. */
+static void add_numbers(const struct uncertainty *joint, size_t first, size_t n_number, struct uncertainty *out)
 {
+    size_t index[CLOTH_MAX_FITTED], n_free = 0, n = joint->n_param, m = out->n_param;
+    double c_xx[CLOTH_MAX_FITTED * CLOTH_MAX_FITTED], inverse[CLOTH_MAX_FITTED * CLOTH_MAX_FITTED];
+    for (size_t k = first; k < first + n_number; k++)
+        if (joint->cov[k * n + k] > 0.0) index[n_free++] = k;
+    for (size_t a = 0; a < n_free; a++)
+        for (size_t b = 0; b < n_free; b++) c_xx[a * n_free + b] = joint->cov[index[a] * n + index[b]];
+    if (n_free == 0 || !small_invert(c_xx, n_free, inverse)) return;
+    double before[FIT_MAX_PARAM];
+    for (size_t p = 0; p < m; p++) before[p] = out->cov[p * m + p];
+    for (size_t p = 0; p < m; p++) {
+        for (size_t q = 0; q < m; q++) {
+            size_t jp = p < first ? p : p + n_number, jq = q < first ? q : q + n_number;
+            for (size_t a = 0; a < n_free && before[p] > 0.0 && before[q] > 0.0; a++)
+                for (size_t b = 0; b < n_free; b++)
+                    out->cov[p * m + q] +=
+                        joint->cov[jp * n + index[a]] * inverse[a * n_free + b] * joint->cov[jq * n + index[b]];
+        }
+    }
+    for (size_t p = 0; p < m; p++)
+        if (before[p] > 0.0) out->se_param[p] *= sqrt(out->cov[p * m + p] / before[p]);
+    for (size_t p = 0; p < m; p++)
+        for (size_t q = 0; q < m; q++)
+            if (p != q && before[p] > 0.0 && before[q] > 0.0)
+                out->correlation[p * m + q] =
+                    fmin(fmax(out->cov[p * m + q] / sqrt(out->cov[p * m + p] * out->cov[q * m + q]), -1.0), 1.0);
+}
+
+/* Errors are not larger than that of a uniform distribution over the range, and decide what is determined. */
+static void limit_errors(const struct cloth_search *q, struct fit_result *out)
+{
+    struct uncertainty *u = &out->uncertainty;
+    for (size_t p = 0; p < u->n_param; p++) {
+        const struct fit_parameter *k = &q->problem->parameter[p];
+        struct coordinate c;
+        if (!(u->cov[p * u->n_param + p] > 0.0)) continue;
+        coordinate_init(&c, &q->problem->info[p], k->lower, k->upper);
+        u->se_param[p] = fmin(u->se_param[p], (k->upper - k->lower) / sqrt(12.0));
+        u->determined[p] = uncertainty_determined(&c, sqrt(u->cov[p * u->n_param + p]), u->se_param[p]);
+    }
+}
+
+void cloth_search_marginal(const struct cloth_search *q, const struct cloth_search_result *r, struct fit_result *out)
+{
+    const size_t n = n_scattering(q), m = n_number(q);
     size_t n_leader = 0;
-    for (size_t p = 0; p < n_scattering_param; p++) n_leader += option->leader[p] == p;
-    *out = *joint;
-    leave_out(&joint->uncertainty, n_scattering_param, n_numbers, &out->uncertainty);
-    leave_out(&joint->unknown_uncertainty, n_leader, n_numbers, &out->unknown_uncertainty);
-    memmove(out->unknown + n_leader, out->unknown + n_leader + n_numbers,
-            (FIT_MAX_PARAM - n_leader - n_numbers) * sizeof *out->unknown);
+    for (size_t p = 0; p < n; p++) n_leader += q->option->leader[p] == p;
+    *out = r->final;
+    leave_out(&r->final.uncertainty, n, m, &out->uncertainty);
+    add_numbers(&r->joint.uncertainty, n, m, &out->uncertainty);
+    limit_errors(q, out);
+    leave_out(&r->final.unknown_uncertainty, n_leader, m, &out->unknown_uncertainty);
+    add_numbers(&r->joint.unknown_uncertainty, n_leader, m, &out->unknown_uncertainty);
+    memmove(out->unknown + n_leader, out->unknown + n_leader + m,
+            (FIT_MAX_PARAM - n_leader - m) * sizeof *out->unknown);
+    out->n_step = r->n_step;
+    out->n_path = r->n_path;
+    out->wall_s = r->wall_s;
 }

@@ -1,15 +1,19 @@
 /* A fit of a cloth's numbers together with the scattering parameters.
  *
  * 1. Screening: the scattering parameters alone are fitted, with few paths, to a few cloths that are spread evenly over
- *    the bounds of the numbers (fit_run_start). All of these fits use the same random numbers, and each begins at the
- *    parameters of the best one so far. The first cloth is that of the start values.
+ *    the bounds of the numbers (fit_run_start). All of these fits use the same random numbers and begin at the job's
+ *    start. The first cloth is that of the start values.
  * 2. Joint fit: the method of descent runs on all unknowns together (cloth_estimator.h) from the best cloth of the
  *    screening. It is aware of noise as it is without numbers: estimates are pooled, steps that are worse beyond doubt
  *    are taken back, paths grow when the noise decides, and it ends when the possible decrease is below the noise or
  *    below what matters (gauss_newton.v1).
  *
- * The covariance of the joint fit is over all unknowns, so the errors of the scattering parameters contain the
- * uncertainty of the cloth. Both steps are deterministic functions of the estimates: with a journal below
+ * 3. Final fit: the scattering parameters alone on the cloth of the joint fit. Where its objective is higher than that of
+ *    the best cloth of the screening beyond doubt, that cloth is fitted as well and the lower one is taken.
+ *
+ * The covariance of the scattering parameters is that of the final fit plus what the numbers add to it by the joint
+ * fit: cov(p) = cov(p | x) + C_px C_xx^-1 C_xp with C the joint covariance (law of total covariance). Their errors thus
+ * contain the uncertainty of the cloth. All steps are deterministic functions of the estimates: with a journal below
  * (estimate_journal.h) a search resumes bit by bit.
  */
 #ifndef SELVEDGE_OPTIMIZER_CLOTH_SEARCH_H
@@ -22,12 +26,15 @@ enum { CLOTH_MAX_SCREEN = 32 };
 
 struct cloth_search {
     const struct descent_method *method;
-    const struct fit_problem *problem; /* of all unknowns; its estimator is cloth_estimator(cloth) or a journal of it */
-    const struct fit_option *option;   /* of all unknowns; numbers are not tied */
+    /* of all unknowns; its estimator is cloth_estimator(cloth) or a journal of it, its budget that of the joint fit
+     * without the differences */
+    const struct fit_problem *problem;
+    const struct fit_option *option; /* of all unknowns; numbers are not tied */
     struct cloth_estimator *cloth;
-    size_t n_screen;        /* cloths of the screening; 0 or 1: the joint fit begins at the start values */
-    uint64_t screen_budget; /* paths of each of them */
-    double screen_share;    /* of the screening in the progress, below 1 */
+    size_t n_screen;                  /* cloths of the screening; 0 or 1: the joint fit begins at the start values */
+    uint64_t screen_budget;           /* paths of each of them */
+    uint64_t final_budget;            /* paths of the final fit */
+    double screen_share, final_share; /* of the progress, together below 1 */
 };
 
 /* One cloth of the screening, internal units. */
@@ -40,17 +47,19 @@ struct cloth_screened {
 struct cloth_search_result {
     size_t n_screen, i_best; /* 0 cloths: no screening was made */
     struct cloth_screened screened[CLOTH_MAX_SCREEN];
-    struct fit_result joint; /* of all unknowns: scattering parameters, then numbers; paths and time of the joint fit */
-    uint64_t n_path;         /* of screening and joint fit, without those of the differences */
+    bool took_screened;              /* the joint fit ended worse than the best cloth of the screening */
+    double number[CLOTH_MAX_FITTED]; /* of the final fit */
+    struct fit_result joint;         /* of all unknowns: scattering parameters, then numbers */
+    struct fit_result final;         /* the same unknowns with fixed numbers */
+    size_t n_step;                   /* of all fits; the next two likewise */
+    uint64_t n_path;                 /* without those of the differences */
     double wall_s;
 };
 
 /* Errors are those of fit_run; STATUS_INVALID for more than CLOTH_MAX_SCREEN cloths. */
 status cloth_search_run(const struct cloth_search *q, struct cloth_search_result *r, struct error *err);
 
-/* Takes the scattering parameters out of the result of a joint fit: values, and the marginal covariance, which contains
- * the uncertainty of the numbers. n_scattering_param: their count. */
-void cloth_search_marginal(const struct fit_result *joint, const struct fit_option *option, size_t n_scattering_param,
-                           size_t n_numbers, struct fit_result *out);
+/* The result for the scattering parameters alone: the final fit with the covariance stated above. */
+void cloth_search_marginal(const struct cloth_search *q, const struct cloth_search_result *r, struct fit_result *out);
 
 #endif

@@ -55,8 +55,9 @@ struct fit_problem {
     /* the fitted ones, each of which is one configuration of the estimator; contrasts come after all radiances */
     const struct observation_set *observation;
     const struct estimator *estimator;
-    uint64_t path_budget;                                                            /* 0: the method's default */
-    size_t max_iteration;                                                            /* 0: the method's default */
+    uint64_t path_budget; /* 0: the method's default */
+    size_t max_iteration; /* 0: the method's default */
+    size_t first_path;    /* of a configuration and replica in the first estimate; 0: the method's default */
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
     const struct progress *progress;    /* reports the fraction of the budget that is used */

@@ -238,6 +238,7 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     /* small budgets begin with fewer paths, so that they allow several iterations */
     double first = (double)g.run.path_budget / (40.0 * 2.0 * (double)problem->observation->n);
     g.n_path_mean = fmax(MIN_PATH, fmin(FIRST_PATH, first));
+    if (problem->first_path > 0) g.n_path_mean = fmax(MIN_PATH, (double)problem->first_path);
     s = iterate(&g, result, err);
     if (s == STATUS_OK) s = finish(&g, result, err);
 out:

@@ -76,7 +76,8 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
     json_object_set_new(json, "mean_radius_um", json_number(radius * um));
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
-    if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, NULL, &c->cloth));
+    const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */
+    if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, number, &c->cloth));
     if (!c->doc->has_volume) return json;
     const struct reconstruct_option *o = &c->option;
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));

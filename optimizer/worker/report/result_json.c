@@ -3,6 +3,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_geometry.h"
+#include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/stages/pipeline_choice.h"
 
@@ -145,6 +146,7 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
     json_object_set_new(json, "misfit_rel_rms", json_number(sqrt(m->fit.uncertainty.misfit_var)));
     json_object_set_new(json, "validation_worst_rel_se", json_number(m->validation.worst_rel_se));
     result_fit_options(c, m, json);
+    result_numbers_put(json, c, m);
     json_object_set_new(json, "n_path_fit", json_integer((json_int_t)m->fit.n_path));
     json_object_set_new(json, "n_step", json_count(m->fit.n_step));
     json_object_set_new(json, "fit_wall_s", json_number(m->fit.wall_s));

@@ -2,6 +2,7 @@
 #include "base/angle.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
+#include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/stages/pipeline_choice.h"
 
@@ -145,6 +146,7 @@ static void print_summary(struct pipeline_context *c, FILE *out)
                 "inside\n",
                 c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
     fprintf(out, "         quality.html shows how good the geometry is\n\n");
+    result_numbers_print(c, m, out);
     if (c->doc->fit_radius)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m, 1e6 * c->radius.se_m,
                 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",

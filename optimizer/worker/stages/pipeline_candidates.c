@@ -1,6 +1,7 @@
 /* The next photograph: every candidate configuration of the job is rendered at the result, with derivatives, and ranked
  * by what it would add (next_photograph.h). */
 #include "optimizer/worker/stages/pipeline_advice.h"
+#include "optimizer/worker/stages/pipeline_cloth.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
 
@@ -46,6 +47,8 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
                                             option.photograph_gain_sd};
     struct progress quiet = {.cancel = c->progress.cancel};
     status s = fit_layout_init(&layout, m->sets.info.param, m->parameter, m->sets.info.n_param, &option, err);
+    if (s != STATUS_OK) return s;
+    s = pipeline_cloth_use(c, i_model, err);
     if (s != STATUS_OK) return s;
     s = pipeline_trace_open(&trace, c, "report", "candidates.journal", i_model, o, err);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {

@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "optimizer/fit/descent/trace_estimator.h"
 #include "optimizer/worker/stages/pipeline_advice.h"
+#include "optimizer/worker/stages/pipeline_cloth.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -58,7 +59,10 @@ status pipeline_certify(struct pipeline_context *c, struct error *err)
                    : error_set(err, STATUS_NO_MEMORY, "cannot check derivatives: out of memory");
     for (size_t i = 0; i < c->fitted.n && s == STATUS_OK; i++)
         weight[i] = sqrt(objective_relative_weight(&c->fitted.item[i]));
-    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = certify(c, &c->model[i], configuration, weight, err);
+    for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) {
+        s = pipeline_cloth_use(c, i, err);
+        if (s == STATUS_OK) s = certify(c, &c->model[i], configuration, weight, err);
+    }
     free(weight);
     free(configuration);
     return s;

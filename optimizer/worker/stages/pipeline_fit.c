@@ -1,6 +1,7 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/worker/stages/pipeline_cloth.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
 #include "optimizer/worker/stages/pipeline_radius.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
@@ -11,18 +12,21 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { FIT_SECTIONS = 2 * JOB_MAX_MODEL + 1 };
+_Static_assert((int)FIT_SECTIONS <= (int)WORK_FILE_MAX_SECTION, "a checkpoint has room for the fits of all models");
+
 struct fit_listener {
     struct pipeline_context *pipeline;
     size_t i_model, step_base; /* steps of the models before this one */
     struct worker_series *series;
     struct estimate_journal *journal;
+    const struct pipeline_joint *joint; /* the unknowns of the model's fit */
 };
 
 static status on_step(void *context, const struct fit_step *step, struct error *err)
 {
     struct fit_listener *l = context;
     struct pipeline_context *c = l->pipeline;
-    const struct pipeline_model *m = &c->model[l->i_model];
     bool replayed = estimate_journal_replaying(l->journal);
     worker_status_objective(c->status, l->step_base + step->step, step->objective.value, step->objective.se);
     if (replayed)
@@ -31,30 +35,55 @@ static status on_step(void *context, const struct fit_step *step, struct error *
         log_info(c->log, "step %zu (%s): objective %.5g +- %.2g, relative RMS error %.3f, %.0f thousand paths in all",
                  step->step, step->phase, step->objective.value, step->objective.se, step->objective.rel_rms,
                  (double)step->n_path_total / 1e3);
-    const struct worker_series_model model = {&m->sets.info, m->parameter, l->i_model, l->step_base};
+    const struct worker_series_model model = {&l->joint->info, l->joint->parameter, l->i_model, l->step_base};
     return worker_series_add(l->series, step, &model, replayed, err);
 }
 
-static status run_method(struct pipeline_context *c, const struct estimator *estimator, struct fit_listener *listener,
-                         const struct progress *progress, struct error *err)
+static struct fit_problem problem_of(struct fit_listener *l, const struct progress *progress)
 {
-    const struct descent_method *method = descent_find(c->doc->method);
-    struct pipeline_model *m = &c->model[listener->i_model];
-    if (method == NULL)
-        return error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
-    struct fit_problem problem = {.n_param = m->sets.info.n_param,
-                                  .info = m->sets.info.param,
-                                  .parameter = m->parameter,
-                                  .observation = &c->row,
-                                  .estimator = estimator,
-                                  .path_budget = c->doc->path_budget,
-                                  .max_iteration = c->doc->max_iteration,
-                                  .report = on_step,
-                                  .report_context = listener,
-                                  .progress = progress};
-    struct fit_option option;
-    pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
-    return fit_run(method, &problem, &option, &m->fit, err);
+    struct pipeline_context *c = l->pipeline;
+    return (struct fit_problem){.n_param = l->joint->info.n_param,
+                                .info = l->joint->info.param,
+                                .parameter = l->joint->parameter,
+                                .observation = &c->row,
+                                .path_budget = c->doc->path_budget,
+                                .max_iteration = c->doc->max_iteration,
+                                .report = on_step,
+                                .report_context = l,
+                                .progress = progress};
+}
+
+/* Fits the scattering parameters to the cloth as it is. */
+static status fit_parameters(struct fit_listener *l, const struct progress *progress, struct error *err)
+{
+    struct pipeline_context *c = l->pipeline;
+    struct pipeline_trace trace;
+    struct fit_problem problem = problem_of(l, progress);
+    status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", l->i_model, &c->row, err);
+    if (s == STATUS_OK) {
+        struct estimator estimator = estimate_journal_estimator(trace.journal);
+        l->journal = trace.journal;
+        problem.estimator = &estimator;
+        s = fit_run(descent_find(c->doc->method), &problem, &l->joint->option, &c->model[l->i_model].fit, err);
+    }
+    if (s == STATUS_OK && estimate_journal_n_replayed(trace.journal) > 0)
+        log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
+    pipeline_trace_close(&trace);
+    return s;
+}
+
+/* Fits the numbers of the cloth as well. */
+static status fit_cloth(struct fit_listener *l, const struct progress *progress, struct error *err)
+{
+    struct pipeline_context *c = l->pipeline;
+    struct pipeline_cloth_trace *trace = NULL;
+    struct fit_problem problem = problem_of(l, progress);
+    status s = pipeline_cloth_open(c, l->i_model, l->joint, &trace, &l->journal, err);
+    if (s == STATUS_OK) s = pipeline_cloth_fit(trace, l->joint, &problem, err);
+    if (s == STATUS_OK && estimate_journal_n_replayed(l->journal) > 0)
+        log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(l->journal));
+    pipeline_cloth_close(trace);
+    return s;
 }
 
 /* Warns of starts that ended at other parameters with the same objective, because the photographs do not distinguish
@@ -101,6 +130,20 @@ static bool list_names(const struct pipeline_model *m, const bool *flag, size_t 
     return used > 0;
 }
 
+/* Names the numbers of the cloth that the measurements do not determine. */
+static void warn_numbers(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    const struct uncertainty *u = &m->cloth.joint.uncertainty;
+    char names[300];
+    size_t used = 0;
+    for (size_t k = 0; k < c->number.n && used < sizeof names; k++)
+        if (!u->determined[u->n_param - c->number.n + k])
+            used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used > 0 ? ", " : "",
+                                     c->number.info[k].name);
+    if (used > 0)
+        worker_status_warn(c->status, "these measurements do not tell, in the fit of %s: %s", m->appearance.id, names);
+}
+
 static void warn_parameters(struct pipeline_context *c, const struct pipeline_model *m)
 {
     bool at_bound[FIT_MAX_PARAM], unknown[FIT_MAX_PARAM];
@@ -129,65 +172,71 @@ static void conclude_fit(struct pipeline_context *c, const struct pipeline_model
     warn_of_starts(c, m);
     warn_density(c, m);
     warn_parameters(c, m);
+    warn_numbers(c, m);
+}
+
+static void announce_model(struct pipeline_context *c, size_t i_model)
+{
+    char message[160];
+    if (c->n_model < 2) return;
+    snprintf(message, sizeof message, "fitting %s (model %zu of %zu)", c->model[i_model].appearance.id, i_model + 1,
+             c->n_model);
+    worker_status_message(c->status, message);
+    log_info(c->log, "%s", message);
 }
 
 static status fit_model(struct fit_listener *listener, struct error *err)
 {
     struct pipeline_context *c = listener->pipeline;
     struct pipeline_model *m = &c->model[listener->i_model];
-    struct pipeline_trace trace;
     struct progress_part rest, part;
     double before = c->doc->fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
     struct progress whole = progress_begin_part(&rest, &c->progress, before, 1.0 - before);
     struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_model);
-    struct estimator estimator;
-    char message[160];
-    snprintf(message, sizeof message, "fitting %s (model %zu of %zu)", m->appearance.id, listener->i_model + 1,
-             c->n_model);
-    if (c->n_model > 1) {
-        worker_status_message(c->status, message);
-        log_info(c->log, "%s", message);
+    struct pipeline_joint *joint = malloc(sizeof *joint);
+    if (joint == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start a fit: out of memory");
+    announce_model(c, listener->i_model);
+    listener->joint = joint;
+    status s = pipeline_joint_init(c, listener->i_model, joint, err);
+    if (s == STATUS_OK && descent_find(c->doc->method) == NULL)
+        s = error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
+    if (s == STATUS_OK)
+        s = c->number.n > 0 ? fit_cloth(listener, &progress, err) : fit_parameters(listener, &progress, err);
+    if (s == STATUS_OK) {
+        conclude_fit(c, m);
+        listener->step_base += m->fit.n_step;
     }
-    status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", listener->i_model, &c->row, err);
-    if (s != STATUS_OK) goto out;
-    listener->journal = trace.journal;
-    estimator = estimate_journal_estimator(trace.journal);
-    s = run_method(c, &estimator, listener, &progress, err);
-    if (s != STATUS_OK) goto out;
-    if (estimate_journal_n_replayed(trace.journal) > 0)
-        log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
-    conclude_fit(c, m);
-    listener->step_base += m->fit.n_step;
-out:
-    pipeline_trace_close(&trace);
+    free(joint);
     return s;
 }
 
-static size_t result_sections(struct pipeline_context *c, struct work_section section[JOB_MAX_MODEL + 1])
+static size_t result_sections(struct pipeline_context *c, struct work_section section[FIT_SECTIONS])
 {
-    for (size_t i = 0; i < c->n_model; i++)
-        section[i] = (struct work_section){&c->model[i].fit, sizeof c->model[i].fit};
-    section[c->n_model] = (struct work_section){&c->radius, sizeof c->radius};
-    return c->n_model + 1;
+    for (size_t i = 0; i < c->n_model; i++) {
+        section[2 * i] = (struct work_section){&c->model[i].fit, sizeof c->model[i].fit};
+        section[2 * i + 1] = (struct work_section){&c->model[i].cloth, sizeof c->model[i].cloth};
+    }
+    section[2 * c->n_model] = (struct work_section){&c->radius, sizeof c->radius};
+    return 2 * c->n_model + 1;
 }
 
 static status store_fits(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[JOB_MAX_MODEL + 1];
+    struct work_section section[FIT_SECTIONS];
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.8", section, n, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.9", section, n, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[JOB_MAX_MODEL + 1];
+    struct work_section section[FIT_SECTIONS];
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    if (s == STATUS_OK) s = work_file_read(path, "fit.8", section, n, err);
+    if (s == STATUS_OK) s = work_file_read(path, "fit.9", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) conclude_fit(c, &c->model[i]);
     return s;

@@ -5,6 +5,8 @@
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/pipeline_advice.h"
+#include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/pipeline_cloth.h"
 #include "optimizer/worker/stages/pipeline_skill.h"
 
 status stage_report(struct pipeline_context *c, struct error *err)
@@ -12,6 +14,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     status s = pipeline_certify(c, err);
     if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);
+    if (s == STATUS_OK) s = pipeline_cloth_use(c, pipeline_best_model(c), err);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);

@@ -61,11 +61,17 @@ static void release_scenes(struct pipeline_context *c)
     c->has_volume_scene = false;
 }
 
-status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err)
+status pipeline_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, struct scene **scene,
+                            struct error *err)
 {
     const struct scene_option option = {.black_sheet = c->doc->black_sheet};
+    return scene_new(f, &option, scene, err);
+}
+
+status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err)
+{
     release_scenes(c);
-    return scene_new(&c->fiber, &option, &c->scene, err);
+    return pipeline_fiber_scene(c, &c->fiber, &c->scene, err);
 }
 
 status pipeline_make_scene(struct pipeline_context *c, struct error *err)

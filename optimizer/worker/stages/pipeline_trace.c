@@ -29,26 +29,36 @@ static status may_write(void *context, struct error *err)
     return worker_folder_check(c->folder, err);
 }
 
-status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
-                           size_t i_model, const struct observation_set *o, struct error *err)
+void pipeline_trace_request(struct trace_estimator *t, const struct pipeline_context *c, size_t i_model,
+                            const struct configuration *configuration, size_t n_configuration)
 {
     const struct pipeline_model *m = &c->model[i_model];
-    char path[WORKER_PATH_BYTES];
-    *t = (struct pipeline_trace){.configuration = trace_configurations(o)};
-    if (t->configuration == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
-    t->live = (struct trace_estimator){
+    *t = (struct trace_estimator){
         .request = {.input = {.scene = pipeline_scene(c), .model = &m->appearance, .n_set = m->sets.n_set},
-                    .configuration = t->configuration,
-                    .n_configuration = o->n,
+                    .configuration = configuration,
+                    .n_configuration = n_configuration,
                     .seed = c->doc->seed,
                     .share_camera_paths = c->doc->share_camera_paths},
         .pool = c->pool};
-    t->live_estimator = trace_estimator(&t->live);
+}
+
+status pipeline_trace_journal(struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
+                              const struct estimator *live, struct estimate_journal **journal, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
     status s = pipeline_model_path(c, stage, name, i_model, path, err);
-    return s == STATUS_OK ? estimate_journal_open(path, fingerprint(c, i_model), &t->live_estimator, may_write, c,
-                                                  &t->journal, err)
-                          : s;
+    return s == STATUS_OK ? estimate_journal_open(path, fingerprint(c, i_model), live, may_write, c, journal, err) : s;
+}
+
+status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c, const char *stage, const char *name,
+                           size_t i_model, const struct observation_set *o, struct error *err)
+{
+    *t = (struct pipeline_trace){.configuration = trace_configurations(o)};
+    if (t->configuration == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot start the path tracer: out of memory");
+    pipeline_trace_request(&t->live, c, i_model, t->configuration, o->n);
+    t->live_estimator = trace_estimator(&t->live);
+    return pipeline_trace_journal(c, stage, name, i_model, &t->live_estimator, &t->journal, err);
 }
 
 void pipeline_trace_close(struct pipeline_trace *t)

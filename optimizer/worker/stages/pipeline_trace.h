@@ -20,6 +20,13 @@ status pipeline_trace_open(struct pipeline_trace *t, struct pipeline_context *c,
                            size_t i_model, const struct observation_set *o, struct error *err);
 void pipeline_trace_close(struct pipeline_trace *t);
 
+/* The parts of it, for tracers of other cloths: the request for the present scene, and a journal before an estimator
+ * that depends on the job's fibers and observations. */
+void pipeline_trace_request(struct trace_estimator *t, const struct pipeline_context *c, size_t i_model,
+                            const struct configuration *configuration, size_t n_configuration);
+status pipeline_trace_journal(struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
+                              const struct estimator *live, struct estimate_journal **journal, struct error *err);
+
 /* The progress of model i_model as a part of `whole`: all models take equal shares. */
 struct progress pipeline_model_progress(struct progress_part *part, const struct progress *whole,
                                         const struct pipeline_context *c, size_t i_model);

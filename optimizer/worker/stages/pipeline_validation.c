@@ -1,6 +1,7 @@
 /* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
  * rows apart. */
 #include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/pipeline_cloth.h"
 #include "optimizer/worker/stages/pipeline_contrast.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
 #include "optimizer/worker/work_file.h"
@@ -149,7 +150,9 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     struct progress of_means = progress_begin_part(&means, &progress, 0.0, share);
     struct progress of_contrasts = progress_begin_part(&contrasts, &progress, share, 1.0 - share);
     struct estimator estimator;
-    status s = pipeline_trace_open(&trace, c, "validation", "estimates.journal", i_model, &c->observation, err);
+    status s = pipeline_cloth_use(c, i_model, err);
+    if (s != STATUS_OK) return s;
+    s = pipeline_trace_open(&trace, c, "validation", "estimates.journal", i_model, &c->observation, err);
     if (s != STATUS_OK) goto out;
     estimator = estimate_journal_estimator(trace.journal);
     s = estimate_validation(c, m, &estimator, &of_means, n_path, err);

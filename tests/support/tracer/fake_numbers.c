@@ -131,7 +131,9 @@ void fake_numbers_init(struct fake_numbers *x, const double number[FAKE_N_NUMBER
                                       .cloth = &x->numbers,
                                       .n_screen = 6,
                                       .screen_budget = 200000,
-                                      .screen_share = 0.3};
+                                      .final_budget = 1000000,
+                                      .screen_share = 0.3,
+                                      .final_share = 0.2};
 }
 
 void fake_numbers_release(struct fake_numbers *x)

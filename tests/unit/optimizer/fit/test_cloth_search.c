@@ -24,7 +24,7 @@ static double number_se(const struct cloth_search_result *r, size_t k)
 
 /* ---- derivatives ---- */
 
-/* The mean of both replicas is a central difference, and falls short of the derivative by the square of the distance.
+/* The mean of two iterations is a central difference, and falls short of the derivative by the square of the distance.
  * A number near its bound moves to the inside. */
 static void test_columns(void **state)
 {
@@ -39,7 +39,7 @@ static void test_columns(void **state)
     for (int fine = 0; fine < 2; fine++) {
         x.numbers.difference = fine ? 0.05 : 0.1;
         for (uint32_t q = 0; q < 2; q++) {
-            struct estimator_call call = {x.truth, n_path, 0, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B, true, false};
+            struct estimator_call call = {x.truth, n_path, q, REPLICA_FIT_A, true, false};
             assert_int_equal(x.estimator.run(x.estimator.context, &call, &quiet, e[q], &wall_s, NULL), STATUS_OK);
         }
         for (size_t i = 0; i < FAKE_N_FIT; i++) {
@@ -189,28 +189,38 @@ static void test_prior_of_an_undetermined_number(void **state)
 
 /* ---- the result without the numbers ---- */
 
+/* The variance of a parameter is that of the final fit plus what the numbers add, which makes about the joint one. */
 static void test_marginal(void **state)
 {
     (void)state;
     struct fake_numbers x;
     struct cloth_search_result *r = malloc(sizeof *r);
     struct fit_result m;
-    fake_numbers_init(&x, mid_cloth, 9, 1.0, 0.01, 0.0);
+    fake_numbers_init(&x, mid_cloth, 9, 0.0, 0.01, 0.0);
     x.option.global_gain_sd = 0.05;
     x.option.leader[5] = 4;
     x.option.ratio[5] = 0.5;
     fake_numbers_run(&x, r);
-    cloth_search_marginal(&r->joint, &x.option, FAKE_N_PARAM, FAKE_N_NUMBER, &m);
+    cloth_search_marginal(&x.search, r, &m);
     assert_int_equal(m.uncertainty.n_param, FAKE_N_PARAM);
     assert_int_equal(m.unknown_uncertainty.n_param, FAKE_N_PARAM); /* eight leaders and the gain */
     assert_int_equal(r->joint.unknown_uncertainty.n_param, FAKE_N_UNKNOWN);
-    assert_true(m.unknown[8] == r->joint.unknown[FAKE_N_UNKNOWN - 1] && m.unknown[8] == m.nuisance.value[0]);
-    assert_true(m.unknown_uncertainty.se_param[8] == m.nuisance.se[0]);
+    assert_true(m.unknown[8] == r->final.unknown[FAKE_N_UNKNOWN - 1] && m.unknown[8] == m.nuisance.value[0]);
+    assert_true(m.n_step == r->n_step && m.n_step > r->joint.n_step + r->final.n_step);
     for (size_t p = 0; p < FAKE_N_PARAM; p++) {
-        assert_true(m.uncertainty.se_param[p] == r->joint.uncertainty.se_param[p]);
-        for (size_t q = 0; q < FAKE_N_PARAM; q++)
-            assert_true(m.uncertainty.cov[p * FAKE_N_PARAM + q] == r->joint.uncertainty.cov[p * FAKE_N_UNKNOWN + q]);
+        double joint = r->joint.uncertainty.se_param[p], fixed = r->final.uncertainty.se_param[p],
+               se = m.uncertainty.se_param[p];
+        assert_true(m.param[p] == r->final.param[p] && r->final.uncertainty.at_bound[p] == m.uncertainty.at_bound[p]);
+        assert_true(se >= fixed);
+        if (m.uncertainty.determined[p]) assert_true(se > 0.7 * joint && se < 1.4 * joint);
+        for (size_t q = 0; q < p; q++) {
+            double cov = m.uncertainty.cov[p * FAKE_N_PARAM + q];
+            assert_true(fabs(cov - m.uncertainty.cov[q * FAKE_N_PARAM + p]) <= 1e-9 * fabs(cov));
+        }
     }
+    print_message("error of C_TT.r: %.4f on the known cloth, %.4f with the numbers', %.4f in the joint fit\n",
+                  r->final.uncertainty.se_param[3], m.uncertainty.se_param[3], r->joint.uncertainty.se_param[3]);
+    assert_true(m.uncertainty.se_param[3] > 1.1 * r->final.uncertainty.se_param[3]);
     fake_numbers_release(&x);
     free(r);
 }

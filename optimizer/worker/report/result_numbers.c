@@ -1,0 +1,71 @@
+#include "optimizer/worker/report/result_numbers.h"
+#include "optimizer/worker/report/json_number.h"
+
+#include <math.h>
+
+static const char *at_bound(const struct fit_result *r, const struct fit_parameter *range, size_t p)
+{
+    if (!r->uncertainty.at_bound[p]) return NULL;
+    return r->param[p] - range->lower < range->upper - r->param[p] ? "lower" : "upper";
+}
+
+/* Correlations of unknown p with the scattering parameters (the first n unknowns), or with the numbers. */
+static json_t *correlation_json(const struct fit_result *r, size_t p, size_t first, size_t n)
+{
+    return json_number_list(r->uncertainty.correlation + p * r->uncertainty.n_param + first, n, 1.0);
+}
+
+static json_t *number_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t k)
+{
+    const struct pipeline_number *item = &c->number.item[k];
+    const struct fit_parameter *range = &c->number.range[k];
+    const struct fit_result *r = &m->cloth.joint;
+    const size_t n = r->uncertainty.n_param - c->number.n, p = n + k;
+    json_t *json =
+        json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:s?, s:b}", "name", c->number.info[k].name, "unit", item->unit,
+                  "value", json_number(r->param[p]), "standard_error", json_number(r->uncertainty.se_param[p]), "lower",
+                  range->lower, "upper", range->upper, "start", range->start, "at_bound", at_bound(r, range, p),
+                  "determined", (int)r->uncertainty.determined[p]);
+    json_object_set_new(
+        json, "prior",
+        isnan(item->prior_sd) ? json_null() : json_pack("{s:f, s:f}", "mean", item->prior_mean, "sd", item->prior_sd));
+    json_object_set_new(json, "correlation_parameters", correlation_json(r, p, 0, n));
+    json_object_set_new(json, "correlation_numbers", correlation_json(r, p, n, c->number.n));
+    return json;
+}
+
+static json_t *screening_json(const struct pipeline_context *c, const struct cloth_search_result *r)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < r->n_screen; i++) {
+        const struct cloth_screened *s = &r->screened[i];
+        json_array_append_new(list,
+                              json_pack("{s:o, s:o, s:o, s:b}", "values", json_number_list(s->number, c->number.n, 1.0),
+                                        "objective", json_number(s->objective), "objective_se",
+                                        json_number(s->objective_se), "best", (int)(i == r->i_best)));
+    }
+    return list;
+}
+
+void result_numbers_put(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    if (c->number.n == 0) return;
+    json_t *list = json_array();
+    for (size_t k = 0; k < c->number.n; k++) json_array_append_new(list, number_json(c, m, k));
+    json_object_set_new(json, "cloth_numbers", list);
+    json_object_set_new(json, "cloth_screening", screening_json(c, &m->cloth));
+}
+
+void result_numbers_print(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
+{
+    const struct fit_result *r = &m->cloth.joint;
+    for (size_t k = 0; k < c->number.n; k++) {
+        const size_t p = r->uncertainty.n_param - c->number.n + k;
+        const char *bound = at_bound(r, &c->number.range[k], p);
+        fprintf(out, "%s %-28s %10.4g +- %-8.2g %s%s%s%s\n", k == 0 ? "cloth   " : "        ", c->number.info[k].name,
+                r->param[p], r->uncertainty.se_param[p], c->number.item[k].unit,
+                r->uncertainty.determined[p] ? "" : " these measurements do not tell it",
+                bound != NULL ? " at its bound: " : "", bound != NULL ? bound : "");
+    }
+    if (c->number.n > 0) fprintf(out, "         the errors of the parameters contain those of these numbers\n\n");
+}

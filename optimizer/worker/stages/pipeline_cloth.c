@@ -1,0 +1,265 @@
+#include "optimizer/worker/stages/pipeline_cloth.h"
+#include "base/clock.h"
+#include "base/option_id.h"
+#include "geometry/cloth/cloth.h"
+#include "optimizer/job/option_key.h"
+#include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/pipeline_trace.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Where the job states no path budget, that of the method is multiplied by this. */
+enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6 };
+/* Shares of the paths: at most, and of the final fit. */
+static const double screen_share = 0.3, final_share = 0.15;
+
+/* ---- the numbers ---- */
+
+static void add_number(struct pipeline_numbers *to, const struct cloth_number *from, size_t index)
+{
+    size_t k = to->n++;
+    to->info[k] = (struct param_info){.name = from->name,
+                                      .symbol = from->name,
+                                      .kind = PARAM_SHAPE,
+                                      .channel = -1,
+                                      .lower = from->info->lower,
+                                      .upper = from->info->upper,
+                                      .start = from->value,
+                                      .coordinate = from->info->coordinate,
+                                      .meaning = from->info->meaning};
+    to->range[k] = (struct fit_parameter){from->lower, from->upper, from->value, false};
+    to->item[k] = (struct pipeline_number){from->info->unit, index, from->prior_mean, from->prior_sd};
+}
+
+static status check_company(const struct pipeline_context *c, struct error *err)
+{
+    for (size_t i = 0; i < c->n_model; i++)
+        if (c->model[i].appearance.kind != MODEL_SURFACE)
+            return error_set_field(err, STATUS_INVALID, OPTION_MODEL,
+                                   "numbers of the cloth are fitted with models of fibers only: '%s' sees a volume",
+                                   c->model[i].appearance.id);
+    if (c->doc->fit_radius)
+        return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
+                               "'%s' is not for a described cloth with fitted numbers: fit its fiber_radius_um",
+                               job_option_key(OPTION_FIT_RADIUS));
+    return STATUS_OK;
+}
+
+status pipeline_cloth_inputs(struct pipeline_context *c, struct error *err)
+{
+    const struct cloth_description *d = c->doc->cloth;
+    memset(&c->number, 0, sizeof c->number);
+    for (size_t i = 0; d != NULL && i < d->n_number; i++) {
+        if (!d->number[i].fitted) continue;
+        if (c->number.n == CLOTH_MAX_FITTED)
+            return error_set_field(err, STATUS_INVALID, "cloth", "at most %d numbers of a cloth can be fitted",
+                                   CLOTH_MAX_FITTED);
+        add_number(&c->number, &d->number[i], i);
+    }
+    return c->number.n > 0 ? check_company(c, err) : STATUS_OK;
+}
+
+/* ---- the unknowns ---- */
+
+status pipeline_joint_init(const struct pipeline_context *c, size_t i_model, struct pipeline_joint *j,
+                           struct error *err)
+{
+    const struct pipeline_model *m = &c->model[i_model];
+    const struct pipeline_numbers *number = &c->number;
+    size_t n = m->sets.info.n_param;
+    memset(j, 0, sizeof *j);
+    if (n + number->n > FIT_MAX_PARAM)
+        return error_set(err, STATUS_TOO_LARGE,
+                         "cannot fit %zu parameters and %zu numbers of the cloth: at most %d unknowns", n, number->n,
+                         FIT_MAX_PARAM);
+    j->n_scattering = n;
+    j->info = m->sets.info;
+    j->info.n_param = n + number->n;
+    j->info.param = j->param;
+    memcpy(j->param, m->sets.info.param, n * sizeof *j->param);
+    memcpy(j->parameter, m->parameter, n * sizeof *j->parameter);
+    memcpy(j->param + n, number->info, number->n * sizeof *j->param);
+    memcpy(j->parameter + n, number->range, number->n * sizeof *j->parameter);
+    pipeline_fit_option(m->option, m->sets.info.param, n, &j->option);
+    for (size_t k = 0; k < number->n; k++) {
+        j->option.prior_mean[n + k] = number->item[k].prior_mean;
+        j->option.prior_se[n + k] = number->item[k].prior_sd;
+    }
+    return STATUS_OK;
+}
+
+/* ---- one cloth after the other ---- */
+
+struct pipeline_cloth_trace {
+    struct pipeline_context *c;
+    size_t i_model;
+    struct configuration *configuration;
+    struct cloth_estimator cloth;
+    struct estimator live;
+    struct estimate_journal *journal;
+    size_t n_built, i_next; /* the cloths of one iteration; the next of them to be replaced */
+    struct built {
+        double number[CLOTH_MAX_FITTED];
+        struct scene *scene;
+    } built[CLOTH_MAX_FITTED + 1];
+};
+
+/* Makes the fibers at given values of the fitted numbers. Where these contradict each other (a crimp that yarns cannot
+ * follow), the nearest of a few cloths on the line to the start values takes their place, so that a search that meets
+ * such a cloth goes on. */
+static status make_fibers(struct pipeline_context *c, const double *number, double value[CLOTH_MAX_NUMBER],
+                          struct fiber_set *f, struct cloth_report *report, struct error *err)
+{
+    const struct cloth_description *d = c->doc->cloth;
+    const struct progress progress = {.cancel = c->progress.cancel};
+    status s = STATUS_OK;
+    for (int k = 0; k <= SHORTENINGS; k++) {
+        double share = 1.0 - (double)k / SHORTENINGS;
+        for (size_t i = 0; i < d->n_number; i++) value[i] = d->number[i].value;
+        for (size_t i = 0; i < c->number.n; i++) {
+            double start = c->number.range[i].start;
+            value[c->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
+        }
+        s = cloth_build(d, value, c->pool, &progress, f, report, err);
+        if (s != STATUS_INVALID) return s;
+    }
+    return s;
+}
+
+/* Finds or builds the scene of a cloth. Both replicas of an iteration ask for the same cloths. */
+static status scene_of(struct pipeline_cloth_trace *t, const double *number, const struct scene **scene,
+                       struct error *err)
+{
+    struct fiber_set fiber;
+    const size_t n_bytes = t->c->number.n * sizeof *number;
+    for (size_t i = 0; i < t->n_built; i++)
+        if (t->built[i].scene != NULL && memcmp(number, t->built[i].number, n_bytes) == 0) {
+            *scene = t->built[i].scene;
+            return STATUS_OK;
+        }
+    struct built *to = &t->built[t->i_next];
+    t->i_next = (t->i_next + 1) % t->n_built;
+    scene_free(to->scene);
+    to->scene = NULL;
+    fiber_set_init(&fiber);
+    struct cloth_report report;
+    double value[CLOTH_MAX_NUMBER];
+    status s = make_fibers(t->c, number, value, &fiber, &report, err);
+    if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, &fiber, &to->scene, err);
+    fiber_set_release(&fiber);
+    memcpy(to->number, number, n_bytes);
+    *scene = to->scene;
+    return s;
+}
+
+static status estimate(void *context, const double *number, const struct estimator_call *call,
+                       const struct progress *progress, struct estimate *out, double *wall_s, struct error *err)
+{
+    struct pipeline_cloth_trace *t = context;
+    struct pipeline_context *c = t->c;
+    double start_s = clock_monotonic_s();
+    struct trace_estimator live;
+    const struct scene *scene = NULL;
+    status s = scene_of(t, number, &scene, err);
+    if (s != STATUS_OK) return s;
+    pipeline_trace_request(&live, c, t->i_model, t->configuration, t->cloth.n_configuration);
+    live.request.input.scene = (struct appearance_scene){.fibers = scene};
+    struct estimator e = trace_estimator(&live);
+    s = e.run(e.context, call, progress, out, wall_s, err);
+    *wall_s = clock_monotonic_s() - start_s;
+    return s;
+}
+
+status pipeline_cloth_open(struct pipeline_context *c, size_t i_model, const struct pipeline_joint *j,
+                           struct pipeline_cloth_trace **trace, struct estimate_journal **journal, struct error *err)
+{
+    struct pipeline_cloth_trace *t = calloc(1, sizeof *t);
+    *trace = t;
+    if (t == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
+    t->c = c;
+    t->i_model = i_model;
+    t->configuration = trace_configurations(&c->row);
+    if (t->configuration == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
+    const struct cloth_source source = {t, c->number.n, estimate};
+    status s = cloth_estimator_init(&t->cloth, &source, j->n_scattering, c->row.n, j->param + j->n_scattering,
+                                    j->parameter + j->n_scattering, err);
+    if (s != STATUS_OK) return s;
+    t->n_built = 1;
+    for (size_t k = 0; k < c->number.n; k++) t->n_built += !c->number.range[k].fixed;
+    t->live = cloth_estimator(&t->cloth);
+    s = pipeline_trace_journal(c, "fit", "estimates.journal", i_model, &t->live, &t->journal, err);
+    *journal = t->journal;
+    return s;
+}
+
+void pipeline_cloth_close(struct pipeline_cloth_trace *t)
+{
+    if (t == NULL) return;
+    estimate_journal_close(t->journal);
+    cloth_estimator_release(&t->cloth);
+    for (size_t i = 0; i < t->n_built; i++) scene_free(t->built[i].scene);
+    free(t->configuration);
+    free(t);
+}
+
+/* ---- the search ---- */
+
+/* Divides the paths between screening, joint fit, whose estimates trace n_free cloths for their differences, and final
+ * fit. */
+static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
+                        struct fit_problem *problem, struct cloth_search *q)
+{
+    double n_free = 0.0, least = (double)method->least_budget(problem);
+    for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
+    double whole =
+        (double)(c->doc->path_budget > 0 ? c->doc->path_budget : BUDGET_FACTOR * method->info->default_path_budget);
+    double per_cloth = SCREEN_ITERATIONS * least, most = fmin(4.0 + 2.0 * n_free, CLOTH_MAX_SCREEN);
+    double n_screen = floor(fmin(most, screen_share * whole / per_cloth));
+    q->n_screen = n_screen >= 2.0 ? (size_t)n_screen : 0;
+    q->screen_budget = (uint64_t)(2.0 * per_cloth);
+    q->final_budget = (uint64_t)fmax(final_share * whole, 2.0 * least);
+    double left = (1.0 - final_share) * whole - (double)q->n_screen * per_cloth;
+    problem->path_budget = (uint64_t)fmax(left / (1.0 + n_free), 2.0 * least);
+    q->screen_share = 0.25;
+    q->final_share = 0.15;
+}
+
+static void log_cloth(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    const struct fit_result *r = &m->cloth.joint;
+    size_t n = m->sets.info.n_param;
+    for (size_t k = 0; k < c->number.n; k++)
+        log_info(c->log, "cloth: %s %.4g +- %.2g%s%s", c->number.info[k].name, r->param[n + k],
+                 r->uncertainty.se_param[n + k], r->uncertainty.determined[n + k] ? "" : ", not determined",
+                 r->uncertainty.at_bound[n + k] ? ", at its bound" : "");
+}
+
+status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipeline_joint *j,
+                          const struct fit_problem *problem, struct error *err)
+{
+    struct pipeline_context *c = trace->c;
+    struct pipeline_model *m = &c->model[trace->i_model];
+    struct fit_problem joint = *problem;
+    struct estimator e = estimate_journal_estimator(trace->journal);
+    struct cloth_search q = {
+        .method = descent_find(c->doc->method), .problem = &joint, .option = &j->option, .cloth = &trace->cloth};
+    joint.estimator = &e;
+    plan_budget(c, q.method, &joint, &q);
+    status s = cloth_search_run(&q, &m->cloth, err);
+    if (s != STATUS_OK) return s;
+    cloth_search_marginal(&q, &m->cloth, &m->fit);
+    log_cloth(c, m);
+    return STATUS_OK;
+}
+
+status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct error *err)
+{
+    const struct pipeline_model *m = &c->model[i_model];
+    if (c->number.n == 0 || c->number.i_shown == i_model + 1) return STATUS_OK;
+    status s = make_fibers(c, m->cloth.number, c->number.shown, &c->fiber, &c->cloth, err);
+    if (s == STATUS_OK) s = pipeline_make_scene(c, err);
+    c->number.i_shown = s == STATUS_OK ? i_model + 1 : 0;
+    return s;
+}

@@ -1,0 +1,115 @@
+"""Jobs that fit numbers of a described cloth: they come back from photographs of a known cloth, and a job that is killed
+again and again ends with the same bits."""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+from daemon_under_test import program
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
+VIEWS = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg\n" + "".join(
+    f"{'fit' if i < 10 else 'held-out'},{light},0,{camera},{phi},{turn}\n"
+    for i, (light, camera, phi, turn) in enumerate([
+        (20, 20, 180, 0), (45, 45, 180, 0), (60, 0, 180, 0), (60, 60, 180, 90), (30, 0, 180, 90), (70, 30, 180, 90), (70, 70, 180, 0),
+        (50, 50, 90, 0), (40, 60, 30, 45), (75, 40, 150, 90), (30, 60, 180, 0), (60, 30, 90, 90)]))
+TRUTH = {"C_R": [0.06, 0.05, 0.08], "C_TT": [0.7, 0.5, 0.3], "beta_R": 6, "beta_TT": 20, "gamma_TT": 20}
+FITTED = {"flatness": {"value": 1.6, "lower": 1, "upper": 4}}
+OUTPUT = {"render_px": 8, "render_samples": 1}
+
+
+def cloth(**yarn):
+    return {"weave": "plain", "tile_warps": 4, "tile_wefts": 4, "yarns": [{"fibers": 20, **yarn}]}
+
+
+def run(job, **document):
+    (job / "job.json").write_text(json.dumps({"sample": "known numbers", **document}))
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)], check=True)
+    return json.loads((job / "results" / "result.json").read_text())
+
+
+def make_job(tmp_path, name, sample=None):
+    job = tmp_path / name
+    (job / "input").mkdir(parents=True)
+    if sample is not None:
+        for p in json.loads((sample / "photographs.json").read_text()):
+            shutil.copy(sample / p["file"], job / "input")
+    return job
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory):
+    """Photographs of a cloth whose yarns are 2.6 times as wide as high."""
+    tmp_path = tmp_path_factory.mktemp("sample")
+    table = tmp_path / "views.csv"
+    table.write_text(VIEWS)
+    first = make_job(tmp_path, "first")
+    rows = VIEWS.replace("cloth_rotation_deg\n", "cloth_rotation_deg,r,g,b\n").replace("held-out", "fit")
+    rows = "\n".join(line if i == 0 else line + ",0.1,0.1,0.1" for i, line in enumerate(rows.strip().split("\n")))
+    (first / "input" / "rows.csv").write_text(rows + "\n")
+    run(first, cloth=cloth(flatness=2.6), measurements={"file": "rows.csv"}, fit={"path_budget": 1000, "max_iterations": 1, **OUTPUT})
+    subprocess.run([program("selvedge-phantom"), "photograph", "--fibers", str(first / "results" / "fibers.hair"), "--out", str(tmp_path / "photographs"),
+                    "--table", str(table), "--px", "16", "--paths", "60000", "--seed", "5", "--param", "C_R=0.06,0.05,0.08",
+                    "--param", "C_TT=0.7,0.5,0.3", "--param", "beta_R=6", "--param", "beta_TT=20", "--param", "gamma_TT=20", "--quiet"], check=True)
+    return tmp_path / "photographs"
+
+
+def photographs(sample):
+    return json.loads((sample / "photographs.json").read_text())
+
+
+def test_numbers_come_back(tmp_path, sample):
+    """The flatness is found again. Hairs have no length where there are none, and the job says so."""
+    job = make_job(tmp_path, "job", sample)
+    fixed = {k: TRUTH[k] for k in ("beta_R", "beta_TT", "gamma_TT")}
+    result = run(job, cloth=cloth(hair_length_um={"value": 200, "lower": 100, "upper": 1000}, **FITTED), photographs=photographs(sample),
+                 fit={"path_budget": 1200000, "fixed": fixed, **OUTPUT})
+    numbers = {n["name"]: n for n in result["cloth_numbers"]}
+    flatness, hairs = numbers["yarns[0].flatness"], numbers["yarns[0].hair_length_um"]
+    assert flatness["determined"] and abs(flatness["value"] - 2.6) < 0.8 and flatness["standard_error"] < 0.6, flatness
+    assert not hairs["determined"] and 100 <= hairs["value"] <= 1000 and hairs["unit"] == "um", hairs
+    assert "these measurements do not tell" in json.dumps(result["warnings"]) and "hair_length_um" in json.dumps(result["warnings"])
+    assert len(flatness["correlation_parameters"]) == len(result["parameters"])
+    shown = {n["name"]: n for n in result["geometry"]["cloth"]["numbers"]}
+    assert abs(shown["yarns[0].flatness"]["value"] - flatness["value"]) < 1e-9
+    summary = (job / "results" / "summary.txt").read_text()
+    assert "yarns[0].flatness" in summary and "these measurements do not tell it" in summary
+    assert sum(s["best"] for s in result["cloth_screening"]) == 1
+
+
+def without_times(result):
+    return {k: v for k, v in result.items() if k not in ("fit_wall_s", "stages", "models")}
+
+
+def test_killed_jobs_end_with_the_same_bits(tmp_path, sample):
+    document = {"cloth": cloth(**FITTED), "photographs": photographs(sample), "fit": {"path_budget": 300000, "max_iterations": 4, **OUTPUT}}
+    want = without_times(run(make_job(tmp_path, "whole", sample), **document))
+    job = make_job(tmp_path, "killed", sample)
+    (job / "job.json").write_text(json.dumps({"sample": "known numbers", **document}))
+    journal = job / "work" / "fit" / "estimates.journal"
+    for _ in range(3):
+        size = journal.stat().st_size if journal.exists() else 0
+        worker = subprocess.Popen([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)])
+        deadline = time.monotonic() + 120
+        while worker.poll() is None and time.monotonic() < deadline and not (journal.exists() and journal.stat().st_size > size):
+            time.sleep(0.01)
+        worker.send_signal(signal.SIGKILL)
+        worker.wait()
+    assert without_times(run(job, **document)) == want
+
+
+def refused(tmp_path, name, sample, **document):
+    job = make_job(tmp_path, name, sample)
+    (job / "job.json").write_text(json.dumps({"sample": "s", "photographs": photographs(sample), **document}))
+    subprocess.run([program("selvedge-worker"), "--quiet", str(job)], check=False)
+    return json.loads((job / "status.json").read_text())["error"]
+
+
+def test_what_numbers_exclude(tmp_path, sample):
+    error = refused(tmp_path, "volume", sample, cloth=cloth(**FITTED), fit={"model": "microflake.v1"})
+    assert error["field"] == "fit.model" and "sees a volume" in error["text"]
+    error = refused(tmp_path, "radius", sample, cloth=cloth(**FITTED), fit={"fit_radius": True})
+    assert error["field"] == "fit.fit_radius" and "fiber_radius_um" in error["text"]
