@@ -195,8 +195,8 @@ class Job:
             time.sleep(interval_s)
 
     def parameters(self):
-        """Return the fitted parameters: dicts with name, unit, value, standard_error, lower, upper, determined ... None
-        before the end."""
+        """Return the fitted parameters: dicts with name, set (the group of fibers, or None), unit, value, standard_error,
+        lower, upper, determined ... None before the end."""
         return self.state()["parameters"]
 
     def models(self):

@@ -23,8 +23,9 @@ BIN = os.path.join(BUILD, "bin")
 DRIVER = shutil.which("chromedriver") or "/usr/bin/chromedriver"
 FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-sync", "--window-size=1280,900", "--enable-unsafe-swiftshader"]
-sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
+sys.path[:0] = [os.path.join(ROOT, "clients", "python"), os.path.join(ROOT, "tests", "support")]
 import selvedge  # noqa: E402
+import small_cloth  # noqa: E402
 
 if not os.path.exists(DRIVER):
     pytest.skip("chromedriver is not installed", allow_module_level=True)
@@ -182,6 +183,28 @@ def test_real_job_live_and_finished(real, browser):
     wait_for(browser, "[...document.images].length === 5 && [...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert browser.execute_script("return getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
     keep(browser, "quality")
+    assert complaints(browser) == []
+
+
+def test_parameters_of_two_groups(real, browser, tmp_path):
+    """The table and the curves show the parameters group by group, under their own names."""
+    url, _ = real
+    (tmp_path / "cloth.hair").write_bytes(small_cloth.hair(groups=True))
+    (tmp_path / "rows.csv").write_text(small_cloth.TABLE)
+    (tmp_path / "job.json").write_text(json.dumps({
+        "sample": "two colours", "fibers": {"file": "cloth.hair", "groups": ["weft", "warp"]}, "measurements": {"file": "rows.csv"},
+        "fit": {"path_budget": 100000, "tied": [["beta_TT"], ["gamma_TT"]], "fixed": {"weft.beta_R": 5}, "render_px": 16, "render_samples": 4}}))
+    job = selvedge.Server(url).submit(str(tmp_path / "job.json"))
+    job.wait()
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#parameters')")
+    rows = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#parameters tbody tr")]
+    assert len(rows) == 20 and rows[0] == "weft" and rows[1].startswith("C_R.r ") and rows[10] == "warp" and rows[11].startswith("C_R.r ")
+    assert "fixed" in rows[7] and "tied to weft.beta_TT" in rows[18]
+    wait_for(browser, "document.querySelectorAll('.charts').length === 2")
+    charts = [[e.text.split()[0] for e in c.find_elements(By.CSS_SELECTOR, ".chart-title")] for c in browser.find_elements(By.CSS_SELECTOR, ".charts")]
+    assert charts == [["C_R", "C_TT", "beta_TT", "gamma_TT"], ["C_R", "C_TT", "beta_R", "beta_TT", "gamma_TT"]]
+    keep(browser, "groups")
     assert complaints(browser) == []
 
 
