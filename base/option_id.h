@@ -32,6 +32,8 @@
 #define OPTION_TILE "tile"
 #define OPTION_DENSITY_VOXEL "density_voxel"
 #define OPTION_GROUPS "groups"
+/* the described cloth */
+#define OPTION_YARNS "yarns"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
 /* the measurements */

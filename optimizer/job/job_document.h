@@ -52,6 +52,7 @@ struct job_candidate {
 /* What a kind of yarn in the document counts or names; 0 fibers: not given. */
 struct job_cloth_yarn {
     size_t n_fiber, n_ply, melange_with;
+    char name[MODEL_SET_NAME_BYTES]; /* "": none */
 };
 
 struct job_document {

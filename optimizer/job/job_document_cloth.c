@@ -1,7 +1,6 @@
 /* The section "cloth": from its keys to a checked description of the cloth. */
 #include "base/catalogue/cloth_description.h"
-#include "optimizer/job/job_document.h"
-#include "optimizer/job/json_field.h"
+#include "optimizer/job/job_document_parts.h"
 #include "optimizer/job/options/option_checks.h"
 
 #include <math.h>
@@ -166,11 +165,28 @@ static status read_cloth(const struct option_value *v, struct cloth_description 
     return st == STATUS_OK ? cloth_description_check(d, err) : st;
 }
 
+/* Reads the names of the kinds of yarn, which are the groups of fibers: all have one, or none. */
+static status read_names(struct job_document *doc, struct error *err)
+{
+    size_t n_named = 0;
+    status s = STATUS_OK;
+    for (size_t k = 0; k < doc->n_cloth_yarn; k++) n_named += doc->cloth_yarn[k].name[0] != '\0';
+    for (size_t k = 0; k < doc->n_cloth_yarn && n_named > 0 && s == STATUS_OK; k++) {
+        char path[JSON_PATH_BYTES];
+        snprintf(path, sizeof path, "cloth.yarns[%zu].name", k);
+        s = n_named == doc->n_cloth_yarn ? job_add_group(doc, doc->cloth_yarn[k].name, path, err)
+                                         : error_set_field(err, STATUS_INVALID, path,
+                                                           "'%s': either all kinds of yarn have a name, or none", path);
+    }
+    return s;
+}
+
 status job_check_cloth(const struct option_value *v, struct error *err)
 {
     v->doc->cloth = calloc(1, sizeof *v->doc->cloth);
     if (v->doc->cloth == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     status st = read_cloth(v, v->doc->cloth, err);
+    if (st == STATUS_OK) st = read_names(v->doc, err);
     if (st == STATUS_INVALID) job_cloth_name_field(err);
     return st;
 }

@@ -18,6 +18,9 @@ bool job_parameter_is_tied(const struct job_fit_option *o, size_t n_param, size_
 /* Number of parameters that "fixed" and "start" can name. It excludes the density multiplier, the last parameter of a
  * volume model, which has keys of its own. */
 size_t job_n_named_parameter(const struct model_info *m);
+/* Adds a group of fibers, which has scattering parameters of its own. Returns STATUS_INVALID with the key `path` when
+ * the name is not valid or was given before. */
+status job_add_group(struct job_document *doc, const char *name, const char *path, struct error *err);
 /* Writes the indices of the parameters among the first n_param that a key names: a colour ("C_TT") or one parameter
  * ("C_TT.r"), of one set ("warp.C_TT") or of all. Returns their number. */
 size_t job_parameter_slots(const struct model_info *m, size_t n_param, const char *key, size_t slot[JOB_MAX_PARAM]);

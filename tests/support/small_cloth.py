@@ -13,10 +13,11 @@ held-out,60,0,30,20,90,0.05,0.03,0.02
 """
 
 
-def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
-    """Returns layers of crossing fibers as the bytes of a .hair file: positions and diameters in millimetres."""
+def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9, groups=False):
+    """Returns layers of crossing fibers as the bytes of a .hair file: positions and diameters in millimetres. groups: the
+    fibers along y are group 1, in colours."""
     rng = random.Random(5)
-    xyz, thickness, strands = [], [], 0
+    xyz, thickness, colours, strands = [], [], [], 0
     for layer in range(layers):
         for i in range(n):
             strands += 1
@@ -26,16 +27,17 @@ def hair(tile_mm=0.2, radius_mm=0.008, n=8, layers=3, points=9):
                 height = 0.02 * layer + 0.004 * rng.random()
                 xyz += [along, across, height] if layer % 2 == 0 else [across, along, height]
                 thickness.append(2 * radius_mm)
-    text = f"selvedge tile_mm={tile_mm},{tile_mm}".encode().ljust(88, b"\0")
-    head = b"HAIR" + struct.pack("<IIIIfffff", strands, strands * points, 2 | 4, points - 1, 2 * radius_mm, 0.0, 1.0, 1.0, 1.0) + text
+                colours += [1.0 - layer % 2, 1.0, 1.0] if groups else []
+    text = f"selvedge tile_mm={tile_mm},{tile_mm}{' groups=rgb' if groups else ''}".encode().ljust(88, b"\0")
+    head = b"HAIR" + struct.pack("<IIIIfffff", strands, strands * points, 2 | 4 | (16 if groups else 0), points - 1, 2 * radius_mm, 0.0, 1.0, 1.0, 1.0) + text
     assert len(head) == 128
-    return head + struct.pack(f"<{len(xyz)}f", *xyz) + struct.pack(f"<{len(thickness)}f", *thickness)
+    return head + struct.pack(f"<{len(xyz)}f", *xyz) + struct.pack(f"<{len(thickness)}f", *thickness) + struct.pack(f"<{len(colours)}f", *colours)
 
 
-def start_small_job(daemon, document, table=TABLE):
+def start_small_job(daemon, document, table=TABLE, groups=False):
     """Uploads cloth.hair and rows.csv (`table`), which the document names, and starts the job."""
     job = daemon.create(document)
-    daemon.upload(job, "cloth.hair", hair(), "fibers")
+    daemon.upload(job, "cloth.hair", hair(groups=groups), "fibers")
     daemon.upload(job, "rows.csv", table.encode(), "measurements")
     reply = daemon.post(f"/v1/jobs/{job}/start")
     assert reply.status_code == 202, reply.text

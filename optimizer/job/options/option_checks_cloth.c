@@ -1,5 +1,5 @@
 /* Checks of the sections "volume" and its parts. */
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_document_parts.h"
 #include "optimizer/job/options/option_checks.h"
 
 #include <math.h>
@@ -93,28 +93,38 @@ static bool group_name_valid(const char *name)
     return n > 0 && n <= 20 && strspn(name, letters) == n;
 }
 
-static status read_groups(const json_t *list, const char *path, struct job_document *doc, struct error *err)
+status job_add_group(struct job_document *doc, const char *name, const char *path, struct error *err)
+{
+    if (!group_name_valid(name))
+        return error_set_field(
+            err, STATUS_INVALID, path,
+            "'%s' is not the name of a group of fibers: allowed are 1 to 20 characters of A-Z a-z 0-9 _ "
+            "-",
+            path);
+    for (size_t k = 0; k < doc->n_group; k++)
+        if (strcmp(doc->group[k], name) == 0)
+            return error_set_field(err, STATUS_INVALID, path, "'%s' gives the name '%s' a second time", path, name);
+    snprintf(doc->group[doc->n_group++], sizeof doc->group[0], "%s", name);
+    return STATUS_OK;
+}
+
+static status read_groups(const json_t *list, struct job_document *doc, struct error *err)
 {
     size_t n = json_array_size(list);
+    status s = STATUS_OK;
     if (n < 2 || n > MODEL_MAX_SET)
-        return error_set_field(err, STATUS_INVALID, path, "'%s' must be a list of 2 to %d names", path, MODEL_MAX_SET);
-    for (size_t i = 0; i < n; i++) {
-        const char *name = json_string_value(json_array_get(list, i));
-        if (!group_name_valid(name))
-            return error_set_field(err, STATUS_INVALID, path,
-                                   "'%s' has an element %zu that is no name: allowed are 1 to 20 of A-Z a-z 0-9 _ -",
-                                   path, i);
-        for (size_t k = 0; k < i; k++)
-            if (strcmp(doc->group[k], name) == 0)
-                return error_set_field(err, STATUS_INVALID, path, "'%s' has the name '%s' twice", path, name);
-        snprintf(doc->group[i], sizeof doc->group[i], "%s", name);
+        return error_set_field(err, STATUS_INVALID, "fibers.groups", "'fibers.groups' must be a list of 2 to %d names",
+                               MODEL_MAX_SET);
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        char path[JSON_PATH_BYTES];
+        snprintf(path, sizeof path, "fibers.groups[%zu]", i);
+        s = job_add_group(doc, json_string_value(json_array_get(list, i)), path, err);
     }
-    doc->n_group = n;
-    return STATUS_OK;
+    return s;
 }
 
 status job_check_fibers(const struct option_value *v, struct error *err)
 {
     const json_t *groups = json_object_get(v->value, "groups");
-    return groups != NULL ? read_groups(groups, "fibers.groups", v->doc, err) : STATUS_OK;
+    return groups != NULL ? read_groups(groups, v->doc, err) : STATUS_OK;
 }

@@ -99,11 +99,13 @@ const struct job_option option_rows_described[] = {
 #undef YARN_NUMBER
     {.path = "cloth.yarns",
      .kind = OPTION_LIST,
+     .id = OPTION_YARNS,
      LIST_INTO(cloth_yarn, n_cloth_yarn),
      RANGE(1, CLOTH_MAX_KIND),
      .items = "kinds of yarn",
      .left_out = "one kind; velvet: ground and pile",
-     .meaning = "The kinds of yarn. Each is a group of fibers and may have scattering parameters of its own. The last "
+     .meaning = "The kinds of yarn. Each is a group of fibers, and has scattering parameters of its own when it has a "
+                "`name`. The last "
                 "kind of a velvet is its pile."},
     {.path = "cloth.yarns[].fibers",
      .kind = OPTION_COUNT,
@@ -112,6 +114,14 @@ const struct job_option option_rows_described[] = {
      .left_out = "40; pile: 16; felt: 600",
      .allowed = "1..1000, felt 1..100000",
      .meaning = "Fibers in a section of the yarn, in a tuft of the pile, or in the tile of a felt."},
+    {.path = "cloth.yarns[].name",
+     .kind = OPTION_TEXT,
+     TEXT_INTO_OF(struct job_cloth_yarn, name),
+     .left_out = "one set of scattering parameters for all kinds",
+     .allowed = "1..20 characters `A-Z a-z 0-9 _ -`",
+     .schema = "{\"pattern\": \"^[A-Za-z0-9_-]{1,20}$\"}",
+     .meaning = "With a name for each of several kinds surface models fit a set of parameters for each, named "
+                "`NAME.C_R.r`."},
     {.path = "cloth.yarns[].plies",
      .kind = OPTION_COUNT,
      OF_YARN(n_ply),

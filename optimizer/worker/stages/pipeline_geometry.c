@@ -239,7 +239,7 @@ static status check_groups(struct pipeline_context *c, struct error *err)
     size_t n_fiber[FIBER_MAX_GROUP] = {0}, n_group = fiber_set_n_group(&c->fiber);
     for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
     if (c->doc->n_group == 0) {
-        if (n_group > 1)
+        if (n_group > 1 && c->doc->cloth == NULL)
             worker_status_warn(
                 c->status,
                 "the fibers belong to %zu groups, but are fitted with one set of parameters: name the groups "
@@ -247,15 +247,14 @@ static status check_groups(struct pipeline_context *c, struct error *err)
                 n_group, job_option_key(OPTION_GROUPS));
         return STATUS_OK;
     }
+    const char *id = c->doc->cloth != NULL ? OPTION_YARNS : OPTION_GROUPS, *key = job_option_key(id);
     if (n_group > c->doc->n_group)
-        return error_set_field(err, STATUS_INVALID, OPTION_GROUPS,
-                               "'%s' names %zu groups, but the fibers belong to %zu", job_option_key(OPTION_GROUPS),
+        return error_set_field(err, STATUS_INVALID, id, "'%s' names %zu groups, but the fibers belong to %zu", key,
                                c->doc->n_group, n_group);
     for (size_t g = 0; g < c->doc->n_group; g++)
         if (n_fiber[g] == 0)
-            return error_set_field(err, STATUS_INVALID, OPTION_GROUPS,
-                                   "'%s' names the group %zu '%s', but no fiber belongs to it",
-                                   job_option_key(OPTION_GROUPS), g, c->doc->group[g]);
+            return error_set_field(err, STATUS_INVALID, id, "'%s' names the group %zu '%s', but no fiber belongs to it",
+                                   key, g, c->doc->group[g]);
     return STATUS_OK;
 }
 

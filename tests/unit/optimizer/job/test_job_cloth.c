@@ -65,6 +65,25 @@ static void test_everything_given(void **state)
     job_document_free(doc);
 }
 
+/* Kinds of yarn with names have scattering parameters of their own. */
+static void test_named_kinds(void **state)
+{
+    (void)state;
+    struct job_document *doc =
+        parse(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{\"name\":\"blue\"}]"));
+    assert_int_equal(doc->n_group, 2);
+    assert_string_equal(doc->group[0], "red");
+    assert_string_equal(doc->group[1], "blue");
+    job_document_free(doc);
+    doc = parse(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{},{}]"));
+    assert_int_equal(doc->n_group, 0);
+    job_document_free(doc);
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"red\"},{}]"), "cloth.yarns[0].name", "or none");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"a\"},{\"name\":\"a\"}]"), "cloth.yarns[1].name",
+                "second time");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"a b\"}]"), "cloth.yarns[0].name", "1 to 20");
+}
+
 static void test_mistakes_are_named(void **state)
 {
     (void)state;
@@ -97,6 +116,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_name_is_enough),
         cmocka_unit_test(test_everything_given),
+        cmocka_unit_test(test_named_kinds),
         cmocka_unit_test(test_mistakes_are_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -55,10 +55,10 @@ static void test_names_of_groups(void **state)
     job_document_free(d);
     check_error(FIBERS_OF("\"groups\":[\"warp\"]"), "fibers.groups", "2 to 8");
     check_error(FIBERS_OF("\"groups\":\"warp\""), "fibers.groups", "2 to 8");
-    check_error(FIBERS_OF("\"groups\":[\"warp\",\"warp\"]"), "fibers.groups", "twice");
-    check_error(FIBERS_OF("\"groups\":[\"warp\",\"a.b\"]"), "fibers.groups", "no name");
-    check_error(FIBERS_OF("\"groups\":[\"warp\",3]"), "fibers.groups", "no name");
-    check_error(FIBERS_OF("\"groups\":[\"warp\",\"abcdefghijabcdefghijk\"]"), "fibers.groups", "no name");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",\"warp\"]"), "fibers.groups[1]", "second time");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",\"a.b\"]"), "fibers.groups[1]", "1 to 20");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",3]"), "fibers.groups[1]", "1 to 20");
+    check_error(FIBERS_OF("\"groups\":[\"warp\",\"abcdefghijabcdefghijk\"]"), "fibers.groups[1]", "1 to 20");
     check_error("{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\",\"groups\":[\"a\",\"b\",\"c\",\"d\",\"e\",\"f\","
                 "\"g\",\"h\"]},"
                 "\"photographs\":[" PHOTO "],\"fit\":{}}",
