@@ -77,9 +77,9 @@ function nextPhotograph(result) {
   if (!list.length) return null;
   const angle = (x) => number(`${Number(x.toPrecision(4))}°`);
   return el("div", {}, el("h3", {}, "Next photograph"),
-    el("p", { class: "hint" }, `The best of ${list.length} candidates: those that would reduce the parameters' uncertainty most.`),
-    table("next-photograph", ["#Light", "#phi", "#Camera", "#phi", "#Cloth turned", "#Information, nats", ""], list.slice(0, SHOWN_CANDIDATES).map((c) => el("tr", {},
-      angle(c.light_theta_deg), angle(c.light_phi_deg), angle(c.camera_theta_deg), angle(c.camera_phi_deg), angle(c.cloth_rotation_deg), number(c.information_nats.toFixed(2)),
+    el("p", { class: "hint" }, `The best of ${list.length} candidates: those that would tell most about the parameters, and about where the model does not describe the cloth.`),
+    table("next-photograph", ["#Light", "#phi", "#Camera", "#phi", "#Cloth turned", "#Information, nats", "#about misfit", ""], list.slice(0, SHOWN_CANDIDATES).map((c) => el("tr", {},
+      angle(c.light_theta_deg), angle(c.light_phi_deg), angle(c.camera_theta_deg), angle(c.camera_phi_deg), angle(c.cloth_rotation_deg), number(c.information_nats.toFixed(2)), number((c.misfit_nats ?? 0).toFixed(2)),
       el("td", {}, c.determines.length ? tag(`determines ${c.determines.join(", ")}`, "good") : "")))));
 }
 

@@ -172,8 +172,10 @@ void next_photograph_score(const struct next_photograph_fit *f, const struct est
     struct estimate shown[2];
     const struct estimate *const replica[2] = {&shown[0], &shown[1]};
     const struct uncertainty *u = f->uncertainty;
+    const double misfit = f->misfit != NULL ? f->misfit->rest_var : u->misfit_var,
+                 smooth = f->misfit != NULL ? f->misfit->smooth_var : 0.0;
     double jc[2][3 * N], s[9], alone[9], inverse[9] = {0},
-                                         v = fmax(u->misfit_var + u->noise_var + u->photograph_var, least_var);
+                                         v = fmax(misfit + u->noise_var + u->photograph_var, least_var);
     memset(score, 0, sizeof *score);
     fit_layout_estimate(f->layout, f->unknown, true, a, &shown[0]);
     fit_layout_estimate(f->layout, f->unknown, true, b, &shown[1]);
@@ -181,9 +183,11 @@ void next_photograph_score(const struct next_photograph_fit *f, const struct est
     take_derivatives(&d, f, replica);
     project(&d, jc, s);
     for (size_t i = 0; i < 3; i++) d.noise[i * 4] += v;
+    for (size_t i = 0; i < 9; i++) d.noise[i] += smooth;
     for (size_t i = 0; i < 9; i++) s[i] += d.noise[i];
     residual_given_parameters(&d, alone);
-    score->information = fmax(0.5 * (ln_det3(s) - ln_det3(alone)), 0.0);
+    score->misfit_information = 0.5 * log1p(3.0 * smooth / v);
+    score->information = fmax(0.5 * (ln_det3(s) - ln_det3(alone)), 0.0) + score->misfit_information;
     (void)small_invert(s, 3, inverse); /* eigenvalues are at least v > 0 */
     for (size_t k = 0; k < d.n_asked; k++) {
         double decrease = 0.0;

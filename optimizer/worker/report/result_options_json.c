@@ -106,11 +106,12 @@ static json_t *candidate_json(const struct pipeline_context *c, const struct pip
     json_t *determines = json_array();
     for (size_t p = 0; p < m->sets.info.n_param; p++)
         if (k->score.determines[p]) json_array_append_new(determines, json_string(m->sets.info.param[p].name));
-    return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:o, s:o, s:o}", "candidate", (json_int_t)k->i_candidate,
+    return json_pack("{s:I, s:f, s:f, s:f, s:f, s:f, s:o, s:o, s:o, s:o}", "candidate", (json_int_t)k->i_candidate,
                      "light_theta_deg", g->light_theta_deg, "light_phi_deg", g->light_phi_deg, "camera_theta_deg",
                      g->camera_theta_deg, "camera_phi_deg", g->camera_phi_deg, "cloth_rotation_deg",
-                     g->cloth_rotation_deg, "information_nats", json_number(k->score.information),
-                     "standard_error_after", values_json(m, k->score.se_after), "determines", determines);
+                     g->cloth_rotation_deg, "information_nats", json_number(k->score.information), "misfit_nats",
+                     json_number(k->score.misfit_information), "standard_error_after",
+                     values_json(m, k->score.se_after), "determines", determines);
 }
 
 /* The ranked candidates, best first. */

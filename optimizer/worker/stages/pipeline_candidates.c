@@ -32,6 +32,50 @@ static int compare_rank(const void *a, const void *b)
     return x->i_candidate < y->i_candidate ? -1 : x->i_candidate > y->i_candidate;
 }
 
+/* The misfit that the model leaves at the fitted rows, by the fresh estimates of the validation. */
+static status make_misfit_field(const struct pipeline_context *c, const struct pipeline_model *m,
+                                struct misfit_field *field, struct error *err)
+{
+    struct observation_set fitted;
+    size_t n = 0;
+    struct estimate *a = malloc(2 * c->observation.n * sizeof *a), *b = a != NULL ? a + c->observation.n : NULL;
+    observation_set_init(&fitted);
+    status s = a != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot rank candidates: out of memory");
+    for (size_t i = 0; i < c->observation.n && s == STATUS_OK; i++) {
+        if (c->observation.item[i].set != JOB_SET_FIT || !(c->observation.item[i].weight > 0.0)) continue;
+        s = observation_set_append(&fitted, &c->observation.item[i], err);
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a[n]);
+        nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b[n++]);
+    }
+    if (s == STATUS_OK) misfit_field_init(field, &fitted, a, b, m->fit.uncertainty.misfit_var);
+    observation_set_release(&fitted);
+    free(a);
+    return s;
+}
+
+/* Scores every candidate by its two estimates. */
+static status score_candidates(const struct pipeline_context *c, struct pipeline_model *m,
+                               const struct observation_set *o, struct estimate *const replica[2],
+                               struct next_photograph_fit *fit, struct error *err)
+{
+    struct misfit_prediction misfit;
+    struct misfit_field *field = malloc(sizeof *field);
+    status s = field != NULL ? make_misfit_field(c, m, field, err)
+                             : error_set(err, STATUS_NO_MEMORY, "cannot rank candidates: out of memory");
+    fit->misfit = &misfit;
+    for (size_t i = 0; i < o->n && s == STATUS_OK; i++) {
+        m->candidate[i].i_candidate = i;
+        misfit_field_predict(field, &o->item[i].configuration, &misfit);
+        next_photograph_score(fit, &replica[0][i], &replica[1][i], &m->candidate[i].score);
+    }
+    if (s == STATUS_OK)
+        log_info(c->log, "misfit of %s: %.0f %% of its variance is smooth over directions, with a length of %.2f",
+                 m->appearance.id, 100.0 * field->smooth_share, field->length);
+    if (s == STATUS_OK) qsort(m->candidate, o->n, sizeof *m->candidate, compare_rank);
+    free(field);
+    return s;
+}
+
 static status rank(struct pipeline_context *c, size_t i_model, const struct observation_set *o,
                    struct estimate *replica[2], size_t *n_path, struct error *err)
 {
@@ -43,8 +87,8 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
     struct fit_layout layout;
     double wall_s;
     pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
-    const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty,
-                                            option.photograph_gain_sd};
+    struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty, option.photograph_gain_sd,
+                                      NULL};
     struct progress quiet = {.cancel = c->progress.cancel};
     status s = fit_layout_init(&layout, m->sets.info.param, m->parameter, m->sets.info.n_param, &option, err);
     if (s != STATUS_OK) return s;
@@ -57,11 +101,7 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
                                       true};
         s = e.run(e.context, &call, &quiet, replica[q], &wall_s, err);
     }
-    for (size_t i = 0; i < o->n && s == STATUS_OK; i++) {
-        m->candidate[i].i_candidate = i;
-        next_photograph_score(&fit, &replica[0][i], &replica[1][i], &m->candidate[i].score);
-    }
-    if (s == STATUS_OK) qsort(m->candidate, o->n, sizeof *m->candidate, compare_rank);
+    if (s == STATUS_OK) s = score_candidates(c, m, o, replica, &fit, err);
     pipeline_trace_close(&trace);
     return s;
 }

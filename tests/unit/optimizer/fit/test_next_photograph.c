@@ -77,8 +77,8 @@ static void check_against_the_whole_matrix(const struct fit_option *o)
     const size_t n = k.layout.n_unknown;
     memcpy(before, k.u.cov, sizeof before);
     fake_radiance(&c, k.unknown, e.mean, e.jac);
-    next_photograph_score(&(struct next_photograph_fit){&k.layout, k.unknown, &k.u, o->photograph_gain_sd}, &e, &e,
-                          &score);
+    next_photograph_score(&(struct next_photograph_fit){&k.layout, k.unknown, &k.u, o->photograph_gain_sd, NULL}, &e,
+                          &e, &score);
     double a = (e.mean[0] + e.mean[1] + e.mean[2]) / 3.0;
     for (size_t i = 0; i < 9; i++)
         v[i] = (i % 4 == 0 ? 5e-4 : 0.0) + pow(o->photograph_gain_sd / a, 2.0) * e.mean[i / 3] * e.mean[i % 3];
@@ -96,6 +96,39 @@ static void check_against_the_whole_matrix(const struct fit_option *o)
     assert_true(score.information > 0.1);
     for (size_t p = 0; p < N; p++)
         assert_true(fabs(score.se_after[p] / (k.slope[p] * sqrt(after[p * n + p])) - 1.0) < 1e-6);
+}
+
+/* The misfit at the candidate as one more unknown of the three channels: the information is the decrease of the
+ * determinant of all unknowns, 1/2 ln det(V + J C J' + k 1 1') - 1/2 ln det V. */
+static void test_misfit_is_an_unknown(void **state)
+{
+    (void)state;
+    const struct misfit_prediction misfit = {.smooth_var = 3e-3, .rest_var = 2e-5};
+    const double v = misfit.rest_var + 1e-4 + 3e-4; /* noise and photograph of set_before */
+    struct fit_option o;
+    struct before k;
+    struct candidate_score score;
+    struct estimate e = {.n_path = 1};
+    double all[9], a;
+    struct configuration c = {.light_theta_rad = 0.7, .camera_theta_rad = 0.6, .camera_phi_rad = M_PI};
+    fit_option_init(&o);
+    set_before(&k, &o);
+    const size_t n = k.layout.n_unknown;
+    fake_radiance(&c, k.unknown, e.mean, e.jac);
+    next_photograph_score(&(struct next_photograph_fit){&k.layout, k.unknown, &k.u, 0.0, &misfit}, &e, &e, &score);
+    a = (e.mean[0] + e.mean[1] + e.mean[2]) / 3.0;
+    for (size_t i = 0; i < 9; i++) {
+        all[i] = misfit.smooth_var + (i % 4 == 0 ? v : 0.0);
+        for (size_t p = 0; p < n; p++)
+            for (size_t q = 0; q < n; q++)
+                all[i] +=
+                    e.jac[i / 3 * N + p] * k.slope[p] / a * k.u.cov[p * n + q] * e.jac[i % 3 * N + q] * k.slope[q] / a;
+    }
+    double fall = 0.5 * (ln_det(all, 3) - 3.0 * log(v));
+    print_message("%.4f nats, of them %.4f about the misfit; by the determinant %.4f\n", score.information,
+                  score.misfit_information, fall);
+    assert_true(fabs(score.information - fall) < 1e-6);
+    assert_true(score.misfit_information > 0.5 && score.misfit_information < score.information);
 }
 
 static void test_against_the_whole_matrix(void **state)
@@ -203,7 +236,8 @@ static void test_finds_what_is_missing(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_against_the_whole_matrix),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_misfit_is_an_unknown),
+                                       cmocka_unit_test(test_against_the_whole_matrix),
                                        cmocka_unit_test(test_finds_what_is_missing)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
