@@ -1,5 +1,5 @@
-// Shows results of a fit beyond its parameters: gradient certificate, nuisance terms, gains of photographs, textures,
-// several starts and the next photograph.
+// Shows results of a fit beyond its parameters: numbers of the cloth, gradient certificate, nuisance terms, gains of
+// photographs, textures, several starts and the next photograph.
 import { el, isNumber, percent, withError } from "./page_parts.js";
 
 function table(id, heads, rows) {
@@ -83,9 +83,19 @@ function nextPhotograph(result) {
       el("td", {}, c.determines.length ? tag(`determines ${c.determines.join(", ")}`, "good") : "")))));
 }
 
+// The fitted numbers of a described cloth.
+function clothNumbers(result) {
+  const list = result.cloth_numbers ?? [];
+  if (!list.length) return null;
+  return el("div", {}, el("h3", {}, "Numbers of the cloth"),
+    el("p", { class: "hint" }, "Fitted together with the parameters, whose standard errors contain those of these numbers."),
+    table("cloth-numbers", ["Number", "#Value ± standard error", "Unit", "#Range", ""], list.map((n) => el("tr", {}, el("td", { class: "mono" }, n.name), number(withError(n.value, n.standard_error)), el("td", {}, n.unit),
+      number(`${n.lower} to ${n.upper}`), el("td", {}, n.determined ? "" : tag("these measurements do not tell it"), n.at_bound ? tag(`at its ${n.at_bound} bound`) : "")))));
+}
+
 // Returns the content of the card, or null if there is nothing to show.
 export function fitDetails(job) {
   if (!job.result) return null;
-  const parts = [skill, certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
+  const parts = [skill, clothNumbers, certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
   return parts.length ? el("div", { id: "fit-details" }, parts) : null;
 }
