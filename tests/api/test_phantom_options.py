@@ -54,9 +54,10 @@ def test_a_described_cloth_and_its_description(tmp_path):
     assert again["result"] == made["result"] and (tmp_path / "a" / "truth.hair").read_bytes() == (tmp_path / "b" / "truth.hair").read_bytes()
 
 
-@pytest.mark.parametrize("weave", ["plain", "knit", "felt"])
-def test_a_phantom_describes_itself(tmp_path, weave):
-    phantom = cloth(tmp_path / "a", "--weave", weave, *(["--felt-tile-um", "160", "--felt-thickness-um", "60"] if weave == "felt" else []))
+@pytest.mark.parametrize("weave,options", [("plain", []), ("knit", ["--fibers-per-yarn", "7"]),
+                                           ("felt", ["--felt-tile-um", "800", "--felt-thickness-um", "400", "--fibers-per-yarn", "20"])])
+def test_a_phantom_describes_itself(tmp_path, weave, options):
+    phantom = cloth(tmp_path / "a", "--weave", weave, *options)
     described = cloth(tmp_path / "b", "--description", str(tmp_path / "a" / "cloth.json"))
     per_area = [r["length_mm"] / (r["tile_mm"][0] * r["tile_mm"][1]) for r in (described["result"], phantom["result"])]
     assert abs(per_area[0] / per_area[1] - 1) < 0.3
