@@ -40,7 +40,7 @@ struct cloth_report {
  * group: kind of yarn. The lowest fiber surface is at z = 0. The result does not depend on the number of threads; pool
  * and progress may be NULL. STATUS_INVALID, with err->field naming the number, for values outside of the catalogue's
  * range and for those that contradict each other (a crimp that yarns cannot bend to, threads that have no room);
- * STATUS_NO_MEMORY, STATUS_CANCELLED. */
+ * STATUS_TOO_LARGE for more than 20 million vertices; STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
                    const struct progress *progress, struct fiber_set *f, struct cloth_report *report,
                    struct error *err);

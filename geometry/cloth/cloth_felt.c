@@ -34,12 +34,13 @@ static status add_fiber(struct web *b, size_t i, struct error *err)
     double free_rad = 2.0 * M_PI * rng_double(&rng), layer = 0.5 * LAYERS * (at[2] + 1.0);
     wave_draw(&turn, 0.5, &rng);
     /* the heading is a direction without sign: the layer's, and about it a spread that layering narrows */
-    double heading = 2.0 * M_PI * wave_at(&b->heading, 0.1 * layer) + (1.0 - b->layering) * (free_rad - M_PI);
+    double heading = M_PI * wave_at(&b->heading, 0.02 * layer) + (1.0 - b->layering) * (free_rad - M_PI);
     double radius_m = b->kind->radius_m * fmax(0.3, 1.0 + b->kind->radius_spread * fmax(-2.0, fmin(2.0, z[1])));
     double half_m = fmax(0.5 * b->thickness_m - radius_m, 0.1 * b->thickness_m);
     double tilt = fmax(-0.45 * M_PI, fmin(0.45 * M_PI, b->tilt_rad * z[0])), step_m = b->length_m / (FELT_NODES - 1);
     struct strand like = {.radius_m = radius_m, .cut = CUT_FACE_XY};
-    status st = strand_add(&b->w->set, &like, FELT_NODES, &node, err);
+    status st = work_has_room(b->w, err);
+    if (st == STATUS_OK) st = strand_add(&b->w->set, &like, FELT_NODES, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t j = 0; j < FELT_NODES; j++) {
         double now = heading + b->curl * wave_at(&turn, (double)j / FELT_NODES);

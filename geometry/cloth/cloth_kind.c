@@ -16,6 +16,15 @@ double work_number(const struct cloth_work *w, const char *name)
     return cloth_number_value(w->d, w->number, -1, name);
 }
 
+status work_has_room(const struct cloth_work *w, struct error *err)
+{
+    if (w->set.n_node <= MAX_CLOTH_NODES) return STATUS_OK;
+    return error_set(err, STATUS_TOO_LARGE,
+                     "the described cloth has more than %d vertices: take fewer yarns in the tile, fewer fibers in a "
+                     "yarn, or fewer hairs",
+                     MAX_CLOTH_NODES);
+}
+
 /* Area-preserving: an ellipse of the area of the round section. Its fibers circulate with a constant rate of the
  * eccentric angle, which keeps their density even. The rate is lowered by round_m / half width, so that fibers on the
  * flat side lie at the same angle to the yarn as on the surface of the round yarn. */

@@ -35,7 +35,8 @@ static status add_fiber(const struct pile *p, const double root_m[2], uint32_t t
                           .axis_class = 2,
                           .group = (uint8_t)p->w->d->pile_kind,
                           .cut = CUT_NONE};
-    status st = strand_add(&p->w->set, &like, PILE_NODES, &node, err);
+    status st = work_has_room(p->w, err);
+    if (st == STATUS_OK) st = strand_add(&p->w->set, &like, PILE_NODES, &node, err);
     if (st != STATUS_OK) return st;
     double at[3] = {root_m[0] + rho_m * cos(angle), root_m[1] + rho_m * sin(angle), -0.5 * p->ground_m};
     for (size_t j = 0; j < PILE_NODES; j++) {

@@ -5,7 +5,7 @@
 #include "geometry/cloth/cloth.h"
 #include "geometry/cloth/yarn_path.h"
 
-enum { POINTS_PER_CROSSING = 24, N_WAVE = 4 };
+enum { POINTS_PER_CROSSING = 24, N_WAVE = 4, MAX_CLOTH_NODES = 20000000 };
 
 /* One kind of yarn at the present numbers. */
 struct kind_shape {
@@ -33,6 +33,8 @@ struct cloth_work {
 
 /* Value of a number of the cloth; NaN if it has none. */
 double work_number(const struct cloth_work *w, const char *name);
+/* STATUS_TOO_LARGE when the fibers so far are more than a job can trace. */
+status work_has_room(const struct cloth_work *w, struct error *err);
 /* Fills w->kind and w->nominal. */
 void kind_shapes(struct cloth_work *w);
 

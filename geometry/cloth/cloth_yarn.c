@@ -130,7 +130,8 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
         like.start_share = melange_share(k, i);
         like.group_of_start = (uint8_t)k->melange_with;
     }
-    status st = strand_add(&y->w->set, &like, n, &node, err);
+    status st = work_has_room(y->w, err);
+    if (st == STATUS_OK) st = strand_add(&y->w->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t j = 0; j < n; j++) {
         double t = (double)j / (double)(n - 1), s = start + t, at[2];
@@ -144,7 +145,8 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
     return STATUS_OK;
 }
 
-/* Adds hair number i, grown to the given share of its length: it leaves the surface of the yarn and curls. */
+/* Adds hair number i, grown to the given share of its length: it leaves the surface of the yarn and curls. Lengths are
+ * exponentially distributed, cut off at three means. */
 static status add_hair(struct filling *y, size_t i, double grown, struct error *err)
 {
     const struct rng_key key = {.seed = y->w->d->seed, .iteration = STREAM_HAIR};
@@ -152,13 +154,14 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
     struct rng rng;
     rng_start(&rng, &key, y->path->number, (uint32_t)i);
     double from = rng_double(&rng), angle = 2.0 * M_PI * rng_double(&rng), side = rng_double(&rng) < 0.5 ? -1.0 : 1.0;
-    double length_m = grown * k->hair_length_m * -log(1.0 - 0.87 * rng_double(&rng)),
+    double length_m = grown * k->hair_length_m * -log(1.0 - 0.87 * rng_double(&rng)) / 0.695,
            rise = 0.1 + 0.7 * rng_double(&rng);
     double curl = 2.0 * (rng_double(&rng) - 0.5), bend = 0.6 + rng_double(&rng), (*node)[3];
     if (length_m < 2.0 * k->radius_m) return STATUS_OK;
     struct strand like = {
         .radius_m = k->radius_m, .axis_class = y->path->axis_class, .group = (uint8_t)y->kind, .cut = CUT_NONE};
-    status st = strand_add(&y->w->set, &like, HAIR_NODES, &node, err);
+    status st = work_has_room(y->w, err);
+    if (st == STATUS_OK) st = strand_add(&y->w->set, &like, HAIR_NODES, &node, err);
     if (st != STATUS_OK) return st;
     double along = side * cos(rise) * length_m / y->length_m[y->path->n], out_m = sin(rise) * length_m;
     for (size_t j = 0; j < HAIR_NODES; j++) {

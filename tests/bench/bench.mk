@@ -40,8 +40,10 @@ docs-grazing: | deps-test ## draw docs/images/microflake-grazing.svg anew: what 
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit grazing > $(BUILD)/bench-fit/grazing.json
 	@/usr/bin/python3 tests/bench/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
 
-docs-pictures: | deps-test ## render docs/images/{twill,derivatives}.png anew (minutes)
-	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures
+docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,cloth-numbers}.png anew (minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures $(BUILD)/tests/bench/cloth_pictures
+	@$(BUILD)/tests/bench/cloth_pictures weaves docs/images/cloth-weaves.png
+	@$(BUILD)/tests/bench/cloth_pictures numbers docs/images/cloth-numbers.png
 	@mkdir -p docs/images
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png

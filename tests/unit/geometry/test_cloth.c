@@ -204,6 +204,59 @@ static void test_contradictions_are_named(void **state)
     assert_non_null(strstr(err.text, "twill31"));
 }
 
+/* A cloth that no job could trace is refused before memory runs out. */
+static void test_too_many_fibers(void **state)
+{
+    (void)state;
+    struct cloth_description d = small_cloth("plain");
+    struct error err = {0};
+    struct fiber_set f;
+    struct cloth_report r;
+    fiber_set_init(&f);
+    d.kind[0].n_fiber = CLOTH_MAX_FIBER;
+    d.n_yarn[0] = d.n_yarn[1] = CLOTH_MAX_YARN;
+    assert_int_equal(cloth_description_check(&d, &err), STATUS_OK);
+    assert_int_equal(cloth_build(&d, NULL, NULL, NULL, &f, &r, &err), STATUS_TOO_LARGE);
+    assert_non_null(strstr(err.text, "fewer yarns"));
+}
+
+/* A melange has the asked share of the other kind, between fibers as well. */
+static void test_melange(void **state)
+{
+    (void)state;
+    static const double share[] = {0.0, 0.31, 0.7, 1.0};
+    for (size_t i = 0; i < 4; i++) {
+        struct cloth_description d = small_cloth("twill");
+        struct fiber_set f;
+        struct cloth_report r;
+        d.n_kind = 2;
+        d.kind[1] = d.kind[0];
+        d.kind[0].melange_with = 1;
+        cloth_description_number(&d);
+        set_number(&d, "yarns[0].melange", share[i]);
+        assert_int_equal(cloth_description_check(&d, NULL), STATUS_OK);
+        build(&d, NULL, NULL, &f, &r);
+        assert_true(fabs(r.length_m[1] / (r.length_m[0] + r.length_m[1]) - share[i]) < 0.01);
+        fiber_set_release(&f);
+    }
+}
+
+/* Counted threads replace the cover, and the spacing is theirs. */
+static void test_threads_per_cm(void **state)
+{
+    (void)state;
+    struct cloth_description d = small_cloth("plain");
+    struct fiber_set f;
+    struct cloth_report r;
+    d.threads_per_cm[CLOTH_WARP] = 100.0;
+    cloth_description_number(&d);
+    assert_true(cloth_number_index(&d, "cover_warp") < 0 && cloth_number_index(&d, "cover_weft") >= 0);
+    build(&d, NULL, NULL, &f, &r);
+    assert_true(fabs(r.yarn_spacing_m[0] - 1e-4) < 1e-12 &&
+                fabs(r.yarn_spacing_m[1] - r.yarn_width_m[0] / 0.95) < 1e-9);
+    fiber_set_release(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -211,6 +264,9 @@ int main(void)
         cmocka_unit_test(test_numbers_move_fibers_smoothly),
         cmocka_unit_test(test_flat_yarns_keep_the_angle_of_twist),
         cmocka_unit_test(test_contradictions_are_named),
+        cmocka_unit_test(test_too_many_fibers),
+        cmocka_unit_test(test_melange),
+        cmocka_unit_test(test_threads_per_cm),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
