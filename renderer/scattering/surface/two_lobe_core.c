@@ -38,18 +38,22 @@ float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const fl
     return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
 }
 
+float two_lobe_sample_theta(const struct scattering_state *s, const struct two_lobe_sampling_entry *e, int lobe,
+                            float theta_o, float u)
+{
+    bool upper_near = theta_o <= 0; /* the pole on the side of -th_o is the near one */
+    float hi = upper_near ? e->near[lobe] : e->far[lobe], lo = -(upper_near ? e->far[lobe] : e->near[lobe]);
+    float theta = -theta_o + (float)M_SQRT2 * s->beta[lobe] * erf_inverse(lo + u * (hi - lo));
+    return fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
+}
+
 void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                      float wi[3])
 {
     struct fiber_direction dout = fiber_direction_of(wo);
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);
     int k = u[0] < two_lobe_p_r(s, &e, weight_rgb) ? TWO_LOBE_R : TWO_LOBE_TT;
-
-    /* th_i about -th_o: the pole on the side of -th_o is the near one */
-    bool upper_near = dout.theta_rad <= 0;
-    float hi = upper_near ? e.near[k] : e.far[k], lo = -(upper_near ? e.far[k] : e.near[k]);
-    float theta = -dout.theta_rad + (float)M_SQRT2 * s->beta[k] * erf_inverse(lo + u[1] * (hi - lo));
-    theta = fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
+    float theta = two_lobe_sample_theta(s, &e, k, dout.theta_rad, u[1]);
     float sin_theta = sinf(theta), cos_theta = fmaxf(cosf(theta), 0);
 
     float delta = k == TWO_LOBE_R ? (float)(2 * M_PI) * u[2] : von_mises_sample(&s->azimuth, u[2]);

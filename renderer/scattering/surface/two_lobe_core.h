@@ -1,5 +1,5 @@
-/* What two_lobe.v1, two_lobe_balanced.v1 and two_lobe_diffuse.v1 share: state, evaluation with scores, sampling.
- * Included by those files only.
+/* What two_lobe.v1, two_lobe_balanced.v1, two_lobe_diffuse.v1 and textile.v1 share: state, evaluation with scores,
+ * sampling. Included by those files only.
  *
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
@@ -211,6 +211,9 @@ static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool bal
     return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
 }
 
+/* th_i from the normal density about -th_o cut to +-pi/2. */
+float two_lobe_sample_theta(const struct scattering_state *s, const struct two_lobe_sampling_entry *e, int lobe,
+                            float theta_o, float u);
 /* Shared by both models as they are. */
 void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                      float wi[3]);

@@ -272,7 +272,8 @@ static void nothing_is_nan(void **state)
 static void reciprocal_models_are(void **state)
 {
     (void)state;
-    static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1", "kajiya_kay.v1", "marschner.v1"};
+    static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1", "kajiya_kay.v1", "marschner.v1",
+                                     "textile.v1"};
     for (size_t k = 0; k < sizeof id / sizeof id[0]; k++) {
         const struct scattering_model *m = scattering_find(id[k]);
         struct rng r;
@@ -326,10 +327,39 @@ static void diffuse_share_in_closed_form(void **unused)
     }
 }
 
+/* The energy of R at C_R and C_TT near 0 is rho alone: near th = 0, for a narrow lobe, the mean over azimuth of
+ * (1 - cos(ph/2))^5 under N. Both means are integrals over half an azimuth, made here by quadrature. */
+static void textile_rise_in_closed_form(void **unused)
+{
+    (void)unused;
+    const struct scattering_model *m = scattering_find("textile.v1");
+    enum { N_THETA = 4000, N_PHI = 200 };
+    for (int k = 0; k < 2; k++) {
+        double s = k == 0 ? 0.02 : 0.98, want = 0, got = 0, c_r = 0.001;
+        const double param[11] = {c_r, c_r, c_r, 0.001, 0.001, 0.001, 1 * RAD_PER_DEG, 0.3, 0.4, 0.3, s};
+        struct scattering_state *state = prepare(m, param);
+        for (int j = 0; j < N_PHI; j++) {
+            double phi = 2 * M_PI * (j + 0.5) / N_PHI - M_PI, c = cos(phi / 2);
+            want += ((1 - s) / (2 * M_PI) + s * c / 4) * pow(1 - c, 5) * 2 * M_PI / N_PHI;
+            for (int i = 0; i < N_THETA; i++) {
+                double theta = 0.2 * ((i + 0.5) / N_THETA - 0.5);
+                float wi[3] = {0, 1, 0}, rgb[3];
+                float wo[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
+                m->eval(state, wi, wo, rgb, NULL);
+                got += (double)rgb[0] * cos(theta) * cos(theta) * 0.2 / N_THETA * 2 * M_PI / N_PHI;
+            }
+        }
+        m->release(state);
+        /* TT and D return at most C_TT = 0.001 */
+        assert_true(fabs(got - (c_r + (1 - c_r) * want) - 5e-4) < 5e-4);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(golden_values),
+        cmocka_unit_test(textile_rise_in_closed_form),
         cmocka_unit_test(diffuse_share_in_closed_form),
         cmocka_unit_test(normaliser_against_quadrature),
         cmocka_unit_test(bessel_values),

@@ -1,0 +1,135 @@
+#include "renderer/scattering/surface/lobe_balance.h"
+
+#include <string.h>
+
+enum { N = LOBE_BALANCE_N };
+
+double lobe_balance_angle_rad(int i) { return i * M_PI_2 / (N - 1); }
+
+void lobe_balance_init(struct lobe_balance *b)
+{
+    const double h = M_PI_2 / (N - 1);
+    for (int i = 0; i < N; i++) {
+        double c = cos(i * h);
+        b->weight[i] = c * c * h * (i == 0 ? 0.5 : 1); /* the weight of the pole is 0 */
+    }
+}
+
+/* Light at t leaves about -t: at u with the difference angle (t - u) / 2, or folded (t + u) / 2, the other way round
+ * than the distance in g. */
+void lobe_balance_fill_kernel(struct lobe_balance *b, double beta, double constant, double slope)
+{
+    const double h = M_PI_2 / (N - 1);
+    double g[2 * N], d_g[2 * N]; /* by distance in nodes */
+    for (int i = 0; i < 2 * N; i++) {
+        double z = i * h / beta;
+        g[i] = exp(-0.5 * z * z) / (sqrt(2 * M_PI) * beta);
+        d_g[i] = g[i] * (z * z - 1) / beta;
+    }
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            int near = abs(i - j), far = i + j;
+            double k_near = constant + slope * b->share[far], k_far = constant + slope * b->share[near];
+            b->kernel[i][j] = g[near] * k_near + g[far] * k_far;
+            b->d_kernel[i][j] = d_g[near] * k_near + d_g[far] * k_far;
+        }
+}
+
+/* y_i = sum of m_ij weight_j x_j, column by column so that it vectorises. */
+void lobe_balance_multiply(const struct lobe_balance *b, double (*m)[N], const double *x, double *y)
+{
+    memset(y, 0, N * sizeof *y);
+    for (int j = 0; j < N; j++) {
+        double wx = b->weight[j] * x[j];
+        for (int i = 0; i < N; i++) y[i] += m[j][i] * wx;
+    }
+}
+
+/* The positive x with x_i (K x)_i = want_i. */
+void lobe_balance_solve(struct lobe_balance *b, double *x)
+{
+    for (int i = 0; i < N; i++) x[i] = 1;
+    for (int iteration = 0; iteration < 200; iteration++) {
+        lobe_balance_multiply(b, b->kernel, x, b->work);
+        double worst = 0;
+        for (int i = 0; i < N; i++) {
+            worst = fmax(worst, fabs(x[i] * b->work[i] / b->want[i] - 1));
+            x[i] = sqrt(x[i] * b->want[i] / b->work[i]);
+        }
+        if (worst < 1e-9) break;
+    }
+}
+
+/* d ln x of the equation above: (I + P) d = source, P = diag(x / want) K diag(x), whose rows sum to 1; half steps
+ * converge. */
+void lobe_balance_solve_derivative(struct lobe_balance *b, const double *x, double *d)
+{
+    double xd[N];
+    for (int i = 0; i < N; i++) d[i] = 0.5 * b->source[i];
+    for (int iteration = 0; iteration < 200; iteration++) {
+        for (int i = 0; i < N; i++) xd[i] = x[i] * d[i];
+        lobe_balance_multiply(b, b->kernel, xd, b->work);
+        double worst = 0;
+        for (int i = 0; i < N; i++) {
+            double residual = d[i] + x[i] / b->want[i] * b->work[i] - b->source[i];
+            worst = fmax(worst, fabs(residual));
+            d[i] -= 0.5 * residual;
+        }
+        if (worst < 1e-7) break;
+    }
+}
+
+/* source = -x (dK x) / want: the kernel's own width. */
+void lobe_balance_source_of_kernel(struct lobe_balance *b, const double *x)
+{
+    lobe_balance_multiply(b, b->d_kernel, x, b->source);
+    for (int i = 0; i < N; i++) b->source[i] *= -x[i] / b->want[i];
+}
+
+void lobe_balance_r(struct lobe_balance *b, double beta, double *a, double *d_ln_a)
+{
+    for (int i = 0; i < N; i++) b->want[i] = 1;
+    lobe_balance_fill_kernel(b, beta, 1, 0);
+    lobe_balance_solve(b, a);
+    lobe_balance_source_of_kernel(b, a);
+    lobe_balance_solve_derivative(b, a, d_ln_a);
+}
+
+void lobe_balance_share(struct lobe_balance *b, double beta, const double *a, const double *d_ln_a, double *rho,
+                        double *d_rho)
+{
+    double da[N], ka[N];
+    lobe_balance_fill_kernel(b, beta, 0, 1);
+    lobe_balance_multiply(b, b->kernel, a, ka);
+    for (int i = 0; i < N; i++) {
+        rho[i] = a[i] * ka[i];
+        d_rho[i] = rho[i] * d_ln_a[i];
+        da[i] = a[i] * d_ln_a[i];
+    }
+    lobe_balance_multiply(b, b->kernel, da, b->work);
+    lobe_balance_multiply(b, b->d_kernel, a, ka);
+    for (int i = 0; i < N; i++) d_rho[i] += a[i] * (b->work[i] + ka[i]);
+}
+
+/* f at table entry i of twice as many: cubic through four nodes, f even about the first. */
+double lobe_balance_at_entry(const double *f, int i)
+{
+    int j = i / 2;
+    if (i % 2 == 0) return f[j];
+    int k = j > N - 3 ? N - 3 : j; /* one-sided at the pole */
+    double before = f[k > 0 ? k - 1 : 1];
+    return j == k ? (9 * (f[k] + f[k + 1]) - before - f[k + 2]) / 16
+                  : (before - 5 * f[k] + 15 * f[k + 1] + 5 * f[k + 2]) / 16;
+}
+
+/* The tables are read by straight lines, which lie above a convex function, on the average by step^2 f'' / 12: taken
+ * off beforehand, as energy would grow by it near the poles of narrow lobes. */
+void lobe_balance_level_lines(struct scattering_state *s, int lobe)
+{
+    float before = s->normal[1].value[lobe]; /* even */
+    for (int i = 0; i < TWO_LOBE_N_TABLE; i++) {
+        float here = s->normal[i].value[lobe], bend = before - 2 * here + s->normal[i + 1].value[lobe];
+        before = here;
+        s->normal[i].value[lobe] = here - bend / 12;
+    }
+}

@@ -1,0 +1,48 @@
+/* Balancing of longitudinal lobes: the symmetric scales a(th) and b(th) that make a lobe g(th_o; -th_i, beta) reciprocal
+ * and lossless from both sides. two_lobe_balanced.c states the equations. Shared by two_lobe_balanced.v1 and textile.v1.
+ *
+ * Functions of an angle are tabulated at LOBE_BALANCE_N equidistant nodes over [0, pi/2]; all are even. Double precision.
+ */
+#ifndef SELVEDGE_RENDERER_LOBE_BALANCE_H
+#define SELVEDGE_RENDERER_LOBE_BALANCE_H
+
+#include "renderer/scattering/surface/two_lobe_core.h"
+
+enum { LOBE_BALANCE_N = TWO_LOBE_N_TABLE / 2 + 1 };
+
+struct lobe_balance {
+    double kernel[LOBE_BALANCE_N][LOBE_BALANCE_N];   /* g (constant + slope k), folded to u >= 0: symmetric */
+    double d_kernel[LOBE_BALANCE_N][LOBE_BALANCE_N]; /* by beta */
+    double weight[LOBE_BALANCE_N];                   /* cos^2 u du */
+    double share[2 * LOBE_BALANCE_N];                /* k of half an angle of so many nodes; filled in by the caller */
+    double want[LOBE_BALANCE_N], work[LOBE_BALANCE_N], source[LOBE_BALANCE_N];
+};
+
+/* Fills in the weights. */
+void lobe_balance_init(struct lobe_balance *b);
+/* Angle of node i, or of the distance of so many nodes. */
+double lobe_balance_angle_rad(int i);
+/* kernel = g(constant + slope share) for a lobe of width beta (rad), and its derivative by beta. */
+void lobe_balance_fill_kernel(struct lobe_balance *b, double beta, double constant, double slope);
+/* y_i = sum over j of m_ij weight_j x_j. */
+void lobe_balance_multiply(const struct lobe_balance *b, double (*m)[LOBE_BALANCE_N], const double *x, double *y);
+/* Finds the positive x with x_i (kernel x)_i = want_i. */
+void lobe_balance_solve(struct lobe_balance *b, double *x);
+/* Derivative of ln x from `source`, the derivative of ln want less x (d_kernel x) / want. */
+void lobe_balance_solve_derivative(struct lobe_balance *b, const double *x, double *d);
+/* source = -x (d_kernel x) / want: the kernel changes and want does not. */
+void lobe_balance_source_of_kernel(struct lobe_balance *b, const double *x);
+
+/* Solves for a, the scale of R: want = 1, no share. d_ln_a: by beta. */
+void lobe_balance_r(struct lobe_balance *b, double beta, double *a, double *d_ln_a);
+/* rho = a (g share) a: what the share sends into R of the light at each node. d_rho: by beta. Leaves the kernel g share.
+ */
+void lobe_balance_share(struct lobe_balance *b, double beta, const double *a, const double *d_ln_a, double *rho,
+                        double *d_rho);
+
+/* The value at entry i of a table of TWO_LOBE_N_TABLE + 1 entries. */
+double lobe_balance_at_entry(const double *f, int i);
+/* Corrects the table of a lobe's scale for linear interpolation, which lies above a convex function. */
+void lobe_balance_level_lines(struct scattering_state *s, int lobe);
+
+#endif

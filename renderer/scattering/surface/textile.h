@@ -1,0 +1,56 @@
+/* textile.v1: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside.
+ * Reciprocal; lossless from both sides where C_TT = 1.
+ *
+ *     d      = (th_i - th_o) / 2,  ph = ph_o - ph_i                        difference angle and relative azimuth
+ *     N(ph)  = (1 - s) / (2 pi) + s cos(ph / 2) / 4                        azimuth of R: uniform, or of a smooth cylinder
+ *     k      = (1 - cos d cos(ph / 2))^5                                   Schlick's rise at the half angle of both
+ *     K(d)   = integral of N k dph                                         a polynomial in cos d
+ *     R  = a(th_i) a(th_o) g(th_o; -th_i, beta_R) N(ph) (C_R + (1 - C_R) k)
+ *     TT = b(th_i) b(th_o) g(th_o; -th_i, beta_TT) (1 - K(d)) f(ph_o; ph_i + pi, gamma_TT)
+ *     D  = q(th_i) q(th_o) / Z,  q = 1 - rho
+ *     S  = R + C_TT (1 - C_R) ((1 - w) TT + w D)
+ *
+ * a, b and rho solve the equations of two_lobe_balanced.c with K in place of its k; Z = 2 pi times the integral of
+ * q cos^2 th. R takes C_R + (1 - C_R) rho of the light at any angle, TT and D each return what is left. cos d cos(ph/2)
+ * is the cosine of the half angle between wi and wo where th_o = -th_i: N for a smooth cylinder and the half angle are
+ * those of Marschner et al. 2003, "Light Scattering from Human Hair Fibers", section 5.
+ */
+#ifndef SELVEDGE_RENDERER_TEXTILE_H
+#define SELVEDGE_RENDERER_TEXTILE_H
+
+#include "renderer/scattering/surface/two_lobe_core.h"
+
+enum {
+    TEXTILE_N_PARAM = surface_textile_n_param,
+    TEXTILE_P_W = TWO_LOBE_N_PARAM, /* the parameters of two_lobe.v1 come first */
+    TEXTILE_P_S
+};
+enum { TEXTILE_DEGREE = 5 };
+
+struct textile_entry { /* by |th| */
+    float q;           /* 1 - rho */
+    float d_q[2];      /* d ln q by beta_R and by s, each with half of d ln (1 / Z) */
+    float cross_s;     /* d ln b / d s */
+};
+
+struct textile_state {
+    struct scattering_state lobes; /* scales, sampling tables and TT's azimuth; cross: d ln b / d beta_R */
+    float w, s;
+    float share[TEXTILE_DEGREE + 1],
+        d_share[TEXTILE_DEGREE + 1]; /* coefficients of K and of dK / ds in powers of 1 - cos d */
+    float inv_z;
+    struct textile_entry entry[TWO_LOBE_N_TABLE + 1];
+};
+
+/* Fills in everything that needs the balanced scales. lobes, w and s are set. STATUS_NO_MEMORY. */
+status textile_balance(struct textile_state *t, const double *param, struct error *err);
+
+/* K or dK / ds from its coefficients. */
+static inline float textile_polynomial(const float c[TEXTILE_DEGREE + 1], float cos_d)
+{
+    float sum = c[TEXTILE_DEGREE];
+    for (int i = TEXTILE_DEGREE - 1; i >= 0; i--) sum = sum * (1 - cos_d) + c[i];
+    return sum;
+}
+
+#endif
