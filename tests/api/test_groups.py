@@ -43,6 +43,7 @@ def test_the_result_names_parameters_by_group(finished):
     assert of["warp.C_R.r"]["value"] != of["weft.C_R.r"]["value"]
     result = state["result"]
     assert len(result["correlation"]) == 18
+    assert result["geometry"]["groups"] == [{"name": "weft", "n_fiber": 16}, {"name": "warp", "n_fiber": 8}]
     checked = [p["name"] for p in result["certificate"]["parameters"]]
     assert "warp.C_R.r" in checked and "weft.C_R.r" in checked and "warp.beta_R" not in checked
     assert result["certificate"]["worst_rel_error"] < 0.01

@@ -61,6 +61,19 @@ static json_t *options_json(const struct reconstruct_option *o)
     return json;
 }
 
+/* The named groups of fibers; null when the cloth has one set of parameters. */
+static json_t *groups_json(const struct pipeline_context *c)
+{
+    size_t n_fiber[FIBER_MAX_GROUP] = {0};
+    if (c->doc->n_group < 2) return json_null();
+    json_t *list = json_array();
+    for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
+    for (size_t g = 0; g < c->doc->n_group; g++)
+        json_array_append_new(list,
+                              json_pack("{s:s, s:o}", "name", c->doc->group[g], "n_fiber", json_count(n_fiber[g])));
+    return list;
+}
+
 json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -75,6 +88,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     double radius = 0.0;
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
     json_object_set_new(json, "mean_radius_um", json_number(radius * um));
+    json_object_set_new(json, "groups", groups_json(c));
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
     const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */
     if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, number, &c->cloth));
