@@ -90,7 +90,7 @@ export class JobCharts {
       return { group, box: part.box, chart: new CurveChart(part.node, part.legend, labels, colours, { digits: 4 }) };
     });
     const sets = [...new Set(this.parameterCharts.map((c) => c.group.set))];
-    this.parameterCard.replaceChildren(...sets.flatMap((set) => [set === "" ? "" : el("h3", {}, set),
+    this.parameterCard.replaceChildren(...sets.flatMap((set) => [sets.length > 1 ? el("h3", {}, set || "cloth") : "",
       el("div", { class: "charts" }, this.parameterCharts.filter((c) => c.group.set === set).map((c) => c.box))]));
     this.charts = [this.objective, this.rms, ...this.parameterCharts.map((c) => c.chart)];
   }

@@ -12,7 +12,7 @@ const ownName = (p) => (p.set ? p.name.slice(p.set.length + 1) : p.name);
 export function parameterGroups(parameters) {
   const groups = [];
   parameters.forEach((p, i) => {
-    const [symbol, channel] = ownName(p).split("."), set = p.set ?? "";
+    const [, symbol, channel] = /^(.+?)(?:\.([rgb]))?$/.exec(ownName(p)), set = p.set ?? "";
     let group = groups.find((g) => g.symbol === symbol && g.set === set);
     if (!group) groups.push(group = { set, symbol, unit: p.unit ?? "", flat: [] });
     group.flat.push({ i, name: ownName(p), channel: channel in CHANNEL ? CHANNEL[channel] : -1 });
