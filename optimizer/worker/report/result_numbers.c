@@ -3,10 +3,13 @@
 
 #include <math.h>
 
-static const char *at_bound(const struct fit_result *r, const struct fit_parameter *range, size_t p)
+/* The bound at which number k ended, "lower" or "upper"; NULL for none. */
+static const char *at_bound(const struct pipeline_context *c, const struct pipeline_model *m, size_t k)
 {
-    if (!r->uncertainty.at_bound[p]) return NULL;
-    return r->param[p] - range->lower < range->upper - r->param[p] ? "lower" : "upper";
+    const struct uncertainty *u = &m->cloth.joint.uncertainty;
+    const struct fit_parameter *range = &c->number.range[k];
+    if (m->cloth.took_screened || !u->at_bound[u->n_param - c->number.n + k]) return NULL;
+    return m->cloth.number[k] - range->lower < range->upper - m->cloth.number[k] ? "lower" : "upper";
 }
 
 /* Correlations of unknown p with the scattering parameters (the first n unknowns), or with the numbers. */
@@ -23,8 +26,8 @@ static json_t *number_json(const struct pipeline_context *c, const struct pipeli
     const size_t n = r->uncertainty.n_param - c->number.n, p = n + k;
     json_t *json =
         json_pack("{s:s, s:s, s:o, s:o, s:f, s:f, s:f, s:s?, s:b}", "name", c->number.info[k].name, "unit", item->unit,
-                  "value", json_number(r->param[p]), "standard_error", json_number(r->uncertainty.se_param[p]), "lower",
-                  range->lower, "upper", range->upper, "start", range->start, "at_bound", at_bound(r, range, p),
+                  "value", json_number(m->cloth.number[k]), "standard_error", json_number(r->uncertainty.se_param[p]),
+                  "lower", range->lower, "upper", range->upper, "start", range->start, "at_bound", at_bound(c, m, k),
                   "determined", (int)r->uncertainty.determined[p]);
     json_object_set_new(
         json, "prior",
@@ -61,9 +64,9 @@ void result_numbers_print(const struct pipeline_context *c, const struct pipelin
     const struct fit_result *r = &m->cloth.joint;
     for (size_t k = 0; k < c->number.n; k++) {
         const size_t p = r->uncertainty.n_param - c->number.n + k;
-        const char *bound = at_bound(r, &c->number.range[k], p);
+        const char *bound = at_bound(c, m, k);
         fprintf(out, "%s %-28s %10.4g +- %-8.2g %s%s%s%s\n", k == 0 ? "cloth   " : "        ", c->number.info[k].name,
-                r->param[p], r->uncertainty.se_param[p], c->number.item[k].unit,
+                m->cloth.number[k], r->uncertainty.se_param[p], c->number.item[k].unit,
                 r->uncertainty.determined[p] ? "" : " these measurements do not tell it",
                 bound != NULL ? " at its bound: " : "", bound != NULL ? bound : "");
     }

@@ -231,7 +231,7 @@ static void log_cloth(const struct pipeline_context *c, const struct pipeline_mo
     const struct fit_result *r = &m->cloth.joint;
     size_t n = m->sets.info.n_param;
     for (size_t k = 0; k < c->number.n; k++)
-        log_info(c->log, "cloth: %s %.4g +- %.2g%s%s", c->number.info[k].name, r->param[n + k],
+        log_info(c->log, "cloth: %s %.4g +- %.2g%s%s", c->number.info[k].name, m->cloth.number[k],
                  r->uncertainty.se_param[n + k], r->uncertainty.determined[n + k] ? "" : ", not determined",
                  r->uncertainty.at_bound[n + k] ? ", at its bound" : "");
 }
@@ -254,12 +254,27 @@ status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipel
     return STATUS_OK;
 }
 
+/* Warns where the cloth of the fitted numbers cannot be and another one takes its place. */
+static void warn_of_contradiction(struct pipeline_context *c, const struct pipeline_model *m)
+{
+    for (size_t k = 0; k < c->number.n; k++) {
+        double built = c->number.shown[c->number.item[k].index];
+        if (built == m->cloth.number[k]) continue;
+        worker_status_warn(c->status,
+                           "the fitted numbers of the cloth contradict each other: '%s' came to %.4g, and the nearest "
+                           "cloth that can be made, with %.4g, was rendered; narrow the bounds",
+                           c->number.info[k].name, m->cloth.number[k], built);
+        return;
+    }
+}
+
 status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct error *err)
 {
     const struct pipeline_model *m = &c->model[i_model];
     if (c->number.n == 0 || c->number.i_shown == i_model + 1) return STATUS_OK;
     status s = make_fibers(c, m->cloth.number, c->number.shown, &c->fiber, &c->cloth, err);
     if (s == STATUS_OK) s = pipeline_make_scene(c, err);
+    if (s == STATUS_OK) warn_of_contradiction(c, m);
     c->number.i_shown = s == STATUS_OK ? i_model + 1 : 0;
     return s;
 }

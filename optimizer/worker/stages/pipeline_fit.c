@@ -140,6 +140,11 @@ static void warn_numbers(struct pipeline_context *c, const struct pipeline_model
         if (!u->determined[u->n_param - c->number.n + k])
             used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used > 0 ? ", " : "",
                                      c->number.info[k].name);
+    if (m->cloth.took_screened)
+        worker_status_warn(c->status,
+                           "the search over the cloth's numbers of %s ended worse than a cloth that was tried first, "
+                           "which was taken: allow more paths",
+                           m->appearance.id);
     if (used > 0)
         worker_status_warn(c->status, "these measurements do not tell, in the fit of %s: %s", m->appearance.id, names);
 }
