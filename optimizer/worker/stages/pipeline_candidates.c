@@ -56,17 +56,18 @@ static status make_misfit_field(const struct pipeline_context *c, const struct p
 /* Scores every candidate by its two estimates. */
 static status score_candidates(const struct pipeline_context *c, struct pipeline_model *m,
                                const struct observation_set *o, struct estimate *const replica[2],
-                               struct next_photograph_fit *fit, struct error *err)
+                               const struct next_photograph_fit *bare, struct error *err)
 {
     struct misfit_prediction misfit;
+    struct next_photograph_fit fit = *bare;
     struct misfit_field *field = malloc(sizeof *field);
     status s = field != NULL ? make_misfit_field(c, m, field, err)
                              : error_set(err, STATUS_NO_MEMORY, "cannot rank candidates: out of memory");
-    fit->misfit = &misfit;
+    fit.misfit = &misfit;
     for (size_t i = 0; i < o->n && s == STATUS_OK; i++) {
         m->candidate[i].i_candidate = i;
         misfit_field_predict(field, &o->item[i].configuration, &misfit);
-        next_photograph_score(fit, &replica[0][i], &replica[1][i], &m->candidate[i].score);
+        next_photograph_score(&fit, &replica[0][i], &replica[1][i], &m->candidate[i].score);
     }
     if (s == STATUS_OK)
         log_info(c->log, "misfit of %s: %.0f %% of its variance is smooth over directions, with a length of %.2f",
@@ -87,8 +88,8 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
     struct fit_layout layout;
     double wall_s;
     pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
-    struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty, option.photograph_gain_sd,
-                                      NULL};
+    const struct next_photograph_fit fit = {&layout, m->fit.unknown, &m->fit.unknown_uncertainty,
+                                            option.photograph_gain_sd, NULL};
     struct progress quiet = {.cancel = c->progress.cancel};
     status s = fit_layout_init(&layout, m->sets.info.param, m->parameter, m->sets.info.n_param, &option, err);
     if (s != STATUS_OK) return s;

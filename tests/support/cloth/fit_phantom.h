@@ -100,9 +100,9 @@ struct fit_score {
 struct fit_score fit_phantom_score(const struct fit_phantom *f, enum job_set set, const double *at, size_t n_kept,
                                    const double *param, size_t n_path);
 
-/* The relative RMS error of the means at param against those at the truth, which have no noise of photographs. The paths
- * are those of fit_phantom_score; means at param and at the truth are pooled from the same paths, so most of their noise
- * cancels, and the product of two replicas has no bias by what is left. */
+/* The relative RMS error of the means at param against those at the truth, which have no noise of photographs. The
+ * paths are those of fit_phantom_score; means at param and at the truth are pooled from the same paths, so most of
+ * their noise cancels, and the product of two replicas has no bias by what is left. */
 double fit_phantom_true_error(const struct fit_phantom *f, enum job_set set, size_t n_kept, const double *param,
                               size_t n_path);
 
