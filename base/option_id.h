@@ -34,6 +34,7 @@
 #define OPTION_GROUPS "groups"
 /* the described cloth */
 #define OPTION_YARNS "yarns"
+#define OPTION_CLOTH "described_cloth"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
 /* the measurements */

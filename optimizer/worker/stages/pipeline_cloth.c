@@ -54,7 +54,7 @@ status pipeline_cloth_inputs(struct pipeline_context *c, struct error *err)
     for (size_t i = 0; d != NULL && i < d->n_number; i++) {
         if (!d->number[i].fitted) continue;
         if (c->number.n == CLOTH_MAX_FITTED)
-            return error_set_field(err, STATUS_INVALID, "cloth", "at most %d numbers of a cloth can be fitted",
+            return error_set_field(err, STATUS_INVALID, OPTION_CLOTH, "at most %d numbers of a cloth can be fitted",
                                    CLOTH_MAX_FITTED);
         add_number(&c->number, &d->number[i], i);
     }
