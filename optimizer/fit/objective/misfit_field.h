@@ -6,8 +6,8 @@
  *
  * common to the three channels, in units of the objective (relative to a row's brightness). misfit_var is that of the
  * fit; the smooth share s and the length l are those of the largest likelihood of the fitted rows' residuals, whose own
- * noise is added on the diagonal. Where a row is a mean over all rotations of the cloth, directions are compared up to a
- * turn about the normal and a mirroring.
+ * noise is added on the diagonal. Where a row is a mean over all rotations of the cloth, directions are compared up to
+ * a turn about the normal and a mirroring.
  *
  * The field then tells what is still unknown of the misfit at another configuration: much far from all fitted rows,
  * little beside one. Source: Kennedy and O'Hagan 2001, Bayesian calibration of computer models, section 4.

@@ -47,8 +47,8 @@ struct uncertainty {
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param);
 
 /* Expected decrease of the weighted objective by a step that follows nothing but the noise of tracing,
- * tr((H + L)^-1 (B of tracing)). The noise of the parameters adds as much to the objective at the end of such a step. The
- * prior's unit is m->row_var. */
+ * tr((H + L)^-1 (B of tracing)). The noise of the parameters adds as much to the objective at the end of such a step.
+ * The prior's unit is m->row_var. */
 double uncertainty_noise_decrease(const struct linear_model *m, const struct coordinate *k, const bool *fixed);
 
 /* m: pooled at the result. fixed: n_param flags. */

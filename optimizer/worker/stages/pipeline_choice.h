@@ -1,5 +1,5 @@
-/* Which of a job's models is the best, and by what it was chosen. Held-out rows have no part in the choice, so their error
- * is that of rows that neither the fit nor the choice has seen. */
+/* Which of a job's models is the best, and by what it was chosen. Held-out rows have no part in the choice, so their
+ * error is that of rows that neither the fit nor the choice has seen. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CHOICE_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CHOICE_H
 
