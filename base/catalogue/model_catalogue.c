@@ -28,6 +28,13 @@ static const struct model_info catalogue[] = {
 #include "base/catalogue/models.def"
 };
 
+static const struct model_nesting nesting[] = {
+#define SURFACE_MODEL(...)
+#define VOLUME_MODEL(...)
+#define MODEL_CONTAINS(outer, inner, symbol, ...) {surface_##outer##_id, surface_##inner##_id, symbol, {__VA_ARGS__}},
+#include "base/catalogue/models.def"
+};
+
 const struct model_info *model_catalogue_at(size_t i)
 {
     return i < sizeof catalogue / sizeof *catalogue ? &catalogue[i] : NULL;
@@ -38,4 +45,9 @@ const struct model_info *model_catalogue_find(const char *id)
     for (size_t i = 0; i < sizeof catalogue / sizeof *catalogue; i++)
         if (strcmp(catalogue[i].id, id) == 0) return &catalogue[i];
     return NULL;
+}
+
+const struct model_nesting *model_catalogue_nesting(size_t i)
+{
+    return i < sizeof nesting / sizeof *nesting ? &nesting[i] : NULL;
 }

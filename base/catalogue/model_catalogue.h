@@ -30,6 +30,16 @@ const struct model_info *model_catalogue_at(size_t i);
 /* NULL when no model has that id. */
 const struct model_info *model_catalogue_find(const char *id);
 
+/* A model that contains another: where its parameter `symbol` goes to 0. */
+enum { MODEL_N_NESTED_START = 2 };
+struct model_nesting {
+    const char *outer, *inner;          /* ids */
+    const char *symbol;                 /* the parameter that outer has and inner has not */
+    double start[MODEL_N_NESTED_START]; /* its values, internal units, for fits that start from a result of inner */
+};
+
+/* The i-th, NULL behind the last. */
+const struct model_nesting *model_catalogue_nesting(size_t i);
 /* The rows as constants, for the implementations of models: a scattering_model or a phase_model begins with
  * SURFACE_MODEL_ROW(name) or VOLUME_MODEL_ROW(name). n_param of a volume model's row does not count the density
  * multiplier, which belongs to the volume and not to the phase function. */

@@ -124,6 +124,16 @@ def test_as_many_models_as_a_job_takes(tmp_path):
     assert (tmp_path / "log.txt").read_text().count("validation of ") == 8
 
 
+def test_a_model_that_contains_another_starts_from_its_result(tmp_path):
+    """Three starts: its own, and the result of the contained model with two values of the parameter that it lacks."""
+    run(tmp_path, models=["two_lobe.v1", "two_lobe_diffuse.v1"], path_budget=60000)
+    inner, outer = result(tmp_path)["models"]
+    found = [p["value"] for p in inner["parameters"]]
+    assert len(outer["starts"]) == 3 and inner["starts"] == [] and sum(s["kept"] for s in outer["starts"]) == 1
+    for start, w in zip(outer["starts"][1:], (0.02, 0.4)):
+        assert start["start"] == pytest.approx([*found, w], rel=1e-6)
+
+
 def test_a_gain_for_each_photograph(tmp_path):
     """The rows are the cloth's own radiances times known gains. The fit finds the gains, reports errors with and
     without them, and a bad row of weight 0 changes neither."""

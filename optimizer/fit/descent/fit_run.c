@@ -14,8 +14,8 @@ struct fit {
     const struct fit_option *option;
     struct fit_layout layout;
     struct estimate *buffer; /* what the renderer gave */
-    size_t i_start;
-    size_t n_step; /* steps of the starts before this one; the next two likewise */
+    size_t i_start, n_start; /* n_start: with the extra ones */
+    size_t n_step;           /* steps of the starts before this one; the next two likewise */
     uint64_t n_path;
     double wall_s;
     uint64_t path_budget; /* of one start; 0: the method's own */
@@ -70,8 +70,8 @@ static status report(void *context, const struct fit_step *step, struct error *e
     while (outer.n_configuration > 0 &&
            observation_is_contrast(&f->problem->observation->item[outer.n_configuration - 1]))
         outer.n_configuration--;
-    if (f->option->n_start > 1) {
-        snprintf(phase, sizeof phase, "start %zu of %zu: %.30s", f->i_start + 1, f->option->n_start, step->phase);
+    if (f->n_start > 1) {
+        snprintf(phase, sizeof phase, "start %zu of %zu: %.30s", f->i_start + 1, f->n_start, step->phase);
         outer.phase = phase;
     }
     outer.step += f->n_step;
@@ -87,7 +87,7 @@ static status report(void *context, const struct fit_step *step, struct error *e
 static void report_progress(void *context, double fraction)
 {
     const struct fit *f = context;
-    progress_report(f->problem->progress, ((double)f->i_start + fraction) / (double)f->option->n_start);
+    progress_report(f->problem->progress, ((double)f->i_start + fraction) / (double)f->n_start);
 }
 
 /* ---- back to the model's parameters ---- */
@@ -152,6 +152,29 @@ void fit_run_start(const struct fit_layout *l, size_t k, double *unknown)
     }
 }
 
+/* Writes the values of the unknowns at a point given in the model's parameters. */
+static void start_at(const struct fit_layout *l, const double *full, double *unknown)
+{
+    for (size_t u = 0; u < l->n_unknown; u++) unknown[u] = l->parameter[u].start;
+    for (size_t p = 0; p < l->n_full; p++) {
+        const struct fit_parameter *own = &l->parameter[l->owner[p]];
+        if (own->fixed || l->ratio[p] != 1.0) continue; /* a leader is its own owner, with the ratio 1 */
+        unknown[l->owner[p]] = fmin(fmax(full[p], own->lower), own->upper);
+    }
+}
+
+static void start_of(const struct fit *f, size_t k, double *unknown)
+{
+    const struct fit_layout *l = &f->layout;
+    size_t n_extra = f->option->n_extra_start;
+    if (k == 0)
+        for (size_t u = 0; u < l->n_unknown; u++) unknown[u] = l->parameter[u].start;
+    else if (k <= n_extra)
+        start_at(l, f->option->extra_start[k - 1], unknown);
+    else
+        fit_run_start(l, k - n_extra, unknown);
+}
+
 static status run_start(struct fit *f, const struct descent_method *method, size_t k, struct fit_start *start,
                         struct fit_result *result, struct error *err)
 {
@@ -166,8 +189,7 @@ static status run_start(struct fit *f, const struct descent_method *method, size
                                 .cancel = f->problem->progress != NULL ? f->problem->progress->cancel : NULL};
     struct fit_problem p = *f->problem;
     double unknown[N];
-    for (size_t u = 0; u < layout.n_unknown; u++) unknown[u] = layout.parameter[u].start;
-    if (k > 0) fit_run_start(&f->layout, k, unknown);
+    start_of(f, k, unknown);
     for (size_t u = 0; u < layout.n_unknown; u++) layout.parameter[u].start = unknown[u];
     fit_layout_full(&f->layout, unknown, start->from);
     f->i_start = k;
@@ -225,7 +247,7 @@ static status run_starts(struct fit *f, const struct descent_method *method, str
     struct fit_start start[FIT_MAX_START];
     status s = next != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot start a fit: out of memory");
     memset(start, 0, sizeof start);
-    for (size_t k = 0; k < f->option->n_start && s == STATUS_OK; k++) {
+    for (size_t k = 0; k < f->n_start && s == STATUS_OK; k++) {
         s = run_start(f, method, k, &start[k], next, err);
         if (s != STATUS_OK) break;
         double se = 0.0;
@@ -235,10 +257,10 @@ static status run_starts(struct fit *f, const struct descent_method *method, str
         *result = *next;
     }
     free(next);
-    if (s != STATUS_OK || f->option->n_start == 1) return s;
+    if (s != STATUS_OK || f->n_start == 1) return s;
     start[kept].kept = true;
     memcpy(result->start, start, sizeof start);
-    result->n_start = f->option->n_start;
+    result->n_start = f->n_start;
     result->n_step = f->n_step;
     result->n_path = f->n_path;
     result->wall_s = f->wall_s;
@@ -257,12 +279,13 @@ status fit_run(const struct descent_method *method, const struct fit_problem *pr
     f->option = option != NULL ? option : &none;
     memset(result, 0, sizeof *result);
     status s = fit_layout_init(&f->layout, problem->info, problem->parameter, problem->n_param, f->option, err);
-    if (s == STATUS_OK && (f->option->n_start < 1 || f->option->n_start > FIT_MAX_START))
+    f->n_start = f->option->n_start + f->option->n_extra_start;
+    if (s == STATUS_OK && (f->option->n_start < 1 || f->n_start > FIT_MAX_START))
         s = error_set_field(err, STATUS_INVALID, OPTION_STARTS, "cannot fit from %zu starts: allowed are 1 to %d",
                             f->option->n_start, FIT_MAX_START);
     if (s != STATUS_OK) goto out;
     size_t n = problem->estimator->n_configuration;
-    f->path_budget = problem->path_budget / f->option->n_start;
+    f->path_budget = problem->path_budget / f->n_start;
     f->buffer = calloc(n > 0 ? n : 1, sizeof *f->buffer);
     s = f->buffer != NULL ? run_starts(f, method, result, err)
                           : error_set(err, STATUS_NO_MEMORY, "cannot fit %zu observations: out of memory", n);

@@ -3,6 +3,7 @@
  *
  * Several starts: the first is the problem's own; the others are spread evenly (additive recurrence by the generalised
  * golden ratio) over the inner 80 % of the bounds in fit coordinates, or over two standard deviations of a prior.
+ * Extra starts of the option come after the problem's own and before the others.
  * Each takes its share of the path budget when one is given, and the method's default otherwise. A later start is kept
  * instead of an earlier one when its objective (with what the priors add) is lower by more than two standard errors of
  * the difference.

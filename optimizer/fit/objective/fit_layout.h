@@ -20,6 +20,7 @@
 #include "optimizer/fit/objective/nuisance.h"
 #include "renderer/transport/estimate/estimate.h"
 
+enum { FIT_MAX_EXTRA_START = 4 };
 /* One parameter of a fit, internal units. Bounds lie inside the model's. A fixed one keeps `start`. */
 struct fit_parameter {
     double lower, upper, start;
@@ -36,6 +37,9 @@ struct fit_option {
     double photograph_gain_sd;                                 /* of ln gain, one for each observation; 0: none */
     double stray_light_sd;                                     /* radiance; 0: none */
     size_t n_start;                                            /* 1 or more */
+    /* Starts besides those, in the model's parameters; fixed parameters keep their own. */
+    size_t n_extra_start;
+    double extra_start[FIT_MAX_EXTRA_START][FIT_MAX_PARAM];
 };
 
 struct fit_layout {

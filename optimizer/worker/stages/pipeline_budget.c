@@ -2,15 +2,16 @@
 #include "base/option_id.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/pipeline_nesting.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 /* Least number of paths that all starts of a model's fit take together. */
-static status least_budget(const struct pipeline_context *c, const struct pipeline_model *m, uint64_t *least,
-                           struct error *err)
+static status least_budget(const struct pipeline_context *c, size_t i_model, uint64_t *least, struct error *err)
 {
+    const struct pipeline_model *m = &c->model[i_model];
     const struct descent_method *method = descent_find(c->doc->method);
     struct fit_option option;
     struct fit_layout *layout = calloc(1, sizeof *layout);
@@ -22,7 +23,8 @@ static status least_budget(const struct pipeline_context *c, const struct pipeli
                                         .parameter = layout->parameter,
                                         .observation = &c->row,
                                         .max_iteration = c->doc->max_iteration};
-    *least = s == STATUS_OK && method != NULL ? method->least_budget(&problem) * option.n_start : 0;
+    size_t n_start = option.n_start + pipeline_n_nested_start(c, i_model);
+    *least = s == STATUS_OK && method != NULL ? method->least_budget(&problem) * n_start : 0;
     free(layout);
     return s;
 }
@@ -32,15 +34,15 @@ status pipeline_warn_budget(struct pipeline_context *c, struct error *err)
     for (size_t i = 0; i < c->n_model && c->doc->path_budget > 0; i++) {
         const struct pipeline_model *m = &c->model[i];
         uint64_t least;
-        status s = least_budget(c, m, &least, err);
+        status s = least_budget(c, i, &least, err);
         if (s != STATUS_OK) return s;
         if (least <= c->doc->path_budget) continue;
-        worker_status_warn(c->status,
-                           "%s: %" PRIu64
-                           " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
-                           " all the same: that is the least%s",
-                           job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method,
-                           c->fitted.n, least, m->option->n_start > 1 ? " for so many starts" : "");
+        worker_status_warn(
+            c->status,
+            "%s: %" PRIu64 " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
+            " all the same: that is the least%s",
+            job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method, c->fitted.n,
+            least, m->option->n_start + pipeline_n_nested_start(c, i) > 1 ? " for so many starts" : "");
     }
     return STATUS_OK;
 }

@@ -3,6 +3,7 @@
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/worker/stages/pipeline_cloth.h"
 #include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/pipeline_nesting.h"
 #include "optimizer/worker/stages/pipeline_radius.h"
 #include "optimizer/worker/stages/pipeline_trace.h"
 #include "optimizer/worker/work_file.h"
@@ -59,12 +60,14 @@ static status fit_parameters(struct fit_listener *l, const struct progress *prog
     struct pipeline_context *c = l->pipeline;
     struct pipeline_trace trace;
     struct fit_problem problem = problem_of(l, progress);
+    struct fit_option option = l->joint->option;
+    pipeline_add_nested_starts(c, l->i_model, &option);
     status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", l->i_model, &c->row, err);
     if (s == STATUS_OK) {
         struct estimator estimator = estimate_journal_estimator(trace.journal);
         l->journal = trace.journal;
         problem.estimator = &estimator;
-        s = fit_run(descent_find(c->doc->method), &problem, &l->joint->option, &c->model[l->i_model].fit, err);
+        s = fit_run(descent_find(c->doc->method), &problem, &option, &c->model[l->i_model].fit, err);
     }
     if (s == STATUS_OK && estimate_journal_n_replayed(trace.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));

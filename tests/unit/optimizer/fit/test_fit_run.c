@@ -173,6 +173,27 @@ static void test_priors_of_tied_channels(void **state)
     assert_true(fabs(precision[2] / precision[0] - (w[0] + w[1]) / w[0]) < 1e-6);
 }
 
+/* An extra start at the truth is a start beside the fit's own, keeps fixed
+ * parameters, and is kept when it ends lower. */
+static void test_extra_starts(void **state)
+{
+    (void)state;
+    struct fit_fixture x;
+    struct fit_result r;
+    fit_fixture_init(&x, fit_fixture_mid_range, 9, true, 0.0);
+    x.parameter[2].fixed = true;
+    x.parameter[2].start = x.truth[2];
+    x.option.n_extra_start = 1;
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) x.option.extra_start[0][p] = p == 2 ? 2.0 * x.truth[p] : x.truth[p];
+    fit_fixture_run(&x, &r);
+    assert_int_equal(r.n_start, 2);
+    assert_true(r.start[0].from[0] == x.parameter[0].start);
+    for (size_t p = 0; p < FAKE_N_PARAM; p++) assert_true(fabs(r.start[1].from[p] / x.truth[p] - 1.0) < 1e-12);
+    assert_true(r.start[1].objective <= r.start[0].objective + 1e-9);
+    x.option.n_start = FIT_MAX_START;
+    assert_int_equal(fit_run(descent_find(method_gauss_newton.id), &x.problem, &x.option, &r, NULL), STATUS_INVALID);
+    fit_fixture_release(&x);
+}
 /* Starts lie inside the bounds, differ, and the best is kept; all are listed. */
 static void test_starts(void **state)
 {
@@ -299,6 +320,7 @@ int main(void)
         cmocka_unit_test(test_priors),
         cmocka_unit_test(test_priors_of_tied_channels),
         cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_extra_starts),
         cmocka_unit_test(test_resume),
         cmocka_unit_test(test_too_many_unknowns),
     };

@@ -133,6 +133,29 @@ static void units_convert(void **unused)
     assert_string_equal(param_unit_name(PARAM_UNIT_NONE), "");
 }
 
+/* The outer model has the parameters of the inner one and one more, whose
+ * starts lie in its range. */
+static void nestings_are_sound(void **unused)
+{
+    (void)unused;
+    for (size_t i = 0; model_catalogue_nesting(i) != NULL; i++) {
+        const struct model_nesting *n = model_catalogue_nesting(i);
+        const struct model_info *outer = model_catalogue_find(n->outer), *inner = model_catalogue_find(n->inner);
+        assert_int_equal(outer->n_param, inner->n_param + 1);
+        for (size_t p = 0; p < inner->n_param; p++) {
+            int k = param_index(outer->param, outer->n_param, inner->param[p].name);
+            assert_true(k >= 0);
+            assert_true(outer->param[k].lower == inner->param[p].lower &&
+                        outer->param[k].upper == inner->param[p].upper);
+        }
+        int own = param_index(outer->param, outer->n_param, n->symbol);
+        assert_true(own >= 0 && param_index(inner->param, inner->n_param, n->symbol) < 0);
+        for (size_t k = 0; k < MODEL_N_NESTED_START; k++)
+            assert_true(n->start[k] >= outer->param[own].lower && n->start[k] <= outer->param[own].upper);
+    }
+    assert_non_null(model_catalogue_nesting(0));
+}
+
 static void sets_name_their_parameters(void **state)
 {
     (void)state;
@@ -166,6 +189,7 @@ int main(void)
         cmocka_unit_test(models_are_sound),       cmocka_unit_test(registries_follow_the_catalogue),
         cmocka_unit_test(methods_are_sound),      cmocka_unit_test(units_convert),
         cmocka_unit_test(stop_reasons_are_sound), cmocka_unit_test(sets_name_their_parameters),
+        cmocka_unit_test(nestings_are_sound),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,53 @@
+#include "optimizer/worker/stages/pipeline_nesting.h"
+
+#include <string.h>
+
+/* The model of the job that n names as the inner one of model i_model, if it is listed before that; otherwise NULL. */
+static const struct pipeline_model *inner_model(const struct pipeline_context *c, size_t i_model,
+                                                const struct model_nesting *n)
+{
+    if (strcmp(n->outer, c->model[i_model].appearance.id) != 0) return NULL;
+    for (size_t i = 0; i < i_model; i++)
+        if (strcmp(n->inner, c->model[i].appearance.id) == 0) return &c->model[i];
+    return NULL;
+}
+
+/* Writes the parameters of `outer` that equal the result of `inner`. The parameter that only outer has, in every group
+ * of fibers, gets `value`. */
+static void nested_start(const struct pipeline_model *outer, const struct pipeline_model *inner, double value,
+                         double *start)
+{
+    const struct model_info *from = &inner->sets.info, *to = &outer->sets.info;
+    for (size_t p = 0; p < to->n_param; p++) {
+        start[p] = value;
+        for (size_t q = 0; q < from->n_param; q++)
+            if (strcmp(to->param[p].name, from->param[q].name) == 0) start[p] = inner->fit.param[q];
+    }
+}
+
+static size_t room_for_starts(const struct pipeline_context *c, size_t i_model)
+{
+    size_t room = FIT_MAX_START - c->model[i_model].option->n_start;
+    return room < FIT_MAX_EXTRA_START ? room : FIT_MAX_EXTRA_START;
+}
+
+size_t pipeline_n_nested_start(const struct pipeline_context *c, size_t i_model)
+{
+    const struct model_nesting *n;
+    size_t n_start = 0, room = room_for_starts(c, i_model);
+    if (c->number.n > 0) return 0;
+    for (size_t i = 0; (n = model_catalogue_nesting(i)) != NULL; i++)
+        if (inner_model(c, i_model, n) != NULL) n_start += MODEL_N_NESTED_START;
+    return n_start < room ? n_start : room;
+}
+
+void pipeline_add_nested_starts(const struct pipeline_context *c, size_t i_model, struct fit_option *o)
+{
+    const struct model_nesting *n;
+    size_t room = room_for_starts(c, i_model);
+    for (size_t i = 0; (n = model_catalogue_nesting(i)) != NULL; i++) {
+        const struct pipeline_model *inner = inner_model(c, i_model, n);
+        for (size_t k = 0; k < MODEL_N_NESTED_START && inner != NULL && o->n_extra_start < room; k++)
+            nested_start(&c->model[i_model], inner, n->start[k], o->extra_start[o->n_extra_start++]);
+    }
+}
