@@ -35,6 +35,7 @@
 /* the described cloth */
 #define OPTION_YARNS "yarns"
 #define OPTION_CLOTH "described_cloth"
+#define OPTION_CLOTH_TEXTURE "cloth_texture"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
 /* the measurements */

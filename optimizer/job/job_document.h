@@ -83,8 +83,10 @@ struct job_document {
     double voxel_um;   /* NaN: chosen from the radius */
     /* cloth, as given; `cloth` is the checked description, NULL without the section */
     char cloth_weave[16];
-    size_t cloth_tile_yarn[2];      /* of enum cloth_direction; 0: not given */
-    double cloth_threads_per_cm[2]; /* NaN: not given */
+    char cloth_texture[JOB_MAX_NAME_BYTES]; /* photograph that shows the weave; "" when none is given */
+    bool cloth_draft_from_texture;          /* neither weave nor draft is given */
+    size_t cloth_tile_yarn[2];              /* of enum cloth_direction; 0: not given */
+    double cloth_threads_per_cm[2];         /* NaN: not given */
     uint64_t cloth_seed;
     size_t n_cloth_yarn;
     struct job_cloth_yarn *cloth_yarn;

@@ -138,10 +138,13 @@ static void take_kinds(const struct job_document *doc, const json_t *section, st
 static status read_weave(const struct option_value *v, struct cloth_description *d, struct error *err)
 {
     const json_t *draft = json_object_get(v->value, "draft");
-    if ((json_object_get(v->value, "weave") != NULL) == (draft != NULL))
+    bool named = json_object_get(v->value, "weave") != NULL, shown = v->doc->cloth_texture[0] != '\0';
+    if (named == (draft != NULL) && (named || !shown))
         return error_set_field(err, STATUS_INVALID, "cloth.weave",
-                               "a described cloth takes either 'cloth.weave' or 'cloth.draft'");
-    status st = cloth_description_init(d, draft != NULL ? "plain" : v->doc->cloth_weave, err);
+                               "a described cloth takes either 'cloth.weave' or 'cloth.draft', or neither with a "
+                               "photograph in 'cloth.texture'");
+    v->doc->cloth_draft_from_texture = !named && draft == NULL; /* until it is read, the weave stands as plain */
+    status st = cloth_description_init(d, named ? v->doc->cloth_weave : "plain", err);
     return st == STATUS_OK && draft != NULL ? read_draft(draft, d, err) : st;
 }
 
@@ -156,7 +159,8 @@ static status read_cloth(const struct option_value *v, struct cloth_description 
                                "a velvet has at least two kinds of yarn: the ground, and last the pile");
     d->seed = doc->cloth_seed;
     for (int a = CLOTH_WEFT; a <= CLOTH_WARP && st == STATUS_OK; a++) {
-        d->n_yarn[a] = doc->cloth_tile_yarn[a];
+        /* the tile of a draft that is not known yet is checked when it is */
+        d->n_yarn[a] = doc->cloth_draft_from_texture ? 0 : doc->cloth_tile_yarn[a];
         if (!isnan(doc->cloth_threads_per_cm[a])) d->threads_per_cm[a] = doc->cloth_threads_per_cm[a];
         st = read_order(v->value, a, d, err);
     }

@@ -34,6 +34,7 @@ void job_document_visit_files(const struct job_document *doc,
 {
     for (size_t i = 0; i < doc->n_volume_file; i++) visit(context, doc->volume_file[i], "volume");
     if (doc->fiber_file[0] != '\0') visit(context, doc->fiber_file, "fibers");
+    if (doc->cloth_texture[0] != '\0') visit(context, doc->cloth_texture, "photograph");
     if (doc->environment_file[0] != '\0') visit(context, doc->environment_file, "environment");
     if (doc->measurement_file[0] != '\0') visit(context, doc->measurement_file, "measurements");
     for (size_t i = 0; i < doc->n_photograph; i++) visit(context, doc->photograph[i].file, "photograph");

@@ -13,6 +13,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume.h"
+#include "geometry/weave/weave_detect.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/cloth/cloth_search.h"
 #include "optimizer/fit/descent/descent.h"
@@ -90,6 +91,12 @@ struct pipeline_skill {
     double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
 };
 
+/* What the photograph of the cloth's texture shows (pipeline_texture.h). */
+struct pipeline_texture {
+    bool found, contradicts; /* contradicts: the job's draft is another one */
+    struct weave_guess guess;
+};
+
 struct pipeline_context {
     const struct worker_folder *folder; /* not owned, as the next three */
     struct worker_status *status;
@@ -118,6 +125,7 @@ struct pipeline_context {
     struct direction_volume direction;
     struct fiber_set fiber;
     struct cloth_report cloth; /* of a described cloth */
+    struct pipeline_texture texture;
     struct scene *scene;
     struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */
     bool has_volume_scene;

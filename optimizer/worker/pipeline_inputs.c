@@ -9,6 +9,7 @@
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/pipeline_budget.h"
 #include "optimizer/worker/stages/pipeline_cloth.h"
+#include "optimizer/worker/stages/pipeline_texture.h"
 #include "renderer/transport/light/environment.h"
 
 #include <math.h>
@@ -198,6 +199,7 @@ static status read_document(struct pipeline_context *c, struct error *err)
 static status read_rows(struct pipeline_context *c, struct error *err)
 {
     status s = set_models(c, err);
+    if (s == STATUS_OK) s = pipeline_read_texture(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_inputs(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);
     if (s == STATUS_OK) s = load_observations(c, err);

@@ -2,14 +2,14 @@
 import json
 import os
 import random
-import struct
 import subprocess
-import zlib
 
 import pytest
 from daemon_under_test import program
+from small_png import png, weave
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+PLAIN = weave(["10", "01"])
 PAIRS = os.path.join(os.environ.get("SELVEDGE_DATA") or os.path.join(ROOT, "..", "shared", "data"), "reflection-transmission-photos")
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-phantom"), os.X_OK), reason="no selvedge-phantom in the build folder")
 # By eye in enlarged photographs: where the weft lies on top (a hole in transmission, dark in reflection) one weft down is
@@ -34,26 +34,21 @@ def turns(draft):
 
 
 def write_png(path, edge, grey):
-    """An 8-bit grey PNG of edge x edge pixels with the values grey(x, y)."""
-    def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-    rows = b"".join(b"\0" + bytes(int(grey(x, y)) for x in range(edge)) for y in range(edge))
-    header = struct.pack(">IIBBBBB", edge, edge, 8, 0, 0, 0, 0)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+    path.write_bytes(png(edge, grey))
     return str(path)
 
 
 @pytest.mark.skipif(not os.path.isdir(PAIRS), reason=f"real data absent: {PAIRS} (set SELVEDGE_DATA)")
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_real_pairs(name, tmp_path):
-    weave, draft, spacing = TRUTH[name]
+    name_of_weave, draft, spacing = TRUTH[name]
     overlay = tmp_path / "overlay.png"
     code, answer, text = detect(*(f"--photograph={PAIRS}/{name}_{kind}.png" for kind in "RT"), "--overlay", str(overlay))
     assert code == 0, text
     assert answer["agree"] and answer["cloth"]["draft"] in turns(draft)
     assert overlay.read_bytes().startswith(b"\x89PNG")
     for kind, found in zip("RT", answer["photographs"]):
-        assert found["weave"] == weave and found["draft"] in turns(draft)
+        assert found["weave"] == name_of_weave and found["draft"] in turns(draft)
         assert found["warp"]["direction_deg"] == pytest.approx(90, abs=4)
         assert found["weft"]["direction_deg"] == pytest.approx(0, abs=4)
         assert (found["warp"]["spacing_px"], found["weft"]["spacing_px"]) == pytest.approx(spacing[kind], rel=0.03)
@@ -62,15 +57,8 @@ def test_real_pairs(name, tmp_path):
         assert found["confidence"]["width_over_spacing"] == 0 and found["confidence"]["color"] == 0
 
 
-def plain(x, y):
-    """A plain weave with 8 x 10 pixels for a crossing, the warp brighter."""
-    warp = (x // 8 + y // 10) % 2 == 0
-    across = abs((x % 8) - 3.5) / 4 if warp else abs((y % 10) - 4.5) / 5
-    return (220 if warp else 130) * (1 - across * across)
-
-
 def test_scale_and_cloth_section(tmp_path):
-    code, answer, text = detect("--photograph", write_png(tmp_path / "plain.png", 192, plain), "--px-per-mm", "16", "--linear")
+    code, answer, text = detect("--photograph", write_png(tmp_path / "plain.png", 192, PLAIN), "--px-per-mm", "16", "--linear")
     assert code == 0, text
     assert answer["cloth"]["draft"] in (["10", "01"], ["01", "10"])
     assert answer["cloth"]["warp_per_cm"] == pytest.approx(20, rel=0.02)
@@ -85,7 +73,7 @@ def test_photographs_without_texture_are_named(tmp_path):
     assert code == 1 and "no texture that repeats in two directions" in text
     assert "cloth" not in answer and "no texture" in answer["photographs"][0]["error"]
     # beside one with a weave it is a part of the answer
-    code, answer, text = detect("--photograph", bare, "--photograph", write_png(tmp_path / "plain.png", 128, plain))
+    code, answer, text = detect("--photograph", bare, "--photograph", write_png(tmp_path / "plain.png", 128, PLAIN))
     assert code == 0 and "error" in answer["photographs"][0] and answer["best"].endswith("plain.png")
 
 

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures
+.PHONY: bench bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures docs-weave bench-weave
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
@@ -47,3 +47,19 @@ docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,c
 	@mkdir -p docs/images
 	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
+
+bench-weave: | deps-test ## share of drawn weaves whose yarns and draft are found (3 minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_weave >&2
+	@$(BUILD)/tests/bench/bench_weave
+
+# the photographs stay where they are, and so do pictures made of them: only our diagram of the drafts is part of docs
+WEAVE_PAIRS := satin1 twill1 twill2 twill3
+WEAVE_DATA = $(or $(SELVEDGE_DATA),../shared/data)/reflection-transmission-photos
+docs-weave: $(BUILD)/bin/selvedge-phantom ## draw docs/images/weave-drafts.svg anew: drafts found in real photographs; build/docs-weave/*.png shows them over the photographs
+	@mkdir -p $(BUILD)/docs-weave docs/images
+	@for n in $(WEAVE_PAIRS); do for k in R T; do \
+		$< detect --photograph $(WEAVE_DATA)/$${n}_$$k.png --overlay $(BUILD)/docs-weave/$${n}_$$k.png >/dev/null || exit 1; done; \
+		$< detect --photograph $(WEAVE_DATA)/$${n}_R.png --photograph $(WEAVE_DATA)/$${n}_T.png \
+			> $(BUILD)/docs-weave/$$n.json || exit 1; done
+	@/usr/bin/python3 tests/bench/plot_weave.py docs/images/weave-drafts.svg \
+		$(foreach n,$(WEAVE_PAIRS),$(n)=$(BUILD)/docs-weave/$(n).json)

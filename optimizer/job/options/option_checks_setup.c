@@ -137,6 +137,7 @@ static void collect_name(void *context, const char *name, const char *role)
 static status named_twice(const struct job_document *doc, const char *name, struct error *err)
 {
     char path[JSON_PATH_BYTES] = "measurements.file";
+    if (strcmp(doc->cloth_texture, name) == 0) snprintf(path, sizeof path, "cloth.texture");
     if (strcmp(doc->environment_file, name) == 0) snprintf(path, sizeof path, "environment.file");
     for (size_t i = 0; i < doc->n_volume_file; i++)
         if (strcmp(doc->volume_file[i], name) == 0) snprintf(path, sizeof path, "volume.files[%zu]", i);
@@ -149,7 +150,7 @@ static status named_twice(const struct job_document *doc, const char *name, stru
 static status check_files(const struct job_document *doc, struct error *err)
 {
     status s = STATUS_OK;
-    struct name_list list = {.name = malloc((doc->n_volume_file + doc->n_photograph + 3) * sizeof *list.name)};
+    struct name_list list = {.name = malloc((doc->n_volume_file + doc->n_photograph + 4) * sizeof *list.name)};
     if (list.name == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check the job document: out of memory");
     job_document_visit_files(doc, collect_name, &list);
     qsort(list.name, list.n, sizeof *list.name, compare_names);

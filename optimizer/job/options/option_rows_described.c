@@ -1,5 +1,6 @@
 /* Rows of the option table: the described cloth. Its numbers are those of base/catalogue/cloth_numbers.def. */
 #include "base/catalogue/cloth_description.h"
+#include "base/option_id.h"
 #include "optimizer/job/options/option_rows.h"
 
 #define OF_YARN(member) INTO_OF(struct job_cloth_yarn, member)
@@ -42,16 +43,26 @@ const struct job_option option_rows_described[] = {
      .kind = OPTION_WORD,
      TEXT_INTO(cloth_weave),
      .choice_at = weave_name,
-     .left_out = "this or `draft`",
+     .left_out = "this, `draft` or `texture`",
      .meaning = "Name of the weave."},
     {.path = "cloth.draft",
      .kind = OPTION_OWN,
-     .left_out = "from `weave`",
+     .left_out = "from `weave` or `texture`",
      .allowed = "1 to 32 texts of 1 to 32 signs 0 and 1",
      .schema =
          "{\"type\": \"array\", \"items\": {\"type\": \"string\", \"pattern\": \"^[01]{1,32}$\"}, \"minItems\": 1, "
          "\"maxItems\": 32}",
      .meaning = "One repeat of the weave, a text for each weft, the upper one first: 1 where the warp lies above."},
+    {.path = "cloth.texture",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_CLOTH_TEXTURE,
+     INTO(cloth_texture),
+     .left_out = "none",
+     .meaning =
+         "Photograph of the flat cloth from straight above, PNG (sRGB) or OpenEXR, that shows its weave. Without "
+         "`weave` and `draft` the draft comes from it, and so do `cover_warp` and `cover_weft` where it shows "
+         "them and they have their standard values; otherwise a weave that contradicts it is warned about. "
+         "docs/weave-detection.md says how it is read."},
     {.path = "cloth.warp",
      .kind = OPTION_OWN,
      .standard = "[0]",

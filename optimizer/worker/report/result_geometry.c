@@ -1,6 +1,7 @@
 #include "optimizer/worker/report/result_geometry.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_cloth.h"
+#include "optimizer/worker/report/weave_json.h"
 
 static json_t *alignment_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
 {
@@ -92,6 +93,12 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
     const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */
     if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, number, &c->cloth));
+    if (c->texture.found) {
+        json_t *texture = weave_guess_json(&c->texture.guess, 0.0);
+        json_object_set_new(texture, "photograph", json_string(c->doc->cloth_texture));
+        json_object_set_new(texture, "contradicts_draft", json_boolean(c->texture.contradicts));
+        json_object_set_new(json, "texture", texture);
+    }
     if (!c->doc->has_volume) return json;
     const struct reconstruct_option *o = &c->option;
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));

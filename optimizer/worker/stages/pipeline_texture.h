@@ -1,0 +1,14 @@
+/* The photograph that shows the weave of a described cloth: it gives the draft where the job has none, and is compared
+ * with it where it has one. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_TEXTURE_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_TEXTURE_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Fills in c->texture. Without weave and draft in the job it replaces the draft of c->doc->cloth, and the covers that
+ * have their standard values if the photograph shows them; else a contradiction becomes a warning, and so does a
+ * photograph without a weave. Errors with the field "cloth.texture": the file cannot be read, or the draft is to come
+ * from it and it shows no weave (STATUS_INVALID). Nothing happens without such a photograph. */
+status pipeline_read_texture(struct pipeline_context *c, struct error *err);
+
+#endif
