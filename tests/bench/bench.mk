@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures docs-weave bench-weave
+.PHONY: bench bench-cloth bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures docs-weave bench-weave
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
@@ -21,6 +21,11 @@ bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and 
 bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing highlights, real tables (1 h 45 min on 2 quiet cores; photographs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
+
+# TABLES: a folder of tables of measured reflectance, each judged by the same procedure. CLOTH: some of the tables or recoveries only
+bench-cloth: | deps-test ## described cloths: fit of measured tables and recovery of known cloths (an hour on 2 quiet cores)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/bench_cloth.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(CLOTH)
 
 # FABRIC: one of tests/support/cloth/fit_fabrics.c
 bench-published: FABRIC ?= microflake

@@ -65,9 +65,7 @@ def cross_validation(result):
 def bench_table(arguments, table):
     """Figures of one table; returns (held-out error of the twin, of the plain BRDF)."""
     sample = os.path.splitext(os.path.basename(table))[0]
-    fit = {"render_px": 16, "render_samples": 4, "path_budget": arguments.path_budget}
-    if arguments.models:
-        fit["models"] = arguments.models.split(",")
+    fit = {"models": arguments.models.split(","), "render_px": 16, "render_samples": 4, "path_budget": arguments.path_budget}
     best, wall_s = None, 0.0
     for name, cloth in DESCRIPTIONS.items():
         document = {"sample": f"{sample} as {name}", "cloth": cloth, "measurements": {"file": os.path.basename(table)}, "fit": fit}
@@ -95,18 +93,122 @@ def bench_tables(arguments):
         figure("cloth.real.tables_below_brdf", sum(twin < brdf for twin, brdf in scores), "tables", "higher")
 
 
+# Recoveries: (description of the true cloth, parameters, names of the kinds of yarn). A job gets the structure, the
+# counts and the names; the numbers of FITTED start at their defaults.
+FITTED = ("flatness", "packing", "twist_per_m", "fiber_angle_deg")
+TEXTILE = {"C_R": "0.05,0.05,0.05", "C_TT": "0.75,0.5,0.3", "beta_R": 6, "beta_TT": 20, "gamma_TT": 20}
+SECOND = {"C_R": "0.04,0.04,0.04", "C_TT": "0.25,0.4,0.7", "beta_R": 8, "beta_TT": 25, "gamma_TT": 15}
+
+
+def woven(weave, n, numbers, kinds=1, **cloth):
+    """A weave of n x n yarns whose kinds share the numbers; with two kinds the warp is the first."""
+    yarns = [dict({"fibers": 40}, **numbers[k % len(numbers)]) for k in range(kinds)]
+    order = {"warp": [0], "weft": [1]} if kinds == 2 else {}
+    return dict({"weave": weave, "tile_warps": n, "tile_wefts": n, "yarns": yarns}, **order, **cloth)
+
+
+RECOVERIES = {
+    "plain": (woven("plain", 4, [{"flatness": 2.6, "packing": 0.5, "twist_per_m": 300, "fiber_angle_deg": 8}]), [TEXTILE]),
+    "plain_tight": (woven("plain", 4, [{"flatness": 1.6, "packing": 0.7, "twist_per_m": 800, "fiber_angle_deg": 3}]), [SECOND]),
+    "twill": (woven("twill", 4, [{"flatness": 2.2, "packing": 0.55, "twist_per_m": 600, "fiber_angle_deg": 6}]), [TEXTILE]),
+    "satin": (woven("satin", 5, [{"flatness": 3.0, "packing": 0.65, "twist_per_m": 200, "fiber_angle_deg": 3}]), [SECOND]),
+    "twill_two_yarns": (woven("twill", 4, [{"flatness": 2.2, "packing": 0.6, "twist_per_m": 500, "fiber_angle_deg": 5}], 2),
+                        [TEXTILE, SECOND]),
+    "satin_two_yarns": (woven("satin", 5, [{"flatness": 2.8, "packing": 0.6, "twist_per_m": 300, "fiber_angle_deg": 5}], 2),
+                        [TEXTILE, SECOND]),
+}
+
+
+def run(arguments, *command):
+    subprocess.run([os.path.join(arguments.build, "bin", command[0]), *command[1:]], check=True, stdout=sys.stderr)
+
+
+def make_truth(arguments, folder, cloth, sets, groups):
+    """Fibers and photographs of the true cloth, whose random places are not those of the job's cloth."""
+    os.makedirs(folder, exist_ok=True)
+    with open(os.path.join(folder, "description.json"), "w", encoding="utf-8") as f:
+        json.dump(dict(cloth, seed=77), f)
+    run(arguments, "selvedge-phantom", "cloth", "--description", os.path.join(folder, "description.json"), "--out", folder,
+        "--snr", "0", "--voxel-um", "4")
+    parameters = []
+    for group, values in zip(groups, sets):
+        for key, value in values.items():
+            parameters += ["--param", f"{group + '.' if len(groups) > 1 else ''}{key}={value}"]
+    run(arguments, "selvedge-phantom", "photograph", "--fibers", os.path.join(folder, "truth.hair"), "--out", folder, "--model",
+        arguments.recovery_model, "--paths", "262144", "--px", "32", "--noise", "0.005", "--seed", "11", "--quiet", *parameters,
+        *(["--groups", ",".join(groups)] if len(groups) > 1 else []))
+    with open(os.path.join(folder, "photographs.json"), encoding="utf-8") as f:
+        photographs = json.load(f)
+    with open(os.path.join(folder, "truth.json"), encoding="utf-8") as f:
+        return photographs, json.load(f)
+
+
+def covered(result, truth_numbers, truth_parameters):
+    """(covered, determined): how many determined values lie within two standard errors of the truth."""
+    found = [(n, truth_numbers[n["name"].split(".")[-1]]) for n in result.get("cloth_numbers", []) if n["name"].split(".")[-1] in truth_numbers]
+    found += [(p, truth_parameters[p["name"]]) for p in result["parameters"] if p["name"] in truth_parameters]
+    found = [(v, t) for v, t in found if v["determined"] and not v.get("fixed") and v["at_bound"] is None]
+    for v, t in found:
+        print(f"  {v['name']}: {v['value']:.4g} +- {v['standard_error']:.2g}, true {t:.4g}", file=sys.stderr)
+    return sum(abs(v["value"] - t) <= 2 * v["standard_error"] for v, t in found), len(found)
+
+
+def flat_parameters(groups, sets):
+    values = {}
+    for group, parameters in zip(groups, sets):
+        prefix = group + "." if len(groups) > 1 else ""
+        for key, value in parameters.items():
+            parts = [float(v) for v in str(value).split(",")]
+            values.update({prefix + key: parts[0]} if len(parts) == 1 else {f"{prefix}{key}.{c}": v for c, v in zip("rgb", parts)})
+    return values
+
+
+def bench_recovery(arguments, name, cloth, sets):
+    groups = ["warp", "weft"][:len(sets)]
+    folder = os.path.join(arguments.keep, "truth." + name)
+    photographs, _ = make_truth(arguments, folder, cloth, sets, groups)
+    files = sorted(glob.glob(os.path.join(folder, "*.exr")))
+    truth_parameters = flat_parameters(groups, sets)
+    fit = {"models": [arguments.recovery_model], "render_px": 16, "render_samples": 4}
+    named = dict(cloth, groups=groups) if len(groups) > 1 else cloth
+    exact = dict(named, seed=77)
+    document = {"sample": name + ", the truth", "cloth": exact, "photographs": photographs,
+                "fit": dict(fit, fixed=truth_parameters, path_budget=100000)}
+    truth, _ = run_job(arguments.build, os.path.join(arguments.keep, "exact." + name), document, files)
+    searched = json.loads(json.dumps(named))
+    for yarn in searched["yarns"]:
+        yarn.update({key: {} for key in FITTED})
+    document = {"sample": name, "cloth": searched, "photographs": photographs, "fit": dict(fit, path_budget=arguments.path_budget)}
+    result, seconds = run_job(arguments.build, os.path.join(arguments.keep, "recovery." + name), document, files)
+    inside, n = covered(result, cloth["yarns"][0], truth_parameters)
+    ratio = result["heldout_rel_rms"] / truth["heldout_rel_rms"]
+    print(f"{name}: held out {result['heldout_rel_rms']:.4f}, truth {truth['heldout_rel_rms']:.4f}, {inside} of {n} within two "
+          f"standard errors, {seconds:.0f} s", file=sys.stderr)
+    figure(f"cloth.recovery.{name}.ratio", round(ratio, 3), "1")
+    figure(f"cloth.recovery.{name}.covered", round(inside / n, 3) if n else None, "1", "higher")
+    return inside, n
+
+
+def bench_recoveries(arguments):
+    counts = [bench_recovery(arguments, name, *spec) for name, spec in RECOVERIES.items() if not arguments.what or name in arguments.what]
+    if counts and not arguments.what:
+        figure("cloth.recovery.covered", round(sum(c for c, _ in counts) / max(1, sum(n for _, n in counts)), 3), "1", "higher")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=os.path.join(ROOT, "build"))
     parser.add_argument("--keep", help="folder of the jobs (default: bench-cloth in the build folder)")
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
-    parser.add_argument("--models", help="scattering models, separated by commas (default: that of a job without fit.models)")
-    parser.add_argument("--path-budget", type=int, default=3000000)
-    parser.add_argument("what", nargs="*")
+    parser.add_argument("--models", default="textile.v1", help="scattering models, separated by commas; several: the worker chooses by cross-validation")
+    parser.add_argument("--path-budget", type=int, default=6000000)
+    parser.add_argument("--recovery-model", default="textile.v1", help="model of the recoveries")
+    parser.add_argument("what", nargs="*", help="tables or recoveries")
     arguments = parser.parse_args()
     arguments.build = os.path.abspath(arguments.build)
     arguments.keep = os.path.abspath(arguments.keep or os.path.join(arguments.build, "bench-cloth"))
     bench_tables(arguments)
+    bench_recoveries(arguments)
 
 
 if __name__ == "__main__":
