@@ -170,7 +170,9 @@ def bench_recovery(arguments, name, cloth, sets):
     files = sorted(glob.glob(os.path.join(folder, "*.exr")))
     truth_parameters = flat_parameters(groups, sets)
     fit = {"models": [arguments.recovery_model], "render_px": 16, "render_samples": 4}
-    named = dict(cloth, groups=groups) if len(groups) > 1 else cloth
+    named = json.loads(json.dumps(cloth))
+    for yarn, group in zip(named["yarns"], groups if len(groups) > 1 else []):
+        yarn["name"] = group
     exact = dict(named, seed=77)
     document = {"sample": name + ", the truth", "cloth": exact, "photographs": photographs,
                 "fit": dict(fit, fixed=truth_parameters, path_budget=100000)}
