@@ -2,8 +2,8 @@
  *
  * LAPACK is not used for it. A result must have the same bits on every machine and with any number of threads;
  * OpenBLAS selects its kernels by processor, and which BLAS a Debian system runs is the administrator's choice. The
- * matrices have 3 to 64 rows, mostly fewer than 16 (a few thousand in a band of 7), where plain loops in a fixed order cost nothing that
- * can be measured.
+ * matrices have 3 to 64 rows, mostly fewer than 16 (a few thousand in a band of 7), where plain loops in a fixed order
+ * cost nothing that can be measured.
  */
 #ifndef SELVEDGE_BASE_SMALL_MATRIX_H
 #define SELVEDGE_BASE_SMALL_MATRIX_H

@@ -19,7 +19,8 @@ static bool crosses(const struct cloth_description *d, enum cloth_direction dire
 
 static status check_draft(const struct cloth_description *d, struct error *err)
 {
-    for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++) {
+    for (int k = 0; k < 2; k++) {
+        enum cloth_direction direction = k == 0 ? CLOTH_WEFT : CLOTH_WARP;
         size_t n = direction == CLOTH_WEFT ? d->n_weft : d->n_warp;
         for (size_t i = 0; i < n; i++)
             if (!crosses(d, direction, i))
@@ -117,7 +118,8 @@ status cloth_description_check(struct cloth_description *d, struct error *err)
 {
     status st = check_kinds(d, err);
     if (st == STATUS_OK && (d->structure == CLOTH_WOVEN || d->structure == CLOTH_VELVET)) st = check_draft(d, err);
-    for (int a = CLOTH_WEFT; a <= CLOTH_WARP && d->structure != CLOTH_FELT && st == STATUS_OK; a++) {
+    for (int k = 0; k < 2 && d->structure != CLOTH_FELT && st == STATUS_OK; k++) {
+        enum cloth_direction a = k == 0 ? CLOTH_WEFT : CLOTH_WARP;
         st = check_order(d, a, err);
         if (st == STATUS_OK) st = choose_yarns(d, a, err);
     }

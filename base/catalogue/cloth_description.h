@@ -117,7 +117,8 @@ double cloth_number_value(const struct cloth_description *d, const double *numbe
 
 /* Completes d (n_yarn) and checks it. STATUS_INVALID with the field as in the job document after "cloth.": "draft" (a
  * yarn that never crosses), "warp", "weft" (orders that name no kind, or do not repeat within CLOTH_MAX_YARN yarns),
- * "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns[k].plies", "crimp" and so on for values outside of their ranges. */
+ * "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns[k].plies", "crimp" and so on for values outside of
+ * their ranges. */
 status cloth_description_check(struct cloth_description *d, struct error *err);
 
 /* Checks a vector of d->n_number values against the ranges of the catalogue. STATUS_INVALID, field: the number. */

@@ -1,6 +1,6 @@
-/* Plain jersey: x = t + a sin 2t, y = h cos t, z = d cos 2t, in units of a wale's width / 2 pi (a smooth form of Peirce's
- * loop). Heads and feet are on one side, legs on the other. Courses are 5 units apart, so each head hangs over the legs
- * of the next course. */
+/* Plain jersey: x = t + a sin 2t, y = h cos t, z = d cos 2t, in units of a wale's width / 2 pi (a smooth form of
+ * Peirce's loop). Heads and feet are on one side, legs on the other. Courses are 5 units apart, so each head hangs over
+ * the legs of the next course. */
 #include "base/rng.h"
 #include "geometry/cloth/cloth_work.h"
 

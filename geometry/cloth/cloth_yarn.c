@@ -1,4 +1,5 @@
-/* The fibers of one yarn: staples on a golden-angle spiral in the section, which turns with the twist; and its hairs. */
+/* The fibers of one yarn: staples on a golden-angle spiral in the section, which turns with the twist; and its
+ * hairs. */
 #include "base/angle.h"
 #include "base/rng.h"
 #include "geometry/cloth/cloth_work.h"
@@ -98,8 +99,8 @@ static void draw_wander(const struct filling *y, struct wander *v, struct rng *r
     v->migration_rad = 2.0 * M_PI * rng_double(rng);
 }
 
-/* Share of fiber i that belongs to the other kind of a melange. Fibers change over one after the other, in an order that
- * is spread over the section; the last one changes in part, so that the share moves smoothly. */
+/* Share of fiber i that belongs to the other kind of a melange. Fibers change over one after the other, in an order
+ * that is spread over the section; the last one changes in part, so that the share moves smoothly. */
 static double melange_share(const struct kind_shape *k, size_t i)
 {
     static const double step = 0.5698402909980532; /* the second step of R2 */

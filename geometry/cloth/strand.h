@@ -61,8 +61,8 @@ struct strand_fit {
     double strain_p95; /* of the surface of bent fibers (radius / radius of curvature): 95 % of the points stay below */
 };
 
-/* How contacts add up. STRAND_STEPS moves a node by the mean of its contacts. STRAND_SMOOTH weighs each by its depth, so
- * that the result has no steps where fibers begin to touch: small changes of the start make small changes. */
+/* How contacts add up. STRAND_STEPS moves a node by the mean of its contacts. STRAND_SMOOTH weighs each by its depth,
+ * so that the result has no steps where fibers begin to touch: small changes of the start make small changes. */
 enum strand_rule { STRAND_STEPS, STRAND_SMOOTH };
 
 struct strand_relax_option {

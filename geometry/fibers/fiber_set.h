@@ -29,7 +29,8 @@ struct fiber_set {
 void fiber_set_init(struct fiber_set *f);
 void fiber_set_release(struct fiber_set *f);
 /* Allocates n_fiber fibers with n_vertex vertices in total and sets the counts. first_vertex,
- * axis_class and group are zero; the other arrays are uninitialised. Earlier content is released, but the tile size is kept. STATUS_NO_MEMORY. */
+ * axis_class and group are zero; the other arrays are uninitialised. Earlier content is released, but the tile size is
+ * kept. STATUS_NO_MEMORY. */
 status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, struct error *err);
 /* STATUS_INVALID, naming the fiber, for NaN, fewer than two vertices, radius <= 0, group >= FIBER_MAX_GROUP; also for
  * tile size <= 0 and for no fiber. */
@@ -46,8 +47,8 @@ void fiber_set_classify(struct fiber_set *f);
 /* Cem Yuksel's .hair (docs/file-formats.md): positions in millimetres, and per point the thickness, which is the
  * diameter in millimetres. The 88-byte text of the header contains "selvedge tile_mm=<x>,<y>", the tile size;
  * without it the tile size is 0 after reading and the caller must set it. If a fiber has another group than 0, the text
- * goes on with " groups=rgb" and the colours of the points are the groups; colours without this text are ignored. Reading
- * sets axis classes from the
+ * goes on with " groups=rgb" and the colours of the points are the groups; colours without this text are ignored.
+ * Reading sets axis classes from the
  * directions, takes half the mean thickness of a fiber's points as its radius, and applies default segments and
  * thickness of files of other programs. It checks the header against the length of the file before it allocates. It
  * replaces the content of f, or leaves f unchanged on failure. A fiber of more than 65,536 vertices is written as

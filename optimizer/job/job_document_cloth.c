@@ -158,7 +158,8 @@ static status read_cloth(const struct option_value *v, struct cloth_description 
         return error_set_field(err, STATUS_INVALID, "cloth.yarns",
                                "a velvet has at least two kinds of yarn: the ground, and last the pile");
     d->seed = doc->cloth_seed;
-    for (int a = CLOTH_WEFT; a <= CLOTH_WARP && st == STATUS_OK; a++) {
+    for (int k = 0; k < 2 && st == STATUS_OK; k++) {
+        enum cloth_direction a = k == 0 ? CLOTH_WEFT : CLOTH_WARP;
         /* the tile of a draft that is not known yet is checked when it is */
         d->n_yarn[a] = doc->cloth_draft_from_texture ? 0 : doc->cloth_tile_yarn[a];
         if (!isnan(doc->cloth_threads_per_cm[a])) d->threads_per_cm[a] = doc->cloth_threads_per_cm[a];

@@ -15,8 +15,8 @@ size_t job_parameter_slots(const struct model_info *m, size_t n_param, const cha
     return n;
 }
 
-/* Writes "C_R, beta_R, ...", and ", or weft.C_R ..." for each set after the first. A colour with three channels stands in the list
- * once. */
+/* Writes "C_R, beta_R, ...", and ", or weft.C_R ..." for each set after the first. A colour with three channels stands
+ * in the list once. */
 static void list_symbols(const struct model_info *m, char *text, size_t n_bytes)
 {
     size_t used = 0;

@@ -17,8 +17,8 @@ status phantom_described_make(const struct cloth_description *d, double voxel_si
                               struct thread_pool *pool, struct fiber_set *f, struct phantom_report *report,
                               struct error *err);
 
-/* The description of a phantom f with single-ply yarns, with the nearest numbers of the catalogue. It describes the same
- * weave, sections and twist; single fibers lie elsewhere. STATUS_UNSUPPORTED for yarn files. */
+/* The description of a phantom f with single-ply yarns, with the nearest numbers of the catalogue. It describes the
+ * same weave, sections and twist; single fibers lie elsewhere. STATUS_UNSUPPORTED for yarn files. */
 status phantom_described_as(const struct phantom_option *o, const struct phantom_report *r, const struct fiber_set *f,
                             struct cloth_description *d, struct error *err);
 

@@ -25,8 +25,8 @@ struct phantom_photograph_option {
 
 void phantom_photograph_option_default(struct phantom_photograph_option *o);
 
-/* Sets model, sets and param: the start values of the scattering model for n_group groups of fibers; 0 or 1: one set for
- * all fibers. STATUS_INVALID. */
+/* Sets model, sets and param: the start values of the scattering model for n_group groups of fibers; 0 or 1: one set
+ * for all fibers. STATUS_INVALID. */
 status phantom_photograph_model(struct phantom_photograph_option *o, const char *model_id,
                                 const char (*group)[MODEL_SET_NAME_BYTES], size_t n_group, struct error *err);
 

@@ -69,8 +69,8 @@ struct pipeline_radius {
     double wall_s;
 };
 
-/* The numbers of the cloth that are fitted together with the scattering parameters (pipeline_cloth.h). Values are in the
- * units of files. */
+/* The numbers of the cloth that are fitted together with the scattering parameters (pipeline_cloth.h). Values are in
+ * the units of files. */
 struct pipeline_numbers {
     size_t n; /* 0: the cloth is taken as it is */
     struct param_info info[CLOTH_MAX_FITTED];

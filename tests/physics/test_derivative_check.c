@@ -84,8 +84,9 @@ static void every_model(void **state)
             print_message("%-24s %d: worst %.1e +- %.0e (%s), %zu paths, %zu steps\n", m.id, place,
                           check.error[check.worst], check.error_se[check.worst], m.param[check.worst].name,
                           (size_t)check.n_path, (size_t)check.n_step);
+            /* some 400 errors are looked at: 3.5 standard errors let one test in ten thousand fail by chance */
             for (size_t p = 0; p < m.n_param; p++)
-                if (check.error[p] > 2e-3 + 2.0 * check.error_se[p])
+                if (check.error[p] > 2e-3 + 3.5 * check.error_se[p])
                     fail_msg("%s, %s: %.2g +- %.1g", m.id, m.param[p].name, check.error[p], check.error_se[p]);
         }
     }

@@ -8,8 +8,8 @@
  *    are taken back, paths grow when the noise decides, and it ends when the possible decrease is below the noise or
  *    below what matters (gauss_newton.v1).
  *
- * 3. Final fit: the scattering parameters alone on the cloth of the joint fit. Where its objective is higher than that of
- *    the best cloth of the screening beyond doubt, that cloth is fitted as well and the lower one is taken.
+ * 3. Final fit: the scattering parameters alone on the cloth of the joint fit. Where its objective is higher than that
+ *    of the best cloth of the screening beyond doubt, that cloth is fitted as well and the lower one is taken.
  *
  * The covariance of the scattering parameters is that of the final fit plus what the numbers add to it by the joint
  * fit: cov(p) = cov(p | x) + C_px C_xx^-1 C_xp with C the joint covariance (law of total covariance). Their errors thus

@@ -11,8 +11,8 @@
 /* From this confidence on the width of the yarns is taken over; below LEAST_CERTAIN a contradiction is not certain. */
 static const double WORTH_TAKING = 0.3, LEAST_CERTAIN = 0.7;
 
-/* The job's draft in the order of a detected one: row 0 is the upper weft. The draft of a cloth without one repeat of at
- * most WEAVE_CELL_MAX yarns cannot be compared: false. */
+/* The job's draft in the order of a detected one: row 0 is the upper weft. The draft of a cloth without one repeat of
+ * at most WEAVE_CELL_MAX yarns cannot be compared: false. */
 static bool draft_of_job(const struct cloth_description *d, struct weave_draft *draft)
 {
     *draft = (struct weave_draft){.n_warp = d->n_warp, .n_weft = d->n_weft};

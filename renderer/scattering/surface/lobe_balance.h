@@ -1,7 +1,9 @@
-/* Balancing of longitudinal lobes: the symmetric scales a(th) and b(th) that make a lobe g(th_o; -th_i, beta) reciprocal
- * and lossless from both sides. two_lobe_balanced.c states the equations. Shared by two_lobe_balanced.v1 and textile.v1.
+/* Balancing of longitudinal lobes: the symmetric scales a(th) and b(th) that make a lobe g(th_o; -th_i, beta)
+ * reciprocal and lossless from both sides. two_lobe_balanced.c states the equations. Shared by two_lobe_balanced.v1 and
+ * textile.v1.
  *
- * Functions of an angle are tabulated at LOBE_BALANCE_N equidistant nodes over [0, pi/2]; all are even. Double precision.
+ * Functions of an angle are tabulated at LOBE_BALANCE_N equidistant nodes over [0, pi/2]; all are even. Double
+ * precision.
  */
 #ifndef SELVEDGE_RENDERER_LOBE_BALANCE_H
 #define SELVEDGE_RENDERER_LOBE_BALANCE_H
@@ -35,7 +37,8 @@ void lobe_balance_source_of_kernel(struct lobe_balance *b, const double *x);
 
 /* Solves for a, the scale of R: want = 1, no share. d_ln_a: by beta. */
 void lobe_balance_r(struct lobe_balance *b, double beta, double *a, double *d_ln_a);
-/* rho = a (g share) a: what the share sends into R of the light at each node. d_rho: by beta. Leaves the kernel g share.
+/* rho = a (g share) a: what the share sends into R of the light at each node. d_rho: by beta. Leaves the kernel g
+ * share.
  */
 void lobe_balance_share(struct lobe_balance *b, double beta, const double *a, const double *d_ln_a, double *rho,
                         double *d_rho);

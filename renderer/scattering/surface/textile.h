@@ -2,9 +2,9 @@
  * Reciprocal; lossless from both sides where C_TT = 1.
  *
  *     d      = (th_i - th_o) / 2,  ph = ph_o - ph_i                        difference angle and relative azimuth
- *     N(ph)  = (1 - s) / (2 pi) + s cos(ph / 2) / 4                        azimuth of R: uniform, or of a smooth cylinder
- *     k      = (1 - cos d cos(ph / 2))^5                                   Schlick's rise at the half angle of both
- *     K(d)   = integral of N k dph                                         a polynomial in cos d
+ *     N(ph)  = (1 - s) / (2 pi) + s cos(ph / 2) / 4                        azimuth of R: uniform, or of a smooth
+ *     cylinder k      = (1 - cos d cos(ph / 2))^5                                   Schlick's rise at the half angle of
+ *     both K(d)   = integral of N k dph                                         a polynomial in cos d
  *     R  = a(th_i) a(th_o) g(th_o; -th_i, beta_R) N(ph) (C_R + (1 - C_R) k)
  *     TT = b(th_i) b(th_o) g(th_o; -th_i, beta_TT) (1 - K(d)) f(ph_o; ph_i + pi, gamma_TT)
  *     D  = q(th_i) q(th_o) / Z,  q = 1 - rho

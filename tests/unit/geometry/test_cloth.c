@@ -89,8 +89,8 @@ static double moved_m(const struct cloth_description *d, size_t i_number, double
     return compared.centerline_rms_voxel * o.voxel_size_m;
 }
 
-/* A tenth of the change of a number moves the fibers by about a tenth, or by less than 5 % of their radius: there are no
- * steps where something is rounded. */
+/* A tenth of the change of a number moves the fibers by about a tenth, or by less than 5 % of their radius: there are
+ * no steps where something is rounded. */
 static void test_numbers_move_fibers_smoothly(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* A weave whose warp and weft scatter differently: a fit of one parameter set for each recovers both from photographs in
- * reflection and transmission. */
+/* A weave whose warp and weft scatter differently: a fit of one parameter set for each recovers both from photographs
+ * in reflection and transmission. */
 #include "base/angle.h"
 #include "base/catalogue/model_sets.h"
 #include "optimizer/fit/descent/fit_run.h"
