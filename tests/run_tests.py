@@ -2,7 +2,7 @@
 
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
---quick runs the checks, the unit tests and the quick API tests, C beside Python: one computes while the other waits for
+--quick runs the checks, the unit tests and the quick API tests, C beside Python: two compute while the other waits for
 daemons. --programs leaves out the checks of the sources, which neither sanitizers nor coverage change.
 """
 import argparse
@@ -107,16 +107,18 @@ def main():
             if wanted(name):
                 totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], TIMEOUT_S, environment))
 
-    def run_c(folder):
+    def c_tests():
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
             for source in sorted(pathlib.Path(ROOT, "tests", kind).rglob("test_*.c")):
                 name = str(source.relative_to(os.path.join(ROOT, "tests")))[:-2]  # "unit/base/test_rng"
-                if not wanted(name):
-                    continue
-                junit = os.path.join(folder, source.stem + ".xml")
-                code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", name)], TIMEOUT_S,
-                                            dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
-                totals.add(name, junit, code, output, seconds)
+                if wanted(name):
+                    yield name
+
+    def run_c(folder, name):
+        junit = os.path.join(folder, name.replace("/", ".") + ".xml")
+        code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", name)], TIMEOUT_S,
+                                    dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
+        totals.add(name, junit, code, output, seconds)
 
     def run_python(folder):
         for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:
@@ -136,9 +138,14 @@ def main():
 
     with tempfile.TemporaryDirectory() as folder:
         run_checks()
-        with concurrent.futures.ThreadPoolExecutor(max_workers=2 if arguments.quick else 1) as lanes:
-            for lane in [lanes.submit(run_c, folder), lanes.submit(run_python, folder)]:
-                lane.result()
+        # quick: one lane waits for daemons most of the time, two compute
+        with concurrent.futures.ThreadPoolExecutor(max_workers=3 if arguments.quick else 1) as lanes:
+            first = [lanes.submit(run_python, folder)] if arguments.quick else []
+            runs = first + [lanes.submit(run_c, folder, name) for name in c_tests()]
+            if not arguments.quick:
+                runs.append(lanes.submit(run_python, folder))
+            for done in runs:
+                done.result()
 
     tail = f", {totals.skipped} skipped" if totals.skipped else ""
     print(f"{totals.passed} passed, {totals.failed} failed{tail}", flush=True)
