@@ -7,9 +7,9 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/stages/pipeline_budget.h"
-#include "optimizer/worker/stages/pipeline_cloth.h"
-#include "optimizer/worker/stages/pipeline_texture.h"
+#include "optimizer/worker/stages/fit/pipeline_budget.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/scene/pipeline_texture.h"
 #include "renderer/transport/light/environment.h"
 
 #include <math.h>

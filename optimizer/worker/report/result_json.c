@@ -5,7 +5,7 @@
 #include "optimizer/worker/report/result_geometry.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
-#include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 
 #include <jansson.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/report/json_number.h"
 
-#include "optimizer/worker/stages/pipeline_contrast.h"
+#include "optimizer/worker/stages/result/pipeline_contrast.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
-#include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "renderer/transport/render.h"
 
 #include <errno.h>

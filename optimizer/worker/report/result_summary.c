@@ -4,7 +4,7 @@
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
-#include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #include "base/durable.h"
 #include "base/option_id.h"
 #include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/scratch_folder.h"

@@ -1,8 +1,8 @@
 /* The gradient certificate of a job: derivative_check.h on its own cloth, photographs and result. */
 #include "base/clock.h"
 #include "optimizer/fit/descent/trace_estimator.h"
-#include "optimizer/worker/stages/pipeline_advice.h"
-#include "optimizer/worker/stages/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/result/pipeline_advice.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "optimizer/worker/stages/pipeline_nesting.h"
+#include "optimizer/worker/stages/fit/pipeline_nesting.h"
 
 #include <string.h>
 

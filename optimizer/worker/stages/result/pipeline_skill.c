@@ -1,5 +1,5 @@
-#include "optimizer/worker/stages/pipeline_skill.h"
-#include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_skill.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 
 #include <math.h>
 

@@ -1,10 +1,10 @@
-#include "optimizer/worker/stages/pipeline_radius.h"
+#include "optimizer/worker/stages/fit/pipeline_radius.h"
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/job/option_key.h"
-#include "optimizer/worker/stages/pipeline_fit_option.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,10 +1,10 @@
-#include "optimizer/worker/stages/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "base/clock.h"
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
 #include "optimizer/job/option_key.h"
-#include "optimizer/worker/stages/pipeline_fit_option.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,11 +1,11 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/worker/stages/pipeline_cloth.h"
-#include "optimizer/worker/stages/pipeline_fit_option.h"
-#include "optimizer/worker/stages/pipeline_nesting.h"
-#include "optimizer/worker/stages/pipeline_radius.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_nesting.h"
+#include "optimizer/worker/stages/fit/pipeline_radius.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
 #include "optimizer/worker/work_file.h"
 #include "optimizer/worker/worker_series.h"
 

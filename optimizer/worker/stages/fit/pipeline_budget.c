@@ -1,8 +1,8 @@
-#include "optimizer/worker/stages/pipeline_budget.h"
+#include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "base/option_id.h"
 #include "optimizer/job/option_key.h"
-#include "optimizer/worker/stages/pipeline_fit_option.h"
-#include "optimizer/worker/stages/pipeline_nesting.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_nesting.h"
 
 #include <inttypes.h>
 #include <stdio.h>

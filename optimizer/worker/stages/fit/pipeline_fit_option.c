@@ -1,4 +1,4 @@
-#include "optimizer/worker/stages/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/fit/descent/descent.h"
 
 #include <math.h>

@@ -4,10 +4,10 @@
 #include "optimizer/worker/report/quality.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
-#include "optimizer/worker/stages/pipeline_advice.h"
-#include "optimizer/worker/stages/pipeline_choice.h"
-#include "optimizer/worker/stages/pipeline_cloth.h"
-#include "optimizer/worker/stages/pipeline_skill.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/result/pipeline_advice.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_skill.h"
 
 status stage_report(struct pipeline_context *c, struct error *err)
 {

@@ -1,9 +1,9 @@
 /* The next photograph: every candidate configuration of the job is rendered at the result, with derivatives, and ranked
  * by what it would add (next_photograph.h). */
-#include "optimizer/worker/stages/pipeline_advice.h"
-#include "optimizer/worker/stages/pipeline_cloth.h"
-#include "optimizer/worker/stages/pipeline_fit_option.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
+#include "optimizer/worker/stages/result/pipeline_advice.h"
 
 #include <math.h>
 #include <stdlib.h>

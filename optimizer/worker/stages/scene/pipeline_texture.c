@@ -1,4 +1,4 @@
-#include "optimizer/worker/stages/pipeline_texture.h"
+#include "optimizer/worker/stages/scene/pipeline_texture.h"
 
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/photograph.h"

@@ -1,4 +1,4 @@
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "optimizer/worker/stages/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 
 #include <math.h>
 #include <stdio.h>

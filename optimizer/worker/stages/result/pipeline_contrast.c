@@ -1,5 +1,5 @@
-#include "optimizer/worker/stages/pipeline_contrast.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/result/pipeline_contrast.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
 
 #include <math.h>
 

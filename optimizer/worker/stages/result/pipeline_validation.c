@@ -1,9 +1,9 @@
 /* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
  * rows apart. */
-#include "optimizer/worker/stages/pipeline_choice.h"
-#include "optimizer/worker/stages/pipeline_cloth.h"
-#include "optimizer/worker/stages/pipeline_contrast.h"
-#include "optimizer/worker/stages/pipeline_trace.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_trace.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_contrast.h"
 #include "optimizer/worker/work_file.h"
 
 #include <math.h>
