@@ -6,7 +6,7 @@
 #include "server/http/static_files.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/supervisor.h"
+#include "server/workers/supervisor.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -122,19 +122,19 @@ def main():
 
     def run_python(folder):
         for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:
-            source = os.path.join(ROOT, "tests", kind)
-            for name in sorted(os.listdir(source)) if os.path.isdir(source) else []:
-                if not (name.startswith("test_") and name.endswith(".py") and wanted(name)):
+            for source in sorted(pathlib.Path(ROOT, "tests", kind).rglob("test_*.py")):
+                name = str(source.relative_to(os.path.join(ROOT, "tests")))[:-3]  # "api/worker/test_skill"
+                if not wanted(name):
                     continue
-                junit = os.path.join(folder, kind + name + ".xml")
+                junit = os.path.join(folder, name.replace("/", ".") + ".xml")
                 command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider",
-                           f"--junitxml={junit}", os.path.join("tests", kind, name)]
+                           f"--junitxml={junit}", str(source.relative_to(ROOT))]
                 if arguments.quick:
                     command += ["-m", "not slow"]
                 code, output, seconds = run(command, PYTEST_TIMEOUT_S, environment)
                 if code == 5 and arguments.quick:  # all tests of the file are slow ones
                     continue
-                totals.add(f"{kind}/{name[:-3]}", junit, code, output, seconds)
+                totals.add(name, junit, code, output, seconds)
 
     with tempfile.TemporaryDirectory() as folder:
         run_checks()

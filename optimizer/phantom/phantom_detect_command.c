@@ -2,7 +2,7 @@
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/phantom/phantom_commands.h"
 #include "optimizer/phantom/weave_overlay.h"
-#include "optimizer/worker/report/weave_json.h"
+#include "optimizer/worker/report/cloth/weave_json.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "server/http/handlers.h"
+#include "server/endpoints/handlers.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 #include "server/http/http_server.h"
+#include "server/endpoints/handlers.h"
 #include "server/http/connection_table.h"
-#include "server/http/handlers.h"
 #include "server/http/http_guard.h"
 #include "server/http/http_reply.h"
 

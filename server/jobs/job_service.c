@@ -2,7 +2,7 @@
 #include "server/jobs/job_service.h"
 #include "base/clock.h"
 #include "server/jobs/job_access.h"
-#include "server/jobs/supervisor.h"
+#include "server/workers/supervisor.h"
 
 #include <string.h>
 

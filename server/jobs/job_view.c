@@ -3,8 +3,8 @@
 #include "base/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
-#include "server/jobs/attempt.h"
 #include "server/jobs/job_paths.h"
+#include "server/workers/attempt.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -89,7 +89,7 @@ def all_tests(quick):
             program = str(pathlib.Path("build", source.relative_to(TREE)).with_suffix(""))
             tests.append(Test(str(source.relative_to(TREE / "tests").with_suffix("")), [program], program))
     for kind in ["api"] if quick else ["api", "crash", "browser", "real"]:
-        for source in sorted((TREE / "tests" / kind).glob("test_*.py")):
+        for source in sorted((TREE / "tests" / kind).rglob("test_*.py")):
             name = str(source.relative_to(TREE))
             command = ["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", name]
             tests.append(Test(name[len("tests/"):-3], command + (["-m", "not slow"] if quick else []), None))

@@ -19,7 +19,7 @@
 #ifndef SELVEDGE_OPTIMIZER_CROSS_VALIDATION_H
 #define SELVEDGE_OPTIMIZER_CROSS_VALIDATION_H
 
-#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/linear/linear_model.h"
 
 #include <stdbool.h>
 

@@ -11,9 +11,9 @@
 #include "base/catalogue/stop_reason.h"
 #include "optimizer/fit/descent/cross_validation.h"
 #include "optimizer/fit/descent/estimator.h"
+#include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/objective/fit_layout.h"
-#include "optimizer/fit/objective/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/fit/objective/uncertainty.h"
 

@@ -15,8 +15,8 @@
 #ifndef SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
 #define SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
 
+#include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/coordinate.h"
-#include "optimizer/fit/objective/linear_model.h"
 #include "optimizer/fit/objective/nuisance.h"
 #include "renderer/transport/estimate/estimate.h"
 

@@ -21,7 +21,7 @@
 #ifndef SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 #define SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 
-#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/linear/linear_model.h"
 
 #include <stdbool.h>
 

@@ -1,5 +1,5 @@
 /* Scores of fits on a phantom (fit_phantom.h). */
-#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
 #include "tests/support/cloth/kept_estimate.h"
 

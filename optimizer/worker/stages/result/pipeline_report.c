@@ -1,7 +1,7 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
 #include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/report/quality.h"
+#include "optimizer/worker/report/cloth/quality.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"

@@ -1,6 +1,6 @@
 /* The objective, fit coordinates, the linear model of an objective, and uncertainty. */
 #include "base/rng.h"
-#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/fit/objective/uncertainty.h"
 #include "tests/support/tracer/fake_estimator.h"

@@ -3,7 +3,7 @@
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/fit/objective/linear_gain.h"
+#include "optimizer/fit/linear/linear_gain.h"
 #include "optimizer/fit/objective/objective.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/chess_board.h"

@@ -1,5 +1,5 @@
 /* The tus 1.0.0 resumable upload protocol: core and termination. */
-#include "server/http/handlers.h"
+#include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_paths.h"
 

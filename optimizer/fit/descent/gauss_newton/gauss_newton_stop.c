@@ -10,7 +10,7 @@
  * of the plain objective or target_rel_rms, or, where no budget was asked for, below photograph_share of the variance
  * of a residual by the photographs' own errors. A fit whose paths or iterations are used up before that has converged
  * if it had arrived. / */
-#include "optimizer/fit/descent/gauss_newton.h"
+#include "optimizer/fit/descent/gauss_newton/gauss_newton.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "optimizer/fit/objective/linear_gain.h"
+#include "optimizer/fit/linear/linear_gain.h"
 #include "optimizer/fit/objective/objective.h"
 
 #include <math.h>

@@ -9,7 +9,7 @@
  * factor of 1.3 when the predicted decrease of the objective is no longer clear of the noise. Configurations share the
  * paths in proportion to the standard deviation of a path (Neyman allocation).
  */
-#include "optimizer/fit/descent/gauss_newton.h"
+#include "optimizer/fit/descent/gauss_newton/gauss_newton.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "renderer/transport/estimate/estimate.h"
 

@@ -1,4 +1,4 @@
-#include "server/jobs/attempt.h"
+#include "server/workers/attempt.h"
 #include "base/clock.h"
 #include "base/durable.h"
 #include "optimizer/job/job_folder.h"

@@ -1,7 +1,7 @@
 #include "base/option_id.h"
 #include "geometry/volume/tile_crop.h"
 #include "optimizer/job/option_key.h"
-#include "optimizer/worker/report/quality.h"
+#include "optimizer/worker/report/cloth/quality.h"
 
 #include <math.h>
 #include <stdarg.h>

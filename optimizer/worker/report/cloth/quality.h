@@ -5,7 +5,7 @@
 #define SELVEDGE_OPTIMIZER_QUALITY_H
 
 #include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/report/fiber_lengths.h"
+#include "optimizer/worker/report/cloth/fiber_lengths.h"
 
 #include <stdio.h>
 

@@ -1,10 +1,10 @@
-#include "optimizer/worker/report/quality.h"
+#include "optimizer/worker/report/cloth/quality.h"
 #include "base/durable.h"
 #include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/cloth/result_geometry.h"
 #include "optimizer/worker/report/json_number.h"
-#include "optimizer/worker/report/result_geometry.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "renderer/image/image.h"
 

@@ -1,9 +1,9 @@
-#include "server/jobs/supervisor.h"
+#include "server/workers/supervisor.h"
 #include "base/clock.h"
-#include "server/jobs/attempt.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/worker_process.h"
+#include "server/workers/attempt.h"
+#include "server/workers/worker_process.h"
 
 #include <errno.h>
 #include <signal.h>

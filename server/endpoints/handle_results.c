@@ -1,5 +1,5 @@
 #include "optimizer/job/job_folder.h"
-#include "server/http/handlers.h"
+#include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/http/tar_stream.h"
 #include "server/jobs/job_paths.h"

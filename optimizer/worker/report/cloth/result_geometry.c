@@ -1,7 +1,7 @@
-#include "optimizer/worker/report/result_geometry.h"
+#include "optimizer/worker/report/cloth/result_geometry.h"
+#include "optimizer/worker/report/cloth/result_cloth.h"
+#include "optimizer/worker/report/cloth/weave_json.h"
 #include "optimizer/worker/report/json_number.h"
-#include "optimizer/worker/report/result_cloth.h"
-#include "optimizer/worker/report/weave_json.h"
 
 static json_t *alignment_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
 {

@@ -1,4 +1,4 @@
-#include "optimizer/worker/report/weave_json.h"
+#include "optimizer/worker/report/cloth/weave_json.h"
 
 #include "optimizer/worker/report/json_number.h"
 

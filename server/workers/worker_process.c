@@ -1,4 +1,4 @@
-#include "server/jobs/worker_process.h"
+#include "server/workers/worker_process.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-#include "optimizer/worker/report/fiber_lengths.h"
+#include "optimizer/worker/report/cloth/fiber_lengths.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
 
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 """Several models in one job, through the daemon, the real worker and the command line: surface and volume models on one
 cloth of fibers."""
 import os
+import pathlib
 import subprocess
 import sys
 
@@ -8,7 +9,8 @@ import pytest
 from daemon_under_test import Daemon, program
 from small_cloth import TABLE, start_small_job
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), "clients", "python"))
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "clients" / "python"))
 import selvedge  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]

@@ -1,4 +1,4 @@
-#include "server/http/handlers.h"
+#include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_view.h"
 

@@ -2,7 +2,7 @@
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/options/option_json.h"
 #include "optimizer/job/stage_table.h"
-#include "server/http/handlers.h"
+#include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/http/static_files.h"
 #include "server/jobs/job_paths.h"

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_LINEAR_GAIN_H
 #define SELVEDGE_OPTIMIZER_LINEAR_GAIN_H
 
-#include "optimizer/fit/objective/linear_model.h"
+#include "optimizer/fit/linear/linear_model.h"
 
 /* Removes gains of standard deviation m->gain_sd from residuals, derivatives and their variances. To be called once
  * for each pooling. photograph_var is kept. */

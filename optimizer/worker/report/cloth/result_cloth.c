@@ -1,4 +1,4 @@
-#include "optimizer/worker/report/result_cloth.h"
+#include "optimizer/worker/report/cloth/result_cloth.h"
 
 #include "base/angle.h"
 #include "optimizer/job/cloth_json.h"

@@ -1,5 +1,5 @@
 /* Averages of a fit's estimates at one point: linear_model_pool. */
-#include "optimizer/fit/objective/linear_gain.h"
+#include "optimizer/fit/linear/linear_gain.h"
 #include "optimizer/fit/objective/objective.h"
 
 #include <math.h>
