@@ -16,7 +16,7 @@ status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source
     *e = (struct cloth_estimator){.source = *source,
                                   .n_scattering = n_scattering,
                                   .n_configuration = n_configuration,
-                                  .differences = true,
+                                  .number_derivatives = true,
                                   .difference = difference_share};
     if (source->n_number > CLOTH_MAX_FITTED)
         return error_set(err, STATUS_INVALID, "cannot fit %zu numbers of a cloth: at most %d are allowed",
@@ -96,7 +96,7 @@ static status run(void *context, const struct estimator_call *call, const struct
 {
     const struct cloth_estimator *e = context;
     const size_t m = e->source.n_number;
-    const bool differ = call->want_jacobian && e->differences;
+    const bool differ = call->want_jacobian && e->number_derivatives;
     double n_cloth = 1.0, done = 1.0;
     for (size_t k = 0; k < m && differ; k++) n_cloth += !e->fixed[k];
     struct progress_part part;

@@ -38,7 +38,7 @@ struct cloth_estimator {
     size_t n_configuration;
     struct coordinate coordinate[CLOTH_MAX_FITTED]; /* of the numbers, with the bounds of the fit */
     bool fixed[CLOTH_MAX_FITTED];                   /* no differences are made; their derivatives are 0 */
-    bool differences;                               /* false: no number has derivatives for now */
+    bool number_derivatives;                        /* whether estimates have them; without, they trace one cloth */
     double difference;                              /* share of the range, in (0, 0.5] */
     struct estimate *moved;                         /* n_configuration, owned */
 };

@@ -36,12 +36,21 @@ static status spread_layout(const struct cloth_search *q, struct fit_layout *l, 
                            &option, err);
 }
 
+/* The extra start to which cloth i of the screening belongs; NULL when it belongs to none. */
+static const double *extra_start(const struct cloth_search *q, size_t i)
+{
+    return i > 0 && i <= q->option->n_extra_start ? q->option->extra_start[i - 1] : NULL;
+}
+
 static void choose_cloth(struct search *s, size_t i, double *number)
 {
-    if (i == 0)
-        for (size_t k = 0; k < s->layout.n_unknown; k++) number[k] = s->layout.parameter[k].start;
-    else
-        fit_run_start(&s->layout, i, number);
+    const double *extra = extra_start(s->search, i);
+    for (size_t k = 0; k < s->layout.n_unknown; k++) {
+        const struct fit_parameter *p = &s->layout.parameter[k];
+        number[k] = p->start;
+        if (extra != NULL && !p->fixed) number[k] = fmin(fmax(extra[n_scattering(s->search) + k], p->lower), p->upper);
+    }
+    if (i > s->search->option->n_extra_start) fit_run_start(&s->layout, i - s->search->option->n_extra_start, number);
 }
 
 static status report_step(void *context, const struct fit_step *step, struct error *err)
@@ -81,16 +90,18 @@ static status fit_on_cloth(struct search *s, const double *number, const double 
     struct fit_option option = *q->option;
     memcpy(parameter, s->parameter, sizeof parameter);
     for (size_t p = 0; p < n_scattering(q); p++)
-        if (start != NULL && !parameter[p].fixed) parameter[p].start = start[p];
+        if (start != NULL && !parameter[p].fixed)
+            parameter[p].start = fmin(fmax(start[p], parameter[p].lower), parameter[p].upper);
     for (size_t k = 0; k < n_number(q); k++) {
         parameter[n_scattering(q) + k].start = number[k];
         parameter[n_scattering(q) + k].fixed = true;
     }
     option.n_start = 1;
+    option.n_extra_start = 0;
     problem->parameter = parameter;
-    q->cloth->differences = false;
+    q->cloth->number_derivatives = false;
     status st = run_fit(s, problem, &option, fit, err);
-    q->cloth->differences = true;
+    q->cloth->number_derivatives = true;
     return st;
 }
 
@@ -108,7 +119,7 @@ static status screen_cloth(struct search *s, size_t i, double *best_param, struc
     problem.path_budget = q->screen_budget;
     problem.max_iteration = SCREEN_STEPS;
     problem.progress = &progress;
-    status st = fit_on_cloth(s, to->number, NULL, &problem, fit, err);
+    status st = fit_on_cloth(s, to->number, extra_start(q, i), &problem, fit, err);
     if (st != STATUS_OK) return st;
     to->objective = fit->objective.value + fit->prior_penalty;
     to->objective_se = fit->objective.se;
@@ -143,11 +154,13 @@ static status run_joint(struct search *s, struct error *err)
     struct progress_part part;
     struct progress progress = progress_begin_part(&part, q->problem->progress, done, 1.0 - done - q->final_share);
     struct fit_problem problem = *q->problem;
+    struct fit_option option = *q->option;
+    option.n_extra_start = 0;
     snprintf(s->kind, sizeof s->kind, "numbers of the cloth");
     problem.first_path = problem.path_budget / (JOINT_STEPS * 2 * problem.observation->n);
     problem.parameter = s->parameter;
     problem.progress = &progress;
-    return run_fit(s, &problem, q->option, &s->result->joint, err);
+    return run_fit(s, &problem, &option, &s->result->joint, err);
 }
 
 static status run_final(struct search *s, const double *number, const double *start, double from,

@@ -2,7 +2,8 @@
  *
  * 1. Screening: the scattering parameters alone are fitted, with few paths, to a few cloths that are spread evenly over
  *    the bounds of the numbers (fit_run_start). All of these fits use the same random numbers and begin at the job's
- *    start. The first cloth is that of the start values.
+ *    start. The first cloth is that of the start values. Those of the extra starts follow, which begin at scattering
+ *    parameters of their own.
  * 2. Joint fit: the method of descent runs on all unknowns together (cloth_estimator.h) from the best cloth of the
  *    screening. It is aware of noise as it is without numbers: estimates are pooled, steps that are worse beyond doubt
  *    are taken back, paths grow when the noise decides, and it ends when the possible decrease is below the noise or
@@ -29,9 +30,10 @@ struct cloth_search {
     /* of all unknowns; its estimator is cloth_estimator(cloth) or a journal of it, its budget that of the joint fit
      * without the differences */
     const struct fit_problem *problem;
-    const struct fit_option *option; /* of all unknowns; numbers are not tied */
+    const struct fit_option *option; /* of all unknowns, extra starts too; numbers are not tied */
     struct cloth_estimator *cloth;
-    size_t n_screen;                  /* cloths of the screening; 0 or 1: the joint fit begins at the start values */
+    size_t
+        n_screen; /* cloths of the screening; 0 or 1: the joint fit begins at the start values. More than extra starts */
     uint64_t screen_budget;           /* paths of each of them */
     uint64_t final_budget;            /* paths of the final fit */
     double screen_share, final_share; /* of the progress, together below 1 */

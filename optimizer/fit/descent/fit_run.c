@@ -251,7 +251,8 @@ static status run_starts(struct fit *f, const struct descent_method *method, str
         s = run_start(f, method, k, &start[k], next, err);
         if (s != STATUS_OK) break;
         double se = 0.0;
-        bool better = k == 0 || difference(&start[kept], &start[k], &se) < -2.0 * se;
+        double change = difference(&start[kept], &start[k], &se);
+        bool better = k == 0 || change < (k <= f->option->n_extra_start ? 0.0 : -2.0 * se);
         if (!better) continue;
         kept = k;
         *result = *next;

@@ -6,7 +6,8 @@
  * Extra starts of the option come after the problem's own and before the others.
  * Each takes its share of the path budget when one is given, and the method's default otherwise. A later start is kept
  * instead of an earlier one when its objective (with what the priors add) is lower by more than two standard errors of
- * the difference.
+ * the difference. An extra start, which is the result of another fit, is kept when its objective is lower at all, so
+ * that the fit does not end worse than the other.
  *
  * Deterministic like the methods themselves, and it asks for the same estimates in the same order: with a journal below
  * (estimate_journal.h) every option resumes bit by bit.

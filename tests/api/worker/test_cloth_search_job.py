@@ -113,3 +113,13 @@ def test_what_numbers_exclude(tmp_path, sample):
     assert error["field"] == "fit.model" and "sees a volume" in error["text"]
     error = refused(tmp_path, "radius", sample, cloth=cloth(**FITTED), fit={"fit_radius": True})
     assert error["field"] == "fit.fit_radius" and "fiber_radius_um" in error["text"]
+
+
+def test_a_contained_model_hands_on_its_cloth(tmp_path, sample):
+    """The screening of the model that contains the other has its cloth twice, whatever the order in the job."""
+    result = run(make_job(tmp_path, "job", sample), cloth=cloth(**FITTED), photographs=photographs(sample),
+                 fit={"models": ["two_lobe_diffuse.v1", "two_lobe.v1"], "path_budget": 60000, "max_iterations": 2, **OUTPUT})
+    outer, inner = result["models"]
+    flatness = inner["cloth_numbers"][0]["value"]
+    assert [s["values"] for s in outer["cloth_screening"][1:3]] == [[flatness]] * 2
+    assert flatness not in [s["values"][0] for s in inner["cloth_screening"]]

@@ -124,10 +124,15 @@ def test_as_many_models_as_a_job_takes(tmp_path):
     assert (tmp_path / "log.txt").read_text().count("validation of ") == 8
 
 
-def test_a_model_that_contains_another_starts_from_its_result(tmp_path):
-    """Three starts: its own, and the result of the contained model with two values of the parameter that it lacks."""
-    run(tmp_path, models=["two_lobe.v1", "two_lobe_diffuse.v1"], path_budget=60000)
-    inner, outer = result(tmp_path)["models"]
+@pytest.mark.parametrize("models", [["two_lobe.v1", "two_lobe_diffuse.v1"], ["two_lobe_diffuse.v1", "two_lobe.v1"]], ids=["inner first", "outer first"])
+def test_a_model_that_contains_another_starts_from_its_result(tmp_path, models):
+    """Three starts: its own, and the result of the contained model with two values of the parameter that it lacks. The
+    contained model is fitted first, whatever the order in the job."""
+    run(tmp_path, models=models, path_budget=60000)
+    found = result(tmp_path)["models"]
+    assert [m["id"] for m in found] == models
+    assert "fitting two_lobe.v1 (model 1 of 2)" in (tmp_path / "log.txt").read_text()
+    inner, outer = (found[models.index(m)] for m in ("two_lobe.v1", "two_lobe_diffuse.v1"))
     found = [p["value"] for p in inner["parameters"]]
     assert len(outer["starts"]) == 3 and inner["starts"] == [] and sum(s["kept"] for s in outer["starts"]) == 1
     for start, w in zip(outer["starts"][1:], (0.02, 0.4)):

@@ -207,7 +207,7 @@ void pipeline_cloth_close(struct pipeline_cloth_trace *t)
 /* ---- the search ---- */
 
 /* Divides the paths between screening, joint fit, whose estimates trace n_free cloths for their differences, and final
- * fit. */
+ * fit. Extra starts are screened however small the budget is. */
 static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
                         struct fit_problem *problem, struct cloth_search *q)
 {
@@ -215,8 +215,9 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
     double whole =
         (double)(c->doc->path_budget > 0 ? c->doc->path_budget : BUDGET_FACTOR * method->info->default_path_budget);
-    double per_cloth = SCREEN_ITERATIONS * least, most = fmin(4.0 + 2.0 * n_free, CLOTH_MAX_SCREEN);
-    double n_screen = floor(fmin(most, screen_share * whole / per_cloth));
+    double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
+    double per_cloth = SCREEN_ITERATIONS * least, most = fmin(4.0 + 2.0 * n_free + n_extra, CLOTH_MAX_SCREEN);
+    double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));
     q->n_screen = n_screen >= 2.0 ? (size_t)n_screen : 0;
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
     q->final_budget = (uint64_t)fmax(final_share * whole, 2.0 * least);

@@ -18,7 +18,8 @@ _Static_assert((int)FIT_SECTIONS <= (int)WORK_FILE_MAX_SECTION, "a checkpoint ha
 
 struct fit_listener {
     struct pipeline_context *pipeline;
-    size_t i_model, step_base; /* steps of the models before this one */
+    size_t i_model, i_place; /* its place in the order of the fits */
+    size_t step_base;        /* steps of the fits before this one */
     struct worker_series *series;
     struct estimate_journal *journal;
     const struct pipeline_joint *joint; /* the unknowns of the model's fit */
@@ -60,14 +61,12 @@ static status fit_parameters(struct fit_listener *l, const struct progress *prog
     struct pipeline_context *c = l->pipeline;
     struct pipeline_trace trace;
     struct fit_problem problem = problem_of(l, progress);
-    struct fit_option option = l->joint->option;
-    pipeline_add_nested_starts(c, l->i_model, &option);
     status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", l->i_model, &c->row, err);
     if (s == STATUS_OK) {
         struct estimator estimator = estimate_journal_estimator(trace.journal);
         l->journal = trace.journal;
         problem.estimator = &estimator;
-        s = fit_run(descent_find(c->doc->method), &problem, &option, &c->model[l->i_model].fit, err);
+        s = fit_run(descent_find(c->doc->method), &problem, &l->joint->option, &c->model[l->i_model].fit, err);
     }
     if (s == STATUS_OK && estimate_journal_n_replayed(trace.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
@@ -183,12 +182,12 @@ static void conclude_fit(struct pipeline_context *c, const struct pipeline_model
     warn_numbers(c, m);
 }
 
-static void announce_model(struct pipeline_context *c, size_t i_model)
+static void announce_model(struct pipeline_context *c, const struct fit_listener *l)
 {
     char message[160];
     if (c->n_model < 2) return;
-    snprintf(message, sizeof message, "fitting %s (model %zu of %zu)", c->model[i_model].appearance.id, i_model + 1,
-             c->n_model);
+    snprintf(message, sizeof message, "fitting %s (model %zu of %zu)", c->model[l->i_model].appearance.id,
+             l->i_place + 1, c->n_model);
     worker_status_message(c->status, message);
     log_info(c->log, "%s", message);
 }
@@ -200,12 +199,13 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     struct progress_part rest, part;
     double before = c->doc->fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
     struct progress whole = progress_begin_part(&rest, &c->progress, before, 1.0 - before);
-    struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_model);
+    struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_place);
     struct pipeline_joint *joint = malloc(sizeof *joint);
     if (joint == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start a fit: out of memory");
-    announce_model(c, listener->i_model);
+    announce_model(c, listener);
     listener->joint = joint;
     status s = pipeline_joint_init(c, listener->i_model, joint, err);
+    if (s == STATUS_OK) pipeline_add_nested_starts(c, listener->i_model, &joint->option);
     if (s == STATUS_OK && descent_find(c->doc->method) == NULL)
         s = error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
     if (s == STATUS_OK)
@@ -253,10 +253,15 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
 status stage_fit(struct pipeline_context *c, struct error *err)
 {
     struct fit_listener listener = {.pipeline = c};
+    size_t order[JOB_MAX_MODEL];
     status s = worker_series_open(c->folder, &listener.series, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_search(c, listener.series, err);
     listener.step_base = c->radius.n_step;
-    for (; listener.i_model < c->n_model && s == STATUS_OK; listener.i_model++) s = fit_model(&listener, err);
+    pipeline_fit_order(c, order);
+    for (; listener.i_place < c->n_model && s == STATUS_OK; listener.i_place++) {
+        listener.i_model = order[listener.i_place];
+        s = fit_model(&listener, err);
+    }
     if (s == STATUS_OK) s = store_fits(c, err);
     worker_series_close(listener.series);
     return s;

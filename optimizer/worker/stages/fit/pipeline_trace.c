@@ -68,8 +68,8 @@ void pipeline_trace_close(struct pipeline_trace *t)
 }
 
 struct progress pipeline_model_progress(struct progress_part *part, const struct progress *whole,
-                                        const struct pipeline_context *c, size_t i_model)
+                                        const struct pipeline_context *c, size_t i_place)
 {
     double share = 1.0 / (double)c->n_model;
-    return progress_begin_part(part, whole, share * (double)i_model, share);
+    return progress_begin_part(part, whole, share * (double)i_place, share);
 }

@@ -27,8 +27,8 @@ void pipeline_trace_request(struct trace_estimator *t, const struct pipeline_con
 status pipeline_trace_journal(struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
                               const struct estimator *live, struct estimate_journal **journal, struct error *err);
 
-/* The progress of model i_model as a part of `whole`: all models take equal shares. */
+/* The progress of the i_place-th model to be computed as a part of `whole`: all models take equal shares. */
 struct progress pipeline_model_progress(struct progress_part *part, const struct progress *whole,
-                                        const struct pipeline_context *c, size_t i_model);
+                                        const struct pipeline_context *c, size_t i_place);
 
 #endif

@@ -85,7 +85,7 @@ static double profiled(unsigned n, const double *number, double *gradient, void 
     }
     problem.parameter = parameter;
     problem.report = NULL;
-    x->numbers.differences = false;
+    x->numbers.number_derivatives = false;
     assert_int_equal(fit_run(x->search.method, &problem, &x->option, r, NULL), STATUS_OK);
     double f = r->objective.value;
     free(r);
@@ -154,7 +154,7 @@ static void test_recovery_and_errors(void **state)
             x.parameter[FAKE_N_PARAM + k].start = x.truth[FAKE_N_PARAM + k];
         }
         x.problem.report = NULL;
-        x.numbers.differences = false;
+        x.numbers.number_derivatives = false;
         assert_int_equal(fit_run(x.search.method, &x.problem, &x.option, &alone, NULL), STATUS_OK);
         ratio += log(u->se_param[4] / alone.uncertainty.se_param[4]) / N_SEED;
         n_wide += u->se_param[4] > alone.uncertainty.se_param[4];
@@ -183,6 +183,34 @@ static void test_prior_of_an_undetermined_number(void **state)
     fake_numbers_run(&x, r);
     print_message("hairs %.2f +- %.2f, prior 6 +- 0.5\n", number_of(r, 2), number_se(r, 2));
     assert_true(fabs(number_of(r, 2) - 6.0) < 0.2 && fabs(number_se(r, 2) - 0.5) < 0.05);
+    fake_numbers_release(&x);
+    free(r);
+}
+
+/* ---- extra starts ---- */
+
+/* An extra start is a cloth of the screening with scattering parameters of its own, and the joint fit begins there if
+ * it is the best. Values beyond the bounds are moved to them. */
+static void test_extra_starts(void **state)
+{
+    (void)state;
+    struct fake_numbers x;
+    struct cloth_search_result *r = malloc(sizeof *r);
+    fake_numbers_init(&x, mid_cloth, 11, 0.0, 0.0, 0.0);
+    x.problem.max_iteration = 1; /* the joint fit stays where it begins */
+    x.search.n_screen = 4;
+    x.option.n_extra_start = 2;
+    memcpy(x.option.extra_start[0], x.truth, sizeof x.truth);
+    x.option.extra_start[0][FAKE_N_PARAM] = 9.0;
+    memcpy(x.option.extra_start[1], x.truth, sizeof x.truth);
+    fake_numbers_run(&x, r);
+    assert_true(r->screened[0].number[1] == x.parameter[FAKE_N_PARAM + 1].start);
+    assert_true(r->screened[1].number[0] == x.info[FAKE_N_PARAM].upper);
+    for (size_t k = 0; k < FAKE_N_NUMBER; k++) assert_true(r->screened[2].number[k] == mid_cloth[k]);
+    assert_true(r->screened[3].number[1] != mid_cloth[1] && r->screened[3].number[1] != r->screened[0].number[1]);
+    assert_int_equal(r->i_best, 2);
+    assert_true(r->screened[2].objective < 1e-3 * fmin(r->screened[0].objective, r->screened[3].objective));
+    assert_int_equal(r->joint.n_start, 0);
     fake_numbers_release(&x);
     free(r);
 }
@@ -265,6 +293,7 @@ int main(void)
         cmocka_unit_test(test_against_bobyqa),
         cmocka_unit_test(test_recovery_and_errors),
         cmocka_unit_test(test_prior_of_an_undetermined_number),
+        cmocka_unit_test(test_extra_starts),
         cmocka_unit_test(test_marginal),
         cmocka_unit_test_setup_teardown(test_resume, scratch_folder_setup, scratch_folder_teardown),
     };
