@@ -4,33 +4,40 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
+static size_t wrap(long i, size_t n) { return (size_t)((i % (long)n + (long)n) % (long)n); }
+
+/* Raises the heights of the pixels under the segment from a to b, of radius r. */
+static void draw_segment(const float a[3], const float b[3], double r, double pixel_size_m, const size_t n[2],
+                         float *height)
+{
+    double d[2] = {(double)b[0] - a[0], (double)b[1] - a[1]}, d2 = fmax(d[0] * d[0] + d[1] * d[1], 1e-30);
+    long low[2], high[2];
+    for (int x = 0; x < 2; x++) {
+        low[x] = (long)floor((fmin((double)a[x], (double)b[x]) - r) / pixel_size_m - 0.5);
+        high[x] = (long)ceil((fmax((double)a[x], (double)b[x]) + r) / pixel_size_m - 0.5);
+    }
+    for (long j = low[1]; j <= high[1]; j++) {
+        float *row = height + wrap(j, n[1]) * n[0];
+        size_t at = wrap(low[0], n[0]);
+        for (long l = low[0]; l <= high[0]; l++, at = at + 1 < n[0] ? at + 1 : 0) {
+            double q[2] = {((double)l + 0.5) * pixel_size_m - a[0], ((double)j + 0.5) * pixel_size_m - a[1]};
+            double t = (q[0] * d[0] + q[1] * d[1]) / d2;
+            t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
+            double off[2] = {q[0] - t * d[0], q[1] - t * d[1]}, off2 = off[0] * off[0] + off[1] * off[1];
+            if (off2 > r * r) continue;
+            float z = (float)((double)a[2] + t * ((double)b[2] - a[2]) + sqrt(r * r - off2));
+            if (z > row[at]) row[at] = z;
+        }
+    }
+}
+
 /* Computes the height of the topmost fiber surface over each pixel of the tile (periodic). Pixels without a fiber
  * keep their height. */
 static void draw(const struct fiber_set *f, double pixel_size_m, const size_t n[2], float *height)
 {
-    for (size_t i = 0; i < f->n_fiber; i++) {
-        double r = f->radius_m[i];
-        for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
-            const float *a = f->position_m + 3 * k, *b = a + 3;
-            double d[2] = {(double)b[0] - a[0], (double)b[1] - a[1]}, d2 = fmax(d[0] * d[0] + d[1] * d[1], 1e-30);
-            long low[2], high[2];
-            for (int x = 0; x < 2; x++) {
-                low[x] = (long)floor((fmin((double)a[x], (double)b[x]) - r) / pixel_size_m - 0.5);
-                high[x] = (long)ceil((fmax((double)a[x], (double)b[x]) + r) / pixel_size_m - 0.5);
-            }
-            for (long j = low[1]; j <= high[1]; j++)
-                for (long l = low[0]; l <= high[0]; l++) {
-                    double q[2] = {((double)l + 0.5) * pixel_size_m - a[0], ((double)j + 0.5) * pixel_size_m - a[1]};
-                    double t = fmax(0.0, fmin(1.0, (q[0] * d[0] + q[1] * d[1]) / d2));
-                    double off2 = pow(q[0] - t * d[0], 2.0) + pow(q[1] - t * d[1], 2.0);
-                    if (off2 > r * r) continue;
-                    long m[2] = {(long)n[0], (long)n[1]};
-                    float z = (float)((double)a[2] + t * ((double)b[2] - a[2]) + sqrt(r * r - off2));
-                    float *to = height + ((j % m[1] + m[1]) % m[1]) * m[0] + (l % m[0] + m[0]) % m[0];
-                    *to = fmaxf(*to, z);
-                }
-        }
-    }
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++)
+            draw_segment(f->position_m + 3 * k, f->position_m + 3 * k + 3, f->radius_m[i], pixel_size_m, n, height);
 }
 
 status fiber_top_view(const struct fiber_set *f, double pixel_size_m, size_t size[2], uint8_t **grey, double *cover,

@@ -26,23 +26,39 @@ struct job {
     size_t scratch_per_thread;
 };
 
-/* Convolves along one axis with edge values repeated. */
-static void blur_axis(const float *in, float *out, const size_t n[3], int axis, const float *kernel, int reach)
+static void add_scaled(float *restrict to, const float *restrict from, float w, size_t n)
 {
-    size_t stride = axis == 0 ? 1 : axis == 1 ? n[0] : n[0] * n[1];
-    ptrdiff_t last = (ptrdiff_t)n[axis] - 1;
-    size_t n_inner = axis == 0 ? 1 : stride, n_outer = n[0] * n[1] * n[2] / (n_inner * n[axis]);
-    for (size_t o = 0; o < n_outer; o++)
-        for (ptrdiff_t c = 0; c <= last; c++) {
-            float *restrict to = out + o * n_inner * n[axis] + (size_t)c * stride;
-            memset(to, 0, n_inner * sizeof *to);
+    for (size_t i = 0; i < n; i++) to[i] += w * from[i];
+}
+
+/* Convolves rows of n values, at most EDGE, with edge values repeated. */
+static void blur_rows(const float *in, float *out, size_t n, size_t n_row, const float *kernel, int reach)
+{
+    float padded[EDGE + 2 * MAX_REACH];
+    size_t before = (size_t)reach;
+    memset(out, 0, n * n_row * sizeof *out);
+    for (size_t k = 0; k < n_row; k++, in += n, out += n) {
+        for (size_t i = 0; i < before; i++) {
+            padded[i] = in[0];
+            padded[before + n + i] = in[n - 1];
+        }
+        memcpy(padded + before, in, n * sizeof *in);
+        for (size_t t = 0; t <= 2 * before; t++) add_scaled(out, padded + t, kernel[t], n);
+    }
+}
+
+/* Convolves across n_line lines of n_inner neighbouring values, with edge lines repeated; n_outer such blocks. */
+static void blur_lines(const float *in, float *out, size_t n_inner, size_t n_line, size_t n_outer, const float *kernel,
+                       int reach)
+{
+    ptrdiff_t last = (ptrdiff_t)n_line - 1;
+    memset(out, 0, n_inner * n_line * n_outer * sizeof *out);
+    for (size_t o = 0; o < n_outer; o++, in += n_inner * n_line, out += n_inner * n_line)
+        for (ptrdiff_t c = 0; c <= last; c++)
             for (int t = -reach; t <= reach; t++) {
                 ptrdiff_t s = c + t < 0 ? 0 : c + t > last ? last : c + t;
-                const float *restrict from = in + o * n_inner * n[axis] + (size_t)s * stride;
-                float w = kernel[t + reach];
-                for (size_t i = 0; i < n_inner; i++) to[i] += w * from[i];
+                add_scaled(out + (size_t)c * n_inner, in + (size_t)s * n_inner, kernel[t + reach], n_inner);
             }
-        }
 }
 
 static void blur(float *a, float *b, const size_t n[3], double sigma)
@@ -53,9 +69,9 @@ static void blur(float *a, float *b, const size_t n[3], double sigma)
     double sum = 0.0;
     for (int t = -reach; t <= reach; t++) sum += exp(-0.5 * t * t / (sigma * sigma));
     for (int t = -reach; t <= reach; t++) kernel[t + reach] = (float)(exp(-0.5 * t * t / (sigma * sigma)) / sum);
-    blur_axis(a, b, n, 0, kernel, reach);
-    blur_axis(b, a, n, 1, kernel, reach);
-    blur_axis(a, b, n, 2, kernel, reach);
+    blur_rows(a, b, n[0], n[1] * n[2], kernel, reach);
+    blur_lines(b, a, n[0], n[1], n[2], kernel, reach);
+    blur_lines(a, b, n[0] * n[1], n[2], 1, kernel, reach);
     memcpy(a, b, n[0] * n[1] * n[2] * sizeof *a);
 }
 
