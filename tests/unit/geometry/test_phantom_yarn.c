@@ -116,6 +116,7 @@ static void test_real_yarn_files(void **state)
             o.packing = 0.5;
             o.n_relax = 0;
             o.vertex_spacing_m = 6e-5;
+            o.voxel_size_m = 8e-6; /* of the view from above, which is not what is tested */
             o.yarn = y;
             o.yarn_true_size = true_size == 1;
             make_phantom(&o, 2, &f, &r);

@@ -89,6 +89,7 @@ static void release(struct result *x)
 }
 
 static char path[128];
+static struct result reference; /* of the scan in memory with axes "xyz" and three threads; tests only read it */
 
 static int make_scan(void **state)
 {
@@ -97,6 +98,14 @@ static int make_scan(void **state)
     test_make_folder(folder);
     snprintf(path, sizeof path, "%s/scan.tif", folder);
     write_scan(path);
+    run(path, "xyz", 3, &reference);
+    return 0;
+}
+
+static int release_reference(void **state)
+{
+    (void)state;
+    release(&reference);
     return 0;
 }
 
@@ -124,8 +133,7 @@ static double rms_from_axes(const struct fiber_set *f)
 static void test_chain(void **state)
 {
     (void)state;
-    struct result x;
-    run(path, "xyz", 2, &x);
+    const struct result x = reference;
     print_message("low %.0f high %.0f noise %.3f diameter %.2f radius %.3f um (7.0) rms %.3f voxels length %.1f um "
                   "dice %.3f change %.2f\n",
                   x.r.density_low, x.r.density_high, x.r.noise_sd, x.r.fiber_diameter_voxel, x.r.radius_m[0] * 1e6,
@@ -155,7 +163,6 @@ static void test_chain(void **state)
     assert_true(red >= 3 * 13); /* crosses of 13 pixels for the three fibers along x */
     free(rgb);
     assert_int_equal(reconstruct_slice_picture(&x.v, &x.f, 0, NX, &rgb, &width, &height, NULL), STATUS_INVALID);
-    release(&x);
 }
 
 /* Values that are chosen from the data are written into the options. A run with these values as options gives the same
@@ -163,8 +170,8 @@ static void test_chain(void **state)
 static void test_choices_are_reported_and_overridable(void **state)
 {
     (void)state;
-    struct result x, y;
-    run(path, "xyz", 2, &x);
+    const struct result x = reference;
+    struct result y;
     const struct reconstruct_option *o = &x.o;
     const double chosen[] = {o->density_low, o->density_high, o->s,           o->t,           (double)o->h,
                              o->eps_d,       o->eps_j,        o->radius_m[0], o->radius_m[1], o->radius_m[2]};
@@ -194,7 +201,6 @@ static void test_choices_are_reported_and_overridable(void **state)
     assert_true(y.r.n_kept_voxel != x.r.n_kept_voxel);
     assert_true(fabs((double)y.f.radius_m[0] / other.radius_m[y.f.axis_class[0]] - 1.0) < 1e-6);
     release(&y);
-    release(&x);
 }
 
 struct advice {
@@ -278,12 +284,10 @@ static void assert_same(const struct result *a, const struct result *b)
 static void test_threads(void **state)
 {
     (void)state;
-    struct result one, three;
+    struct result one;
     run(path, "xyz", 1, &one);
-    run(path, "xyz", 3, &three);
-    assert_same(&one, &three);
+    assert_same(&one, &reference);
     release(&one);
-    release(&three);
 }
 
 /* Processing in slabs of a few slices with arrays in files gives the same bits as processing in memory. The axes
@@ -294,9 +298,9 @@ static void test_memory_limit(void **state)
     char folder[64];
     test_make_folder(folder);
     for (int turned = 0; turned < 2; turned++) {
-        struct result free_of_limit, limited;
+        struct result free_of_limit = reference, limited;
         const char *axes = turned ? "zxy" : "xyz";
-        run(path, axes, 2, &free_of_limit);
+        if (turned) run(path, axes, 2, &free_of_limit);
         for (size_t mib = 1; mib <= 4; mib += 3) {
             struct scratch_space *space;
             assert_int_equal(scratch_space_new(folder, mib << 20, &space, NULL), STATUS_OK);
@@ -306,7 +310,7 @@ static void test_memory_limit(void **state)
             release(&limited);
             scratch_space_free(space);
         }
-        release(&free_of_limit);
+        if (turned) release(&free_of_limit);
     }
 }
 
@@ -326,8 +330,8 @@ static bool starts_and_ends_at_faces(const struct result *x, size_t fiber)
 static void test_axes(void **state)
 {
     (void)state;
-    struct result plain, turned;
-    run(path, "xyz", 2, &plain);
+    const struct result plain = reference;
+    struct result turned;
     run(path, "zx-y", 2, &turned);
     assert_true(turned.v.n[0] == NZ && turned.v.n[1] == NX && turned.v.n[2] == NY);
     for (size_t k = 0; k < NZ; k += 5)
@@ -344,24 +348,22 @@ static void test_axes(void **state)
         assert_true(starts_and_ends_at_faces(&plain, l));
         assert_true(starts_and_ends_at_faces(&turned, l));
     }
-    release(&plain);
     release(&turned);
 }
 
 static void test_cancel(void **state)
 {
     (void)state;
-    struct result x;
+    struct volume v;
+    struct direction_volume d;
+    struct reconstruct_option o = reference.o;
+    struct reconstruct_report r = reference.r;
     struct error err = {0};
     atomic_bool cancel = true;
     const struct progress progress = {.cancel = &cancel};
-    run(path, "xyz", 2, &x);
-    direction_volume_release(&x.d);
-    assert_int_equal(reconstruct_orientation(&x.v, &x.o, NULL, &progress, &x.d, &x.r, &err), STATUS_CANCELLED);
     const char *list[1] = {path};
-    volume_release(&x.v);
-    assert_int_equal(reconstruct_read(list, 1, &x.o, NULL, NULL, &progress, &x.v, &x.r, &err), STATUS_CANCELLED);
-    release(&x);
+    assert_int_equal(reconstruct_orientation(&reference.v, &o, NULL, &progress, &d, &r, &err), STATUS_CANCELLED);
+    assert_int_equal(reconstruct_read(list, 1, &o, NULL, NULL, &progress, &v, &r, &err), STATUS_CANCELLED);
 }
 
 /* Removes the folder during the search, so that no more arrays can be kept in files, as when a disk fails. */
@@ -402,5 +404,5 @@ int main(void)
                                        cmocka_unit_test(test_cancel),
                                        cmocka_unit_test(test_memory_limit),
                                        cmocka_unit_test(test_first_error_is_the_one_told)};
-    return cmocka_run_group_tests(tests, make_scan, NULL);
+    return cmocka_run_group_tests(tests, make_scan, release_reference);
 }
