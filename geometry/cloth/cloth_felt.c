@@ -39,7 +39,7 @@ static status add_fiber(struct web *b, size_t i, struct error *err)
     double half_m = fmax(0.5 * b->thickness_m - radius_m, 0.1 * b->thickness_m);
     double tilt = fmax(-0.45 * M_PI, fmin(0.45 * M_PI, b->tilt_rad * z[0])), step_m = b->length_m / (FELT_NODES - 1);
     struct strand like = {.radius_m = radius_m, .cut = CUT_FACE_XY};
-    status st = work_has_room(b->w, err);
+    status st = work_has_room(b->w, FELT_NODES, err);
     if (st == STATUS_OK) st = strand_add(&b->w->set, &like, FELT_NODES, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t j = 0; j < FELT_NODES; j++) {

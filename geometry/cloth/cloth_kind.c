@@ -16,9 +16,9 @@ double work_number(const struct cloth_work *w, const char *name)
     return cloth_number_value(w->d, w->number, -1, name);
 }
 
-status work_has_room(const struct cloth_work *w, struct error *err)
+status work_has_room(const struct cloth_work *w, size_t n_more, struct error *err)
 {
-    if (w->set.n_node <= MAX_CLOTH_NODES) return STATUS_OK;
+    if (w->set.n_node + n_more <= MAX_CLOTH_NODES) return STATUS_OK;
     return error_set(err, STATUS_TOO_LARGE,
                      "the described cloth has more than %d vertices: take fewer yarns in the tile, fewer fibers in a "
                      "yarn, or fewer hairs",

@@ -35,8 +35,7 @@ static status add_fiber(const struct pile *p, const double root_m[2], uint32_t t
                           .axis_class = 2,
                           .group = (uint8_t)p->w->d->pile_kind,
                           .cut = CUT_NONE};
-    status st = work_has_room(p->w, err);
-    if (st == STATUS_OK) st = strand_add(&p->w->set, &like, PILE_NODES, &node, err);
+    status st = strand_add(&p->w->set, &like, PILE_NODES, &node, err);
     if (st != STATUS_OK) return st;
     double at[3] = {root_m[0] + rho_m * cos(angle), root_m[1] + rho_m * sin(angle), -0.5 * p->ground_m};
     for (size_t j = 0; j < PILE_NODES; j++) {
@@ -62,7 +61,8 @@ status cloth_pile(struct cloth_work *w, const double *x_m, const double *y_m, do
                            .tilt_rad = RAD_PER_DEG * work_number(w, "pile_tilt_deg"),
                            .direction_rad = RAD_PER_DEG * work_number(w, "pile_direction_deg"),
                            .spread_rad = RAD_PER_DEG * work_number(w, "pile_spread_deg")};
-    status st = STATUS_OK;
+    size_t n_tuft = d->n_yarn[CLOTH_WEFT] * d->n_yarn[CLOTH_WARP];
+    status st = work_has_room(w, n_tuft * d->kind[d->pile_kind].n_fiber * PILE_NODES, err);
     for (size_t i = 0; i < d->n_yarn[CLOTH_WEFT]; i++)
         for (size_t j = 0; j < d->n_yarn[CLOTH_WARP]; j++) {
             uint32_t tuft = (uint32_t)(i * d->n_yarn[CLOTH_WARP] + j);

@@ -176,12 +176,24 @@ static status add_yarn(const struct weave *v, int direction, size_t i, struct er
     return st;
 }
 
+/* Refuses a tile that is too large before its fibers are made. */
+static status check_size(const struct weave *v, struct error *err)
+{
+    const struct cloth_work *w = v->w;
+    size_t n_node = 0;
+    for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++)
+        for (size_t i = 0; i < w->d->n_yarn[direction]; i++)
+            n_node += yarn_nodes(w, kind_of(w->d, direction, i), v->nominal_tile_m[direction]);
+    return work_has_room(w, n_node, err);
+}
+
 status cloth_weave(struct cloth_work *w, struct error *err)
 {
     struct weave *v = calloc(1, sizeof *v);
     if (v == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
     v->w = w;
     status st = weave_lay_out(v, err);
+    if (st == STATUS_OK) st = check_size(v, err);
     for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++)
         for (size_t i = 0; i < w->d->n_yarn[direction] && st == STATUS_OK; i++) st = add_yarn(v, direction, i, err);
     if (st == STATUS_OK && w->d->structure == CLOTH_VELVET) {

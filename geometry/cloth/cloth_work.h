@@ -33,8 +33,8 @@ struct cloth_work {
 
 /* Value of a number of the cloth; NaN if it has none. */
 double work_number(const struct cloth_work *w, const char *name);
-/* STATUS_TOO_LARGE when the fibers so far are more than a job can trace. */
-status work_has_room(const struct cloth_work *w, struct error *err);
+/* STATUS_TOO_LARGE when the nodes so far and n_more further ones are more than a job can trace. */
+status work_has_room(const struct cloth_work *w, size_t n_more, struct error *err);
 /* Fills w->kind and w->nominal. */
 void kind_shapes(struct cloth_work *w);
 
@@ -50,6 +50,8 @@ double wave_at(const struct wave *v, double s);
 /* Standard deviation of the slope by s. */
 double wave_slope_sd(const struct wave *v);
 
+/* Nodes of the staple fibers of one yarn of a kind, of the length nominal_m at the description's own values. */
+size_t yarn_nodes(const struct cloth_work *w, size_t kind, double nominal_m);
 /* Adds the staple fibers and hairs of one yarn. nominal_m: its length at the description's own values. yarn_number
  * selects random streams. */
 status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, double nominal_m, struct error *err);

@@ -110,6 +110,12 @@ static double melange_share(const struct kind_shape *k, size_t i)
     return fmax(0.0, fmin(1.0, k->melange * (double)k->n_fiber - (double)rank));
 }
 
+static size_t staple_nodes(double nominal_radii)
+{
+    size_t n = (size_t)ceil(nominal_radii / NODE_STEP_RADII);
+    return n > LEAST_NODES ? n : LEAST_NODES;
+}
+
 static status add_staple(struct filling *y, size_t i, double start, struct error *err)
 {
     const struct rng_key key = {.seed = y->w->d->seed, .iteration = STREAM_STAPLE};
@@ -121,8 +127,7 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
     rng_start(&rng, &key, y->path->number, (uint32_t)i);
     rng_normal_pair(&rng, z);
     draw_wander(y, &v, &rng);
-    size_t n = (size_t)ceil(y->nominal_radii / NODE_STEP_RADII);
-    if (n < LEAST_NODES) n = LEAST_NODES;
+    size_t n = staple_nodes(y->nominal_radii);
     struct strand like = {.radius_m = k->radius_m * fmax(0.3, 1.0 + k->radius_spread * fmax(-2.0, fmin(2.0, z[0]))),
                           .axis_class = y->path->axis_class,
                           .group = (uint8_t)y->kind,
@@ -131,8 +136,7 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
         like.start_share = melange_share(k, i);
         like.group_of_start = (uint8_t)k->melange_with;
     }
-    status st = work_has_room(y->w, err);
-    if (st == STATUS_OK) st = strand_add(&y->w->set, &like, n, &node, err);
+    status st = strand_add(&y->w->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
     for (size_t j = 0; j < n; j++) {
         double t = (double)j / (double)(n - 1), s = start + t, at[2];
@@ -161,7 +165,7 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
     if (length_m < 2.0 * k->radius_m) return STATUS_OK;
     struct strand like = {
         .radius_m = k->radius_m, .axis_class = y->path->axis_class, .group = (uint8_t)y->kind, .cut = CUT_NONE};
-    status st = work_has_room(y->w, err);
+    status st = work_has_room(y->w, HAIR_NODES, err);
     if (st == STATUS_OK) st = strand_add(&y->w->set, &like, HAIR_NODES, &node, err);
     if (st != STATUS_OK) return st;
     double along = side * cos(rise) * length_m / y->length_m[y->path->n], out_m = sin(rise) * length_m;
@@ -186,6 +190,11 @@ static status add_hairs(struct filling *y, struct error *err)
     return st;
 }
 
+size_t yarn_nodes(const struct cloth_work *w, size_t kind, double nominal_m)
+{
+    return w->kind[kind].n_fiber * staple_nodes(nominal_m / w->nominal[kind].radius_m);
+}
+
 status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, double nominal_m, struct error *err)
 {
     const struct rng_key key = {.seed = w->d->seed, .iteration = STREAM_YARN};
@@ -201,7 +210,8 @@ status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, dou
     y.nap[1] = lean * sin(towards);
     wave_draw(&y.thick, 1.0, &rng);
     double start = rng_double(&rng);
-    status st = measure_path(&y, err);
+    status st = work_has_room(w, yarn_nodes(w, kind, nominal_m), err);
+    if (st == STATUS_OK) st = measure_path(&y, err);
     for (size_t i = 0; i < y.shape->n_fiber && st == STATUS_OK; i++) {
         double at = start + START_STEP * (double)i;
         st = add_staple(&y, i, at - floor(at), err);

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NODES_PER_TASK = 2048, N_UNBEND = 6 }; /* N_UNBEND: steps per round */
+/* N_UNBEND: steps per round. MAX_CELLS limits the memory of the grid that finds neighbours. */
+enum { NODES_PER_TASK = 2048, N_UNBEND = 6, MAX_CELLS = 1 << 26 };
 
 /* Share of its last step by which a node moves again (heavy-ball momentum). A stack of fibers then separates in a
  * sixth of the rounds. */
@@ -57,6 +58,20 @@ static size_t clamp_cell(double x, double cell_m, size_t n_cell)
     return c < 0.0 ? 0 : c >= (double)n_cell ? n_cell - 1 : (size_t)c;
 }
 
+/* Divides the space into cells at least a diameter wide; thin fibers in a high pile get wider ones. */
+static void choose_cells(struct relax *r, const double extent_m[3])
+{
+    double edge_m = 2.0 * r->r_max, n_cell[3];
+    do {
+        for (int a = 0; a < 3; a++) n_cell[a] = fmax(1.0, floor(extent_m[a] / edge_m));
+        edge_m *= 1.25;
+    } while (n_cell[0] * n_cell[1] * n_cell[2] > MAX_CELLS);
+    for (int a = 0; a < 3; a++) {
+        r->n_cell[a] = (size_t)n_cell[a];
+        r->cell_m[a] = extent_m[a] / n_cell[a];
+    }
+}
+
 static status relax_init(struct relax *r, struct strand_set *s, enum strand_rule rule, struct error *err)
 {
     *r = (struct relax){.s = s, .rule = rule, .per_tile = {1.0 / s->tile_m[0], 1.0 / s->tile_m[1]}};
@@ -67,11 +82,7 @@ static status relax_init(struct relax *r, struct strand_set *s, enum strand_rule
         high = fmax(high, s->start[k][2]);
     }
     r->z_low_m = low - 4.0 * r->r_max;
-    double extent[3] = {s->tile_m[0], s->tile_m[1], high - low + 8.0 * r->r_max};
-    for (int a = 0; a < 3; a++) {
-        r->n_cell[a] = (size_t)fmax(1.0, floor(extent[a] / (2.0 * r->r_max)));
-        r->cell_m[a] = extent[a] / (double)r->n_cell[a];
-    }
+    choose_cells(r, (const double[3]){s->tile_m[0], s->tile_m[1], high - low + 8.0 * r->r_max});
     size_t n_cell = r->n_cell[0] * r->n_cell[1] * r->n_cell[2];
     r->strand_of = calloc(s->n_node, sizeof *r->strand_of);
     r->move = calloc(s->n_node, sizeof *r->move);
