@@ -4,7 +4,7 @@ import sys
 import pytest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
-from daemon_under_test import Daemon  # noqa: E402
+from daemon_under_test import Daemon, program  # noqa: E402
 from system_calls import build_shim  # noqa: E402
 
 
@@ -12,6 +12,13 @@ from system_calls import build_shim  # noqa: E402
 def daemon(tmp_path_factory):
     """One daemon for all tests of a file. Its worker is tests/support/fake_worker.py."""
     with Daemon(tmp_path_factory.mktemp("daemon") / "data") as d:
+        yield d
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    """The same with the real worker."""
+    with Daemon(tmp_path_factory.mktemp("real") / "data", worker=program("selvedge-worker")) as d:
         yield d
 
 

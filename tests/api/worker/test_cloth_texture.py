@@ -2,19 +2,13 @@
 import os
 
 import pytest
-from daemon_under_test import Daemon, problem, program
+from daemon_under_test import problem, program
 from small_cloth import TABLE
 from small_png import png, weave
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1}
 TWILL = ["110", "011", "101"]
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("texture") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 def finish(d, cloth, picture, state="succeeded"):

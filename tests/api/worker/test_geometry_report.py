@@ -4,17 +4,11 @@ import os
 import subprocess
 
 import pytest
-from daemon_under_test import Daemon, program
+from daemon_under_test import program
 from small_cloth import TABLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"max_iterations": 1, "path_budget": 1000, "render_px": 8, "render_samples": 1}
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("geometry") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 @pytest.fixture(scope="module")

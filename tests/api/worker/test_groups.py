@@ -6,18 +6,12 @@ import struct
 import subprocess
 
 import pytest
-from daemon_under_test import Daemon, program
+from daemon_under_test import program
 from small_cloth import TABLE, start_small_job
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 OWN = ["C_R.r", "C_R.g", "C_R.b", "C_TT.r", "C_TT.g", "C_TT.b", "beta_R", "beta_TT", "gamma_TT"]
 FIT = {"max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1}
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("groups") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 def document(groups, **fit):

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from daemon_under_test import Daemon, program
+from daemon_under_test import program
 from small_cloth import TABLE, start_small_job
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -20,12 +20,6 @@ MODELS = ["microflake.v1", "two_lobe.v1"]
 def document(**fit):
     return {"sample": "which model", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"},
             "fit": {"models": MODELS, "path_budget": 100000, "render_px": 8, "render_samples": 1, "density_multiplier_per_cm": 2000, **fit}}
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("models") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 import os
 
 import pytest
-from daemon_under_test import Daemon, program
+from daemon_under_test import program
 from small_cloth import start_small_job
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
@@ -11,12 +11,6 @@ pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_O
 def document(**more):
     return {"sample": "skill", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"},
             "fit": {"path_budget": 20000, "render_px": 8, "render_samples": 1}, **more}
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("skill") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 def test_the_plain_brdf_stands_beside_the_fit(real):

@@ -18,6 +18,8 @@
 
 #include <cmocka.h>
 
+#include "tests/support/refused_job.h"
+
 enum { N_ROW = 3, N_PATH = 1024 };
 
 #define CLOTH                                                                                                          \
@@ -152,17 +154,8 @@ static void test_shared_camera_paths(void **state)
 
 static void refused(void **state, const char *set_up, const char *field)
 {
-    struct worker_folder f;
-    struct pipeline_context c;
-    struct error err = {0};
     write_job(state, set_up, "");
-    assert_int_equal(worker_folder_open(&f, scratch_path(state, "job"), NULL), STATUS_OK);
-    pipeline_context_init(&c);
-    c.folder = &f;
-    assert_int_not_equal(pipeline_read_inputs(&c, &err), STATUS_OK);
-    assert_string_equal(err.field, field);
-    pipeline_context_release(&c);
-    worker_folder_close(&f);
+    check_refused_job(scratch_path(state, "job"), field);
 }
 
 static void test_refused(void **state)

@@ -17,6 +17,8 @@
 
 #include <cmocka.h>
 
+#include "tests/support/refused_job.h"
+
 static void test_work_file(void **state)
 {
     const char *path = scratch_path(state, "a.bin");
@@ -159,18 +161,9 @@ static void test_series(void **state)
 
 static void check_input_error(void **state, const char *document, const char *field)
 {
-    struct worker_folder f;
-    struct pipeline_context c;
-    struct error err = {0};
     assert_int_equal(durable_make_folder(scratch_path(state, "inputs/input"), NULL), STATUS_OK);
     scratch_write(scratch_path(state, "inputs/job.json"), document, strlen(document));
-    assert_int_equal(worker_folder_open(&f, scratch_path(state, "inputs"), NULL), STATUS_OK);
-    pipeline_context_init(&c);
-    c.folder = &f;
-    assert_int_not_equal(pipeline_read_inputs(&c, &err), STATUS_OK);
-    assert_string_equal(err.field, field);
-    pipeline_context_release(&c);
-    worker_folder_close(&f);
+    check_refused_job(scratch_path(state, "inputs"), field);
 }
 
 static void test_inputs(void **state)
