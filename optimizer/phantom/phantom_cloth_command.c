@@ -306,7 +306,10 @@ static status write_files(struct cloth *c, struct error *err)
     json_decref(j);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     st = durable_replace(path, text, strlen(text), err);
-    if (st == STATUS_OK) puts(text);
+    if (st == STATUS_OK)
+        printf("%zu fibers in a tile of %.4g x %.4g mm, scan of %zu x %zu x %zu voxels; all numbers are in %s\n",
+               c->fibers.n_fiber, 1e3 * c->fibers.tile_size_m[0], 1e3 * c->fibers.tile_size_m[1], c->report.n_voxel[0],
+               c->report.n_voxel[1], c->report.n_voxel[2], path);
     free(text);
     return st;
 }

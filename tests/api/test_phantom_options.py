@@ -27,7 +27,8 @@ use_flyaways: 0
 def cloth(folder, *options):
     p = subprocess.run([program("selvedge-phantom"), "cloth", "--voxel-um", "8", "--out", str(folder), *options], capture_output=True, timeout=120)
     assert p.returncode == 0, p.stderr.decode()
-    return json.loads(p.stdout)
+    assert p.stdout.decode().rstrip().endswith(str(folder / "phantom.json")) and p.stdout.count(b"\n") == 1
+    return json.loads((folder / "phantom.json").read_text())
 
 
 def test_weave_and_yarn_in_both_spellings(tmp_path):
