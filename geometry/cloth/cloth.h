@@ -25,7 +25,8 @@ struct cloth_report {
     double yarn_width_m[CLOTH_MAX_KIND]; /* as designed, before yarns press each other; 0 without yarns */
     double yarn_height_m[CLOTH_MAX_KIND];
     double surface_angle_rad[CLOTH_MAX_KIND]; /* between the yarn and its outermost fibers, from the twist */
-    double thickness_m;                       /* from the lowest to the highest fiber surface */
+    double thickness_m;                       /* from the lowest to the highest fiber surface, hairs included */
+    double body_thickness_m;                  /* the same without hairs: what a thickness gauge finds, not pressed */
     double cover;                             /* share of the tile's area under at least one fiber, along z */
     double volume_fraction;                   /* volume of the fibers over tile area x thickness */
     double overlap_mean;                      /* depth of interpenetration over the diameter, mean over all points */

@@ -48,6 +48,20 @@ static void report_fibers(const struct fiber_set *f, struct cloth_report *r)
     r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * r->thickness_m);
 }
 
+/* Height from the lowest to the highest surface of fibers that are no hairs. */
+static double body_thickness_m(const struct strand_set *s)
+{
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < s->n_strand; i++) {
+        const struct strand *t = &s->strand[i];
+        for (size_t k = t->first; k < t->first + t->n && !t->hair; k++) {
+            low = fmin(low, s->p[k][2] - t->radius_m);
+            high = fmax(high, s->p[k][2] + t->radius_m);
+        }
+    }
+    return high - low;
+}
+
 static double thickest_m(const struct strand_set *s)
 {
     double most_m = 0.0;
@@ -67,6 +81,7 @@ static status report_fill(const struct cloth_work *w, const struct strand_fit *f
     r->overlap_mean = fit->overlap_mean;
     r->overlap_max = fit->overlap_max;
     r->strain_p95 = fit->strain_p95;
+    r->body_thickness_m = body_thickness_m(&w->set);
     report_kinds(w, r);
     report_fibers(f, r);
     return fiber_top_view(f, fmax(fmax(r->tile_m[0], r->tile_m[1]) / VIEW_PIXELS, 0.4 * thickest_m(&w->set)), size,

@@ -163,8 +163,11 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
            rise = 0.1 + 0.7 * rng_double(&rng);
     double curl = 2.0 * (rng_double(&rng) - 0.5), bend = 0.6 + rng_double(&rng), (*node)[3];
     if (length_m < 2.0 * k->radius_m) return STATUS_OK;
-    struct strand like = {
-        .radius_m = k->radius_m, .axis_class = y->path->axis_class, .group = (uint8_t)y->kind, .cut = CUT_NONE};
+    struct strand like = {.radius_m = k->radius_m,
+                          .axis_class = y->path->axis_class,
+                          .group = (uint8_t)y->kind,
+                          .hair = true,
+                          .cut = CUT_NONE};
     status st = work_has_room(y->w, HAIR_NODES, err);
     if (st == STATUS_OK) st = strand_add(&y->w->set, &like, HAIR_NODES, &node, err);
     if (st != STATUS_OK) return st;

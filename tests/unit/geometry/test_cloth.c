@@ -226,6 +226,23 @@ static void test_too_many_fibers(void **state)
     assert_non_null(strstr(err.text, "fewer yarns"));
 }
 
+/* The thickness without hairs is nearly that of the cloth that has none; hairs push some fibers aside. */
+static void test_thickness_without_hairs(void **state)
+{
+    (void)state;
+    struct cloth_description d = small_cloth("plain");
+    struct fiber_set f;
+    struct cloth_report bare, hairy;
+    build(&d, NULL, NULL, &f, &bare);
+    fiber_set_release(&f);
+    set_number(&d, "yarns[0].hairs_per_mm", 20.0);
+    build(&d, NULL, NULL, &f, &hairy);
+    fiber_set_release(&f);
+    assert_true(fabs(bare.thickness_m - bare.body_thickness_m) < 1e-9);
+    assert_true(hairy.thickness_m > 1.3 * bare.thickness_m);
+    assert_true(fabs(hairy.body_thickness_m / bare.thickness_m - 1.0) < 0.1);
+}
+
 /* A melange has the asked share of the other kind, between fibers as well. */
 static void test_melange(void **state)
 {
@@ -271,6 +288,7 @@ int main(void)
         cmocka_unit_test(test_flat_yarns_keep_the_angle_of_twist),
         cmocka_unit_test(test_contradictions_are_named),
         cmocka_unit_test(test_too_many_fibers),
+        cmocka_unit_test(test_thickness_without_hairs),
         cmocka_unit_test(test_melange),
         cmocka_unit_test(test_threads_per_cm),
     };

@@ -33,9 +33,10 @@ static json_t *kinds_json(const struct cloth_description *d, const struct cloth_
 json_t *result_cloth_json(const struct cloth_description *d, const double *number, const struct cloth_report *r)
 {
     json_t *made =
-        json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "tile_yarns", json_count_list(r->n_yarn, 2),
+        json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "tile_yarns", json_count_list(r->n_yarn, 2),
                   "yarn_spacing_um", json_number_list(r->yarn_spacing_m, 2, 1e6), "thickness_um",
-                  json_number(1e6 * r->thickness_m), "cover", json_number(r->cover), "volume_fraction",
+                  json_number(1e6 * r->thickness_m), "thickness_without_hairs_um",
+                  json_number(1e6 * r->body_thickness_m), "cover", json_number(r->cover), "volume_fraction",
                   json_number(r->volume_fraction), "overlap_mean", json_number(r->overlap_mean), "overlap_max",
                   json_number(r->overlap_max), "strain_p95", json_number(r->strain_p95), "yarns", kinds_json(d, r));
     json_t *json = json_pack("{s:s, s:I, s:o, s:o}", "weave", d->weave[0] != '\0' ? d->weave : "draft", "seed",
