@@ -93,6 +93,42 @@ static status check_kinds(const struct cloth_description *d, struct error *err)
     return STATUS_OK;
 }
 
+/* A kind is used if a yarn is of it, if it is the pile, or if it is mixed into another. */
+static bool kind_is_used(const struct cloth_description *d, size_t kind)
+{
+    if ((int)kind == d->pile_kind) return true;
+    for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++)
+        for (size_t i = 0; i < d->n_order[a] && (a == CLOTH_WEFT || d->structure != CLOTH_KNIT); i++)
+            if (d->order[a][i] == kind) return true;
+    for (size_t k = 0; k < d->n_kind; k++)
+        if (d->kind[k].melange_with == (int)kind) return true;
+    return false;
+}
+
+/* Checks that the cloth has a place for each kind, and for its plies and mixed fibers. */
+static status check_places(const struct cloth_description *d, struct error *err)
+{
+    char field[48];
+    if (d->structure == CLOTH_FELT && d->n_kind > 1)
+        return error_set_field(err, STATUS_INVALID, "yarns", "a felt has one kind of fibers, 'yarns' has %zu",
+                               d->n_kind);
+    for (size_t k = 0; k < d->n_kind; k++) {
+        snprintf(field, sizeof field, "yarns[%zu]", k);
+        if (!kind_is_used(d, k))
+            return error_set_field(err, STATUS_INVALID, field,
+                                   "no yarn is of the kind '%s': name its place in 'warp' or 'weft', or leave it out",
+                                   field);
+        bool loose = d->structure == CLOTH_FELT || (int)k == d->pile_kind;
+        snprintf(field, sizeof field, "yarns[%zu].plies", k);
+        if (loose && d->kind[k].n_ply > 1)
+            return error_set_field(err, STATUS_INVALID, field, "'%s': fibers of a felt or a pile have no plies", field);
+        snprintf(field, sizeof field, "yarns[%zu].melange_with", k);
+        if (loose && d->kind[k].melange_with >= 0)
+            return error_set_field(err, STATUS_INVALID, field, "'%s': fibers of a pile are of one kind", field);
+    }
+    return STATUS_OK;
+}
+
 /* Checks value, bounds and prior of one number. */
 static status check_number(const struct cloth_number *n, struct error *err)
 {
@@ -111,6 +147,10 @@ static status check_number(const struct cloth_number *n, struct error *err)
     if (!isnan(n->prior_sd) && !(n->prior_sd > 0.0 && isfinite(n->prior_mean)))
         return error_set_field(err, STATUS_INVALID, n->name,
                                "the prior of '%s' needs a mean and a positive standard deviation", n->name);
+    if (n->prior_mean < i->lower || n->prior_mean > i->upper) /* false for NaN: no prior */
+        return error_set_field(err, STATUS_INVALID, n->name,
+                               "the mean of the prior of '%s' is %g, but must be between %g and %g", n->name,
+                               n->prior_mean, i->lower, i->upper);
     return STATUS_OK;
 }
 
@@ -123,6 +163,7 @@ status cloth_description_check(struct cloth_description *d, struct error *err)
         st = check_order(d, a, err);
         if (st == STATUS_OK) st = choose_yarns(d, a, err);
     }
+    if (st == STATUS_OK) st = check_places(d, err);
     for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) st = check_number(&d->number[i], err);
     return st;
 }

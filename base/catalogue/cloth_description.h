@@ -11,6 +11,7 @@
 #ifndef SELVEDGE_BASE_CLOTH_DESCRIPTION_H
 #define SELVEDGE_BASE_CLOTH_DESCRIPTION_H
 
+#include "base/catalogue/model_sets.h"
 #include "base/catalogue/param_info.h"
 
 #include <stdbool.h>
@@ -64,9 +65,10 @@ struct cloth_number {
 
 /* What is counted or named of one kind of yarn. */
 struct cloth_kind {
-    size_t n_fiber;   /* fibers in a section; of a tuft of the pile; of a felt: in the tile */
-    size_t n_ply;     /* 1: single yarn */
-    int melange_with; /* kind that the share `melange` of its fibers belongs to; -1: none */
+    size_t n_fiber;                  /* fibers in a section; of a tuft of the pile; of a felt: in the tile */
+    size_t n_ply;                    /* 1: single yarn */
+    int melange_with;                /* kind that the share `melange` of its fibers belongs to; -1: none */
+    char name[MODEL_SET_NAME_BYTES]; /* of its group of fibers; "": none */
 };
 
 struct cloth_description {
@@ -117,8 +119,8 @@ double cloth_number_value(const struct cloth_description *d, const double *numbe
 
 /* Completes d (n_yarn) and checks it. STATUS_INVALID with the field as in the job document after "cloth.": "draft" (a
  * yarn that never crosses), "warp", "weft" (orders that name no kind, or do not repeat within CLOTH_MAX_YARN yarns),
- * "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns[k].plies", "crimp" and so on for values outside of
- * their ranges. */
+ * "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns" (several kinds in a felt), "yarns[k]" (a kind that no
+ * yarn has), "yarns[k].plies", "crimp" and so on for values outside of their ranges. */
 status cloth_description_check(struct cloth_description *d, struct error *err);
 
 /* Checks a vector of d->n_number values against the ranges of the catalogue. STATUS_INVALID, field: the number. */

@@ -31,6 +31,7 @@ static json_t *yarn_json(const struct cloth_description *d, const double *number
 {
     json_t *yarn =
         json_pack("{s:I, s:I}", "fibers", (json_int_t)d->kind[k].n_fiber, "plies", (json_int_t)d->kind[k].n_ply);
+    if (d->kind[k].name[0] != '\0') json_object_set_new(yarn, "name", json_string(d->kind[k].name));
     if (d->kind[k].melange_with >= 0) json_object_set_new(yarn, "melange_with", json_integer(d->kind[k].melange_with));
     put_numbers(yarn, d, number, (int)k);
     return yarn;
@@ -44,7 +45,7 @@ json_t *cloth_section_json(const struct cloth_description *d, const double *numb
     else
         json_object_set_new(section, "draft", cloth_draft_json(d));
     if (d->structure != CLOTH_FELT) {
-        json_object_set_new(section, "warp", order_json(d, CLOTH_WARP));
+        if (d->structure != CLOTH_KNIT) json_object_set_new(section, "warp", order_json(d, CLOTH_WARP));
         json_object_set_new(section, "weft", order_json(d, CLOTH_WEFT));
         json_object_set_new(section, "tile_warps", json_integer((json_int_t)d->n_yarn[CLOTH_WARP]));
         json_object_set_new(section, "tile_wefts", json_integer((json_int_t)d->n_yarn[CLOTH_WEFT]));

@@ -95,6 +95,18 @@ static status check_surplus(const struct json_field *f, int kind, const struct c
     return STATUS_OK;
 }
 
+/* Refuses counts and orders of yarns that a knit or a felt does not have. */
+static status check_yarn_keys(const json_t *section, const struct cloth_description *d, struct error *err)
+{
+    static const char *const key[] = {"warp_per_cm", "weft_per_cm", "warp", "tile_warps", "weft", "tile_wefts"};
+    size_t n = d->structure == CLOTH_FELT ? 6 : d->structure == CLOTH_KNIT ? 3 : 0;
+    for (size_t i = 0; i < n; i++)
+        if (json_object_get(section, key[i]) != NULL)
+            return error_set_field(err, STATUS_INVALID, key[i], "'cloth.%s' is for woven cloth: a %s has none", key[i],
+                                   d->weave);
+    return STATUS_OK;
+}
+
 static struct json_field field_of(const json_t *section, int kind)
 {
     struct json_field f = {.object = section, .path = "cloth"};
@@ -152,6 +164,7 @@ static status read_cloth(const struct option_value *v, struct cloth_description 
 {
     const struct job_document *doc = v->doc;
     status st = read_weave(v, d, err);
+    if (st == STATUS_OK) st = check_yarn_keys(v->value, d, err);
     if (st != STATUS_OK) return st;
     take_kinds(doc, v->value, d);
     if (d->pile_kind == 0)
@@ -177,6 +190,7 @@ static status read_names(struct job_document *doc, struct error *err)
     status s = STATUS_OK;
     for (size_t k = 0; k < doc->n_cloth_yarn; k++) n_named += doc->cloth_yarn[k].name[0] != '\0';
     for (size_t k = 0; k < doc->n_cloth_yarn && n_named > 0 && s == STATUS_OK; k++) {
+        memcpy(doc->cloth->kind[k].name, doc->cloth_yarn[k].name, sizeof doc->cloth->kind[k].name);
         char path[JSON_PATH_BYTES];
         snprintf(path, sizeof path, "cloth.yarns[%zu].name", k);
         s = n_named == doc->n_cloth_yarn ? job_add_group(doc, doc->cloth_yarn[k].name, path, err)

@@ -2,17 +2,11 @@
 import os
 
 import pytest
-from daemon_under_test import Daemon, problem, program
+from daemon_under_test import problem, program
 from small_cloth import TABLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1}
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("described") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 def start(d, cloth):
@@ -39,6 +33,24 @@ def test_from_description_to_results(real):
     assert state["result"]["parameters"]
     files = [f["path"] for f in real.get(f"/v1/jobs/{job}/results").json()["files"]]
     assert "fibers.hair" in files and "quality.html" in files
+
+
+def test_a_result_describes_its_cloth_to_another_job(real):
+    """With kinds of yarn that have names, and with a number that is searched in the first job."""
+    first = start(real, {"draft": ["10", "01"], "tile_warps": 2, "tile_wefts": 4, "weft": [1], "warp_per_cm": 50,
+                         "crimp": {"lower": 0.45, "upper": 0.55},
+                         "yarns": [{"name": "red", "fibers": 9}, {"name": "blue", "fibers": 8, "plies": 2, "hairs_per_mm": 5}]})
+    result = real.wait_state(first, "succeeded", timeout_s=120)["result"]
+    described = result["geometry"]["cloth"]["description"]
+    assert [yarn["name"] for yarn in described["yarns"]] == ["red", "blue"]
+    made = result["geometry"]["cloth"]["made"]
+    assert 0.1 < made["thickness_without_hairs_um"] / made["thickness_um"] < 0.95
+    again = start(real, described)
+    same = real.wait_state(again, "succeeded", timeout_s=120)["result"]
+    assert same["geometry"]["cloth"]["made"] == made and same["geometry"]["cloth"]["description"] == described
+    assert [p["name"] for m in same["models"] for p in m["parameters"]] == [p["name"] for m in result["models"] for p in m["parameters"]]
+    fibers = [real.get(f"/v1/jobs/{job}/results/fibers.hair").content for job in (first, again)]
+    assert fibers[0] == fibers[1]
 
 
 def test_a_crimp_that_cannot_be(real):

@@ -1,4 +1,5 @@
 /* The section "cloth" of the job document: descriptions are read with their defaults, and mistakes are named. */
+#include "optimizer/job/cloth_json.h"
 #include "optimizer/job/job_document.h"
 
 #include <math.h>
@@ -78,10 +79,51 @@ static void test_named_kinds(void **state)
     doc = parse(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{},{}]"));
     assert_int_equal(doc->n_group, 0);
     job_document_free(doc);
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"red\"},{}]"), "cloth.yarns[0].name", "or none");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"a\"},{\"name\":\"a\"}]"), "cloth.yarns[1].name",
-                "second time");
+    check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{}]"), "cloth.yarns[0].name",
+                "or none");
+    check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"a\"},{\"name\":\"a\"}]"),
+                "cloth.yarns[1].name", "second time");
     check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"a b\"}]"), "cloth.yarns[0].name", "1 to 20");
+}
+
+/* The section that results state for a described cloth is accepted, and describes the same cloth. */
+static void describes_itself(const char *text)
+{
+    struct job_document *doc = parse(text);
+    json_t *document = json_pack("{s:s, s:o, s:{s:s}}", "sample", "s", "cloth", cloth_section_json(doc->cloth, NULL),
+                                 "measurements", "file", "a.csv");
+    char *again_text = json_dumps(document, JSON_REAL_PRECISION(17));
+    assert_non_null(again_text);
+    struct job_document *again = parse(again_text);
+    assert_int_equal(again->n_group, doc->n_group);
+    assert_memory_equal(again->group, doc->group, sizeof doc->group);
+    for (size_t i = 0; i < doc->cloth->n_number; i++) { /* numbers that were searched are given now */
+        struct cloth_number *n = &doc->cloth->number[i];
+        n->fitted = false;
+        n->lower = n->info->lower;
+        n->upper = n->info->upper;
+        n->prior_mean = n->prior_sd = again->cloth->number[i].prior_mean;
+    }
+    assert_memory_equal(again->cloth, doc->cloth, sizeof *doc->cloth);
+    free(again_text);
+    json_decref(document);
+    job_document_free(again);
+    job_document_free(doc);
+}
+
+static void test_a_cloth_describes_itself(void **state)
+{
+    (void)state;
+    for (const char *const *weave = cloth_weave_names; *weave != NULL; weave++) {
+        char text[200];
+        snprintf(text, sizeof text, CLOTH("\"weave\":\"%s\",\"seed\":3"), *weave);
+        describes_itself(text);
+    }
+    describes_itself(CLOTH("\"draft\":[\"1000\",\"0011\",\"0110\"],\"warp\":[0,1,1],\"weft\":[1],"
+                           "\"warp_per_cm\":40,\"weft_per_cm\":30.5,\"tile_warps\":24,"
+                           "\"crimp\":{\"lower\":0.4,\"upper\":0.6,\"prior\":[0.5,0.1]},"
+                           "\"yarns\":[{\"name\":\"a\",\"packing\":0.55},"
+                           "{\"name\":\"b-2\",\"plies\":2,\"melange_with\":0,\"melange\":0.3}]"));
 }
 
 static void test_mistakes_are_named(void **state)
@@ -106,18 +148,57 @@ static void test_mistakes_are_named(void **state)
     check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"lower\":0.6,\"upper\":0.4}"), "cloth.crimp", "rise");
     check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"value\":0.9,\"upper\":0.6}"), "cloth.crimp", "starts");
     check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5,0]}"), "cloth.crimp", "prior");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5]}"), "cloth.crimp.prior", "2 numbers");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[7,0.1]}"), "cloth.crimp", "mean of the prior");
     check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"mean\":1}"), "cloth.crimp.mean", "unknown");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":\"NaN\""), "cloth.crimp", "but it is a text");
+    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1e308"), "cloth.crimp", "1e+308");
+    check_error(CLOTH("\"weave\":\"plain\",\"tile_warps\":-4"), "cloth.tile_warps", "-4");
+    check_error(CLOTH("\"weave\":\"plain\",\"warp\":[]"), "cloth.warp", "1 to 64");
+    check_error(CLOTH("\"weave\":\"plain\",\"warp\":[\"red\"],\"yarns\":[{\"name\":\"red\"}]"), "cloth.warp",
+                "element 0");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[]"), "cloth.yarns", "1 to 4");
     check_error("{\"sample\":\"s\"," VOLUME ",\"cloth\":{\"weave\":\"plain\"},\"measurements\":{\"file\":\"a.csv\"}}",
                 "cloth", "one of them");
+}
+
+/* Keys that a structure has no use for are refused, so that nobody believes they had an effect. */
+static void test_what_would_have_no_effect(void **state)
+{
+    (void)state;
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{},{}]"), "cloth.yarns[1]", "no yarn is of the kind");
+    check_error(CLOTH("\"weave\":\"jersey\",\"warp\":[0]"), "cloth.warp", "jersey has none");
+    check_error(CLOTH("\"weave\":\"jersey\",\"weft_per_cm\":9"), "cloth.weft_per_cm", "jersey has none");
+    check_error(CLOTH("\"weave\":\"felt\",\"tile_wefts\":4"), "cloth.tile_wefts", "felt has none");
+    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{},{}]"), "cloth.yarns", "one kind");
+    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{\"plies\":2}]"), "cloth.yarns[0].plies", "no plies");
+    check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"plies\":2}]"), "cloth.yarns[1].plies", "no plies");
+    check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"melange_with\":0}]"), "cloth.yarns[1].melange_with",
+                "of one kind");
+}
+
+static void test_sizes_of_drafts(void **state)
+{
+    (void)state;
+    char text[4000] = "{\"sample\":\"s\",\"cloth\":{\"draft\":[";
+    for (int i = 0; i < 33; i++) strcat(text, i % 2 == 0 ? (i == 0 ? "\"10\"" : ",\"10\"") : ",\"01\"");
+    strcat(text, "]},\"measurements\":{\"file\":\"a.csv\"}}");
+    check_error(text, "cloth.draft", "1 to 32");
+    check_error(CLOTH("\"draft\":[]"), "cloth.draft", "1 to 32");
+    check_error(CLOTH("\"draft\":[\"\",\"\"]"), "cloth.draft", "1 to 32");
+    check_error(CLOTH("\"draft\":[\"101010101010101010101010101010101\",\"010101010101010101010101010101010\"]"),
+                "cloth.draft", "1 to 32");
+    check_error(CLOTH("\"draft\":[10,\"01\"]"), "cloth.draft", "no text");
+    check_error(CLOTH("\"draft\":[\"11\",\"01\"]"), "cloth.draft", "never crosses");
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_name_is_enough),
-        cmocka_unit_test(test_everything_given),
-        cmocka_unit_test(test_named_kinds),
-        cmocka_unit_test(test_mistakes_are_named),
+        cmocka_unit_test(test_a_name_is_enough),   cmocka_unit_test(test_everything_given),
+        cmocka_unit_test(test_named_kinds),        cmocka_unit_test(test_a_cloth_describes_itself),
+        cmocka_unit_test(test_mistakes_are_named), cmocka_unit_test(test_what_would_have_no_effect),
+        cmocka_unit_test(test_sizes_of_drafts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
