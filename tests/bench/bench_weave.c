@@ -1,5 +1,6 @@
 /* The share of drawn weaves with known drafts whose yarns and draft are found: nine drafts, random spacing, rotation,
- * colors, noise, gradient of the light and a dark object in a corner. One JSON object a line for each kind of picture.
+ * colors, noise, gradient of the light and a dark object in a corner. And how far confidences can be trusted: the share
+ * of right drafts among those with a confidence of at least 0.9, and among the others. One JSON object a line.
  *
  *   bench_weave [pictures of each draft, 6]
  */
@@ -74,34 +75,50 @@ static bool draft_right(const struct drawn_weave *w, const struct weave_guess *g
     return weave_draft_same(&truth, &g->draft);
 }
 
-static void try_picture(const struct drawn_weave *w, size_t *n_yarns, size_t *n_draft)
+/* Counts of pictures; certain: the confidence of the draft is at least CERTAIN. */
+struct tally {
+    size_t n_yarns, n_draft; /* right ones */
+    size_t n[2], n_right[2]; /* drafts that were found and right drafts, [1]: certain */
+};
+static const double CERTAIN = 0.9;
+
+static void try_picture(const struct drawn_weave *w, struct tally *t)
 {
     struct weave_guess g;
     struct error err = {0};
     float *rgb = drawn_weave_picture(w);
     const struct weave_picture picture = {rgb, w->edge_px, w->edge_px};
-    if (weave_detect(&picture, &g, &err) == STATUS_OK && yarns_right(w, &g)) {
-        ++*n_yarns;
-        *n_draft += draft_right(w, &g);
+    if (weave_detect(&picture, &g, &err) == STATUS_OK) {
+        bool yarns = yarns_right(w, &g), draft = yarns && draft_right(w, &g);
+        size_t certain = g.draft_confidence >= CERTAIN;
+        t->n_yarns += yarns;
+        t->n_draft += draft;
+        t->n[certain]++;
+        t->n_right[certain] += draft;
     }
     free(rgb);
+}
+
+static void print_share(const char *kind, const char *what, size_t n_right, size_t n)
+{
+    printf("{\"name\":\"weave.%s.%s\",\"value\":%.4g,\"unit\":\"1\",\"better\":\"higher\",\"n\":%zu,\"of\":%zu}\n",
+           kind, what, (double)n_right / (double)(n > 0 ? n : 1), n_right, n);
 }
 
 int main(int argc, char **argv)
 {
     size_t n_each = argc > 1 ? strtoul(argv[1], NULL, 10) : 6, n_of = sizeof drafts / sizeof *drafts;
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
-        size_t n_yarns = 0, n_draft = 0;
+        struct tally t = {0};
         uint64_t seed = 1 + k;
         for (size_t i = 0; i < n_each * n_of; i++) {
             const struct drawn_weave w = random_picture(&kinds[k], drafts[i % n_of], &seed);
-            try_picture(&w, &n_yarns, &n_draft);
+            try_picture(&w, &t);
         }
-        double n = (double)(n_each * n_of);
-        printf("{\"name\":\"weave.%s.yarns_right\",\"value\":%.4g,\"unit\":\"1\",\"better\":\"higher\"}\n",
-               kinds[k].name, (double)n_yarns / n);
-        printf("{\"name\":\"weave.%s.draft_right\",\"value\":%.4g,\"unit\":\"1\",\"better\":\"higher\"}\n",
-               kinds[k].name, (double)n_draft / n);
+        print_share(kinds[k].name, "yarns_right", t.n_yarns, n_each * n_of);
+        print_share(kinds[k].name, "draft_right", t.n_draft, n_each * n_of);
+        print_share(kinds[k].name, "certain_draft_right", t.n_right[1], t.n[1]);
+        print_share(kinds[k].name, "uncertain_draft_right", t.n_right[0], t.n[0]);
         fflush(stdout);
     }
     return 0;
