@@ -13,8 +13,8 @@
  *   DIR    slices with the fibers drawn on them are written there
  * Progress, times and counts go to standard error.
  */
-#include "tests/support/cloth/phantom_reconstruction.h"
 #include "tests/support/cloth/weave_labels.h"
+#include "tests/support/scan/phantom_reconstruction.h"
 
 #include <math.h>
 #include <png.h>

@@ -1,7 +1,7 @@
 /* The gradient certificate: every model passes it at its defaults and at its bounds, and wrong derivatives fail it. */
 #include "renderer/transport/derivative_check.h"
-#include "tests/support/cloth/hand_volume.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>

@@ -5,7 +5,7 @@
 #include "base/rng.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/trace_estimator.h"
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 
 #include <math.h>
 #include <setjmp.h>

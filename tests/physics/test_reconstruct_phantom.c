@@ -1,6 +1,6 @@
 /* Reconstruction of phantoms measured against the truth: fiber diameter 7 voxels, blur 0.7 voxels, signal-to-noise
  * 5. */
-#include "tests/support/cloth/phantom_reconstruction.h"
+#include "tests/support/scan/phantom_reconstruction.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -3,7 +3,7 @@
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>

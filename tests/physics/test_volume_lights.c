@@ -5,7 +5,7 @@
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/painted_environment.h"
 #include "tests/support/tracer/trace_input.h"

@@ -5,7 +5,7 @@
 #include "base/thread_pool.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/agreement.h"
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/naive_volume.h"
 #include "tests/support/tracer/trace_input.h"

@@ -3,7 +3,7 @@
  * multiplier. Also tests white cloth with and without roulette. */
 #include "base/angle.h"
 #include "renderer/transport/volume/volume_tracer.h"
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

@@ -8,7 +8,7 @@
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume_align.h"
 #include "tests/support/cloth/repeated_cloth.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -5,7 +5,7 @@
 #include "geometry/orientation/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
 #include "geometry/reconstruct.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

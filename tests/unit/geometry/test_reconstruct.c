@@ -2,7 +2,7 @@
  * for any number of threads. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -4,8 +4,8 @@
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/volume/volume_tracer.h"
-#include "tests/support/cloth/hand_volume.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 
 #include <math.h>

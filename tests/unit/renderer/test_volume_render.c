@@ -2,7 +2,7 @@
  * files, progress and cancellation. */
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

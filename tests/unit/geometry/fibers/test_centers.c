@@ -1,7 +1,7 @@
 /* Fiber centers in slices (fabric thesis 5.6.2): a leaning fiber is found once in every slice of each of the nine
  * frames, on its axis, with the slope of its direction. */
 #include "geometry/fibers/slices/centers.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

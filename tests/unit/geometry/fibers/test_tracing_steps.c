@@ -8,7 +8,7 @@
 #include "geometry/fibers/shape/relax.h"
 #include "geometry/fibers/shape/smoothing.h"
 #include "geometry/volume/volume_align.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

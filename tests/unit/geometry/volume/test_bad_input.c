@@ -2,7 +2,7 @@
 #include "base/option_id.h"
 #include "base/rng.h"
 #include "geometry/reconstruct.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,6 +1,6 @@
 /* NRRD scans: golden bytes of every type and order, compressed and detached data, and wrong headers. */
 #include "base/option_id.h"
-#include "tests/support/cloth/scan_expectation.h"
+#include "tests/support/scan/scan_expectation.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 /* TIFF volumes: which kinds of samples, layouts and stacks are read. */
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
-#include "tests/support/cloth/tiff_stack.h"
+#include "tests/support/scan/tiff_stack.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,7 +2,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 #include "geometry/volume/vol_file.h"
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -4,7 +4,7 @@
 #include "geometry/volume/vol_file.h"
 #include "geometry/volume/volume_reader.h"
 #include "geometry/volume/volume_source.h"
-#include "tests/support/cloth/scan_expectation.h"
+#include "tests/support/scan/scan_expectation.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "tests/support/cloth/scan_files.h"
+#include "tests/support/scan/scan_files.h"
 
 #include "base/rng.h"
 

@@ -1,4 +1,4 @@
-#include "tests/support/cloth/hand_volume.h"
+#include "tests/support/scan/hand_volume.h"
 
 #include <math.h>
 #include <stdlib.h>

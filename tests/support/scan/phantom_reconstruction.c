@@ -1,4 +1,4 @@
-#include "tests/support/cloth/phantom_reconstruction.h"
+#include "tests/support/scan/phantom_reconstruction.h"
 
 #include "base/clock.h"
 #include "geometry/volume/density_map.h"

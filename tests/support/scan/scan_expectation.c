@@ -1,4 +1,4 @@
-#include "tests/support/cloth/scan_expectation.h"
+#include "tests/support/scan/scan_expectation.h"
 
 #include "geometry/volume/volume_source.h"
 

@@ -1,4 +1,4 @@
-#include "tests/support/cloth/tiff_stack.h"
+#include "tests/support/scan/tiff_stack.h"
 
 #include "base/option_id.h"
 
