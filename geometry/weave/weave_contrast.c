@@ -63,6 +63,43 @@ status weave_contrast(const float *grey, size_t width, size_t height, double per
     return s;
 }
 
+/* Energy of the bands' response to one bright pixel in the middle of a picture of edge x edge pixels that was blurred
+ * before. */
+static status impulse_energy(struct planes *p, size_t edge, double blur_px, double period_px,
+                             double square[WEAVE_SCALES], struct error *err)
+{
+    size_t n = edge * edge;
+    status s = STATUS_OK;
+    for (size_t i = 0; i < n; i++) p->mean[i] = p->fine[i] = i == edge / 2 * edge + edge / 2 ? 1.0f : 0.0f;
+    if (blur_px > 0.0) s = vision_smooth(p->fine, edge, edge, blur_px, p->mean, err);
+    for (int k = 0; k < WEAVE_SCALES && s == STATUS_OK; k++) {
+        double sigma_px = BAND * SCALE[k] * period_px;
+        s = vision_smooth(p->mean, edge, edge, sigma_px, p->fine, err);
+        if (s == STATUS_OK) s = vision_smooth(p->mean, edge, edge, 2.0 * sigma_px, p->coarse, err);
+        square[k] = 0.0;
+        for (size_t i = 0; i < n; i++) square[k] += pow((double)p->fine[i] - (double)p->coarse[i], 2.0);
+    }
+    return s;
+}
+
+status weave_contrast_noise(double relative_var, double blur_px, double period_px, double square[WEAVE_SCALES],
+                            struct error *err)
+{
+    if (!(period_px >= 2.0 && period_px < 1000.0 && blur_px >= 0.0 && blur_px < 100.0))
+        return error_set(err, STATUS_INVALID, "cannot state the noise of contrast at a period of %.4g pixels",
+                         period_px);
+    size_t edge = (size_t)ceil(4.0 * period_px + 12.0 * blur_px) + 16, bytes = edge * edge * sizeof(float);
+    struct planes p = {malloc(bytes), malloc(bytes), malloc(bytes)};
+    status s = p.fine != NULL && p.coarse != NULL && p.mean != NULL
+                   ? impulse_energy(&p, edge, blur_px, period_px, square, err)
+                   : error_set(err, STATUS_NO_MEMORY, "cannot measure contrast: out of memory");
+    for (int k = 0; k < WEAVE_SCALES && s == STATUS_OK; k++) square[k] *= relative_var;
+    free(p.fine);
+    free(p.coarse);
+    free(p.mean);
+    return s;
+}
+
 status weave_look_measure(const float *rgb, size_t width, size_t height, double period_px, struct weave_look *look,
                           struct error *err)
 {

@@ -95,7 +95,7 @@ struct job_document {
     size_t n_group;
     char group[MODEL_MAX_SET][MODEL_SET_NAME_BYTES];
     /* set-up */
-    double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
+    double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm, camera_blur_mm;
     bool lamp_directional, camera_far_field;
     double environment_rgb[3];
     char environment_file[JOB_MAX_NAME_BYTES]; /* "" when none is given */

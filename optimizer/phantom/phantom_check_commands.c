@@ -27,6 +27,10 @@ static const char photograph_usage[] =
     "  --px N                  edge of a photograph in pixels                              [64]\n"
     "  --noise S               relative sd of an error per photograph and channel          [0]\n"
     "  --lamp-side-cm 10  --lamp-distance-cm 61  --camera-distance-cm 100  --crop-cm 1\n"
+    "  --lamp-directional      parallel light in place of a square lamp\n"
+    "  --environment R,G,B     light of this radiance from all around, besides the lamp            [0,0,0]\n"
+    "  --far-field             the camera sees the cloth in parallel projection\n"
+    "  --blur-mm B             blur of the camera: standard deviation of a Gaussian                [0]\n"
     "  --no-black-sheet        no black sheet: light passes through the cloth\n"
     "  --seed N                seed of all random numbers                                  [1]\n"
     "  --threads N             number of threads; 0: one per processor                     [0]\n"
@@ -104,6 +108,10 @@ static status parse_photograph(struct phantom_photograph_option *o, size_t *n_th
         {.name = "lamp-distance-cm", .kind = OPTION_NUMBER, .to = &o->lamp_distance_cm},
         {.name = "camera-distance-cm", .kind = OPTION_NUMBER, .to = &o->camera_distance_cm},
         {.name = "crop-cm", .kind = OPTION_NUMBER, .to = &o->crop_cm},
+        {.name = "lamp-directional", .kind = OPTION_FLAG, .to = &o->lamp_directional},
+        {.name = "environment", .kind = OPTION_NUMBER_LIST, .to = o->environment_rgb, .n = 3},
+        {.name = "far-field", .kind = OPTION_FLAG, .to = &o->camera_far_field},
+        {.name = "blur-mm", .kind = OPTION_NUMBER, .to = &o->camera_blur_mm},
         {.name = "no-black-sheet", .kind = OPTION_FALSE, .to = &o->black_sheet},
         {.name = "seed", .kind = OPTION_U64, .to = &o->seed},
         {.name = "threads", .kind = OPTION_COUNT, .to = n_thread},

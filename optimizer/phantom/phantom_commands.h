@@ -12,6 +12,7 @@ int phantom_command_cloth(int argc, char **argv);
 int phantom_command_photograph(int argc, char **argv);
 int phantom_command_compare(int argc, char **argv);
 int phantom_command_detect(int argc, char **argv);
+int phantom_command_look(int argc, char **argv);
 
 /* What the option --NAME takes. Each command has one table of its options. */
 enum option_kind {

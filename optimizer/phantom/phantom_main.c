@@ -16,6 +16,8 @@ static const char usage[] =
     "                                                    measure reconstructed fibers against true ones\n"
     "  selvedge-phantom detect --photograph FILE [options]\n"
     "                                                    find the weave of a real cloth in photographs\n"
+    "  selvedge-phantom look --photograph FILE --rendering FILE --period-px P [options]\n"
+    "                                                    compare color and texture of a rendering and a photograph\n"
     "\n"
     "  selvedge-phantom --version                        print the version\n"
     "\n"
@@ -25,10 +27,9 @@ static const struct {
     const char *name;
     int (*run)(int argc, char **argv);
 } command[] = {
-    {"cloth", phantom_command_cloth},
-    {"photograph", phantom_command_photograph},
-    {"compare", phantom_command_compare},
-    {"detect", phantom_command_detect},
+    {"cloth", phantom_command_cloth},     {"photograph", phantom_command_photograph},
+    {"compare", phantom_command_compare}, {"detect", phantom_command_detect},
+    {"look", phantom_command_look},
 };
 
 int main(int argc, char **argv)

@@ -160,10 +160,15 @@ static status finish_picture(const struct phantom_photograph_option *o, const st
 static struct configuration view_configuration(const struct phantom_photograph_option *o,
                                                const struct job_photograph *v)
 {
-    const struct job_document set_up = {.lamp_side_cm = o->lamp_side_cm,
-                                        .lamp_distance_cm = o->lamp_distance_cm,
-                                        .camera_distance_cm = o->camera_distance_cm,
-                                        .crop_cm = o->crop_cm};
+    const struct job_document set_up = {
+        .lamp_side_cm = o->lamp_side_cm,
+        .lamp_distance_cm = o->lamp_distance_cm,
+        .lamp_directional = o->lamp_directional,
+        .camera_distance_cm = o->camera_distance_cm,
+        .crop_cm = o->crop_cm,
+        .camera_far_field = o->camera_far_field,
+        .camera_blur_mm = o->camera_blur_mm,
+        .environment_rgb = {o->environment_rgb[0], o->environment_rgb[1], o->environment_rgb[2]}};
     return observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
                                      v->camera_phi_deg, v->cloth_rotation_deg);
 }
@@ -276,9 +281,14 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
     json_object_set_new(truth, "noise", json_real(o->noise));
     json_object_set_new(truth, "black_sheet", json_boolean(o->black_sheet));
     json_object_set_new(truth, "lamp",
-                        json_pack("{s:f,s:f}", "side_cm", o->lamp_side_cm, "distance_cm", o->lamp_distance_cm));
+                        json_pack("{s:s,s:f,s:f}", "kind", o->lamp_directional ? "directional" : "square", "side_cm",
+                                  o->lamp_side_cm, "distance_cm", o->lamp_distance_cm));
+    json_object_set_new(
+        truth, "environment",
+        json_pack("{s:[f,f,f]}", "radiance", o->environment_rgb[0], o->environment_rgb[1], o->environment_rgb[2]));
     json_object_set_new(truth, "camera",
-                        json_pack("{s:f,s:f}", "distance_cm", o->camera_distance_cm, "crop_cm", o->crop_cm));
+                        json_pack("{s:f,s:f,s:b,s:f}", "distance_cm", o->camera_distance_cm, "crop_cm", o->crop_cm,
+                                  "far_field", o->camera_far_field, "blur_mm", o->camera_blur_mm));
     json_object_set(truth, "photographs", rows);
     st = write_json(photographs, o->folder, "photographs.json", err);
     if (st == STATUS_OK) st = write_json(truth, o->folder, "truth.json", err);

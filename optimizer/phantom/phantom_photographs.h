@@ -19,7 +19,9 @@ struct phantom_photograph_option {
     size_t px;                         /* edge of the square picture */
     double noise;                      /* relative standard deviation of an error per photograph and channel */
     uint64_t seed;
-    double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm;
+    double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm, camera_blur_mm;
+    double environment_rgb[3];               /* radiance of light from all around, besides the lamp */
+    bool lamp_directional, camera_far_field; /* as lamp.kind and camera.far_field of a job */
     bool black_sheet;
 };
 

@@ -118,8 +118,20 @@ struct reader {
     struct exr_note note;
     int32_t width, height, min_y;
     exr_storage_t storage;
+    const char *prefix; /* of the names of the channels: "" or "var." */
     bool grey;
 };
+
+static const char channel_letter[] = "RGBY";
+
+/* The place in channel_letter of the channel "prefix + letter"; -1 for any other name. */
+static int letter_index(const struct reader *rd, const char *name)
+{
+    size_t n = strlen(rd->prefix);
+    if (strncmp(name, rd->prefix, n) != 0 || strlen(name) != n + 1) return -1;
+    const char *which = strchr(channel_letter, name[n]);
+    return which != NULL ? (int)(which - channel_letter) : -1;
+}
 
 static status refuse(const struct reader *rd, struct error *err, const char *why)
 {
@@ -132,22 +144,21 @@ static status check_channels(struct reader *rd, struct error *err)
     if (exr_get_channels(rd->file, 0, &list) != EXR_ERR_SUCCESS || list == NULL)
         return refuse(rd, err, "it has no list of channels");
     bool have[4] = {false, false, false, false};
-    static const char name[4] = "RGBY";
     for (int i = 0; i < list->num_channels; i++) {
         const exr_attr_chlist_entry_t *e = &list->entries[i];
-        if (e->name.length != 1) continue;
-        const char *which = memchr(name, e->name.str[0], sizeof name);
-        if (which == NULL) continue;
+        int which = letter_index(rd, e->name.str);
+        if (which < 0) continue;
         if (e->pixel_type == EXR_PIXEL_UINT) return refuse(rd, err, "its pixels are integers, half or float is needed");
         if (e->x_sampling != 1 || e->y_sampling != 1) return refuse(rd, err, "its channels are subsampled");
-        have[which - name] = true;
+        have[which] = true;
     }
     rd->grey = !(have[0] && have[1] && have[2]);
     if (rd->grey && have[3] && !(have[0] || have[1] || have[2])) return STATUS_OK;
     if (!rd->grey) return STATUS_OK;
     for (int c = 0; c < 3; c++)
         if (!have[c])
-            return error_set(err, STATUS_FORMAT, "cannot read image '%s': channel '%c' is missing", rd->path, name[c]);
+            return error_set(err, STATUS_FORMAT, "cannot read image '%s': channel '%s%c' is missing", rd->path,
+                             rd->prefix, channel_letter[c]);
     return refuse(rd, err, "channels are missing");
 }
 
@@ -188,14 +199,13 @@ static exr_result_t decode_chunk(struct reader *rd, exr_decode_pipeline_t *decod
     exr_result_t r = *first ? exr_decoding_initialize(rd->file, 0, chunk, decoder)
                             : exr_decoding_update(rd->file, 0, chunk, decoder);
     if (r != EXR_ERR_SUCCESS) return r;
-    static const char name[] = "RGB";
     for (int16_t k = 0; k < decoder->channel_count; k++) {
         exr_coding_channel_info_t *c = &decoder->channels[k];
-        const char *which = strlen(c->channel_name) == 1 ? strchr(name, c->channel_name[0]) : NULL;
-        bool wanted = rd->grey ? strcmp(c->channel_name, "Y") == 0 : which != NULL;
+        int which = letter_index(rd, c->channel_name);
+        bool wanted = rd->grey ? which == 3 : which >= 0 && which < 3;
         c->decode_to_ptr = NULL;
         if (!wanted) continue;
-        size_t channel = rd->grey ? 0 : (size_t)(which - name);
+        size_t channel = rd->grey ? 0 : (size_t)which;
         c->user_bytes_per_element = sizeof(float);
         c->user_data_type = EXR_PIXEL_FLOAT;
         c->user_pixel_stride = 3 * sizeof(float);
@@ -237,9 +247,10 @@ static exr_result_t read_tiles(struct reader *rd, exr_decode_pipeline_t *decoder
     return r;
 }
 
-status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err)
+static status read_channels(struct image *im, const char *path, const char *prefix, size_t limit_pixel,
+                            struct error *err)
 {
-    struct reader rd = {.im = im, .path = path};
+    struct reader rd = {.im = im, .path = path, .prefix = prefix};
     memset(im, 0, sizeof *im);
     exr_context_initializer_t init = initializer(&rd.note);
     if (access(path, R_OK) != 0) return error_set_errno(err, "cannot read image '%s'", path);
@@ -260,4 +271,14 @@ status image_read_exr(struct image *im, const char *path, size_t limit_pixel, st
     if (st != STATUS_OK) image_release(im);
     exr_finish(&rd.file);
     return st;
+}
+
+status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err)
+{
+    return read_channels(im, path, "", limit_pixel, err);
+}
+
+status image_read_exr_variance(struct image *im, const char *path, size_t limit_pixel, struct error *err)
+{
+    return read_channels(im, path, "var.", limit_pixel, err);
 }

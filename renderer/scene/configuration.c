@@ -25,8 +25,9 @@ static bool lights_make_sense(const struct configuration *c)
 static bool camera_makes_sense(const struct configuration *c)
 {
     return c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2 && c->camera <= CAMERA_FAR_FIELD &&
-           (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0) && c->crop_m > 0 && c->crop_aspect >= 0 &&
-           isfinite(c->crop_aspect) && c->contrast_cells != 1 && c->contrast_cells <= CONFIGURATION_MAX_CELLS;
+           (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0) && c->crop_m > 0 && c->blur_m >= 0 &&
+           c->crop_aspect >= 0 && isfinite(c->crop_aspect) && c->contrast_cells != 1 &&
+           c->contrast_cells <= CONFIGURATION_MAX_CELLS;
 }
 
 status configuration_check(const struct configuration *c, size_t n, struct error *err)

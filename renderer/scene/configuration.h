@@ -48,7 +48,8 @@ struct configuration {
     double camera_distance_m; /* perspective camera; default 1.0 */
     double crop_m; /* 0.01: edge of the square crop, measured at the orbit centre perpendicular to the view */
 
-    double crop_aspect;                    /* width over height of the crop, whose width is crop_m; 0: 1 */
+    double blur_m;      /* standard deviation of the camera's Gaussian blur, measured like crop_m; 0: a sharp camera */
+    double crop_aspect; /* width over height of the crop, whose width is crop_m; 0: 1 */
     double environment_rgb[3];             /* radiance of a constant environment, besides the lamp; 0: none */
     const struct environment *environment; /* an image around the scene, fixed to the world (not turned with the cloth),
                                               besides the lamp; not owned; NULL: none */

@@ -6,6 +6,8 @@ void camera_init(struct camera *m, const struct configuration *c)
 {
     double theta = c->camera_theta_rad, phi = c->camera_phi_rad - c->cloth_rotation_rad;
     double crop = 1e3 * c->crop_m, aspect = c->crop_aspect > 0 ? c->crop_aspect : 1;
+    m->blur[0] = c->blur_m / c->crop_m;
+    m->blur[1] = m->blur[0] * aspect;
     m->far_field = c->camera == CAMERA_FAR_FIELD;
     /* far-field: any, as long as all of the crop's rays start above the cloth */
     double distance = m->far_field ? 1e3 + 0.5 * crop / aspect * tan(theta) : 1e3 * c->camera_distance_m;
@@ -18,6 +20,13 @@ void camera_init(struct camera *m, const struct configuration *c)
         m->right_mm[a] = crop * right[a];
         m->up_mm[a] = crop / aspect * up[a];
     }
+}
+
+void camera_blur(const struct camera *m, const double xy[2], struct rng *rng, double blurred[2])
+{
+    double normal[2] = {0.0, 0.0};
+    if (m->blur[0] > 0.0) rng_normal_pair(rng, normal);
+    for (int a = 0; a < 2; a++) blurred[a] = xy[a] + m->blur[a] * normal[a];
 }
 
 void camera_direction(const struct camera *m, const double xy[2], double d[3])

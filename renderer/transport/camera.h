@@ -5,6 +5,7 @@
 #ifndef SELVEDGE_RENDERER_CAMERA_H
 #define SELVEDGE_RENDERER_CAMERA_H
 
+#include "base/rng.h"
 #include "renderer/scene/configuration.h"
 #include "renderer/scene/scene_ray.h"
 
@@ -13,10 +14,14 @@
 struct camera {
     double eye_mm[3];             /* far-field: the middle of the plane that the rays start from */
     double right_mm[3], up_mm[3]; /* full edges of the crop */
+    double blur[2];               /* standard deviation of the point that a ray starts from, in units of xy; 0: sharp */
     bool far_field;
 };
 
 void camera_init(struct camera *camera, const struct configuration *c);
+/* Where a path through the point xy of the picture meets the crop: a blurred camera adds a normal deviate to it, a sharp
+ * one takes no random number. */
+void camera_blur(const struct camera *camera, const double xy[2], struct rng *rng, double blurred[2]);
 /* xy: a point of the crop, both in [0, 1], x to the right and y downwards. Unit direction of the ray through it. */
 void camera_direction(const struct camera *camera, const double xy[2], double direction[3]);
 /* Where that ray starts: the eye, or for the far-field camera a point beside it. */

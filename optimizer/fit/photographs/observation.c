@@ -102,6 +102,7 @@ struct configuration observation_configuration(const struct job_document *doc, d
         .lamp_side_m = doc->lamp_side_cm * cm,
         .camera_distance_m = doc->camera_distance_cm * cm,
         .crop_m = doc->crop_cm * cm,
+        .blur_m = doc->camera_blur_mm * 1e-3,
         .light = doc->lamp_directional ? LIGHT_DIRECTIONAL : LIGHT_SQUARE_LAMP,
         .camera = doc->camera_far_field ? CAMERA_FAR_FIELD : CAMERA_PERSPECTIVE,
     };

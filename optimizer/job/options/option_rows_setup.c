@@ -53,6 +53,16 @@ const struct job_option option_rows_setup[] = {
      .standard = "false",
      .meaning = "Whether the cloth is seen in parallel projection, as by a telecentric lens or from very far; "
                 "`distance_cm` is then not used."},
+    {.path = "camera.blur_mm",
+     .kind = OPTION_NUMBER,
+     INTO(camera_blur_mm),
+     RANGE(0, 10),
+     .unit = "mm",
+     .standard = "0",
+     .meaning =
+         "Blur of the camera on the cloth: standard deviation of a Gaussian. Renderings are blurred by it, and so "
+         "is the texture that they are fitted with; means hardly change. Some 0.5 pixels are usual for a "
+         "sharp photograph."},
     {.path = "environment",
      .kind = OPTION_SECTION,
      .left_out = "none",

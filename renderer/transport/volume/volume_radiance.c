@@ -64,11 +64,13 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     return STATUS_OK;
 }
 
-static bool enter(const struct volume_state *s, const struct camera *camera, const double xy[2], struct volume_ray *ray)
+static bool enter(const struct volume_state *s, const struct camera *camera, const double xy[2], struct rng *rng,
+                  struct volume_ray *ray)
 {
-    double origin_mm[3], direction[3];
-    camera_origin(camera, xy, origin_mm);
-    camera_direction(camera, xy, direction);
+    double at[2], origin_mm[3], direction[3];
+    camera_blur(camera, xy, rng, at);
+    camera_origin(camera, at, origin_mm);
+    camera_direction(camera, at, direction);
     return volume_ray_enter(s->scene, origin_mm, direction, ray);
 }
 
@@ -80,7 +82,7 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
     size_t n_ray = 0, place[RADIANCE_BLOCK_PATHS];
     uint64_t n_bounce = 0;
     for (size_t i = 0; i < b->n_path; i++) {
-        if (!enter(s, &s->camera[b->member[0]], b->xy[i], &ray[n_ray])) continue; /* sees nothing: adds 0 */
+        if (!enter(s, &s->camera[b->member[0]], b->xy[i], &b->rng[i], &ray[n_ray])) continue; /* sees nothing: adds 0 */
         b->rng[n_ray] = b->rng[i];
         place[n_ray++] = i;
     }
@@ -102,7 +104,7 @@ static void record_path(const void *state, size_t i_configuration, const double 
     struct volume_ray ray;
     struct volume_record events = {0, record->capacity, record->entry};
     record->n_entry = record->n_bounce = 0;
-    if (!enter(s, &s->camera[i_configuration], xy, &ray)) return;
+    if (!enter(s, &s->camera[i_configuration], xy, rng, &ray)) return;
     volume_trace(&s->setting[i_configuration], &ray, rng, &path, &events);
     record->n_entry = events.n_event;
     record->n_bounce = events.n_event / 4; /* look-ups are cheap beside scattering */

@@ -83,8 +83,27 @@ static void exr_round_trip(void **state)
         for (size_t c = 0; c < 3; c++) assert_true(back.pixel[3 * i + c] == im.pixel[5 * i + c]);
     image_release(&back);
     assert_int_equal(image_read_exr(&back, path_of("a.exr"), 37 * 41 - 1, &err), STATUS_TOO_LARGE);
+    assert_int_equal(image_read_exr_variance(&back, path_of("a.exr"), LIMIT, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "'var.G' is missing"));
     assert_int_equal(image_write_exr(&im, "/nonexistent/x.exr", &err), STATUS_IO);
     assert_non_null(strstr(err.text, "/nonexistent/x.exr"));
+    image_release(&im);
+}
+
+static void exr_variances(void **state)
+{
+    (void)state;
+    static const char *const name[6] = {"R", "G", "B", "var.R", "var.G", "var.B"};
+    struct image im, back;
+    struct error err = {0};
+    assert_int_equal(image_init(&im, 19, 23, 6, &err), STATUS_OK);
+    im.channel_name = name;
+    fill(&im);
+    assert_int_equal(image_write_exr(&im, path_of("a.exr"), &err), STATUS_OK);
+    if (image_read_exr_variance(&back, path_of("a.exr"), LIMIT, &err) != STATUS_OK) fail_msg("%s", err.text);
+    for (size_t i = 0; i < 19 * 23; i++)
+        for (size_t c = 0; c < 3; c++) assert_true(back.pixel[3 * i + c] == im.pixel[6 * i + 3 + c]);
+    image_release(&back);
     image_release(&im);
 }
 
@@ -254,9 +273,9 @@ static void png_is_srgb(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_round_trip),        cmocka_unit_test(exr_noise_survives),
-        cmocka_unit_test(exr_half_tiled_grey),   cmocka_unit_test(bad_files),
-        cmocka_unit_test(truncated_and_damaged), cmocka_unit_test(png_is_srgb),
+        cmocka_unit_test(exr_round_trip),      cmocka_unit_test(exr_variances), cmocka_unit_test(exr_noise_survives),
+        cmocka_unit_test(exr_half_tiled_grey), cmocka_unit_test(bad_files),     cmocka_unit_test(truncated_and_damaged),
+        cmocka_unit_test(png_is_srgb),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

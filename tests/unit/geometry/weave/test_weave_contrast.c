@@ -1,5 +1,7 @@
 /* Contrast at three scales against its closed form for sinusoids, and the errors between two pictures. */
+#include "base/rng.h"
 #include "geometry/vision/vision.h"
+#include "geometry/vision/vision_texture.h"
 #include "geometry/weave/weave_contrast.h"
 
 #include <math.h>
@@ -88,6 +90,31 @@ static void errors_between_pictures_are_relative(void **state)
     assert_true(fabs(weave_contrast_error(&rendering, &photograph) - 0.5) < 0.02);
 }
 
+/* White noise without a texture, as it is and blurred: what is stated is what is measured. */
+static void noise_is_stated(void **state)
+{
+    (void)state;
+    static float blurred[EDGE * EDGE];
+    struct error err = {0};
+    struct rng rng;
+    rng_start(&rng, &(struct rng_key){.seed = 3}, 0, 0);
+    for (size_t i = 0; i < EDGE * EDGE; i += 2) {
+        double normal[2];
+        rng_normal_pair(&rng, normal);
+        for (size_t k = 0; k < 2; k++) grey[i + k] = (float)(0.4 + 0.02 * normal[k]);
+    }
+    for (double blur_px = 0.0; blur_px < 1.0; blur_px += 0.6) {
+        double measured[WEAVE_SCALES], stated[WEAVE_SCALES];
+        if (blur_px > 0.0) assert_int_equal(vision_smooth(grey, EDGE, EDGE, blur_px, blurred, &err), STATUS_OK);
+        const float *picture = blur_px > 0.0 ? blurred : grey;
+        assert_int_equal(weave_contrast(picture, EDGE, EDGE, 5.0, measured, &err), STATUS_OK);
+        assert_int_equal(weave_contrast_noise(0.0025, blur_px, 5.0, stated, &err), STATUS_OK);
+        for (int k = 0; k < WEAVE_SCALES; k++) assert_true(fabs(measured[k] * measured[k] / stated[k] - 1.0) < 0.06);
+    }
+    double square[WEAVE_SCALES];
+    assert_int_equal(weave_contrast_noise(0.1, -1.0, 5.0, square, &err), STATUS_INVALID);
+}
+
 int main(void)
 {
     struct error err = {0};
@@ -97,6 +124,7 @@ int main(void)
         cmocka_unit_test(magnification_does_not_matter),
         cmocka_unit_test(periods_that_do_not_fit_are_refused),
         cmocka_unit_test(errors_between_pictures_are_relative),
+        cmocka_unit_test(noise_is_stated),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,7 @@
 /* The contrast of a texture: estimates are unbiased for any number of paths, their errors and derivatives are right,
  * and they agree with the contrast of a rendered picture. */
+#include "base/rng.h"
+#include "renderer/transport/camera.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/chess_board.h"
@@ -183,6 +185,65 @@ static void test_against_picture(void **state)
     woven_release(&w);
 }
 
+/* A path of a blurred camera starts beside its pixel, as a Gaussian says; a sharp camera takes no random number. */
+static void test_blurred_places(void **state)
+{
+    (void)state;
+    enum { N = 40000 };
+    struct configuration c[16];
+    struct camera camera;
+    struct rng rng;
+    const double xy[2] = {0.3, 0.8};
+    double at[2], sum[2] = {0}, sum2[2] = {0};
+    orbit_configurations_16(c);
+    camera_init(&camera, &c[0]);
+    rng_start(&rng, &(struct rng_key){.seed = 2}, 0, 0);
+    struct rng before = rng;
+    camera_blur(&camera, xy, &rng, at);
+    assert_true(at[0] == xy[0] && at[1] == xy[1]);
+    assert_memory_equal(&rng, &before, sizeof rng);
+    c[0].blur_m = 0.02 * c[0].crop_m;
+    c[0].crop_aspect = 2.0; /* the crop is half as high as wide */
+    camera_init(&camera, &c[0]);
+    for (size_t i = 0; i < N; i++) {
+        camera_blur(&camera, xy, &rng, at);
+        for (int a = 0; a < 2; a++) {
+            sum[a] += (at[a] - xy[a]) / N;
+            sum2[a] += (at[a] - xy[a]) * (at[a] - xy[a]) / N;
+        }
+    }
+    for (int a = 0; a < 2; a++) {
+        double want = a == 0 ? 0.02 : 0.04;
+        assert_true(fabs(sum[a]) < 4.0 * want / sqrt(N));
+        assert_true(fabs(sqrt(sum2[a]) / want - 1.0) < 0.02);
+    }
+}
+
+/* The contrast of a blurred camera agrees with that of its picture, and is less than that of a sharp one. */
+static void test_blurred_contrast(void **state)
+{
+    (void)state;
+    struct woven w;
+    struct estimate sharp, blurred;
+    struct image im = {0};
+    const size_t n_path = 60000;
+    woven_init(&w);
+    w.configuration[0].contrast_cells = BOARD_SIDE;
+    struct estimate_request q = woven_request(&w, &n_path);
+    assert_int_equal(estimate_run(&q, w.pool, NULL, &sharp, NULL), STATUS_OK);
+    w.configuration[0].blur_m = 0.5 * w.configuration[0].crop_m / BOARD_SIDE;
+    assert_int_equal(estimate_run(&q, w.pool, NULL, &blurred, NULL), STATUS_OK);
+    w.configuration[0].contrast_cells = 0;
+    woven_picture(&w, &im);
+    for (size_t c = 0; c < 3; c++) {
+        double se, contrast = picture_contrast(&im, c, &se);
+        assert_true(fabs(blurred.mean[c] - contrast) < 4.0 * hypot(se, sqrt(blurred.var[c])));
+        assert_true(blurred.mean[c] + 4.0 * sqrt(blurred.var[c]) < sharp.mean[c]);
+    }
+    image_release(&im);
+    woven_release(&w);
+}
+
 static void test_refused_requests(void **state)
 {
     (void)state;
@@ -207,6 +268,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_unbiased),         cmocka_unit_test(test_derivative),
         cmocka_unit_test(test_same_bits),        cmocka_unit_test(test_against_picture),
+        cmocka_unit_test(test_blurred_places),   cmocka_unit_test(test_blurred_contrast),
         cmocka_unit_test(test_refused_requests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

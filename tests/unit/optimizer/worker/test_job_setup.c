@@ -125,6 +125,9 @@ static void test_lamp_and_camera(void **state)
     compare(state, ",\"lamp\":{\"kind\":\"directional\"}", "", c, false);
     for (size_t i = 0; i < N_ROW; i++) c[i].camera = CAMERA_FAR_FIELD;
     compare(state, ",\"lamp\":{\"kind\":\"directional\"},\"camera\":{\"far_field\":true}", "", c, false);
+    for (size_t i = 0; i < N_ROW; i++) c[i].blur_m = 0.25e-3;
+    compare(state, ",\"lamp\":{\"kind\":\"directional\"},\"camera\":{\"far_field\":true,\"blur_mm\":0.25}", "", c,
+            false);
 }
 
 static void test_environment(void **state)
