@@ -139,6 +139,16 @@ def test_a_model_that_contains_another_starts_from_its_result(tmp_path, models):
         assert start["start"] == pytest.approx([*found, w], rel=1e-6)
 
 
+def gain_error(row, misfit, prior):
+    """Standard error of a row's gain: three channels with the noise of rendering and measurement and the misfit, which is
+    relative to the row's brightness but at least to 0.02, beside the prior."""
+    brightness = max(sum(row["measured"]) / 3, 0.02)
+    information = 1 / prior ** 2
+    for mean, se, measured_se in zip(row["rendered"], row["rendered_se"], row["measured_se"]):
+        information += mean ** 2 / ((misfit * brightness) ** 2 + se ** 2 + measured_se ** 2)
+    return information ** -0.5
+
+
 def test_a_gain_for_each_photograph(tmp_path):
     """The rows are the cloth's own radiances times known gains. The fit finds the gains, reports errors with and
     without them, and a bad row of weight 0 changes neither."""
@@ -156,7 +166,7 @@ def test_a_gain_for_each_photograph(tmp_path):
     told = result(tmp_path / "told")
     for row, gain in zip(told["rows"], gains):
         assert abs(row["gain"] - gain) < 4 * row["gain_se"] + 0.005, (row["gain"], row["gain_se"], gain)
-        assert 0 < row["gain_se"] < 0.07  # the prior: 0.1
+        assert row["gain_se"] == pytest.approx(gain_error(row, told["misfit_rel_rms"], 0.1), rel=1e-3)
     assert 0.06 < told["fit_rel_rms"] < 0.11 and 0.05 < told["heldout_rel_rms"] < 0.1
     for key in ("fit_rel_rms_with_gains", "heldout_rel_rms_with_gains"):
         assert told[key] < 0.02 + 4 * told[key + "_se"], (key, told[key], told[key + "_se"])

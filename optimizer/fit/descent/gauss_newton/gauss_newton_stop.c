@@ -9,7 +9,7 @@
  * The fit ends when it has arrived, there is no pull any more, and the noise is good enough too: below target_share
  * of the plain objective or target_rel_rms, or, where no budget was asked for, below photograph_share of the variance
  * of a residual by the photographs' own errors. A fit whose paths or iterations are used up before that has converged
- * if it had arrived. / */
+ * if it had arrived. */
 #include "optimizer/fit/descent/gauss_newton/gauss_newton.h"
 
 #include <math.h>
