@@ -5,9 +5,11 @@
 WHAT: names of tables or of recoveries; default: everything. All tables go through the same procedure: one job for each
 of the descriptions in DESCRIPTIONS, whose cloth numbers are fitted together with the scattering parameters. The job
 with the lowest cross-validation error inside the fitted rows is the result of the table. The held-out rows choose
-nothing. The jobs' folders are kept in --keep, and a job that is there already is not run again.
+nothing. The jobs' folders are kept in --keep, and a job that is there already, with the same document and files, is not
+run again. A table or a recovery that fails does not keep the others from running; the exit status is then 1.
 """
 import argparse
+import filecmp
 import glob
 import json
 import os
@@ -34,10 +36,33 @@ def figure(name, value, unit, better="lower"):
     print(json.dumps({"name": name, "value": value, "unit": unit, "better": better}), flush=True)
 
 
+class Failure(Exception):
+    """A table or a recovery that gives no figures, and why."""
+
+
+def is_done(folder, document, files):
+    """Whether the folder has the results of this very job."""
+    if not os.path.exists(os.path.join(folder, "wall_s")):
+        return False
+    with open(os.path.join(folder, "job.json"), encoding="utf-8") as f:
+        same = json.load(f) == document
+    kept = [os.path.join(folder, "input", os.path.basename(file)) for file in files]
+    return same and all(os.path.exists(k) and filecmp.cmp(k, file, shallow=False) for k, file in zip(kept, files))
+
+
+def worker_error(folder, code):
+    try:
+        with open(os.path.join(folder, "status.json"), encoding="utf-8") as f:
+            error = json.load(f).get("error") or {}
+    except (OSError, ValueError):
+        error = {}
+    return f"{folder}: the worker ended with {code}: {error.get('text') or 'see worker.txt'}"
+
+
 def run_job(build, folder, document, files):
-    """Runs the worker on a job; returns result.json and the wall time in seconds. A finished job is read only."""
+    """Runs the worker on a job; returns result.json and the wall time in seconds. A finished job is only read."""
     result_file, wall_file = os.path.join(folder, "results", "result.json"), os.path.join(folder, "wall_s")
-    if not os.path.exists(wall_file):
+    if not is_done(folder, document, files):
         shutil.rmtree(folder, ignore_errors=True)
         os.makedirs(os.path.join(folder, "input"))
         for file in files:
@@ -48,8 +73,7 @@ def run_job(build, folder, document, files):
         with open(os.path.join(folder, "worker.txt"), "w", encoding="utf-8") as log:
             code = subprocess.run([os.path.join(build, "bin", "selvedge-worker"), folder], stdout=log, stderr=log).returncode
         if code != 0:
-            with open(os.path.join(folder, "status.json"), encoding="utf-8") as f:
-                raise RuntimeError(f"{folder}: worker ended with {code}: {json.load(f).get('error')}")
+            raise Failure(worker_error(folder, code))
         with open(wall_file, "w", encoding="utf-8") as f:
             f.write(f"{time.monotonic() - start:.2f}")
     with open(result_file, encoding="utf-8") as f, open(wall_file, encoding="utf-8") as w:
@@ -70,6 +94,8 @@ def bench_table(arguments, table):
     for name, cloth in DESCRIPTIONS.items():
         document = {"sample": f"{sample} as {name}", "cloth": cloth, "measurements": {"file": os.path.basename(table)}, "fit": fit}
         result, seconds = run_job(arguments.build, os.path.join(arguments.keep, f"{sample}.{name}"), document, [table])
+        if result["heldout_rel_rms"] is None or not result["skill"]:
+            raise Failure(f"{table}: it has no held-out rows, or rows that a plain BRDF does not describe")
         wall_s += seconds
         print(f"{sample} as {name}: fitted {result['fit_rel_rms']:.3f}, cross-validation {cross_validation(result):.3f}, "
               f"held out {result['heldout_rel_rms']:.3f}, {seconds:.0f} s", file=sys.stderr)
@@ -83,14 +109,28 @@ def bench_table(arguments, table):
     return best["heldout_rel_rms"], brdf
 
 
+def each(names, bench):
+    """Results of bench(name) for each name, and whether all gave one. A failure is printed."""
+    found, whole = [], True
+    for name in names:
+        try:
+            found.append(bench(name))
+        except (Failure, OSError, subprocess.CalledProcessError) as failure:
+            print(f"FAILED {name}: {failure}", file=sys.stderr)
+            whole = False
+    return found, whole
+
+
 def bench_tables(arguments):
     tables = sorted(glob.glob(os.path.join(arguments.tables, "*.csv")))
     if not tables:
         print(f"skipped cloth.real: no tables (*.csv) in {arguments.tables}", file=sys.stderr)
-    scores = [bench_table(arguments, t) for t in tables if not arguments.what or os.path.splitext(os.path.basename(t))[0] in arguments.what]
+    wanted = [t for t in tables if not arguments.what or os.path.splitext(os.path.basename(t))[0] in arguments.what]
+    scores, whole = each(wanted, lambda table: bench_table(arguments, table))
     if scores and not arguments.what:
         figure("cloth.real.tables_below_5_percent", sum(twin < 0.05 for twin, _ in scores), "tables", "higher")
         figure("cloth.real.tables_below_brdf", sum(twin < brdf for twin, brdf in scores), "tables", "higher")
+    return whole
 
 
 # Recoveries: (description of the true cloth, parameters, names of the kinds of yarn). A job gets the structure, the
@@ -147,7 +187,7 @@ def covered(result, truth_numbers, truth_parameters):
     """(covered, determined): how many determined values lie within two standard errors of the truth."""
     found = [(n, truth_numbers[n["name"].split(".")[-1]]) for n in result.get("cloth_numbers", []) if n["name"].split(".")[-1] in truth_numbers]
     found += [(p, truth_parameters[p["name"]]) for p in result["parameters"] if p["name"] in truth_parameters]
-    found = [(v, t) for v, t in found if v["determined"] and not v.get("fixed") and v["at_bound"] is None]
+    found = [(v, t) for v, t in found if v["determined"] and not v.get("fixed")]
     for v, t in found:
         print(f"  {v['name']}: {v['value']:.4g} +- {v['standard_error']:.2g}, true {t:.4g}", file=sys.stderr)
     return sum(abs(v["value"] - t) <= 2 * v["standard_error"] for v, t in found), len(found)
@@ -161,6 +201,21 @@ def flat_parameters(groups, sets):
             parts = [float(v) for v in str(value).split(",")]
             values.update({prefix + key: parts[0]} if len(parts) == 1 else {f"{prefix}{key}.{c}": v for c, v in zip("rgb", parts)})
     return values
+
+
+def own_error(result, truth):
+    """Relative RMS error of the held-out means against those of the true cloth, without the noise of the photographs and
+    of either rendering."""
+    square = n = 0
+    for row, exact in zip(result["rows"], truth["rows"]):
+        if row["set"] != "held-out":
+            continue
+        brightness = sum(exact["rendered"]) / 3
+        for c in range(3):
+            difference = row["rendered"][c] - exact["rendered"][c]
+            square += (difference ** 2 - row["rendered_se"][c] ** 2 - exact["rendered_se"][c] ** 2) / brightness ** 2
+            n += 1
+    return max(0.0, square / n) ** 0.5
 
 
 def bench_recovery(arguments, name, cloth, sets):
@@ -187,14 +242,20 @@ def bench_recovery(arguments, name, cloth, sets):
     print(f"{name}: held out {result['heldout_rel_rms']:.4f}, truth {truth['heldout_rel_rms']:.4f}, {inside} of {n} within two "
           f"standard errors, {seconds:.0f} s", file=sys.stderr)
     figure(f"cloth.recovery.{name}.ratio", round(ratio, 3), "1")
-    figure(f"cloth.recovery.{name}.covered", round(inside / n, 3) if n else None, "1", "higher")
+    figure(f"cloth.recovery.{name}.own_rel_rms", round(own_error(result, truth), 4), "1")
+    figure(f"cloth.recovery.{name}.determined", n, "values", "higher")
+    if n > 0:
+        figure(f"cloth.recovery.{name}.covered", round(inside / n, 3), "1", "higher")
     return inside, n
 
 
 def bench_recoveries(arguments):
-    counts = [bench_recovery(arguments, name, *spec) for name, spec in RECOVERIES.items() if not arguments.what or name in arguments.what]
-    if counts and not arguments.what:
-        figure("cloth.recovery.covered", round(sum(c for c, _ in counts) / max(1, sum(n for _, n in counts)), 3), "1", "higher")
+    wanted = [name for name in RECOVERIES if not arguments.what or name in arguments.what]
+    counts, whole = each(wanted, lambda name: bench_recovery(arguments, name, *RECOVERIES[name]))
+    n = sum(n for _, n in counts)
+    if n > 0 and not arguments.what:
+        figure("cloth.recovery.covered", round(sum(c for c, _ in counts) / n, 3), "1", "higher")
+    return whole
 
 
 def main():
@@ -209,9 +270,9 @@ def main():
     arguments = parser.parse_args()
     arguments.build = os.path.abspath(arguments.build)
     arguments.keep = os.path.abspath(arguments.keep or os.path.join(arguments.build, "bench-cloth"))
-    bench_tables(arguments)
-    bench_recoveries(arguments)
+    whole = bench_tables(arguments)
+    return 0 if bench_recoveries(arguments) and whole else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
