@@ -66,7 +66,11 @@ struct reconstruct_report {
     size_t n_fiber, n_vertex;
     double total_length_m;
     double radius_m[3], radius_score[3];
-    double radius_se_m[3];            /* standard error; NaN where the radius was given */
+    double radius_se_m[3]; /* standard error; NaN where the radius was given */
+    /* Radius of the profile that was fitted to the axes: a second measurement, by the edges instead of the mass. */
+    double profile_radius_m;
+    /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
+    double axis_position_se_m, axis_direction_se_rad;
     bool radius_per_axis;             /* each class has a radius of its own */
     double dice;                      /* overlap of fibers of radius r with kept voxels */
     double direction_noise_deg[2];    /* before and after the transfer (direction_noise.h) */

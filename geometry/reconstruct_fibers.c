@@ -203,17 +203,21 @@ static status keep_inside(const struct fiber_job *job, const struct polyline_set
     return s;
 }
 
-/* Moves lines to where they explain the scan best. */
-static status fit_axes(struct fiber_job *job, struct polyline_set *lines, int n_round, struct error *err)
+/* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, and the report gets their errors. */
+static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool last, struct error *err)
 {
-    struct axis_profile profile = {0.5 * job->diameter, 0.8, 0.0, 1.0};
+    struct axis_profile profile = {.radius = 0.5 * job->diameter, .blur = 0.8, .high = 1.0, .measured_curvature = last};
+    const double voxel_m = job->v->voxel_size_m[0];
     struct polyline_set even, inside;
     polyline_set_init(&even);
     polyline_set_init(&inside);
     status s = polylines_resample(lines, &even, err);
-    if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, n_round, &profile, job->pool, &job->inner, err);
+    if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, N_FIT, &profile, job->pool, &job->inner, err);
     if (s == STATUS_OK) s = keep_inside(job, &even, &inside, err);
     if (s == STATUS_OK) {
+        job->report->axis_position_se_m = profile.position_se * voxel_m;
+        job->report->axis_direction_se_rad = profile.direction_se_rad;
+        job->report->profile_radius_m = profile.radius * voxel_m;
         polyline_set_release(lines);
         *lines = inside;
         polyline_set_init(&inside);
@@ -277,13 +281,13 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         s = smooth_and_drop(job, &part[0], lines, err);
     }
     if (s == STATUS_OK) s = relax(job, lines, 2, err);
-    if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
+    if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
     if (s == STATUS_OK)
         s = repair_lines(job, lines, true, &part[1], &counts,
                          err); /* lines on the fibers' axes are easier to distinguish and to join */
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
-    if (s == STATUS_OK) s = fit_axes(job, lines, N_FIT, err);
+    if (s == STATUS_OK) s = fit_axes(job, lines, true, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
     if (s == STATUS_OK) {
         job->report->n_gap_bridged = counts.n_gap_bridged;

@@ -9,8 +9,8 @@
 
 enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK, N_TABLE = 512 };
 static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
-/* Standard deviation of a fiber's curvature, per diameter. */
-static const double CURVATURE_SD = 0.35;
+/* Bounds of the measured standard deviation of a fiber's curvature, per diameter. */
+static const double CURVATURE_LEAST = 0.05, CURVATURE_MOST = 0.35;
 static const double TAIL = 2.5; /* distance beyond the radius up to which a fiber is modelled, in units of the blur */
 
 /* Sums over one brick: for the vertices of its segments, and for the profile. */
@@ -286,6 +286,36 @@ static void step_profile(const struct fit_job *job, size_t n_brick, double diame
     p->high = fmin(1.5, fmax(0.5, p->high + x[3]));
 }
 
+/* Standard deviation of one component of the lines' curvature, per voxel. It is measured over chords of a diameter,
+ * where the noise of single vertices has little weight. */
+static double measure_curvature(const struct polyline_set *lines, double diameter)
+{
+    size_t h = diameter > 4.0 ? (size_t)(0.5 * diameter) : 2;
+    double square = 0.0, n = 0.0;
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l] + h; i + h < lines->first[l + 1]; i++, n += 2.0)
+            for (int a = 0; a < 3; a++) {
+                double bend = (double)lines->vertex[i - h][a] - 2.0 * (double)lines->vertex[i][a] +
+                              (double)lines->vertex[i + h][a];
+                square += bend * bend;
+            }
+    double sd = n > 0.0 ? sqrt(square / n) / (double)(h * h) : INFINITY;
+    return fmin(fmax(sd, CURVATURE_LEAST / diameter), CURVATURE_MOST / diameter);
+}
+
+/* States the errors of the axes that the step has made (axis_fit.h). */
+static void state_error(const struct axis_pull *total, size_t n_vertex, double variance, double stiffness,
+                        struct axis_profile *p)
+{
+    double information = 0.0; /* of the data, a component and vertex: half the trace, none lies along the fiber */
+    for (size_t i = 0; i < n_vertex; i++)
+        information += 0.5 * (double)(total[i].normal[0] + total[i].normal[2] + total[i].normal[5]);
+    information = fmax(information / fmax((double)n_vertex, 1.0), 1e-12);
+    double length = pow(stiffness / information, 0.25);
+    p->position_se = sqrt(variance / (2.0 * M_SQRT2 * information * length));
+    p->direction_se_rad = p->position_se / length;
+}
+
 static status one_round(struct fit_job *job, struct polyline_set *lines, const uint32_t *first_vertex_of,
                         struct axis_pull *total, double diameter, struct thread_pool *pool,
                         const struct progress *progress, struct error *err)
@@ -310,8 +340,10 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, const u
             for (size_t e = 0; e < 2 * (bricks.first[b + 1] - bricks.first[b]); e++)
                 axis_pull_add(&total[first_vertex_of[job->sum[b].pull[e].segment] + e % 2], &job->sum[b].pull[e]);
         step_profile(job, n_brick, diameter, &job->profile);
-        double curvature_sd = CURVATURE_SD / diameter;
-        s = axis_solve_lines(lines, total, residual_variance(job, n_brick) / (curvature_sd * curvature_sd), pool, err);
+        double sd = job->profile.measured_curvature ? measure_curvature(lines, diameter) : CURVATURE_MOST / diameter;
+        double variance = residual_variance(job, n_brick), stiffness = variance / (sd * sd);
+        state_error(total, lines->n_vertex, variance, stiffness, &job->profile);
+        s = axis_solve_lines(lines, total, stiffness, pool, err);
     }
     for (size_t b = 0; job->sum != NULL && b < n_brick; b++) free(job->sum[b].pull);
     free(job->sum);

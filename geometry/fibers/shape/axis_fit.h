@@ -7,7 +7,13 @@
  *     sum over voxels of w (V - M)^2 + sum over lines of stiffness |p_{i-1} - 2 p_i + p_{i+1}|^2
  * for all vertices, and one for r, b, low and high together. The weight w (Geman and McClure 1985) ignores fibers
  * that no line represents. The stiffness is the variance of the residuals over that of the fibers' curvature, so
- * noisy scans give smoother fibers. */
+ * noisy scans give smoother fibers.
+ *
+ * The errors of the axes follow from the same sum. With data of information n a vertex, residuals of variance s and
+ * stiffness L, the posterior spectrum of the position is s / (n + L k^4). Its integral, and that of k^2 times it, are
+ *     position^2 = s / (2 sqrt 2 n l),   direction^2 = position^2 / l^2,   l = (L / n)^(1/4) voxels,
+ * l being the length over which the axes are smoothed. The noise of voxels counts as independent, so that the errors
+ * are lower limits where a scanner's filter has blurred its noise. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_FIT_H
 #define SELVEDGE_GEOMETRY_AXIS_FIT_H
 
@@ -15,9 +21,16 @@
 #include "geometry/fibers/lines/polyline.h"
 #include "geometry/volume/volume.h"
 
+#include <stdbool.h>
+
 struct axis_profile {
     double radius, blur; /* voxels */
     double low, high;    /* densities of void and fiber */
+    /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
+     * about to break, which holds back no line that still has to find its fiber. */
+    bool measured_curvature;
+    /* Written by the fit: standard error of one component of the axes' position (voxels) and of their direction. */
+    double position_se, direction_se_rad;
 };
 
 /* Moves `lines`, which have about one vertex per voxel (polylines_resample). *profile is the start, and is refined.

@@ -1,4 +1,5 @@
 /* The steps from directions to fibers, one by one: smoothing, linking, joining, relaxing, radius, alignment. */
+#include "base/angle.h"
 #include "base/option_id.h"
 #include "base/rng.h"
 #include "geometry/fibers/lines/joining.h"
@@ -164,7 +165,7 @@ static void test_axis_fit(void **state)
                                        {{0.0, 26.6, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
     struct volume v;
     struct polyline_set coarse, lines;
-    struct axis_profile profile = {3.2, 0.8, 0.0, 1.0};
+    struct axis_profile profile = {.radius = 3.2, .blur = 0.8, .high = 1.0};
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, 3, 0.2, 1);
     polyline_set_init(&coarse);
@@ -187,6 +188,49 @@ static void test_axis_fit(void **state)
     polyline_set_release(&coarse);
     polyline_set_release(&lines);
     volume_release(&v);
+}
+
+/* RMS of one component of the deviation of lines along x from their axis, and of the slope of their segments. */
+static void deviation(const struct polyline_set *lines, double y, double z, double *position, double *slope)
+{
+    double square = 0.0, turn = 0.0, n = 0.0;
+    for (size_t i = 4; i + 5 < lines->n_vertex; i++, n += 2.0) {
+        const float *a = lines->vertex[i], *b = lines->vertex[i + 1];
+        square += pow((double)a[1] - y, 2.0) + pow((double)a[2] - z, 2.0);
+        turn += (pow((double)(b[1] - a[1]), 2.0) + pow((double)(b[2] - a[2]), 2.0)) / pow((double)(b[0] - a[0]), 2.0);
+    }
+    *position = sqrt(square / n);
+    *slope = sqrt(turn / n);
+}
+
+/* The stated errors of the axes. A straight fiber loses nothing by smoothing, so it has only the noise's part of them:
+ * the integrals of n / (n + L k^4)^2 are 3/4 of the position's variance and 1/4 of the direction's. */
+static void test_axis_errors(void **state)
+{
+    (void)state;
+    const size_t n[3] = {400, 24, 24};
+    const struct test_cylinder c = {{0.0, 12.3, 12.1}, {1.0, 0.0, 0.0}, 3.5};
+    for (int round = 0; round < 2; round++) {
+        struct volume v;
+        struct polyline_set coarse, lines;
+        double position, slope;
+        struct axis_profile profile = {.radius = 3.2, .blur = 0.8, .high = 1.0, .measured_curvature = round == 1};
+        assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+        test_fill_cylinders(&v, &c, 1, 0.2, 1);
+        polyline_set_init(&coarse);
+        polyline_set_init(&lines);
+        add_piece(&coarse, 0, 0.5f, 399.5f, 12.5f);
+        assert_int_equal(polylines_resample(&coarse, &lines, NULL), STATUS_OK);
+        assert_int_equal(polylines_fit(&lines, &v, 7.0, 6, &profile, NULL, NULL, NULL), STATUS_OK);
+        deviation(&lines, 12.3, 12.1, &position, &slope);
+        print_message("position %.3f voxels (stated %.3f), direction %.2f degrees (stated %.2f)\n", position,
+                      profile.position_se, slope / RAD_PER_DEG, profile.direction_se_rad / RAD_PER_DEG);
+        assert_true(fabs(position / (sqrt(0.75) * profile.position_se) - 1.0) < 0.4);
+        assert_true(fabs(slope / (0.5 * profile.direction_se_rad) - 1.0) < 0.4);
+        polyline_set_release(&coarse);
+        polyline_set_release(&lines);
+        volume_release(&v);
+    }
 }
 
 /* The histogram against a count in this test, and both estimates of the radius for a bundle of touching fibers whose
@@ -335,6 +379,7 @@ int main(void)
         cmocka_unit_test(test_duplicates_and_joins),
         cmocka_unit_test(test_relax),
         cmocka_unit_test(test_axis_fit),
+        cmocka_unit_test(test_axis_errors),
         cmocka_unit_test(test_radius),
         cmocka_unit_test(test_radius_of_each_class),
         cmocka_unit_test(test_alignment),
