@@ -58,7 +58,8 @@ def test_lights_and_cameras_of_photographs(tmp_path):
     near = ["--crop-cm", 0.02, "--lamp-side-cm", 60, "--camera-distance-cm", 0.05, "--px", 16, "--paths", 8192]
 
     def picture(name, *options):
-        code, _, text = run("photograph", "--fibers", tmp_path / "cloth.hair", "--table", tmp_path / "views.csv", "--out", tmp_path / name, "--quiet", *near, *options)
+        files = ["--fibers", tmp_path / "cloth.hair", "--table", tmp_path / "views.csv", "--out", tmp_path / name]
+        code, _, text = run("photograph", *files, "--quiet", *near, *options)
         assert code == 0, text
         truth = json.loads((tmp_path / name / "truth.json").read_text())
         return truth, truth["photographs"][0]["mean_rgb"]

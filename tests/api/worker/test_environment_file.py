@@ -2,7 +2,7 @@
 import os
 
 import pytest
-from daemon_under_test import Daemon, problem, program
+from daemon_under_test import Daemon, program
 from small_cloth import TABLE, hair
 from small_exr import exr
 

@@ -21,28 +21,35 @@ static const double cloth[][FAKE_N_PARAM] = {
     {0.040, 0.087, 0.087, 0.452, 0.725, 0.948, 7.238, 10.0, 25.989},
 };
 
+/* Fits all parameters within their bounds from their defaults, and releases o. */
+static void fit_observations(struct observation_set *o, const struct estimator *e, uint64_t budget,
+                             struct fit_result *r)
+{
+    struct fit_parameter parameter[FAKE_N_PARAM];
+    struct error err = {0};
+    for (size_t p = 0; p < FAKE_N_PARAM; p++)
+        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
+    struct fit_problem problem = {.n_param = FAKE_N_PARAM,
+                                  .info = fake_param,
+                                  .parameter = parameter,
+                                  .observation = o,
+                                  .estimator = e,
+                                  .path_budget = budget};
+    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    observation_set_release(o);
+}
+
 static void fit(const double *file_unit, uint64_t seed, uint64_t budget, double noise, double photograph_noise,
                 double *truth, struct fake_cloth *f, struct fit_result *r)
 {
     struct observation_set o;
-    struct fit_parameter parameter[FAKE_N_PARAM];
-    struct error err = {0};
     fake_cloth_init(f, seed, FAKE_N_FIT);
     f->noise = noise;
     struct estimator e = fake_estimator(f);
     fake_param_set(file_unit, truth);
     observation_set_init(&o);
     assert_int_equal(fake_observe(f, truth, photograph_noise, seed, &o), STATUS_OK);
-    for (size_t p = 0; p < FAKE_N_PARAM; p++)
-        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
-    struct fit_problem problem = {.n_param = FAKE_N_PARAM,
-                                  .info = fake_param,
-                                  .parameter = parameter,
-                                  .observation = &o,
-                                  .estimator = &e,
-                                  .path_budget = budget};
-    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
-    observation_set_release(&o);
+    fit_observations(&o, &e, budget, r);
 }
 
 static const double unstated_error = 0.04;
@@ -62,21 +69,10 @@ static void fit_unstated(const double *file_unit, uint64_t seed, uint64_t budget
                          struct fake_cloth *f, struct fit_result *r)
 {
     struct observation_set o;
-    struct fit_parameter parameter[FAKE_N_PARAM];
-    struct error err = {0};
     observe_unstated(file_unit, seed, truth, f, &o);
     f->noise = noise;
     struct estimator e = fake_estimator(f);
-    for (size_t p = 0; p < FAKE_N_PARAM; p++)
-        parameter[p] = (struct fit_parameter){fake_param[p].lower, fake_param[p].upper, fake_param[p].start, false};
-    struct fit_problem problem = {.n_param = FAKE_N_PARAM,
-                                  .info = fake_param,
-                                  .parameter = parameter,
-                                  .observation = &o,
-                                  .estimator = &e,
-                                  .path_budget = budget};
-    if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
-    observation_set_release(&o);
+    fit_observations(&o, &e, budget, r);
 }
 
 /* Relative RMS error of the exact means at param against these photographs. */
