@@ -1,0 +1,64 @@
+"""A daemon and a page of the dashboard, for the tests in tests/browser. SELVEDGE_SCREENSHOTS=DIR keeps screenshots."""
+import json
+import os
+import subprocess
+import sys
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
+BIN = os.path.join(BUILD, "bin")
+sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
+import selvedge  # noqa: E402
+
+
+def start_daemon(folder, *more):
+    process = subprocess.Popen([os.path.join(BIN, "selvedged"), "--data", str(folder), "--port", "0", "--set", "disk.floor_bytes=0", *more],
+                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    line = process.stdout.readline()
+    assert "listens on http://" in line, line
+    return process, line.split()[-1]
+
+
+def stop_daemon(process):
+    process.terminate()
+    process.wait(30)
+    process.stdout.close()
+
+
+def wait_for(browser, condition, seconds=30):
+    """Waits until the JavaScript expression is true."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if browser.execute_script(f"return Boolean({condition})"):
+            return
+        time.sleep(0.2)
+    keep(browser, "timeout")
+    page = browser.find_element("tag name", "body").text
+    raise AssertionError(f"never true: {condition}\n{page[:2000]}")
+
+
+def keep(browser, name):
+    folder = os.environ.get("SELVEDGE_SCREENSHOTS")
+    if folder:
+        os.makedirs(folder, exist_ok=True)
+        height = browser.execute_script("return document.documentElement.scrollHeight")
+        browser.set_window_size(1280, min(height + 150, 6000))
+        time.sleep(0.5)
+        browser.save_screenshot(os.path.join(folder, name + ".png"))
+        browser.set_window_size(1280, 900)
+
+
+def complaints(browser):
+    """Returns the errors of the console: scripts, content security policy, missing files."""
+    return [e["message"] for e in browser.get_log("browser") if e["level"] == "SEVERE"]
+
+
+def submit(url, folder, name):
+    sample = folder / name.replace(" ", "-")
+    sample.mkdir()
+    (sample / "scan.tif").write_bytes(b"scan")
+    (sample / "cloth.csv").write_text("set\n")
+    document = {"sample": name, "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "cloth.csv"}}
+    (sample / "job.json").write_text(json.dumps(document))
+    return selvedge.Server(url).submit(str(sample / "job.json")), sample
