@@ -106,6 +106,12 @@ static status find_draft(const struct piece *p, struct finding *f, struct error 
     return s;
 }
 
+/* A drawing that explains less than this share of the averaged repeat does not resemble the photograph; that it is
+ * better than other drawings then tells less about the yarns, and little about the draft. Drawn pictures keep more,
+ * renderings of described cloths 0.02 to 0.4, and most of their drafts come out wrong
+ * (docs/weave-detection.md). */
+static const double RESEMBLING = 0.5;
+
 static double odds_to_confidence(double score, double other) { return 1.0 / (1.0 + exp(fmin(50.0, other - score))); }
 
 static double modulo_deg(double deg, double from) { return deg - 180.0 * floor((deg - from) / 180.0); }
@@ -128,8 +134,9 @@ static void fill_guess(const struct piece *p, const struct finding *f, struct we
     g->direction_deg[0] = modulo_deg(atan2(d->step_weft_px[1], d->step_weft_px[0]) * 180.0 / M_PI, -45.0);
     g->direction_deg[1] = modulo_deg(atan2(d->step_warp_px[1], d->step_warp_px[0]) * 180.0 / M_PI, -90.0);
     g->texture_period_px = p->px / hypot(line[0], line[1]);
-    g->yarns_confidence = odds_to_confidence(d->score, d->score_other_yarns);
-    g->draft_confidence = g->yarns_confidence * odds_to_confidence(d->score, d->score_other_draft);
+    double explained = fmax(0.0, 1.0 - d->residual), odds = odds_to_confidence(d->score, d->score_other_yarns);
+    g->yarns_confidence = odds * fmin(1.0, RESEMBLING + explained);
+    g->draft_confidence = odds * odds_to_confidence(d->score, d->score_other_draft) * fmin(1.0, explained / RESEMBLING);
 }
 
 /* Where the crossing of warp 0 and weft 0 is in the photograph. A pixel counts at its center. */

@@ -52,7 +52,7 @@ def test_real_pairs(name, tmp_path):
         assert found["warp"]["direction_deg"] == pytest.approx(90, abs=4)
         assert found["weft"]["direction_deg"] == pytest.approx(0, abs=4)
         assert (found["warp"]["spacing_px"], found["weft"]["spacing_px"]) == pytest.approx(spacing[kind], rel=0.03)
-        assert 0.3 < found["confidence"]["draft"] <= found["confidence"]["yarns"] <= 1
+        assert 0.2 < found["confidence"]["draft"] <= found["confidence"]["yarns"] <= 1
         # yarns of one or two pixels show neither their width nor their color
         assert found["confidence"]["width_over_spacing"] == 0 and found["confidence"]["color"] == 0
 

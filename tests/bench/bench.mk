@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-cloth bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures docs-weave bench-weave
+.PHONY: bench bench-cloth bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures docs-weave bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
@@ -60,6 +60,9 @@ bench-weave: | deps-test ## share of drawn weaves whose yarns and draft are foun
 # the photographs stay where they are, and so do pictures made of them: only our diagram of the drafts is part of docs
 WEAVE_PAIRS := satin1 twill1 twill2 twill3
 WEAVE_DATA = $(or $(SELVEDGE_DATA),../shared/data)/reflection-transmission-photos
+bench-weave-rendered: $(BUILD)/bin/selvedge-phantom ## the same for renderings of described cloths (3 minutes); the table goes to stderr
+	@/usr/bin/python3 tests/bench/bench_weave_rendered.py $(BUILD) $(BUILD)/bench-weave-rendered
+
 docs-weave: $(BUILD)/bin/selvedge-phantom ## draw docs/images/weave-drafts.svg anew: drafts found in real photographs; build/docs-weave/*.png shows them over the photographs
 	@mkdir -p $(BUILD)/docs-weave docs/images
 	@for n in $(WEAVE_PAIRS); do for k in R T; do \

@@ -48,6 +48,18 @@ static void take_cover(struct cloth_description *d, const char *name, double cov
     if (n->value == n->info->standard) n->value = fmin(fmax(cover, n->lower), n->upper);
 }
 
+static void warn_uncertain(struct pipeline_context *c)
+{
+    char text[300];
+    double confidence = c->texture.guess.draft_confidence;
+    if (confidence >= LEAST_CERTAIN) return;
+    snprintf(text, sizeof text,
+             "the draft comes from photograph '%.120s', which is not certain of it (confidence %.2f): compare it with "
+             "the cloth, or state 'weave' or 'draft'",
+             c->doc->cloth_texture, confidence);
+    pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
+}
+
 static status take_draft(struct pipeline_context *c, struct error *err)
 {
     const struct weave_guess *g = &c->texture.guess;
@@ -108,7 +120,10 @@ status pipeline_read_texture(struct pipeline_context *c, struct error *err)
              "photograph '%s' shows the weave '%s' (confidence %.2f), warps every %.2f and wefts every %.2f pixels "
              "(confidence %.2f)",
              c->doc->cloth_texture, name, g->draft_confidence, g->spacing_px[0], g->spacing_px[1], g->yarns_confidence);
-    if (c->doc->cloth_draft_from_texture) return take_draft(c, err);
+    if (c->doc->cloth_draft_from_texture) {
+        warn_uncertain(c);
+        return take_draft(c, err);
+    }
     compare_drafts(c);
     return STATUS_OK;
 }
