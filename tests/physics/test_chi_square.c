@@ -71,7 +71,7 @@ static void samples_follow_the_density(void **state)
 {
     (void)state;
     static const double angle_deg[][2] = {{0, 90}, {-25, 200}, {50, 10}, {75, -60}, {-88, 33}, {90, 0}};
-    enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 3 };
+    enum { N_ANGLE = sizeof angle_deg / sizeof angle_deg[0], N_SET = 4 };
     static const float coloured[2][3] = {{1, 0.1f, 0},
                                          {0, 0.3f, 20}}; /* the weights of the channels change the choice of lobes */
     const float *const weight[3] = {NULL, coloured[0], coloured[1]};
@@ -86,11 +86,12 @@ static void samples_follow_the_density(void **state)
             for (int a = 0; a < N_ANGLE; a++) {
                 double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * RAD_PER_DEG,
                                                     phi = angle_deg[a][1] * RAD_PER_DEG;
-                for (size_t p = 0; p < m->n_param; p++) { /* start; everything widest; narrow lobes */
+                for (size_t p = 0; p < m->n_param; p++) { /* start; everything largest; narrow lobes; shares least */
                     const struct param_info *i = &m->param[p];
-                    bool angle = i->channel < 0;
+                    bool angle = i->channel < 0, share = angle && i->unit != PARAM_UNIT_DEG;
                     param[p] = set == 0   ? i->start
                                : set == 1 ? i->upper
+                               : set == 3 ? (share ? i->lower : i->start)
                                : angle    ? i->lower + 0.1 * (i->upper - i->lower)
                                           : 0.2 + 0.3 * (i->channel % 2);
                 }
