@@ -33,7 +33,7 @@ struct cloth_search {
     const struct fit_option *option; /* of all unknowns, extra starts too; numbers are not tied */
     struct cloth_estimator *cloth;
     size_t
-        n_screen; /* cloths of the screening; 0 or 1: the joint fit begins at the start values. More than extra starts */
+        n_screen; /* cloths of the screening, more than extra starts; 0 or 1: the joint fit begins at the start values */
     uint64_t screen_budget;           /* paths of each of them */
     uint64_t final_budget;            /* paths of the final fit */
     double screen_share, final_share; /* of the progress, together below 1 */
