@@ -32,8 +32,8 @@ struct cloth_search {
     const struct fit_problem *problem;
     const struct fit_option *option; /* of all unknowns, extra starts too; numbers are not tied */
     struct cloth_estimator *cloth;
-    size_t
-        n_screen; /* cloths of the screening, more than extra starts; 0 or 1: the joint fit begins at the start values */
+    /* Cloths of the screening, more than extra starts; 0 or 1: the joint fit begins at the start values. */
+    size_t n_screen;
     uint64_t screen_budget;           /* paths of each of them */
     uint64_t final_budget;            /* paths of the final fit */
     double screen_share, final_share; /* of the progress, together below 1 */
