@@ -36,6 +36,7 @@
 #define OPTION_YARNS "yarns"
 #define OPTION_CLOTH "described_cloth"
 #define OPTION_CLOTH_TEXTURE "cloth_texture"
+#define OPTION_TEXTURE_PX_PER_MM "texture_px_per_mm"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
 /* the measurements */

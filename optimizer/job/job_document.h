@@ -84,6 +84,8 @@ struct job_document {
     /* cloth, as given; `cloth` is the checked description, NULL without the section */
     char cloth_weave[16];
     char cloth_texture[JOB_MAX_NAME_BYTES]; /* photograph that shows the weave; "" when none is given */
+    double cloth_texture_px_per_mm;         /* NaN: not given */
+    bool cloth_texture_colors;              /* start C_TT of the kinds at the colors of the photograph */
     bool cloth_draft_from_texture;          /* neither weave nor draft is given */
     size_t cloth_tile_yarn[2];              /* of enum cloth_direction; 0: not given */
     double cloth_threads_per_cm[2];         /* NaN: not given */

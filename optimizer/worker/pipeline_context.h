@@ -92,9 +92,12 @@ struct pipeline_skill {
 };
 
 /* What the photograph of the cloth's texture shows (pipeline_texture.h). */
+enum { PIPELINE_TEXTURE_MAX_TAKEN = 48 };
 struct pipeline_texture {
     bool found, contradicts; /* contradicts: the job's draft is another one */
     struct weave_guess guess;
+    size_t n_taken; /* start values that came from the photograph: keys of "cloth", names of parameters */
+    char taken[PIPELINE_TEXTURE_MAX_TAKEN][MODEL_SET_TEXT_BYTES];
 };
 
 struct pipeline_context {

@@ -10,6 +10,7 @@
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/scene/pipeline_texture.h"
+#include "optimizer/worker/stages/scene/texture_start.h"
 #include "renderer/transport/light/environment.h"
 
 #include <math.h>
@@ -203,6 +204,7 @@ static status read_rows(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_cloth_inputs(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);
     if (s == STATUS_OK) s = load_observations(c, err);
+    if (s == STATUS_OK) texture_take_colors(c);
     if (s == STATUS_OK) s = load_environment(c, err);
     if (s == STATUS_OK) s = select_rows(c, err);
     if (s == STATUS_OK) s = check_density(c, err);

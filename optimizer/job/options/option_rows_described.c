@@ -63,6 +63,24 @@ const struct job_option option_rows_described[] = {
          "`weave` and `draft` the draft comes from it, and so do `cover_warp` and `cover_weft` where it shows "
          "them and they have their standard values; otherwise a weave that contradicts it is warned about. "
          "docs/weave-detection.md says how it is read."},
+    {.path = "cloth.texture_px_per_mm",
+     .kind = OPTION_NUMBER,
+     .id = OPTION_TEXTURE_PX_PER_MM,
+     INTO(cloth_texture_px_per_mm),
+     RANGE(0.1, 10000),
+     .unit = "px/mm",
+     .left_out = "not known",
+     .meaning =
+         "Pixels of `texture` in a millimetre of the cloth. Where the draft comes from the photograph, the threads "
+         "per centimetre then do too, with the `flatness` that makes single yarns as wide as seen, and the "
+         "`crimp` that bends warp and weft equally sharply. What the job states stays."},
+    {.path = "cloth.texture_colors",
+     .kind = OPTION_BOOL,
+     INTO(cloth_texture_colors),
+     .standard = "false",
+     .meaning =
+         "Whether `C_TT` of named kinds of yarn starts at the colors that `texture` shows of warp and weft, if it "
+         "shows them clearly. The brightness is that of the fitted rows."},
     {.path = "cloth.warp",
      .kind = OPTION_OWN,
      .standard = "[0]",

@@ -4,7 +4,7 @@ import os
 import pytest
 from daemon_under_test import problem, program
 from small_cloth import TABLE
-from small_png import png, weave
+from small_png import png, png_rgb, weave
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1}
@@ -30,6 +30,33 @@ def test_the_draft_comes_from_the_photograph(real):
     assert texture["weave"] == "twill 2/1" and texture["draft"] == geometry["cloth"]["draft"]
     assert texture["photograph"] == "weave.png" and not texture["contradicts_draft"]
     assert 0.5 < texture["confidence"]["draft"] <= 1
+
+
+def test_scale_and_colors_of_the_photograph(real):
+    """Threads, flatness, crimp and the colors of the kinds come from a photograph whose scale is given."""
+    grey, size = weave(TWILL), (8, 10)
+
+    def rgb(x, y):
+        warp = TWILL[y // size[1] % 3][x // size[0] % 3] == "1"
+        return [grey(x, y) * v for v in ((0.9, 0.6, 0.3) if warp else (0.5, 0.7, 1.0))]
+    cloth = {"texture_px_per_mm": 30, "texture_colors": True, "tile_warps": 3, "tile_wefts": 3, "warp": [0], "weft": [1],
+             "yarns": [{"fibers": 40, "name": "warp"}, {"fibers": 40, "name": "weft"}]}
+    state = finish(real, cloth, png_rgb(256, rgb))
+    geometry = state["result"]["geometry"]
+    texture, spacing_um = geometry["texture"], geometry["cloth"]["made"]["yarn_spacing_um"]
+    assert spacing_um == pytest.approx([1000 * s / 30 for s in size], rel=0.03)
+    assert texture["warp"]["yarns_per_cm"] == pytest.approx(1e4 / spacing_um[0], rel=1e-6)
+    assert geometry["cloth"]["description"]["crimp"] == pytest.approx(spacing_um[1] ** 2 / (spacing_um[0] ** 2 + spacing_um[1] ** 2), rel=1e-6)
+    colors = [f"{k}.C_TT.{c}" for k in ("warp", "weft") for c in "rgb"]
+    assert set(texture["taken"]) >= {"warp_per_cm", "weft_per_cm", "crimp", *colors}
+    start = {p["name"]: p["start"] for p in state["result"]["parameters"]}
+    assert start["warp.C_TT.r"] > start["warp.C_TT.g"] > start["warp.C_TT.b"]
+    assert start["weft.C_TT.r"] < start["weft.C_TT.b"] and start["warp.C_TT.r"] > start["weft.C_TT.r"]
+
+
+def test_a_scale_that_cannot_be(real):
+    error = finish(real, {"texture_px_per_mm": 9000}, png(192, weave(TWILL)), "failed")["error"]
+    assert error["field"] == "cloth.texture_px_per_mm" and "yarns in a centimetre" in error["text"]
 
 
 def test_a_contradiction_is_named(real):

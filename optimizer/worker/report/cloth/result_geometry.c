@@ -95,7 +95,11 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */
     if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, number, &c->cloth));
     if (c->texture.found) {
-        json_t *texture = weave_guess_json(&c->texture.guess, 0.0);
+        double px_per_mm = c->doc->cloth_texture_px_per_mm;
+        json_t *texture = weave_guess_json(&c->texture.guess, isnan(px_per_mm) ? 0.0 : px_per_mm),
+               *taken = json_array();
+        for (size_t i = 0; i < c->texture.n_taken; i++) json_array_append_new(taken, json_string(c->texture.taken[i]));
+        json_object_set_new(texture, "taken", taken);
         json_object_set_new(texture, "photograph", json_string(c->doc->cloth_texture));
         json_object_set_new(texture, "contradicts_draft", json_boolean(c->texture.contradicts));
         json_object_set_new(json, "texture", texture);

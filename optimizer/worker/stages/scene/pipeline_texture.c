@@ -3,13 +3,14 @@
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/worker/stages/scene/texture_start.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-/* From this confidence on the width of the yarns is taken over; below LEAST_CERTAIN a contradiction is not certain. */
-static const double WORTH_TAKING = 0.3, LEAST_CERTAIN = 0.7;
+/* Below this confidence a contradiction is not certain. */
+static const double LEAST_CERTAIN = 0.7;
 
 /* The job's draft in the order of a detected one: row 0 is the upper weft. The draft of a cloth without one repeat of
  * at most WEAVE_CELL_MAX yarns cannot be compared: false. */
@@ -40,14 +41,6 @@ static void compare_drafts(struct pipeline_context *c)
     pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
 }
 
-static void take_cover(struct cloth_description *d, const char *name, double cover)
-{
-    int i = cloth_number_index(d, name);
-    if (i < 0) return;
-    struct cloth_number *n = &d->number[i];
-    if (n->value == n->info->standard) n->value = fmin(fmax(cover, n->lower), n->upper);
-}
-
 static void warn_uncertain(struct pipeline_context *c)
 {
     char text[300];
@@ -73,10 +66,7 @@ static status take_draft(struct pipeline_context *c, struct error *err)
     }
     status s = cloth_description_draft(d, row, g->draft.n_weft, err);
     for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) d->n_yarn[a] = c->doc->cloth_tile_yarn[a];
-    if (g->cover_confidence > WORTH_TAKING) {
-        take_cover(d, "cover_warp", g->cover[0]);
-        take_cover(d, "cover_weft", g->cover[1]);
-    }
+    if (s == STATUS_OK) s = texture_take_widths(c, err);
     if (s == STATUS_OK) s = cloth_description_check(d, err);
     if (s == STATUS_INVALID) job_cloth_name_field(err);
     return s;
