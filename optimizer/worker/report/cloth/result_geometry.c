@@ -76,6 +76,18 @@ static json_t *groups_json(const struct pipeline_context *c)
     return list;
 }
 
+/* What the photograph of the weave shows, and what of it the job has taken. */
+static json_t *texture_json(const struct pipeline_context *c)
+{
+    double px_per_mm = c->doc->cloth_texture_px_per_mm;
+    json_t *json = weave_guess_json(&c->texture.guess, isnan(px_per_mm) ? 0.0 : px_per_mm), *taken = json_array();
+    for (size_t i = 0; i < c->texture.n_taken; i++) json_array_append_new(taken, json_string(c->texture.taken[i]));
+    json_object_set_new(json, "taken", taken);
+    json_object_set_new(json, "photograph", json_string(c->doc->cloth_texture));
+    json_object_set_new(json, "contradicts_draft", json_boolean(c->texture.contradicts));
+    return json;
+}
+
 json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -94,16 +106,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
     const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */
     if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, number, &c->cloth));
-    if (c->texture.found) {
-        double px_per_mm = c->doc->cloth_texture_px_per_mm;
-        json_t *texture = weave_guess_json(&c->texture.guess, isnan(px_per_mm) ? 0.0 : px_per_mm),
-               *taken = json_array();
-        for (size_t i = 0; i < c->texture.n_taken; i++) json_array_append_new(taken, json_string(c->texture.taken[i]));
-        json_object_set_new(texture, "taken", taken);
-        json_object_set_new(texture, "photograph", json_string(c->doc->cloth_texture));
-        json_object_set_new(texture, "contradicts_draft", json_boolean(c->texture.contradicts));
-        json_object_set_new(json, "texture", texture);
-    }
+    if (c->texture.found) json_object_set_new(json, "texture", texture_json(c));
     if (!c->doc->has_volume) return json;
     const struct reconstruct_option *o = &c->option;
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));
