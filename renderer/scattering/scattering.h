@@ -30,6 +30,12 @@ struct scattering_model {
     size_t n_param;
     const struct param_info *param;
 
+    /* False: light leaves a fiber where the camera's ray meets it (fabric thesis 5.5.1). True: it enters at a random
+     * place of the fiber's width, as a BCSDF is a mean over the width of both the incident and the exitant light
+     * (Marschner et al. 2003, "Light Scattering from Human Hair Fibers", section 3). The two differ where neighbours
+     * shade a part of the width; the latter keeps light transport through dense cloth reciprocal. */
+    bool across_width;
+
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
     status (*prepare)(const double *param, struct scattering_state **state, struct error *err);
     void (*release)(struct scattering_state *state);

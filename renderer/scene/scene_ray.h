@@ -36,6 +36,10 @@ bool scene_occluded(const struct scene *scene, const struct scene_ray *ray);
 /* Ray leaving a hit point: starts behind the fiber's far side when it points into the fiber. */
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
                      struct scene_ray *ray);
+/* Ray leaving the fiber of a hit from a place of its width as seen against direction: place in [0, 1) goes from one
+ * edge to the other. It starts on the side that faces direction, so never within the fiber. */
+void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
+                            float place, struct scene_ray *ray);
 /* Ray from a point outside (double precision, unwrapped), brought to the top or bottom plane of the cloth.
  * False when it never meets the cloth. */
 bool scene_ray_enter(const struct scene *scene, const double origin_mm[3], const double direction[3],

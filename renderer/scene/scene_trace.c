@@ -130,6 +130,28 @@ void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], con
     r->tnear_mm = tnear + 1e-3f * hit->radius_mm;
 }
 
+void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
+                            float place, struct scene_ray *r)
+{
+    const float *t = hit->tangent;
+    float along = t[0] * direction[0] + t[1] * direction[1] + t[2] * direction[2], front[3], norm2 = 0;
+    for (int a = 0; a < 3; a++) {
+        front[a] = direction[a] - along * t[a];
+        norm2 += front[a] * front[a];
+    }
+    float inv = norm2 > 0 ? 1 / sqrtf(norm2) : 0, across = 2 * place - 1, towards = sqrtf(1 - across * across);
+    for (int a = 0; a < 3; a++) front[a] *= inv;
+    const float side[3] = {t[1] * front[2] - t[2] * front[1], t[2] * front[0] - t[0] * front[2],
+                           t[0] * front[1] - t[1] * front[0]};
+    for (int a = 0; a < 3; a++) {
+        float from_axis = across * side[a] + towards * front[a];
+        r->origin_mm[a] = hit->position_mm[a] + hit->radius_mm * (from_axis - hit->normal[a]);
+    }
+    memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
+    memcpy(r->direction, direction, sizeof r->direction);
+    r->tnear_mm = 1e-3f * hit->radius_mm;
+}
+
 bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const double direction[3], struct scene_ray *r)
 {
     double top = (double)SLAB_MARGIN_MM, bottom = (double)(s->bottom_mm - SLAB_MARGIN_MM), z = origin_mm[2], t = 0;

@@ -218,15 +218,15 @@ static void wrong_scores_are_found(void **state)
     assert_true(!check.checked[6] && check.error[6] == 0.0 && check.error[check.worst] < 2e-3);
 }
 
-/* At the upper bounds of textile.v1, where differences are noisiest. Hardly any light is in the lobe TT there, so its
+/* At the upper bounds of textile.v2, where differences are noisiest. Hardly any light is in the lobe TT there, so its
  * widths, which hardly act, are left out: their errors refer to a least slope (derivative_check.h). */
 static void small_faults_at_the_bounds_are_found(void **state)
 {
     enum { P_BETA_TT = 7, P_GAMMA_TT = 8 };
     const struct fixture *x = *state;
-    for (size_t p = 0; p < scattering_find("textile.v1")->n_param; p++) {
+    for (size_t p = 0; p < scattering_find("textile.v2")->n_param; p++) {
         if (p == P_BETA_TT || p == P_GAMMA_TT) continue;
-        const struct scattering_model wrong = faulty_model("textile.v1", p, 1.02f);
+        const struct scattering_model wrong = faulty_model("textile.v2", p, 1.02f);
         static struct derivative_check check;
         struct appearance m;
         double param[SCATTERING_MAX_PARAM];

@@ -1,4 +1,4 @@
-/* textile.v1: evaluation with scores, and sampling (textile.h states the model).
+/* textile.v2: evaluation with scores, and sampling (textile.h states the model).
  *
  * Sampling of wi: one of four terms, by its energy at th_o and the weights of the channels. R with the azimuth of a
  * smooth cylinder; R with a uniform azimuth, which also serves Schlick's rise, whose azimuth has no peak; TT; D, with
@@ -225,6 +225,6 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 const struct scattering_model scattering_textile = {
-    SURFACE_MODEL_ROW(textile), .prepare = prepare, .release = two_lobe_release, .eval = eval,
-    .sample = sample,           .pdf = pdf,         .eval_pdf = eval_pdf,
+    SURFACE_MODEL_ROW(textile), .across_width = true, .prepare = prepare,   .release = two_lobe_release, .eval = eval,
+    .sample = sample,           .pdf = pdf,           .eval_pdf = eval_pdf,
 };

@@ -1,14 +1,16 @@
-/* textile.v1: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside.
+/* textile.v2: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside.
  * Reciprocal; lossless from both sides where C_TT = 1.
  *
- *     d      = (th_i - th_o) / 2,  ph = ph_o - ph_i                        difference angle and relative azimuth
- *     N(ph)  = (1 - s) / (2 pi) + s cos(ph / 2) / 4                        azimuth of R: uniform, or of a smooth
- *     cylinder k      = (1 - cos d cos(ph / 2))^5                                   Schlick's rise at the half angle of
- *     both K(d)   = integral of N k dph                                         a polynomial in cos d
+ *     d     = (th_i - th_o) / 2,  ph = ph_o - ph_i       difference angle and relative azimuth
+ *     N(ph) = (1 - s) / (2 pi) + s cos(ph / 2) / 4       azimuth of R: uniform, or that of a smooth cylinder
+ *     k     = (1 - cos d cos(ph / 2))^5                  Schlick's rise at the half angle of both directions
+ *     K(d)  = integral of N k dph                        a polynomial in cos d
  *     R  = a(th_i) a(th_o) g(th_o; -th_i, beta_R) N(ph) (C_R + (1 - C_R) k)
  *     TT = b(th_i) b(th_o) g(th_o; -th_i, beta_TT) (1 - K(d)) f(ph_o; ph_i + pi, gamma_TT)
  *     D  = q(th_i) q(th_o) / Z,  q = 1 - rho
  *     S  = R + C_TT (1 - C_R) ((1 - w) TT + w D)
+ *
+ * Light enters the fiber at a random place of its width (scattering_model.across_width).
  *
  * a, b and rho solve the equations of two_lobe_balanced.c with K in place of its k; Z = 2 pi times the integral of
  * q cos^2 th. R takes C_R + (1 - C_R) rho of the light at any angle, TT and D each return what is left. cos d cos(ph/2)

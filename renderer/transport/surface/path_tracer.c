@@ -66,6 +66,14 @@ static void add_light_to_all(struct walk *w, const float value[3], const float *
     }
 }
 
+static void leave(struct walk *w, const struct bounce *b, const float direction[3], struct scene_ray *ray)
+{
+    if (w->s->model->across_width)
+        scene_ray_leave_across(&b->hit, b->offset_mm, direction, rng_float(w->rng), ray);
+    else
+        scene_ray_leave(&b->hit, b->offset_mm, direction, ray);
+}
+
 /* Next-event estimation from a bounce to one point on the lamp. weight: multiple-importance weight of this connection,
  * in [0, 1]. Returns the incident light as stored in path_step.light, or 0 if the light is occluded. */
 static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight, const struct bounce *b, float wi[3])
@@ -94,7 +102,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
         for (int c = 0; c < 3; c++) value[c] /= survival;
     }
     struct scene_ray shadow;
-    scene_ray_leave(&b->hit, b->offset_mm, direction, &shadow);
+    leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return 0;
     add_light(w, value, w->score);
     return light;
@@ -129,7 +137,7 @@ static void connect_image(struct walk *w, const struct bounce *b)
         }
     }
     struct scene_ray shadow;
-    scene_ray_leave(&b->hit, b->offset_mm, direction, &shadow);
+    leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
     add_light_to_all(w, value, w->score);
     if (w->step != NULL) {
@@ -190,7 +198,7 @@ static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounc
     struct scene_hit hit;
     struct bounce b;
     float wi[3];
-    scene_ray_leave(&from->hit, from->offset_mm, direction, &ray);
+    leave(w, from, direction, &ray);
     if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond the cloth is counted by the walk itself */
     bounce_at(w, &hit, &ray, &b);
     float light = connect_lamp(w, &w->lamp[i_lamp], 1, &b, wi);
@@ -301,7 +309,7 @@ static bool scatter(struct walk *w, const struct bounce *b, struct scene_ray *ra
     fiber_frame_to_world(&b->frame, wi, direction);
     for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++)
         w->weight[k] = pdf / (pdf + w->p_guided * light_guide_pdf(w->towards[k], direction));
-    scene_ray_leave(&b->hit, b->offset_mm, direction, ray);
+    leave(w, b, direction, ray);
     *pdf_out = pdf;
     return true;
 }

@@ -142,7 +142,20 @@ double naive_lamp_radiance(const struct configuration *c, const double from_m[3]
     return lamp_radiance(c, (struct vec){from_m[0], from_m[1], from_m[2]}, (struct vec){d[0], d[1], d[2]});
 }
 
-double naive_path(const struct fiber_set *f, const struct configuration *c, const double param[9], struct rng *r)
+/* A point of the circumference about axis point p, with a density in proportion to the cosine between its normal and
+ * d: a uniform place of the width that d sees. */
+static struct vec facing_point(struct vec p, struct vec v, struct vec w, double radius, struct vec d, struct rng *r)
+{
+    double most = sqrt(dot(d, v) * dot(d, v) + dot(d, w) * dot(d, w));
+    for (;;) {
+        double angle = 2 * M_PI * rng_double(r);
+        struct vec n = add(add((struct vec){0, 0, 0}, cos(angle), v), sin(angle), w);
+        if (dot(n, d) > most * rng_double(r)) return add(p, radius, n);
+    }
+}
+
+double naive_path(const struct fiber_set *f, const struct configuration *c, const double param[9], bool across_width,
+                  struct rng *r)
 {
     double z_low, z_high, throughput = 1, tnear = 0;
     fiber_set_z_range_m(f, &z_low, &z_high);
@@ -167,6 +180,10 @@ double naive_path(const struct fiber_set *f, const struct configuration *c, cons
         throughput *= reference_s(param, wi, wo, 0) * M_PI * M_PI;
         d = add(add(add((struct vec){0, 0, 0}, wi[0], u), wi[1], v), wi[2], w);
         tnear = 1e-3 * h.radius;
+        if (across_width) {
+            o = facing_point(add(o, -h.radius, h.normal), v, w, h.radius, d, r);
+            continue;
+        }
         double into = dot(d, h.normal), along = dot(d, u);
         if (into < 0) tnear += fmin(-2 * into / fmax(1 - along * along, 1e-6), 4) * h.radius;
     }

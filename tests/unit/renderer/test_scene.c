@@ -86,6 +86,36 @@ static void back_faces_do_not_exist(void **state)
     scene_free(s);
 }
 
+/* Rays that leave across the width start on the fiber's surface, on the side that they point to, and are distributed
+ * uniformly over the width that their direction sees. */
+static void rays_leave_across_the_width(void **state)
+{
+    (void)state;
+    struct scene *s = straight_scene(false);
+    struct scene_hit h;
+    struct scene_ray down = ray_to(0.2, 0.1, 0.001, 0, 0, -1), out;
+    assert_true(scene_trace(s, &down, &h));
+    const float axis[3] = {h.position_mm[0] - h.radius_mm * h.normal[0], h.position_mm[1] - h.radius_mm * h.normal[1],
+                           h.position_mm[2] - h.radius_mm * h.normal[2]};
+    const float to[3][3] = {{0, 0, -1}, {0.6f, 0.8f, 0}, {-0.64f, -0.48f, 0.6f}};
+    for (int k = 0; k < 3; k++) {
+        float norm = sqrtf(to[k][1] * to[k][1] + to[k][2] * to[k][2]); /* the fiber lies along x */
+        for (int i = 0; i < 10; i++) {
+            float place = 0.1f * (float)i + 0.05f;
+            scene_ray_leave_across(&h, down.offset_mm, to[k], place, &out);
+            float y = (out.origin_mm[1] - axis[1]) / h.radius_mm, z = (out.origin_mm[2] - axis[2]) / h.radius_mm;
+            float front = (y * to[k][1] + z * to[k][2]) / norm, across = (z * to[k][1] - y * to[k][2]) / norm;
+            assert_true(fabsf(out.origin_mm[0] - h.position_mm[0]) < 1e-6f);
+            assert_true(fabsf(y * y + z * z - 1) < 1e-3f && front > 0);
+            assert_true(fabsf(fabsf(across) - fabsf(2 * place - 1)) < 1e-3f);
+            assert_true(out.tnear_mm < 0.01f * h.radius_mm);
+        }
+    }
+    scene_ray_leave_across(&h, down.offset_mm, (const float[3]){1, 0, 0}, 0.5f, &out); /* along the fiber */
+    for (int a = 0; a < 3; a++) assert_true(isfinite(out.origin_mm[a]));
+    scene_free(s);
+}
+
 /* A ray and the same ray shifted by whole tiles hit the same place, at any slope. */
 static void cloth_is_periodic(void **state)
 {
@@ -304,15 +334,11 @@ static void lamp_is_calibrated(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hits_are_where_they_should_be),
-        cmocka_unit_test(back_faces_do_not_exist),
-        cmocka_unit_test(cloth_is_periodic),
-        cmocka_unit_test(bad_fibers_are_refused),
-        cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
-        cmocka_unit_test(too_thin_fibers_are_refused),
-        cmocka_unit_test(segments_of_enormous_length_are_refused),
-        cmocka_unit_test(camera_looks_at_the_orbit_centre),
-        cmocka_unit_test(lamp_is_calibrated),
+        cmocka_unit_test(hits_are_where_they_should_be),    cmocka_unit_test(back_faces_do_not_exist),
+        cmocka_unit_test(rays_leave_across_the_width),      cmocka_unit_test(cloth_is_periodic),
+        cmocka_unit_test(bad_fibers_are_refused),           cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
+        cmocka_unit_test(too_thin_fibers_are_refused),      cmocka_unit_test(segments_of_enormous_length_are_refused),
+        cmocka_unit_test(camera_looks_at_the_orbit_centre), cmocka_unit_test(lamp_is_calibrated),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
