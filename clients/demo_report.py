@@ -54,7 +54,7 @@ def summary(truth_path, result_path, out_path, wall_s):
         json.dump(data, f, indent=1)
     print(f"\nrelative RMS error: {100 * data['fit_rel_rms']:.2f} % over the fitted photographs, "
           f"{100 * data['heldout_rel_rms']:.2f} % over the held-out ones")
-    print("The fit used the fibers found in the noisy scan, not the true ones; the standard errors do not include that difference.")
+    print("The fit used the fibers found in the noisy scan, not the true ones; the standard errors include what is known of that difference.")
     print(f"largest error of C_TT: {data['c_tt_error']:.3f};  wall time: {data['wall_s']:.0f} s")
 
 

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 void fiber_set_init(struct fiber_set *f) { *f = (struct fiber_set){0}; }
 
@@ -34,6 +35,19 @@ status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, s
     }
     f->n_fiber = n_fiber;
     f->n_vertex = n_vertex;
+    return STATUS_OK;
+}
+
+status fiber_set_copy(const struct fiber_set *from, struct fiber_set *to, struct error *err)
+{
+    status s = fiber_set_reserve(to, from->n_fiber, from->n_vertex, err);
+    if (s != STATUS_OK) return s;
+    memcpy(to->first_vertex, from->first_vertex, (from->n_fiber + 1) * sizeof *to->first_vertex);
+    memcpy(to->position_m, from->position_m, 3 * from->n_vertex * sizeof *to->position_m);
+    memcpy(to->radius_m, from->radius_m, from->n_fiber * sizeof *to->radius_m);
+    memcpy(to->axis_class, from->axis_class, from->n_fiber);
+    memcpy(to->group, from->group, from->n_fiber);
+    memcpy(to->tile_size_m, from->tile_size_m, sizeof to->tile_size_m);
     return STATUS_OK;
 }
 

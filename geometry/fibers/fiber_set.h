@@ -32,6 +32,8 @@ void fiber_set_release(struct fiber_set *f);
  * axis_class and group are zero; the other arrays are uninitialised. Earlier content is released, but the tile size is
  * kept. STATUS_NO_MEMORY. */
 status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, struct error *err);
+/* Makes `to` (initialised) a copy. STATUS_NO_MEMORY. */
+status fiber_set_copy(const struct fiber_set *from, struct fiber_set *to, struct error *err);
 /* STATUS_INVALID, naming the fiber, for NaN, fewer than two vertices, radius <= 0, group >= FIBER_MAX_GROUP; also for
  * tile size <= 0 and for no fiber. */
 status fiber_set_validate(const struct fiber_set *f, struct error *err);

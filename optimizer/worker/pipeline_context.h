@@ -46,6 +46,12 @@ struct pipeline_candidate {
     struct candidate_score score;
 };
 
+/* What the errors of scanned fibers add to those of the parameters (pipeline_scan_error.h). */
+struct pipeline_scan_error {
+    double radius_rel_se, direction_se_rad; /* of the fibers; direction 0: no errors were carried */
+    double se_param[FIT_MAX_PARAM];         /* their part of the standard errors, internal units */
+};
+
 /* One model of the job: its parameters, and the results of its fit. */
 struct pipeline_model {
     struct appearance appearance;
@@ -54,6 +60,7 @@ struct pipeline_model {
     const struct job_fit_option *option; /* of the document */
     struct fit_result fit;
     struct cloth_search_result cloth; /* when numbers of the cloth are fitted; `fit` is its part without the numbers */
+    struct pipeline_scan_error scan_error;
     struct validation validation;
     struct derivative_check certificate;  /* of the free parameters at the result; filled in before the report */
     struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */

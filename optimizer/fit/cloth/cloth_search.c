@@ -1,5 +1,5 @@
 #include "optimizer/fit/cloth/cloth_search.h"
-#include "base/small_matrix.h"
+#include "optimizer/fit/cloth/carried_error.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -222,81 +222,17 @@ out:
 
 /* ---- the result for the scattering parameters ---- */
 
-/* Leaves out of u the n_out entries from `first` on: of vectors and of rows and columns of matrices. */
-static void leave_out(const struct uncertainty *u, size_t first, size_t n_out, struct uncertainty *out)
-{
-    size_t n = u->n_param, m = n - n_out;
-    *out = *u;
-    out->n_param = m;
-    for (size_t p = 0; p < m; p++) {
-        size_t from = p < first ? p : p + n_out;
-        out->se_param[p] = u->se_param[from];
-        out->at_bound[p] = u->at_bound[from];
-        out->determined[p] = u->determined[from];
-        for (size_t q = 0; q < m; q++) {
-            size_t to = q < first ? q : q + n_out;
-            out->cov[p * m + q] = u->cov[from * n + to];
-            out->correlation[p * m + q] = u->correlation[from * n + to];
-        }
-    }
-}
-
-/* Adds C_px C_xx^-1 C_xp to the covariance of out, which lacks the n_number entries from `first` on that the joint
- * covariance C has. Standard errors grow in the same proportion. */
-static void add_numbers(const struct uncertainty *joint, size_t first, size_t n_number, struct uncertainty *out)
-{
-    size_t index[CLOTH_MAX_FITTED], n_free = 0, n = joint->n_param, m = out->n_param;
-    double c_xx[CLOTH_MAX_FITTED * CLOTH_MAX_FITTED], inverse[CLOTH_MAX_FITTED * CLOTH_MAX_FITTED];
-    for (size_t k = first; k < first + n_number; k++)
-        if (joint->cov[k * n + k] > 0.0) index[n_free++] = k;
-    for (size_t a = 0; a < n_free; a++)
-        for (size_t b = 0; b < n_free; b++) c_xx[a * n_free + b] = joint->cov[index[a] * n + index[b]];
-    if (n_free == 0 || !small_invert(c_xx, n_free, inverse)) return;
-    double before[FIT_MAX_PARAM];
-    for (size_t p = 0; p < m; p++) before[p] = out->cov[p * m + p];
-    for (size_t p = 0; p < m; p++) {
-        for (size_t q = 0; q < m; q++) {
-            size_t jp = p < first ? p : p + n_number, jq = q < first ? q : q + n_number;
-            for (size_t a = 0; a < n_free && before[p] > 0.0 && before[q] > 0.0; a++)
-                for (size_t b = 0; b < n_free; b++)
-                    out->cov[p * m + q] +=
-                        joint->cov[jp * n + index[a]] * inverse[a * n_free + b] * joint->cov[jq * n + index[b]];
-        }
-    }
-    for (size_t p = 0; p < m; p++)
-        if (before[p] > 0.0) out->se_param[p] *= sqrt(out->cov[p * m + p] / before[p]);
-    for (size_t p = 0; p < m; p++)
-        for (size_t q = 0; q < m; q++)
-            if (p != q && before[p] > 0.0 && before[q] > 0.0)
-                out->correlation[p * m + q] =
-                    fmin(fmax(out->cov[p * m + q] / sqrt(out->cov[p * m + p] * out->cov[q * m + q]), -1.0), 1.0);
-}
-
-/* Errors are not larger than that of a uniform distribution over the range, and decide what is determined. */
-static void limit_errors(const struct cloth_search *q, struct fit_result *out)
-{
-    struct uncertainty *u = &out->uncertainty;
-    for (size_t p = 0; p < u->n_param; p++) {
-        const struct fit_parameter *k = &q->problem->parameter[p];
-        struct coordinate c;
-        if (!(u->cov[p * u->n_param + p] > 0.0)) continue;
-        coordinate_init(&c, &q->problem->info[p], k->lower, k->upper);
-        u->se_param[p] = fmin(u->se_param[p], (k->upper - k->lower) / sqrt(12.0));
-        u->determined[p] = uncertainty_determined(&c, sqrt(u->cov[p * u->n_param + p]), u->se_param[p]);
-    }
-}
-
 void cloth_search_marginal(const struct cloth_search *q, const struct cloth_search_result *r, struct fit_result *out)
 {
     const size_t n = n_scattering(q), m = n_number(q);
     size_t n_leader = 0;
     for (size_t p = 0; p < n; p++) n_leader += q->option->leader[p] == p;
     *out = r->final;
-    leave_out(&r->final.uncertainty, n, m, &out->uncertainty);
-    add_numbers(&r->joint.uncertainty, n, m, &out->uncertainty);
-    limit_errors(q, out);
-    leave_out(&r->final.unknown_uncertainty, n_leader, m, &out->unknown_uncertainty);
-    add_numbers(&r->joint.unknown_uncertainty, n_leader, m, &out->unknown_uncertainty);
+    carried_error_leave_out(&r->final.uncertainty, n, m, &out->uncertainty);
+    carried_error_add(&r->joint.uncertainty, n, m, NULL, &out->uncertainty);
+    carried_error_limit(q->problem->info, q->problem->parameter, &out->uncertainty);
+    carried_error_leave_out(&r->final.unknown_uncertainty, n_leader, m, &out->unknown_uncertainty);
+    carried_error_add(&r->joint.unknown_uncertainty, n_leader, m, NULL, &out->unknown_uncertainty);
     memmove(out->unknown + n_leader, out->unknown + n_leader + m,
             (FIT_MAX_PARAM - n_leader - m) * sizeof *out->unknown);
     out->n_step = r->n_step;

@@ -82,6 +82,9 @@ static json_t *parameters_json(const struct pipeline_model *m)
                                       param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper),
                                       "start", param_to_file_unit(info, k->start), "at_bound", at_bound(m, p),
                                       "determined", (int)m->fit.uncertainty.determined[p], "fixed", (int)k->fixed);
+        if (m->scan_error.direction_se_rad > 0.0)
+            json_object_set_new(parameter, "standard_error_of_fibers",
+                                json_number(param_to_file_unit(info, m->scan_error.se_param[p])));
         result_parameter_options(m, p, parameter);
         json_array_append_new(list, parameter);
     }

@@ -5,6 +5,7 @@
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/worker/stages/fit/pipeline_nesting.h"
 #include "optimizer/worker/stages/fit/pipeline_radius.h"
+#include "optimizer/worker/stages/fit/pipeline_scan_error.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 #include "optimizer/worker/work_file.h"
 #include "optimizer/worker/worker_series.h"
@@ -13,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIT_SECTIONS = 2 * JOB_MAX_MODEL + 1 };
+enum { FIT_SECTIONS = 3 * JOB_MAX_MODEL + 1 };
 _Static_assert((int)FIT_SECTIONS <= (int)WORK_FILE_MAX_SECTION, "a checkpoint has room for the fits of all models");
 
 struct fit_listener {
@@ -192,6 +193,19 @@ static void announce_model(struct pipeline_context *c, const struct fit_listener
     log_info(c->log, "%s", message);
 }
 
+/* Fits the model, and carries the errors of scanned fibers into those of its parameters. */
+static status run_fit(struct fit_listener *l, const struct progress *progress, struct error *err)
+{
+    struct pipeline_context *c = l->pipeline;
+    struct progress_part first, last;
+    const double share = pipeline_scan_error_applies(c, l->i_model) ? PIPELINE_SCAN_ERROR_SHARE : 0.0;
+    struct progress fit = progress_begin_part(&first, progress, 0.0, 1.0 - share);
+    status s = c->number.n > 0 ? fit_cloth(l, &fit, err) : fit_parameters(l, &fit, err);
+    if (s != STATUS_OK) return s;
+    struct progress rest = progress_begin_part(&last, progress, 1.0 - share, share);
+    return pipeline_scan_error_carry(c, l->i_model, &rest, err);
+}
+
 static status fit_model(struct fit_listener *listener, struct error *err)
 {
     struct pipeline_context *c = listener->pipeline;
@@ -208,8 +222,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     if (s == STATUS_OK) pipeline_add_nested_starts(c, listener->i_model, &joint->option);
     if (s == STATUS_OK && descent_find(c->doc->method) == NULL)
         s = error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
-    if (s == STATUS_OK)
-        s = c->number.n > 0 ? fit_cloth(listener, &progress, err) : fit_parameters(listener, &progress, err);
+    if (s == STATUS_OK) s = run_fit(listener, &progress, err);
     if (s == STATUS_OK) {
         conclude_fit(c, m);
         listener->step_base += m->fit.n_step;
@@ -221,11 +234,12 @@ static status fit_model(struct fit_listener *listener, struct error *err)
 static size_t result_sections(struct pipeline_context *c, struct work_section section[FIT_SECTIONS])
 {
     for (size_t i = 0; i < c->n_model; i++) {
-        section[2 * i] = (struct work_section){&c->model[i].fit, sizeof c->model[i].fit};
-        section[2 * i + 1] = (struct work_section){&c->model[i].cloth, sizeof c->model[i].cloth};
+        section[3 * i] = (struct work_section){&c->model[i].fit, sizeof c->model[i].fit};
+        section[3 * i + 1] = (struct work_section){&c->model[i].cloth, sizeof c->model[i].cloth};
+        section[3 * i + 2] = (struct work_section){&c->model[i].scan_error, sizeof c->model[i].scan_error};
     }
-    section[2 * c->n_model] = (struct work_section){&c->radius, sizeof c->radius};
-    return 2 * c->n_model + 1;
+    section[3 * c->n_model] = (struct work_section){&c->radius, sizeof c->radius};
+    return 3 * c->n_model + 1;
 }
 
 static status store_fits(struct pipeline_context *c, struct error *err)
@@ -235,7 +249,7 @@ static status store_fits(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.9", section, n, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.10", section, n, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
@@ -244,7 +258,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     struct work_section section[FIT_SECTIONS];
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    if (s == STATUS_OK) s = work_file_read(path, "fit.9", section, n, err);
+    if (s == STATUS_OK) s = work_file_read(path, "fit.10", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) conclude_fit(c, &c->model[i]);
     return s;

@@ -1,0 +1,23 @@
+/* Carries the errors of scanned fibers into those of the scattering parameters.
+ *
+ * The reconstruction measures them (geometry/reconstruct.h): the radius by two methods, and the direction noise of the
+ * axes. They become two numbers of the cloth: a factor of all radii, and the variance of the direction noise in units of
+ * the stated one (fiber_roughen.h), where 0 stands for the fibers as they are. After the fit one more estimate traces
+ * the cloth as it is and with each of the numbers moved, and the shift of the parameters by each number, times its
+ * prior error, is added to their covariance (carried_error.h). The parameters stay as they are. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_SCAN_ERROR_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_SCAN_ERROR_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Share of the progress of a fit that this step takes. */
+#define PIPELINE_SCAN_ERROR_SHARE 0.2
+
+/* Whether the fibers of the job come from a scan and the model sees fibers. */
+bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_model);
+
+/* Adds the errors to m->fit, and fills in m->scan_error, which is all zero where they do not apply. */
+status pipeline_scan_error_carry(struct pipeline_context *c, size_t i_model, const struct progress *progress,
+                                 struct error *err);
+
+#endif

@@ -1,0 +1,101 @@
+/* Errors of numbers that were held fixed, carried into parameters: a linear problem with a known answer. */
+#include "optimizer/fit/cloth/carried_error.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Two parameters and one number between them in the order p, x, q, with shifts dp/dx = 2 and dq/dx = -1 at fixed
+ * measurements. The joint covariance is that of p and q at fixed x plus S var(x) S'. */
+static const double at_fixed_x[2][2] = {{0.5, 0.1}, {0.1, 0.8}}, shift[2] = {2.0, -1.0};
+static const double joint_variance = 0.3;
+
+static void make_joint(struct uncertainty *u)
+{
+    static const size_t at[2] = {0, 2};
+    memset(u, 0, sizeof *u);
+    u->n_param = 3;
+    u->cov[3 * 1 + 1] = joint_variance;
+    for (size_t a = 0; a < 2; a++) {
+        u->cov[3 * at[a] + 1] = u->cov[3 * 1 + at[a]] = shift[a] * joint_variance;
+        for (size_t b = 0; b < 2; b++)
+            u->cov[3 * at[a] + at[b]] = at_fixed_x[a][b] + shift[a] * shift[b] * joint_variance;
+    }
+}
+
+static void make_fixed(struct uncertainty *u)
+{
+    memset(u, 0, sizeof *u);
+    u->n_param = 2;
+    for (size_t a = 0; a < 2; a++) {
+        u->se_param[a] = 10.0 * sqrt(at_fixed_x[a][a]); /* another unit */
+        for (size_t b = 0; b < 2; b++) {
+            u->cov[2 * a + b] = at_fixed_x[a][b];
+            u->correlation[2 * a + b] = at_fixed_x[a][b] / sqrt(at_fixed_x[a][a] * at_fixed_x[b][b]);
+        }
+    }
+}
+
+static void expect(const struct uncertainty *u, double variance)
+{
+    for (size_t a = 0; a < 2; a++) {
+        double own = at_fixed_x[a][a] + shift[a] * shift[a] * variance;
+        assert_true(fabs(u->se_param[a] - 10.0 * sqrt(own)) < 1e-12);
+        for (size_t b = 0; b < 2; b++) {
+            double other = at_fixed_x[b][b] + shift[b] * shift[b] * variance;
+            double both = at_fixed_x[a][b] + shift[a] * shift[b] * variance;
+            assert_true(fabs(u->cov[2 * a + b] - both) < 1e-12);
+            assert_true(fabs(u->correlation[2 * a + b] - both / sqrt(own * other)) < 1e-12);
+        }
+    }
+}
+
+static void test_joint_and_given_variance(void **state)
+{
+    (void)state;
+    struct uncertainty joint, u;
+    const double given = 0.07, none = 0.0;
+    make_joint(&joint);
+    make_fixed(&u);
+    carried_error_add(&joint, 1, 1, NULL, &u);
+    expect(&u, joint_variance);
+    make_fixed(&u);
+    carried_error_add(&joint, 1, 1, &given, &u);
+    expect(&u, given);
+    make_fixed(&u);
+    carried_error_add(&joint, 1, 1, &none, &u);
+    expect(&u, 0.0);
+}
+
+/* A number without variance was fixed in the joint fit too, and a fixed parameter keeps its zero. */
+static void test_fixed_ones_are_left_out(void **state)
+{
+    (void)state;
+    struct uncertainty joint, u, before;
+    const double given = 0.07;
+    make_joint(&joint);
+    for (size_t k = 0; k < 3; k++) joint.cov[3 * 1 + k] = joint.cov[3 * k + 1] = 0.0;
+    make_fixed(&u);
+    before = u;
+    carried_error_add(&joint, 1, 1, &given, &u);
+    assert_memory_equal(&u, &before, sizeof u);
+    make_joint(&joint);
+    memset(u.cov, 0, sizeof u.cov);
+    u.cov[3] = at_fixed_x[1][1];
+    u.se_param[0] = 0.0;
+    carried_error_add(&joint, 1, 1, &given, &u);
+    assert_true(u.cov[0] == 0.0 && u.cov[1] == 0.0 && u.se_param[0] == 0.0);
+    assert_true(fabs(u.cov[3] - (at_fixed_x[1][1] + given)) < 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_joint_and_given_variance),
+        cmocka_unit_test(test_fixed_ones_are_left_out),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
