@@ -203,7 +203,7 @@ static status keep_inside(const struct fiber_job *job, const struct polyline_set
     return s;
 }
 
-/* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, and the report gets their errors. */
+/* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, with errors for the report. */
 static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool last, struct error *err)
 {
     struct axis_profile profile = {.radius = 0.5 * job->diameter, .blur = 0.8, .high = 1.0, .measured_curvature = last};

@@ -19,8 +19,8 @@ struct camera {
 };
 
 void camera_init(struct camera *camera, const struct configuration *c);
-/* Where a path through the point xy of the picture meets the crop: a blurred camera adds a normal deviate to it, a sharp
- * one takes no random number. */
+/* Where a path through the point xy of the picture meets the crop: a blurred camera adds a normal deviate to it, a
+ * sharp one takes no random number. */
 void camera_blur(const struct camera *camera, const double xy[2], struct rng *rng, double blurred[2]);
 /* xy: a point of the crop, both in [0, 1], x to the right and y downwards. Unit direction of the ray through it. */
 void camera_direction(const struct camera *camera, const double xy[2], double direction[3]);

@@ -119,8 +119,8 @@ double texture_albedo(double reflectance)
     return 1.0 - s * s;
 }
 
-/* Share of the light that the cloth reflects, from the fitted rows that are lit from the front, as if it were a diffuser;
- * NaN without such rows. */
+/* Share of the light that the cloth reflects, from the fitted rows that are lit from the front, as if it were a
+ * diffuser; NaN without such rows. */
 static void reflectance(const struct pipeline_context *c, double rgb[3])
 {
     double sum[3] = {0.0, 0.0, 0.0}, light = 0.0;
