@@ -250,6 +250,15 @@ status weave_average_again(const float *picture, size_t width, size_t height, st
     return s;
 }
 
+/* Moves a place by whole repeats to where it is nearest to `target`. */
+static void move_towards(const struct weave_lattice *lattice, const double target_px[2], double at_px[2])
+{
+    const double *a = lattice->shift_px[0], *b = lattice->shift_px[1];
+    double d[2] = {target_px[0] - at_px[0], target_px[1] - at_px[1]}, det = a[0] * b[1] - a[1] * b[0];
+    double n_a = round((d[0] * b[1] - d[1] * b[0]) / det), n_b = round((a[0] * d[1] - a[1] * d[0]) / det);
+    for (int k = 0; k < 2; k++) at_px[k] += n_a * a[k] + n_b * b[k];
+}
+
 void weave_repeat_middle(const struct weave_repeat *repeat, const struct weave_lattice *lattice, double at_px[2])
 {
     size_t x = repeat->n_across / 2, y = repeat->n_window / repeat->n_across / 2;
@@ -258,6 +267,9 @@ void weave_repeat_middle(const struct weave_repeat *repeat, const struct weave_l
     at_px[1] = (double)(y * (repeat->edge_px / 2));
     for (int i = 0; i < 2; i++)
         for (int a = 0; a < 2; a++) at_px[a] -= phase[i] / (2.0 * M_PI) * lattice->shift_px[i][a];
+    /* the phases are those of the window's middle best: the yarns of its corner may have wandered from there */
+    const double half = 0.5 * (double)repeat->edge_px;
+    move_towards(lattice, (double[2]){(double)x * half + half, (double)y * half + half}, at_px);
 }
 
 void weave_repeat_release(struct weave_repeat *repeat)

@@ -36,7 +36,7 @@ status weave_average_repeat(const float *flat, size_t width, size_t height, cons
  * values of the coefficients. STATUS_NO_MEMORY. */
 status weave_average_again(const float *picture, size_t width, size_t height, struct weave_repeat *repeat,
                            struct error *err);
-/* Where the place 0 of the repeat is in the window in the middle of the picture, in its pixels. */
+/* A place 0 of the repeat in the middle of the window that is in the middle of the picture, in its pixels. */
 void weave_repeat_middle(const struct weave_repeat *repeat, const struct weave_lattice *lattice, double at_px[2]);
 void weave_repeat_release(struct weave_repeat *repeat);
 

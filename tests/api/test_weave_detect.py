@@ -49,6 +49,7 @@ def test_real_pairs(name, tmp_path):
     assert overlay.read_bytes().startswith(b"\x89PNG")
     for kind, found in zip("RT", answer["photographs"]):
         assert found["weave"] == name_of_weave and found["draft"] in turns(draft)
+        assert found["middle_px"] == pytest.approx([256, 256], abs=8)  # a repeat is no larger; the overlay shows this place
         assert found["warp"]["direction_deg"] == pytest.approx(90, abs=4)
         assert found["weft"]["direction_deg"] == pytest.approx(0, abs=4)
         assert (found["warp"]["spacing_px"], found["weft"]["spacing_px"]) == pytest.approx(spacing[kind], rel=0.03)
