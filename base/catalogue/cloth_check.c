@@ -129,8 +129,7 @@ static status check_places(const struct cloth_description *d, struct error *err)
     return STATUS_OK;
 }
 
-/* Checks value, bounds and prior of one number. */
-static status check_number(const struct cloth_number *n, struct error *err)
+status cloth_number_check_one(const struct cloth_number *n, struct error *err)
 {
     const struct cloth_number_info *i = n->info;
     if (!(n->value >= i->lower && n->value <= i->upper))
@@ -164,6 +163,6 @@ status cloth_description_check(struct cloth_description *d, struct error *err)
         if (st == STATUS_OK) st = choose_yarns(d, a, err);
     }
     if (st == STATUS_OK) st = check_places(d, err);
-    for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) st = check_number(&d->number[i], err);
+    for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) st = cloth_number_check_one(&d->number[i], err);
     return st;
 }

@@ -63,6 +63,9 @@ struct cloth_number {
     double prior_mean, prior_sd; /* on the number itself; NaN: no prior */
 };
 
+/* STATUS_INVALID, with err->field naming the number: a value, bounds or a prior that cannot be. */
+status cloth_number_check_one(const struct cloth_number *n, struct error *err);
+
 /* What is counted or named of one kind of yarn. */
 struct cloth_kind {
     size_t n_fiber;                  /* fibers in a section; of a tuft of the pile; of a felt: in the tile */

@@ -8,7 +8,7 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 
-#include "base/catalogue/cloth_description.h"
+#include "base/catalogue/correction_numbers.h"
 #include "base/catalogue/model_sets.h"
 #include "base/status.h"
 #include "optimizer/job/job_fit_option.h"
@@ -93,6 +93,8 @@ struct job_document {
     size_t n_cloth_yarn;
     struct job_cloth_yarn *cloth_yarn;
     struct cloth_description *cloth;
+    bool has_correction;
+    struct cloth_number correction[CORRECTION_N]; /* of scanned or given fibers; set with has_correction */
     /* The groups of fibers that have scattering parameters of their own; 0: one set of parameters for all fibers. */
     size_t n_group;
     char group[MODEL_MAX_SET][MODEL_SET_NAME_BYTES];

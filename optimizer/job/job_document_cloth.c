@@ -209,3 +209,23 @@ status job_check_cloth(const struct option_value *v, struct error *err)
     if (st == STATUS_INVALID) job_cloth_name_field(err);
     return st;
 }
+
+status job_check_correction(const struct option_value *v, struct error *err)
+{
+    struct job_document *doc = v->doc;
+    const struct json_field f = {.object = v->value, .path = "correction"};
+    status s = STATUS_OK;
+    if (doc->cloth != NULL)
+        return error_set_field(
+            err, STATUS_INVALID, "correction",
+            "'correction' is for fibers of a scan or a file: a described cloth has numbers of its own");
+    correction_numbers_init(doc->correction);
+    for (int k = 0; k < CORRECTION_N && s == STATUS_OK; k++) s = read_number(&f, &doc->correction[k], err);
+    if (s == STATUS_OK) s = correction_numbers_check(doc->correction, err);
+    if (s == STATUS_INVALID && err != NULL && strncmp(err->field, "correction", 10) != 0) {
+        char field[sizeof err->field];
+        snprintf(field, sizeof field, "correction.%.100s", err->field);
+        memcpy(err->field, field, sizeof field);
+    }
+    return s;
+}

@@ -31,6 +31,7 @@ void pipeline_context_release(struct pipeline_context *c)
     volume_release(&c->volume);
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);
+    fiber_set_release(&c->uncorrected);
     scratch_space_free(c->space);
     scene_free(c->scene);
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);

@@ -46,10 +46,17 @@ struct pipeline_candidate {
     struct candidate_score score;
 };
 
+/* Relative RMS errors of a fit to the fibers without the job's corrections (pipeline_correction.h). */
+struct pipeline_uncorrected {
+    bool measured;
+    double fit_rel_rms, heldout_rel_rms, heldout_rel_rms_se; /* NaN without rows of that set */
+};
+
 /* What the errors of scanned fibers add to those of the parameters (pipeline_scan_error.h). */
 struct pipeline_scan_error {
     double radius_rel_se, direction_se_rad; /* of the fibers; direction 0: no errors were carried */
     double se_param[FIT_MAX_PARAM];         /* their part of the standard errors, internal units */
+    struct pipeline_uncorrected uncorrected;
 };
 
 /* One model of the job: its parameters, and the results of its fit. */
@@ -134,7 +141,8 @@ struct pipeline_context {
     struct volume volume; /* empty when not in memory: pipeline_need_volume */
     struct direction_volume direction;
     struct fiber_set fiber;
-    struct cloth_report cloth; /* of a described cloth */
+    struct fiber_set uncorrected; /* the fibers before the job's corrections; empty without these */
+    struct cloth_report cloth;    /* of a described cloth */
     struct pipeline_texture texture;
     struct scene *scene;
     struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */

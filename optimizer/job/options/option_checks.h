@@ -17,6 +17,8 @@ status job_check_crop_voxel(const struct option_value *v, struct error *err);
 status job_check_filter(const struct option_value *v, struct error *err);
 /* Also makes job_document.cloth of the section and checks it. */
 status job_check_cloth(const struct option_value *v, struct error *err);
+/* Reads the numbers of the section "correction". */
+status job_check_correction(const struct option_value *v, struct error *err);
 /* Also reads the names of the groups of fibers. */
 status job_check_fibers(const struct option_value *v, struct error *err);
 /* the set-up and the photographs */

@@ -1,4 +1,5 @@
-/* Rows of the option table: the described cloth. Its numbers are those of base/catalogue/cloth_numbers.def. */
+/* Rows of the option table: the described cloth, and corrections of other ones. Their numbers are those of
+ * base/catalogue/cloth_numbers.def and correction_numbers.def. */
 #include "base/catalogue/cloth_description.h"
 #include "base/option_id.h"
 #include "optimizer/job/options/option_rows.h"
@@ -22,6 +23,8 @@
 #define CLOTH_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)                              \
     NUMBER_ROW("cloth.", name, unit, lower, upper, standard, meaning)
 #define YARN_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)
+#define CORRECTION_NUMBER(name, unit, lower, upper, standard, coordinate, meaning)                                     \
+    NUMBER_ROW("correction.", name, unit, lower, upper, standard, meaning)
 
 static const char *weave_name(size_t i) { return cloth_weave_names[i]; }
 
@@ -168,5 +171,17 @@ const struct job_option option_rows_described[] = {
 #define YARN_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)                               \
     NUMBER_ROW("cloth.yarns[].", name, unit, lower, upper, standard, meaning)
 #include "base/catalogue/cloth_numbers.def"
+    {.path = "correction",
+     .kind = OPTION_SECTION,
+     INTO(has_correction),
+     .id = OPTION_CORRECTION,
+     .check = job_check_correction,
+     .left_out = "the fibers are used as they are",
+     .meaning =
+         "Corrections of the fibers of a scan or a file. Each number is a value, or an object as in `cloth` for one "
+         "that is fitted together with the scattering parameters. The result says which corrections the "
+         "measurements ask for and what they gain (docs/scanned-cloth.md)."},
+#include "base/catalogue/correction_numbers.def"
+#undef CORRECTION_NUMBER
     {.path = NULL},
 };

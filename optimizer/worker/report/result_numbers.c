@@ -50,12 +50,20 @@ static json_t *screening_json(const struct pipeline_context *c, const struct clo
     return list;
 }
 
+static json_t *uncorrected_json(const struct pipeline_model *m)
+{
+    const struct pipeline_uncorrected *u = &m->scan_error.uncorrected;
+    return json_pack("{s:o, s:o, s:o}", "fit_rel_rms", json_number(u->fit_rel_rms), "heldout_rel_rms",
+                     json_number(u->heldout_rel_rms), "heldout_rel_rms_se", json_number(u->heldout_rel_rms_se));
+}
+
 void result_numbers_put(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
 {
     if (c->number.n == 0) return;
     json_t *list = json_array();
     for (size_t k = 0; k < c->number.n; k++) json_array_append_new(list, number_json(c, m, k));
     json_object_set_new(json, "cloth_numbers", list);
+    if (m->scan_error.uncorrected.measured) json_object_set_new(json, "without_corrections", uncorrected_json(m));
     json_object_set_new(json, "cloth_screening", screening_json(c, &m->cloth));
 }
 
@@ -70,5 +78,8 @@ void result_numbers_print(const struct pipeline_context *c, const struct pipelin
                 r->uncertainty.determined[p] ? "" : " these measurements do not tell it",
                 bound != NULL ? " at its bound: " : "", bound != NULL ? bound : "");
     }
+    if (m->scan_error.uncorrected.measured)
+        fprintf(out, "         without these corrections: relative RMS error %.4f fitted, %.4f held out\n",
+                m->scan_error.uncorrected.fit_rel_rms, m->scan_error.uncorrected.heldout_rel_rms);
     if (c->number.n > 0) fprintf(out, "         the errors of the parameters contain those of these numbers\n\n");
 }

@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
+#include "geometry/fibers/shape/fiber_correct.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
@@ -41,22 +42,31 @@ static status check_company(const struct pipeline_context *c, struct error *err)
                                    "numbers of the cloth are fitted with models of fibers only: '%s' sees a volume",
                                    c->model[i].appearance.id);
     if (c->doc->fit_radius)
-        return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
-                               "'%s' is not for a described cloth with fitted numbers: fit its fiber_radius_um",
-                               job_option_key(OPTION_FIT_RADIUS));
+        return error_set_field(
+            err, STATUS_INVALID, OPTION_FIT_RADIUS, "'%s' is not for a cloth with fitted numbers: fit its %s",
+            job_option_key(OPTION_FIT_RADIUS), c->doc->cloth != NULL ? "fiber_radius_um" : "correction.radius");
     return STATUS_OK;
+}
+
+/* All numbers that the cloth has: those of its description, or its corrections. */
+static const struct cloth_number *numbers_of(const struct pipeline_context *c, size_t *n)
+{
+    const struct cloth_description *d = c->doc->cloth;
+    *n = d != NULL ? d->n_number : c->doc->has_correction ? CORRECTION_N : 0;
+    return d != NULL ? d->number : c->doc->correction;
 }
 
 status pipeline_cloth_inputs(struct pipeline_context *c, struct error *err)
 {
-    const struct cloth_description *d = c->doc->cloth;
+    size_t n_number;
+    const struct cloth_number *list = numbers_of(c, &n_number);
     memset(&c->number, 0, sizeof c->number);
-    for (size_t i = 0; d != NULL && i < d->n_number; i++) {
-        if (!d->number[i].fitted) continue;
+    for (size_t i = 0; i < n_number; i++) {
+        if (!list[i].fitted) continue;
         if (c->number.n == CLOTH_MAX_FITTED)
             return error_set_field(err, STATUS_INVALID, OPTION_CLOTH, "at most %d numbers of a cloth can be fitted",
                                    CLOTH_MAX_FITTED);
-        add_number(&c->number, &d->number[i], i);
+        add_number(&c->number, &list[i], i);
     }
     return c->number.n > 0 ? check_company(c, err) : STATUS_OK;
 }
@@ -112,17 +122,19 @@ struct pipeline_cloth_trace {
 static status make_fibers(struct pipeline_context *c, const double *number, double value[CLOTH_MAX_NUMBER],
                           struct fiber_set *f, struct cloth_report *report, struct error *err)
 {
-    const struct cloth_description *d = c->doc->cloth;
+    size_t n_number;
+    const struct cloth_number *list = numbers_of(c, &n_number);
     const struct progress progress = {.cancel = c->progress.cancel};
     status s = STATUS_OK;
     for (int k = 0; k <= SHORTENINGS; k++) {
         double share = 1.0 - (double)k / SHORTENINGS;
-        for (size_t i = 0; i < d->n_number; i++) value[i] = d->number[i].value;
+        for (size_t i = 0; i < n_number; i++) value[i] = list[i].value;
         for (size_t i = 0; i < c->number.n; i++) {
             double start = c->number.range[i].start;
             value[c->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
         }
-        s = cloth_build(d, value, c->pool, &progress, f, report, err);
+        s = c->doc->cloth != NULL ? cloth_build(c->doc->cloth, value, c->pool, &progress, f, report, err)
+                                  : fiber_correct(&c->uncorrected, value, f, err);
         if (s != STATUS_INVALID) return s;
     }
     return s;

@@ -2,6 +2,7 @@
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_correction.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/worker/stages/fit/pipeline_nesting.h"
 #include "optimizer/worker/stages/fit/pipeline_radius.h"
@@ -198,12 +199,16 @@ static status run_fit(struct fit_listener *l, const struct progress *progress, s
 {
     struct pipeline_context *c = l->pipeline;
     struct progress_part first, last;
-    const double share = pipeline_scan_error_applies(c, l->i_model) ? PIPELINE_SCAN_ERROR_SHARE : 0.0;
+    const bool compare = pipeline_correction_applies(c);
+    const double share = compare                                      ? PIPELINE_CORRECTION_SHARE
+                         : pipeline_scan_error_applies(c, l->i_model) ? PIPELINE_SCAN_ERROR_SHARE
+                                                                      : 0.0;
     struct progress fit = progress_begin_part(&first, progress, 0.0, 1.0 - share);
     status s = c->number.n > 0 ? fit_cloth(l, &fit, err) : fit_parameters(l, &fit, err);
     if (s != STATUS_OK) return s;
     struct progress rest = progress_begin_part(&last, progress, 1.0 - share, share);
-    return pipeline_scan_error_carry(c, l->i_model, &rest, err);
+    s = pipeline_scan_error_carry(c, l->i_model, &rest, err);
+    return s == STATUS_OK && compare ? pipeline_correction_compare(c, l->i_model, &rest, err) : s;
 }
 
 static status fit_model(struct fit_listener *listener, struct error *err)

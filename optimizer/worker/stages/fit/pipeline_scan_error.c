@@ -42,13 +42,11 @@ struct scan_trace {
 
 bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_model)
 {
-    return c->doc->has_volume && c->model[i_model].appearance.kind == MODEL_SURFACE &&
+    return c->doc->has_volume && c->number.n == 0 && c->model[i_model].appearance.kind == MODEL_SURFACE &&
            c->model[i_model].sets.info.n_param + N_NUMBER <= FIT_MAX_PARAM && c->geometry.axis_direction_se_rad > 0.0;
 }
 
-/* Relative error of the radius: the statistical one, and the difference of both measurements. 0 where the radius was
- * given, or fitted to the photographs. */
-static double radius_error(const struct pipeline_context *c)
+double pipeline_scan_error_radius(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
     double mean_m = 0.0, se_m = 0.0;
@@ -160,7 +158,7 @@ status pipeline_scan_error_carry(struct pipeline_context *c, size_t i_model, con
     const struct reconstruct_report *g = &c->geometry;
     memset(&m->scan_error, 0, sizeof m->scan_error);
     if (!pipeline_scan_error_applies(c, i_model)) return STATUS_OK;
-    const double direction = g->axis_direction_se_rad, sd[N_NUMBER] = {radius_error(c), noise_sd};
+    const double direction = g->axis_direction_se_rad, sd[N_NUMBER] = {pipeline_scan_error_radius(c), noise_sd};
     struct scan_trace t = {.c = c, .i_model = i_model, .noise = {g->axis_position_se_m / direction, direction}};
     struct pipeline_joint *j = malloc(sizeof *j);
     struct fit_result *joint = malloc(sizeof *joint);

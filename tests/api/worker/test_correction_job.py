@@ -1,0 +1,73 @@
+"""Jobs that correct the fibers of a file or a scan: a wrong radius is found and what its correction gains is stated,
+given corrections are applied, and documents that cannot be are refused."""
+import json
+import os
+import shutil
+import subprocess
+
+import pytest
+from daemon_under_test import program
+
+pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
+TRUTH = {"C_R": [0.06, 0.05, 0.08], "C_TT": [0.7, 0.5, 0.3], "beta_R": 6, "beta_TT": 20, "gamma_TT": 20}
+OUTPUT = {"render_px": 8, "render_samples": 1}
+THIN = 0.85
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory):
+    """Photographs of a cloth, and its fibers with radii that are too small."""
+    folder = tmp_path_factory.mktemp("sample")
+    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "twill", "--fibers-per-yarn", "7", "--cover", "0.7", "--out", str(folder)], check=True, capture_output=True)
+    subprocess.run([program("selvedge-phantom"), "photograph", "--fibers", str(folder / "truth.hair"), "--out", str(folder), "--px", "8", "--paths", "20000",
+                    "--param", "C_R=0.06,0.05,0.08", "--param", "C_TT=0.7,0.5,0.3", "--param", "beta_R=6", "--param", "beta_TT=20", "--param", "gamma_TT=20", "--quiet"], check=True)
+    rows = [line.split() for line in (folder / "truth.txt").read_text().splitlines()]
+    (folder / "thin.txt").write_text("\n".join(" ".join([*r[:3], f"{THIN * float(r[3]):.9g}"]) if r else "" for r in rows) + "\n")
+    return folder
+
+
+def job_of(tmp_path, sample, fit, **document):
+    job = tmp_path / "job"
+    (job / "input").mkdir(parents=True)
+    photographs = json.loads((sample / "photographs.json").read_text())
+    for name in ["thin.txt"] + [p["file"] for p in photographs]:
+        shutil.copy(sample / name, job / "input")
+    tile = json.loads((sample / "phantom.json").read_text())["result"]["tile_mm"]
+    (job / "job.json").write_text(json.dumps({"sample": "thin", "fibers": {"file": "thin.txt", "tile_mm": tile}, "photographs": photographs,
+                                              "fit": {**fit, **OUTPUT}, **document}))
+    code = subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)]).returncode
+    return code, job
+
+
+@pytest.mark.slow
+def test_a_wrong_radius_is_corrected(tmp_path, sample):
+    code, job = job_of(tmp_path, sample, {"path_budget": 1200000, "fixed": {k: v for k, v in TRUTH.items() if k != "C_TT"}}, correction={"radius": {"lower": 0.8, "upper": 1.4}})
+    assert code == 0
+    result = json.loads((job / "results" / "result.json").read_text())
+    (radius,) = result["cloth_numbers"]
+    print(radius["value"], radius["standard_error"], result["heldout_rel_rms"], result["without_corrections"])
+    assert radius["name"] == "radius" and radius["determined"]
+    assert abs(radius["value"] - 1 / THIN) < max(0.03, 3 * radius["standard_error"])
+    assert result["heldout_rel_rms"] < 0.5 * result["without_corrections"]["heldout_rel_rms"]
+    assert abs(result["geometry"]["mean_radius_um"] - 7 * THIN * radius["value"]) < 0.02
+    assert "without these corrections" in (job / "results" / "summary.txt").read_text()
+
+
+def test_given_corrections_are_applied(tmp_path, sample):
+    code, job = job_of(tmp_path, sample, {"path_budget": 40000, "max_iterations": 1}, correction={"radius": 1.1, "smoothing_um": {"value": 5, "fit": False}})
+    assert code == 0
+    result = json.loads((job / "results" / "result.json").read_text())
+    assert abs(result["geometry"]["mean_radius_um"] - 7 * THIN * 1.1) < 0.01
+    assert "cloth_numbers" not in result and "without_corrections" not in result
+
+
+@pytest.mark.parametrize("correction, field, text", [
+    ({"radius": 3}, "correction.radius", "0.7"),
+    ({"compression": {"lower": 1.2, "upper": 0.8}}, "correction.compression", "bounds"),
+    ({"hairs_per_mm2": {"prior": [1, 0]}}, "correction.hairs_per_mm2", "prior"),
+    ({"flatness": 2}, "correction.flatness", "flatness"),
+])
+def test_refused(tmp_path, sample, correction, field, text):
+    code, job = job_of(tmp_path, sample, {}, correction=correction)
+    error = json.loads((job / "status.json").read_text())["error"]
+    assert code != 0 and error["field"] == field and text in error["text"], error
