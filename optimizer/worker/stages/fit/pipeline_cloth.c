@@ -42,9 +42,10 @@ static status check_company(const struct pipeline_context *c, struct error *err)
                                    "numbers of the cloth are fitted with models of fibers only: '%s' sees a volume",
                                    c->model[i].appearance.id);
     if (c->doc->fit_radius)
-        return error_set_field(
-            err, STATUS_INVALID, OPTION_FIT_RADIUS, "'%s' is not for a cloth with fitted numbers: fit its %s",
-            job_option_key(OPTION_FIT_RADIUS), c->doc->cloth != NULL ? "fiber_radius_um" : "correction.radius");
+        return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
+                               "'%s' is not for a cloth with fitted numbers: fit the %s of '%s'",
+                               job_option_key(OPTION_FIT_RADIUS), c->doc->cloth != NULL ? "fiber_radius_um" : "radius",
+                               job_option_key(c->doc->cloth != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
     return STATUS_OK;
 }
 
