@@ -2,6 +2,7 @@
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
+#include "optimizer/worker/stages/fit/pipeline_scan_error.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 
 #include <math.h>
@@ -11,6 +12,18 @@
 static const double score_share = 0.1, score_least = 4096.0, score_most = 65536.0;
 
 bool pipeline_correction_applies(const struct pipeline_context *c) { return c->doc->has_correction && c->number.n > 0; }
+
+void pipeline_correction_priors(struct pipeline_context *c)
+{
+    if (!c->doc->has_correction || !c->doc->has_volume) return;
+    const double se = pipeline_scan_error_radius(c);
+    for (size_t k = 0; k < c->number.n; k++) {
+        struct pipeline_number *item = &c->number.item[k];
+        if (item->index != CORRECT_RADIUS || !isnan(item->prior_sd) || !(se > 0.0)) continue;
+        item->prior_mean = 1.0;
+        item->prior_sd = se;
+    }
+}
 
 static status fit_uncorrected(struct pipeline_context *c, size_t i_model, const struct scene *scene,
                               const struct progress *progress, struct fit_result *r, struct error *err)

@@ -11,8 +11,11 @@
 /* Whether the job has corrections fitted. */
 bool pipeline_correction_applies(const struct pipeline_context *c);
 
-/* Fits the parameters to the uncorrected fibers, with as many paths as the final fit of the corrected ones, and fills in
- * m->scan_error.uncorrected. An interrupted comparison starts over, with the same result. */
+/* Gives a fitted radius of scanned fibers that has no prior that of the reconstruction's own error. */
+void pipeline_correction_priors(struct pipeline_context *c);
+
+/* Fits the parameters to the uncorrected fibers, with as many paths as the final fit of the corrected ones, and fills
+ * in m->scan_error.uncorrected. An interrupted comparison starts over, with the same result. */
 status pipeline_correction_compare(struct pipeline_context *c, size_t i_model, const struct progress *progress,
                                    struct error *err);
 

@@ -262,6 +262,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     char path[WORKER_PATH_BYTES];
     struct work_section section[FIT_SECTIONS];
     size_t n = result_sections(c, section);
+    pipeline_correction_priors(c);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = work_file_read(path, "fit.10", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
@@ -272,6 +273,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
 status stage_fit(struct pipeline_context *c, struct error *err)
 {
     struct fit_listener listener = {.pipeline = c};
+    pipeline_correction_priors(c);
     size_t order[JOB_MAX_MODEL];
     status s = worker_series_open(c->folder, &listener.series, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_search(c, listener.series, err);

@@ -49,9 +49,10 @@ bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_mode
 double pipeline_scan_error_radius(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
+    const struct fiber_set *f = c->uncorrected.n_fiber > 0 ? &c->uncorrected : &c->fiber;
     double mean_m = 0.0, se_m = 0.0;
     if (isnan(g->radius_se_m[0]) || c->doc->fit_radius) return 0.0;
-    for (size_t i = 0; i < c->fiber.n_fiber; i++) mean_m += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
+    for (size_t i = 0; i < f->n_fiber; i++) mean_m += (double)f->radius_m[i] / (double)f->n_fiber;
     for (int a = 0; a < 3; a++)
         if (isfinite(g->radius_se_m[a])) se_m = fmax(se_m, g->radius_se_m[a]);
     return hypot(se_m, mean_m - g->profile_radius_m) / mean_m;

@@ -13,8 +13,8 @@
 /* Share of the progress of a fit that this step takes. */
 #define PIPELINE_SCAN_ERROR_SHARE 0.2
 
-/* Whether the fibers of the job come from a scan, the model sees fibers, and no corrections of them are fitted, whose own
- * errors would then count. */
+/* Whether the fibers of the job come from a scan, the model sees fibers, and no corrections of them are fitted,
+ * whose own errors would then count. */
 bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_model);
 
 /* Relative error of the radius: the statistical one, and the difference of both measurements. 0 where the radius was

@@ -4,7 +4,6 @@
 #include "geometry/fibers/voxelise.h"
 #include "geometry/reconstruct.h"
 #include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/stages/fit/pipeline_scan_error.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -90,16 +89,10 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? make_volume_scene(c, err) : s;
 }
 
-/* Keeps the fibers as they came, and applies the corrections at the values of the document. A fitted radius without a
- * prior gets that of the reconstruction's own error. */
+/* Keeps the fibers as they came, and applies the corrections at the values of the document. */
 static status correct_fibers(struct pipeline_context *c, struct error *err)
 {
-    double value[CORRECTION_N], radius_se = c->doc->has_volume ? pipeline_scan_error_radius(c) : 0.0;
-    for (size_t k = 0; k < c->number.n; k++)
-        if (c->number.item[k].index == CORRECT_RADIUS && isnan(c->number.item[k].prior_sd) && radius_se > 0.0) {
-            c->number.item[k].prior_mean = 1.0;
-            c->number.item[k].prior_sd = radius_se;
-        }
+    double value[CORRECTION_N];
     for (int k = 0; k < CORRECTION_N; k++) value[k] = c->doc->correction[k].value;
     status s = fiber_set_copy(&c->fiber, &c->uncorrected, err);
     return s == STATUS_OK ? fiber_correct(&c->uncorrected, value, &c->fiber, err) : s;
