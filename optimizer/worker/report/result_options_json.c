@@ -1,6 +1,7 @@
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/report/json_number.h"
 
+#include "optimizer/worker/stages/result/pipeline_advice.h"
 #include "optimizer/worker/stages/result/pipeline_contrast.h"
 
 #include <math.h>
@@ -91,11 +92,12 @@ static json_t *certificate_json(const struct pipeline_model *m)
     json_t *list = json_array();
     for (size_t p = 0; p < m->sets.info.n_param; p++)
         if (k->checked[p])
-            json_array_append_new(list,
-                                  json_pack("{s:s, s:o, s:o}", "name", m->sets.info.param[p].name, "rel_error",
-                                            json_number(k->error[p]), "rel_error_se", json_number(k->error_se[p])));
-    return json_pack("{s:o, s:o, s:s, s:I, s:o}", "worst_rel_error", json_number(k->error[k->worst]),
-                     "worst_rel_error_se", json_number(k->error_se[k->worst]), "worst_parameter",
+            json_array_append_new(list, json_pack("{s:s, s:o, s:o, s:o}", "name", m->sets.info.param[p].name,
+                                                  "rel_error", json_number(k->error[p]), "noise",
+                                                  json_number(k->noise[p]), "noise_se", json_number(k->noise_se[p])));
+    return json_pack("{s:b, s:o, s:o, s:o, s:s, s:I, s:o}", "passed", (int)pipeline_certificate_passed(m),
+                     "worst_rel_error", json_number(k->error[k->worst]), "worst_noise", json_number(k->noise[k->worst]),
+                     "worst_noise_se", json_number(k->noise_se[k->worst]), "worst_parameter",
                      m->sets.info.param[k->worst].name, "n_path", (json_int_t)k->n_path, "parameters", list);
 }
 
@@ -165,8 +167,11 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
     const struct fit_nuisance *n = &m->fit.nuisance;
     const struct derivative_check *check = &m->certificate;
     const struct validation *v = &m->validation;
-    fprintf(out, "gradient certificate: the derivatives on this cloth are right to %.1g (+- %.1g), worst by %s\n",
-            check->error[check->worst], check->error_se[check->worst], m->sets.info.param[check->worst].name);
+    fprintf(
+        out,
+        "gradient certificate: the derivatives on this cloth are right to %.1g (noise: %.1g +- %.1g), worst by %s\n",
+        check->error[check->worst], check->noise[check->worst], check->noise_se[check->worst],
+        m->sets.info.param[check->worst].name);
     if (m->candidate != NULL) {
         const struct job_candidate *best = &c->doc->candidate[m->candidate[0].i_candidate];
         fprintf(out,

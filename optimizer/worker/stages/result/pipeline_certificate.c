@@ -10,19 +10,25 @@
 
 enum { N_PATH = 2048 };
 
-/* Relative error of a derivative above which the certificate fails. Rounding in single precision alone gives up to
- * 0.2 %. */
+/* Relative error of a derivative, beyond noise, above which the certificate fails. Rounding in single precision alone
+ * gives up to 0.2 %. */
 static const double allowed_error = 0.01;
+
+bool pipeline_certificate_passed(const struct pipeline_model *m)
+{
+    return derivative_check_excess(&m->certificate, m->certificate.worst) <= allowed_error;
+}
 
 static void warn_of(struct pipeline_context *c, const struct pipeline_model *m)
 {
     const struct derivative_check *k = &m->certificate;
-    if (k->error[k->worst] - 3.0 * k->error_se[k->worst] <= allowed_error) return;
+    if (pipeline_certificate_passed(m)) return;
     worker_status_warn(
         c->status,
-        "the derivatives by '%s' of model '%s' are off by %.2g +- %.1g of themselves on this cloth: do not trust "
-        "the fit's standard errors, and report this",
-        m->sets.info.param[k->worst].name, m->appearance.id, k->error[k->worst], k->error_se[k->worst]);
+        "the derivatives by '%s' of model '%s' are off by %.2g of themselves on this cloth, where noise gives %.2g +- "
+        "%.1g: do not trust the fit's standard errors, and report this",
+        m->sets.info.param[k->worst].name, m->appearance.id, k->error[k->worst], k->noise[k->worst],
+        k->noise_se[k->worst]);
 }
 
 static status certify(struct pipeline_context *c, struct pipeline_model *m, const struct configuration *configuration,
@@ -43,9 +49,10 @@ static status certify(struct pipeline_context *c, struct pipeline_model *m, cons
     status s = derivative_check_run(&q, &c->progress, &m->certificate, err);
     if (s != STATUS_OK) return s;
     const struct derivative_check *k = &m->certificate;
-    log_info(c->log, "gradient certificate of %s: worst relative error %.2g +- %.1g (%s), %zu paths, %.1f s",
-             m->appearance.id, k->error[k->worst], k->error_se[k->worst], m->sets.info.param[k->worst].name,
-             (size_t)k->n_path, clock_monotonic_s() - start_s);
+    log_info(c->log,
+             "gradient certificate of %s: worst relative error %.2g, noise %.2g +- %.1g (%s), %zu paths, %.1f s",
+             m->appearance.id, k->error[k->worst], k->noise[k->worst], k->noise_se[k->worst],
+             m->sets.info.param[k->worst].name, (size_t)k->n_path, clock_monotonic_s() - start_s);
     warn_of(c, m);
     return STATUS_OK;
 }
