@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-cloth bench-scan-errors bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pictures docs-weave bench-weave bench-weave-rendered
+.PHONY: bench bench-cloth bench-scan-errors bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
@@ -22,15 +22,21 @@ bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing h
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
 
-# TABLES: a folder of tables of measured reflectance, each judged by the same procedure. CLOTH: some of the tables or recoveries only
-bench-cloth: | deps-test ## described cloths: fit of measured tables and recovery of known cloths (an hour on 2 quiet cores)
+# TABLES: a folder of tables of measured reflectance, each judged by the same procedure. CLOTH: some of the tables, recoveries or photo
+# pairs only
+bench-cloth: | deps-test ## described cloths: fit of measured tables, recovery of known cloths, photo pairs (two hours on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_cloth.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(CLOTH)
+	@$(if $(TABLES),,/usr/bin/python3 tests/bench/bench_pairs.py --build $(BUILD) $(CLOTH))
 	@$(if $(TABLES)$(CLOTH),,/usr/bin/python3 tests/bench/bench_scan_errors.py --build $(BUILD))
 
 bench-scan-errors: | deps-test ## scanned cloths: whether the stated errors contain the truth (an hour and a half on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_scan_errors.py --build $(BUILD)
+
+docs-pairs: | deps-test ## draw docs/images/photo-pairs.png anew: renderings of four photo pairs (10 minutes, seconds after bench-cloth)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/bench_pairs.py --build $(BUILD) --picture docs/images/photo-pairs.png >&2
 
 # FABRIC: one of tests/support/cloth/fit_fabrics.c
 bench-published: FABRIC ?= microflake
