@@ -18,9 +18,13 @@ THIN = 0.85
 def sample(tmp_path_factory):
     """Photographs of a cloth, and its fibers with radii that are too small."""
     folder = tmp_path_factory.mktemp("sample")
-    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "twill", "--fibers-per-yarn", "7", "--cover", "0.7", "--out", str(folder)], check=True, capture_output=True)
-    subprocess.run([program("selvedge-phantom"), "photograph", "--fibers", str(folder / "truth.hair"), "--out", str(folder), "--px", "8", "--paths", "20000",
-                    "--param", "C_R=0.06,0.05,0.08", "--param", "C_TT=0.7,0.5,0.3", "--param", "beta_R=6", "--param", "beta_TT=20", "--param", "gamma_TT=20", "--quiet"], check=True)
+    phantom = program("selvedge-phantom")
+    subprocess.run([phantom, "cloth", "--weave", "twill", "--fibers-per-yarn", "7", "--cover", "0.7", "--out", str(folder)],
+                   check=True, capture_output=True)
+    values = {name: ",".join(map(str, v)) if isinstance(v, list) else v for name, v in TRUTH.items()}
+    given = [word for name, value in values.items() for word in ("--param", f"{name}={value}")]
+    subprocess.run([phantom, "photograph", "--fibers", str(folder / "truth.hair"), "--out", str(folder), "--px", "8",
+                    "--paths", "20000", *given, "--quiet"], check=True)
     rows = [line.split() for line in (folder / "truth.txt").read_text().splitlines()]
     (folder / "thin.txt").write_text("\n".join(" ".join([*r[:3], f"{THIN * float(r[3]):.9g}"]) if r else "" for r in rows) + "\n")
     return folder
@@ -41,7 +45,8 @@ def job_of(tmp_path, sample, fit, **document):
 
 @pytest.mark.slow
 def test_a_wrong_radius_is_corrected(tmp_path, sample):
-    code, job = job_of(tmp_path, sample, {"path_budget": 1200000, "fixed": {k: v for k, v in TRUTH.items() if k != "C_TT"}}, correction={"radius": {"lower": 0.8, "upper": 1.4}})
+    known = {k: v for k, v in TRUTH.items() if k != "C_TT"}
+    code, job = job_of(tmp_path, sample, {"path_budget": 1200000, "fixed": known}, correction={"radius": {"lower": 0.8, "upper": 1.4}})
     assert code == 0
     result = json.loads((job / "results" / "result.json").read_text())
     (radius,) = result["cloth_numbers"]

@@ -19,7 +19,8 @@ def result(d, cloth, name, role, data):
 
 
 def test_errors_of_fibers_are_carried(real, tmp_path):
-    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--out", str(tmp_path)], check=True, capture_output=True)
+    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--out", str(tmp_path)],
+                   check=True, capture_output=True)
     scanned = result(real, {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}}, "scan.tif", "volume", (tmp_path / "scan.tif").read_bytes())
     geometry = scanned["geometry"]
     assert 0.2 < geometry["axis_direction_error_deg"] < 3 and 0.01 < geometry["axis_position_error_um"] < 0.5
