@@ -12,9 +12,9 @@
 
 #include "geometry/orientation/consensus.h"
 #include "geometry/orientation/fiber_diameter.h"
-#include "geometry/orientation/line_bound.h"
-#include "geometry/orientation/line_descent.h"
-#include "geometry/orientation/line_filter.h"
+#include "geometry/orientation/lines/line_bound.h"
+#include "geometry/orientation/lines/line_descent.h"
+#include "geometry/orientation/lines/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #include "base/option_id.h"
 
 #include "base/durable.h"
-#include "geometry/volume/raw_source.h"
+#include "geometry/volume/format/raw_source.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
 /* The first six bytes are the declaration, and the rest is the file. */
-#include "geometry/volume/raw_source.h"
+#include "geometry/volume/format/raw_source.h"
 #include "geometry/volume/sample_type.h"
 #include "tests/fuzz/fuzz_input.h"
 

@@ -1,5 +1,5 @@
 /* Reads Mitsuba grids as a scan and as directions. */
-#include "geometry/volume/vol_file.h"
+#include "geometry/volume/format/vol_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdlib.h>

@@ -2,7 +2,7 @@
  * writers. */
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/volume/vol_file.h"
+#include "geometry/volume/format/vol_file.h"
 #include "renderer/image/image.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "optimizer/worker/report/result_pictures.h"
 #include "base/durable.h"
-#include "geometry/volume/vol_file.h"
+#include "geometry/volume/format/vol_file.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"

@@ -2,7 +2,7 @@
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/orientation/fiber_diameter.h"
-#include "geometry/orientation/line_filter.h"
+#include "geometry/orientation/lines/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
 #include "geometry/reconstruct.h"
 #include "tests/support/scan/scan_files.h"

@@ -1,7 +1,7 @@
 /* `.vol` files: golden bytes, round trips, and the error of quantised directions. */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "geometry/volume/vol_file.h"
+#include "geometry/volume/format/vol_file.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <math.h>

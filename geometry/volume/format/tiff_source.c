@@ -3,7 +3,7 @@
  * error texts. */
 #include "base/durable.h"
 #include "base/option_id.h"
-#include "geometry/volume/tiff_page.h"
+#include "geometry/volume/format/tiff_page.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <errno.h>

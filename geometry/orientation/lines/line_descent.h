@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_GEOMETRY_LINE_DESCENT_H
 #define SELVEDGE_GEOMETRY_LINE_DESCENT_H
 
-#include "geometry/orientation/line_filter.h"
+#include "geometry/orientation/lines/line_filter.h"
 
 struct line_descent {
     const struct direction_set *set;

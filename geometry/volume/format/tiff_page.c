@@ -1,4 +1,4 @@
-#include "geometry/volume/tiff_page.h"
+#include "geometry/volume/format/tiff_page.h"
 #include "base/option_id.h"
 
 enum { MAX_EDGE = 1 << 20 };

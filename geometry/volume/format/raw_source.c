@@ -1,4 +1,4 @@
-#include "geometry/volume/raw_source.h"
+#include "geometry/volume/format/raw_source.h"
 #include "base/option_id.h"
 
 #include "base/durable.h"

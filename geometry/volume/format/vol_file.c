@@ -1,4 +1,4 @@
-#include "geometry/volume/vol_file.h"
+#include "geometry/volume/format/vol_file.h"
 #include "base/option_id.h"
 
 #include "base/durable.h"

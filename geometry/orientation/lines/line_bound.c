@@ -1,4 +1,4 @@
-#include "geometry/orientation/line_bound.h"
+#include "geometry/orientation/lines/line_bound.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "geometry/orientation/line_descent.h"
+#include "geometry/orientation/lines/line_descent.h"
 
 enum { MAX_STEP = 24 };
 

@@ -1,5 +1,5 @@
 /* The isotropic part of the line filter: a difference of two Gaussians, computed along the three axes in turn. */
-#include "geometry/orientation/line_filter.h"
+#include "geometry/orientation/lines/line_filter.h"
 
 #include <math.h>
 #include <stdlib.h>

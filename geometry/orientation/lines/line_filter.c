@@ -1,4 +1,4 @@
-#include "geometry/orientation/line_filter.h"
+#include "geometry/orientation/lines/line_filter.h"
 
 #include <math.h>
 #include <stdlib.h>
