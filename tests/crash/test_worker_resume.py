@@ -17,8 +17,9 @@ WORKER = os.path.join(BUILD, "bin", "selvedge-worker")
 
 def make_job(folder, **fit):
     os.makedirs(os.path.join(folder, "input"))
+    model = {} if "models" in fit else {"model": "two_lobe.v1"}
     document = {"sample": "resume", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
-                "fit": {"path_budget": 160000, "max_iterations": 12, "render_px": 8, "render_samples": 1, "seed": 7, **fit}}
+                "fit": {**model, "path_budget": 160000, "max_iterations": 12, "render_px": 8, "render_samples": 1, "seed": 7, **fit}}
     with open(os.path.join(folder, "job.json"), "w") as f:
         json.dump(document, f)
     with open(os.path.join(folder, "input", "cloth.hair"), "wb") as f:

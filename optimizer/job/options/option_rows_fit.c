@@ -35,7 +35,9 @@ const struct job_option option_rows_fit[] = {
      .id = OPTION_MODEL,
      TEXT_INTO(model[0].id),
      .choice_at = job_model_id,
-     .meaning = "The scattering model; docs/model.md describes each."},
+     .standard = "\"textile.v2\"",
+     .meaning = "The scattering model; docs/model.md describes each. `two_lobe.v1` is the published one, with nine "
+                "parameters."},
     {.path = "fit.models",
      .kind = OPTION_OWN,
      .left_out = "`model` alone",

@@ -49,7 +49,7 @@ struct job_option {
     size_t count_at, element_bytes; /* of lists: offset of the count, size of an element */
     double lower, upper;            /* numbers; of lists: upper is the largest number of elements */
     size_t n;                       /* count of numbers; bytes of a text */
-    const char *const *choice;      /* NULL-terminated; the first is the default, unless `left_out` is given */
+    const char *const *choice;      /* NULL-terminated; the first is the default without `standard` and `left_out` */
     const char *(*choice_at)(size_t i); /* the same for words of a catalogue: NULL after the last */
     const char *unit;                   /* "" or NULL: none */
     const char *standard;               /* the default as JSON; NULL: NaN for a number, else zero or empty */

@@ -38,7 +38,7 @@ def job_of(tmp_path, sample, fit, **document):
         shutil.copy(sample / name, job / "input")
     tile = json.loads((sample / "phantom.json").read_text())["result"]["tile_mm"]
     (job / "job.json").write_text(json.dumps({"sample": "thin", "fibers": {"file": "thin.txt", "tile_mm": tile}, "photographs": photographs,
-                                              "fit": {**fit, **OUTPUT}, **document}))
+                                              "fit": {"model": "two_lobe.v1", **fit, **OUTPUT}, **document}))
     code = subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)]).returncode
     return code, job
 

@@ -7,7 +7,8 @@ from small_cloth import TABLE, hair
 from small_exr import exr
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
-FIT = {"fixed": {"C_R": 0.1, "C_TT": 0.6, "beta_TT": 20, "gamma_TT": 20}, "max_iterations": 1, "path_budget": 20000, "render_px": 8, "render_samples": 1}
+FIT = {"model": "two_lobe.v1", "fixed": {"C_R": 0.1, "C_TT": 0.6, "beta_TT": 20, "gamma_TT": 20},
+       "max_iterations": 1, "path_budget": 20000, "render_px": 8, "render_samples": 1}
 GREY = (0.25, 0.5, 1.0)
 
 

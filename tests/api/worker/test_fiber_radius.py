@@ -39,7 +39,7 @@ def test_radius_comes_back(tmp_path):
     photographs = json.loads((sample / "photographs.json").read_text())
     for p in photographs:
         shutil.copy(sample / p["file"], job / "input")
-    fit = {"path_budget": 100000, "seed": 2, "fit_radius": True, "render_px": 8, "render_samples": 1,
+    fit = {"model": "two_lobe.v1", "path_budget": 100000, "seed": 2, "fit_radius": True, "render_px": 8, "render_samples": 1,
            "fixed": {"C_R": 0.1, "beta_R": 5, "beta_TT": 15, "gamma_TT": 20}}
     (job / "job.json").write_text(json.dumps({"sample": "too thick", "fibers": {"file": "cloth.hair"}, "photographs": photographs, "fit": fit}))
     subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)], check=True)

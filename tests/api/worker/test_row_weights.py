@@ -31,7 +31,7 @@ def table(weight=1, dead_weight=None):
 def run(folder, text, **fit):
     os.makedirs(folder / "input")
     document = {"sample": "weights", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
-                "fit": {"path_budget": 60000, "render_px": 8, "render_samples": 1, **fit}}
+                "fit": {"model": "two_lobe.v1", "path_budget": 60000, "render_px": 8, "render_samples": 1, **fit}}
     (folder / "job.json").write_text(json.dumps(document))
     (folder / "input" / "cloth.hair").write_bytes(hair())
     (folder / "input" / "rows.csv").write_text(text)

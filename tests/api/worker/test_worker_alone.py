@@ -15,8 +15,9 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selved
 
 def run(folder, table=TABLE, expect=0, photographs=(), set_up=None, **fit):
     """Runs a job of the small cloth with a table, or with photographs [(bytes of a PNG, keys)]. Returns status.json."""
+    model = {} if "models" in fit else {"model": "two_lobe.v1"}
     document = {"sample": "alone", "fibers": {"file": "cloth.hair"},
-                "fit": {"path_budget": 100000, "render_px": 8, "render_samples": 1, **fit}, **(set_up or {})}
+                "fit": {**model, "path_budget": 100000, "render_px": 8, "render_samples": 1, **fit}, **(set_up or {})}
     (folder / "input").mkdir()
     (folder / "input" / "cloth.hair").write_bytes(hair())
     if photographs:

@@ -30,7 +30,8 @@ static void test_defaults(void **state)
     assert_true(d->lamp_side_cm == 10.0 && d->lamp_distance_cm == 61.0 && d->camera_distance_cm == 100.0 &&
                 d->crop_cm == 1.0);
     assert_true(d->black_sheet);
-    assert_string_equal(d->model[0].id, "two_lobe.v1");
+    assert_int_equal(d->n_model, 1);
+    assert_string_equal(d->model[0].id, "textile.v2");
     assert_string_equal(d->method, method_gauss_newton.id);
     assert_int_equal(d->n_photograph, 0);
     assert_int_equal(d->radius_per_axis, -1);

@@ -24,11 +24,12 @@ static void test_fit(void **state)
     check_error(FIT_OF("{\"method\":\"adam\"}"), "fit.method", method_gauss_newton.id);
     check_error(FIT_OF("{\"seed\":-1}"), "fit.seed", "-1");
     check_error(FIT_OF("{\"fixed\":{\"beta_X\":1}}"), "fit.fixed.beta_X", "C_R");
-    check_error(FIT_OF("{\"fixed\":{\"beta_R\":50}}"), "fit.fixed.beta_R", "1 to 10");
+    check_error(FIT_OF("{\"fixed\":{\"beta_R\":50}}"), "fit.fixed.beta_R", "1 to 30");
     check_error(FIT_OF("{\"start\":{\"C_TT\":[0.1,0.2]}}"), "fit.start.C_TT", "3 numbers");
     check_error(FIT_OF("{\"start\":{\"C_TT\":0.5,\"C_TT.r\":0.2}}"), "fit.start.C_TT.r", "second time");
     check_error(FIT_OF("{\"start\":{\"beta_R\":5},\"fixed\":{\"beta_R\":5}}"), "fit.start", "beta_R");
-    check_error(FIT_OF("{\"fixed\":{\"beta_R\":5,\"beta_TT\":10,\"gamma_TT\":10,\"C_R\":0.1,\"C_TT\":0.8}}"),
+    check_error(FIT_OF("{\"model\":\"two_lobe.v1\",\"fixed\":{\"beta_R\":5,\"beta_TT\":10,\"gamma_TT\":10,\"C_R\":0.1,"
+                       "\"C_TT\":0.8}}"),
                 "fit.fixed", "at least one free");
     check_error(FIT_OF("{\"path_budget\":10}"), "fit.path_budget", "1000");
     check_error(FIT_OF("{\"model\":\"microflake.v1\",\"fit_density\":true}"), "fit.fit_density", "behind the cloth");
@@ -62,7 +63,7 @@ static void test_names_of_groups(void **state)
     check_error("{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\",\"groups\":[\"a\",\"b\",\"c\",\"d\",\"e\",\"f\","
                 "\"g\",\"h\"]},"
                 "\"photographs\":[" PHOTO "],\"fit\":{}}",
-                "fit.model", "72");
+                "fit.model", "88");
 }
 
 /* Names with that of a group concern its set, names without it concern all sets. */
@@ -70,7 +71,8 @@ static void test_parameters_of_groups(void **state)
 {
     (void)state;
     struct job_fit_parameter k[JOB_MAX_PARAM];
-    resolve(GROUPS_OF("{\"start\":{\"C_R\":[0.1,0.2,0.3],\"warp.C_TT\":0.5,\"weft.C_TT\":[0.6,0.7,0.8]},"
+    resolve(GROUPS_OF("{\"model\":\"two_lobe.v1\",\"start\":{\"C_R\":[0.1,0.2,0.3],\"warp.C_TT\":0.5,\"weft.C_TT\":[0."
+                      "6,0.7,0.8]},"
                       "\"fixed\":{\"beta_R\":5,\"weft.gamma_TT\":19},\"bounds\":{\"warp.beta_TT\":[12,30]},"
                       "\"priors\":{\"weft.beta_TT\":{\"mean\":21,\"se\":1}}}"),
             k);
@@ -81,10 +83,11 @@ static void test_parameters_of_groups(void **state)
         }
     assert_true(k[6].fixed && k[15].fixed && !k[8].fixed && k[17].fixed && k[17].start == 19.0);
     assert_true(k[7].lower == 12.0 && k[7].upper == 30.0 && k[16].upper == 45.0 && k[16].start == 21.0);
-    resolve(GROUPS_OF("{\"tied\":[[\"beta_TT\"],{\"warp.C_R\":1,\"weft.C_R\":0.5}],\"start\":{\"weft.beta_TT\":17}}"),
+    resolve(GROUPS_OF("{\"model\":\"two_lobe.v1\",\"tied\":[[\"beta_TT\"],{\"warp.C_R\":1,\"weft.C_R\":0.5}],\"start\":"
+                      "{\"weft.beta_TT\":17}}"),
             k);
     assert_true(k[7].start == 17.0 && k[16].start == 17.0 && k[9].start == 0.5 * k[0].start);
-    const struct job_document *d = parse(GROUPS_OF("{\"tied\":[[\"beta_TT\"]]}"));
+    const struct job_document *d = parse(GROUPS_OF("{\"model\":\"two_lobe.v1\",\"tied\":[[\"beta_TT\"]]}"));
     assert_true(d->model[0].option.leader[16] == 7 && d->model[0].option.leader[17] == 17);
     job_document_free((struct job_document *)(uintptr_t)d);
     check_error(GROUPS_OF("{\"fixed\":{\"pile.C_R\":0.1}}"), "fit.fixed.pile.C_R", "or weft.C_R ...");
@@ -109,15 +112,14 @@ static void test_fit_options(void **state)
 {
     (void)state;
     struct job_fit_parameter k[JOB_MAX_PARAM];
-    resolve(
-        FIT_OF(
-            "{\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":0.5}],\"bounds\":{\"beta_R\":[2,8],\"gamma_TT\":[6,20]},"
-            "\"start\":{\"gamma_TT\":8},\"priors\":{\"beta_R\":{\"mean\":3,\"se\":1}}}"),
-        k);
+    resolve(FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[[\"C_R\"],{\"beta_TT\":1,\"gamma_TT\":0.5}],\"bounds\":{"
+                   "\"beta_R\":[2,8],\"gamma_TT\":[6,20]},"
+                   "\"start\":{\"gamma_TT\":8},\"priors\":{\"beta_R\":{\"mean\":3,\"se\":1}}}"),
+            k);
     assert_true(k[6].lower == 2.0 && k[6].upper == 8.0 && k[6].start == 3.0);
     assert_true(fabs(k[7].lower - 12.0) < 1e-12 && fabs(k[7].upper - 40.0) < 1e-12 && fabs(k[7].start - 16.0) < 1e-12);
     assert_true(fabs(k[8].lower - 6.0) < 1e-12 && fabs(k[8].upper - 20.0) < 1e-12 && k[8].start == 8.0);
-    resolve(FIT_OF("{\"tied\":[[\"C_R.r\",\"C_R.b\"]],\"fixed\":{\"C_R.b\":0.3}}"), k);
+    resolve(FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[[\"C_R.r\",\"C_R.b\"]],\"fixed\":{\"C_R.b\":0.3}}"), k);
     assert_true(k[0].fixed && k[0].start == 0.3 && !k[1].fixed && k[2].fixed);
     struct job_document *d =
         parse(FIT_OF("{\"starts\":4,\"nuisance\":{\"gain\":\"per_photograph\",\"gain_prior_rel\":0.1,"
@@ -215,33 +217,37 @@ static void test_fit_option_errors(void **state)
     check_error(FIT_OF("{\"tied\":[[\"C_R\"]],\"start\":{\"C_R\":[0.1,0.2,0.1]}}"), "fit.start", "does not allow");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2]}}"), "fit.bounds.beta_R", "2 numbers");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[5,5]}}"), "fit.bounds.beta_R", "below the second");
-    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[0,5]}}"), "fit.bounds.beta_R[0]", "1 to 10");
+    check_error(FIT_OF("{\"bounds\":{\"beta_R\":[0,5]}}"), "fit.bounds.beta_R[0]", "1 to 30");
     check_error(FIT_OF("{\"bounds\":{\"C_R\":[0.1,0.5],\"C_R.g\":[0.1,0.2]}}"), "fit.bounds.C_R.g", "second time");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"start\":{\"beta_R\":5}}"), "fit.start", "2 and 4");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"fixed\":{\"beta_R\":5}}"), "fit.fixed", "2 and 4");
-    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":10}}"), "fit.fixed",
-                "'gamma_TT' at 10: its bounds are 20 and 45, with those of what 'fit.tied' ties it to");
-    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"start\":{\"beta_TT\":40}}"), "fit.start",
-                "'beta_TT' at 40: its bounds are 10 and 22.5, with");
     check_error(
-        FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":30},\"start\":{\"beta_TT\":20}}"),
-        "fit.start", "'beta_TT', which 'fit.fixed' holds fixed");
+        FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":10}}"),
+        "fit.fixed", "'gamma_TT' at 10: its bounds are 20 and 45, with those of what 'fit.tied' ties it to");
+    check_error(
+        FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"start\":{\"beta_TT\":40}}"),
+        "fit.start", "'beta_TT' at 40: its bounds are 10 and 22.5, with");
+    check_error(FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":"
+                       "30},\"start\":{\"beta_TT\":20}}"),
+                "fit.start", "'beta_TT', which 'fit.fixed' holds fixed");
     check_error(FIT_OF("{\"fit_radius\":1}"), "fit.fit_radius", "true, false or an object of lower_um and upper_um");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5}}}"), "fit.priors.beta_R.se", "missing");
-    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 10");
+    check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 30");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":0}}}"), "fit.priors.beta_R.se", "0");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"sd\":1}}}"), "fit.priors.beta_R.sd", "unknown field");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"fixed\":{\"beta_R\":5}}"), "fit.priors",
                 "fixed");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}},\"method\":\"published_sgd.v1\"}"), "fit.priors",
                 method_gauss_newton.id);
-    check_error(FIT_OF("{\"tied\":[{\"beta_TT\":1,\"gamma_TT\":0.2}],\"priors\":{\"gamma_TT\":{\"mean\":1,\"se\":1}}}"),
+    check_error(FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[{\"beta_TT\":1,\"gamma_TT\":0.2}],\"priors\":{\"gamma_"
+                       "TT\":{\"mean\":1,\"se\":1}}}"),
                 "fit.priors", "10 and 45");
     check_error(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":9,\"se\":0.01}}}"),
                 "fit.priors", "'beta_R' at 9 +- 0.01, its bounds are 2 and 4");
-    check_error(FIT_OF("{\"bounds\":{\"beta_TT\":[30,40]},\"tied\":[{\"beta_TT\":2,\"gamma_TT\":1}],"
-                       "\"priors\":{\"gamma_TT\":{\"mean\":10,\"se\":1}}}"),
-                "fit.priors", "'gamma_TT' at 10 +- 1, its bounds are 15 and 20");
+    check_error(
+        FIT_OF("{\"model\":\"two_lobe.v1\",\"bounds\":{\"beta_TT\":[30,40]},\"tied\":[{\"beta_TT\":2,\"gamma_TT\":1}],"
+               "\"priors\":{\"gamma_TT\":{\"mean\":10,\"se\":1}}}"),
+        "fit.priors", "'gamma_TT' at 10 +- 1, its bounds are 15 and 20");
     job_document_free(parse(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}}}")));
     check_error(FIT_OF("{\"nuisance\":{\"stray_light\":true},\"method\":\"published_sgd.v1\"}"), "fit.nuisance",
                 method_gauss_newton.id);
@@ -268,7 +274,8 @@ static void test_fit_option_errors(void **state)
 static void test_bounds_are_values(void **state)
 {
     (void)state;
-    struct job_document *d = parse(FIT_OF("{\"start\":{\"beta_TT\":45,\"gamma_TT\":1},\"fixed\":{\"C_TT\":0.999}}"));
+    struct job_document *d = parse(
+        FIT_OF("{\"model\":\"two_lobe.v1\",\"start\":{\"beta_TT\":45,\"gamma_TT\":1},\"fixed\":{\"C_TT\":0.999}}"));
     const struct scattering_model *m = scattering_find(d->model[0].id);
     assert_true(fabs(d->model[0].start[scattering_param_index(m, "beta_TT")] - 45.0) < 1e-9);
     assert_true(d->model[0].fixed[scattering_param_index(m, "C_TT.g")] == 0.999);

@@ -24,7 +24,7 @@ enum { N_ROW = 3, N_PATH = 1024 };
 
 #define CLOTH                                                                                                          \
     "\"sample\":\"s\",\"fibers\":{\"file\":\"a.txt\",\"tile_mm\":[0.2,0.2]},\"measurements\":{\"file\":\"a.csv\"},"    \
-    "\"fit\":{\"seed\":5%s}"
+    "\"fit\":{\"model\":\"two_lobe.v1\",\"seed\":5%s}"
 static const char fibers[] = "-0.01 0.05 0 0.02\n0.21 0.05 0 0.02\n\n-0.01 0.15 0 0.02\n0.21 0.15 0 0.02\n\n"
                              "0.05 -0.01 0.05 0.02\n0.05 0.21 0.05 0.02\n\n0.15 -0.01 0.05 0.02\n0.15 0.21 0.05 0.02\n";
 static const char rows[] =
