@@ -13,6 +13,7 @@ void lobe_balance_init(struct lobe_balance *b)
         double c = cos(i * h);
         b->weight[i] = c * c * h * (i == 0 ? 0.5 : 1); /* the weight of the pole is 0 */
     }
+    memset(b->share, 0, sizeof b->share); /* kernels of slope 0 read it before the caller sets it */
 }
 
 /* Light at t leaves about -t: at u with the difference angle (t - u) / 2, or folded (t + u) / 2, the other way round

@@ -20,7 +20,7 @@ struct lobe_balance {
     double want[LOBE_BALANCE_N], work[LOBE_BALANCE_N], source[LOBE_BALANCE_N];
 };
 
-/* Fills in the weights. */
+/* Fills in the weights; the share is 0. */
 void lobe_balance_init(struct lobe_balance *b);
 /* Angle of node i, or of the distance of so many nodes. */
 double lobe_balance_angle_rad(int i);

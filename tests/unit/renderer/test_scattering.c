@@ -9,6 +9,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 
+#include <malloc.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -355,6 +356,31 @@ static void textile_rise_in_closed_form(void **unused)
     }
 }
 
+/* With new memory full of NaN (every byte 0xff) a model is what it is otherwise. */
+static void memory_is_not_read_before_it_is_set(void **state)
+{
+    enum { NO_BYTES = 0, BYTES_FF = 0x100 }; /* glibc fills with the complement of the low byte */
+    const float wi[3] = {0.3f, 0.9f, -0.3f}, wo[3] = {-0.4f, 0.2f, 0.9f};
+    (void)state;
+    for (size_t i = 0; scattering_registry()[i] != NULL; i++) {
+        const struct scattering_model *m = scattering_registry()[i];
+        double param[SCATTERING_MAX_PARAM];
+        float rgb[2][3], score[2][3 * SCATTERING_MAX_PARAM];
+        memset(score, 0, sizeof score);
+        for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
+        for (int k = 0; k < 2; k++) {
+            mallopt(M_PERTURB, k == 0 ? NO_BYTES : BYTES_FF);
+            struct scattering_state *s = prepare(m, param);
+            mallopt(M_PERTURB, NO_BYTES);
+            m->eval(s, wi, wo, rgb[k], score[k]);
+            m->release(s);
+        }
+        if (!(rgb[1][0] > 0) || memcmp(rgb[0], rgb[1], sizeof rgb[0]) != 0 ||
+            memcmp(score[0], score[1], sizeof score[0]) != 0)
+            fail_msg("%s: S = %g with clean memory, %g without", m->id, (double)rgb[0][0], (double)rgb[1][0]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -368,6 +394,7 @@ int main(void)
         cmocka_unit_test(agrees_with_reference),
         cmocka_unit_test(scores_against_differences),
         cmocka_unit_test(nothing_is_nan),
+        cmocka_unit_test(memory_is_not_read_before_it_is_set),
         cmocka_unit_test(reciprocal_models_are),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
