@@ -2,6 +2,7 @@
 again and again ends with the same bits."""
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -59,6 +60,22 @@ def sample(tmp_path_factory):
 
 def photographs(sample):
     return json.loads((sample / "photographs.json").read_text())
+
+
+def test_a_budget_that_cannot_be_kept_is_said(tmp_path, sample):
+    """Screening of the contained model's result, joint fit with its differences and final fit count."""
+    def warnings_of(name, budget):
+        job = make_job(tmp_path, name, sample)
+        result = run(job, cloth=cloth(**FITTED), photographs=photographs(sample),
+                     fit={"models": ["two_lobe.v1", "two_lobe_diffuse.v1"], "path_budget": budget, "max_iterations": 2, **OUTPUT})
+        return result, [w for w in result["warnings"] if w.startswith("fit.path_budget")]
+
+    _, said = warnings_of("less", 1000)
+    least = [int(re.search(r"takes up to (\d+) all the same: that is the least with numbers of the cloth", w).group(1)) for w in said]
+    fit = least[0] // 6  # of one fit: twice for the joint fit, as often for its differences, twice for the final fit
+    assert least == [6 * fit, (3 * 12 + 4 + 4) * fit]
+    result, said = warnings_of("least", max(least))
+    assert said == [] and all(m["n_path_fit"] <= max(least) for m in result["models"])
 
 
 def test_numbers_come_back(tmp_path, sample):

@@ -365,8 +365,7 @@ static void memory_is_not_read_before_it_is_set(void **state)
     for (size_t i = 0; scattering_registry()[i] != NULL; i++) {
         const struct scattering_model *m = scattering_registry()[i];
         double param[SCATTERING_MAX_PARAM];
-        float rgb[2][3], score[2][3 * SCATTERING_MAX_PARAM];
-        memset(score, 0, sizeof score);
+        float rgb[2][3], score[2][3 * SCATTERING_MAX_PARAM] = {{0}};
         for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
         for (int k = 0; k < 2; k++) {
             mallopt(M_PERTURB, k == 0 ? NO_BYTES : BYTES_FF);

@@ -1,6 +1,7 @@
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "base/option_id.h"
 #include "optimizer/job/option_key.h"
+#include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/worker/stages/fit/pipeline_nesting.h"
 
@@ -8,7 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Least number of paths that all starts of a model's fit take together. */
+/* Least number of paths that all starts of a model's fit take together, and the search over the cloth's numbers. */
 static status least_budget(const struct pipeline_context *c, size_t i_model, uint64_t *least, struct error *err)
 {
     const struct pipeline_model *m = &c->model[i_model];
@@ -23,8 +24,10 @@ static status least_budget(const struct pipeline_context *c, size_t i_model, uin
                                         .parameter = layout->parameter,
                                         .observation = &c->row,
                                         .max_iteration = c->doc->max_iteration};
-    size_t n_start = option.n_start + pipeline_n_nested_start(c, i_model);
-    *least = s == STATUS_OK && method != NULL ? method->least_budget(&problem) * n_start : 0;
+    size_t n_nested = pipeline_n_nested_start(c, i_model);
+    uint64_t of_one = s == STATUS_OK && method != NULL ? method->least_budget(&problem) : 0;
+    *least = c->number.n > 0 ? pipeline_cloth_least_budget(c, of_one, option.n_start, n_nested)
+                             : of_one * (option.n_start + n_nested);
     free(layout);
     return s;
 }
@@ -37,12 +40,15 @@ status pipeline_warn_budget(struct pipeline_context *c, struct error *err)
         status s = least_budget(c, i, &least, err);
         if (s != STATUS_OK) return s;
         if (least <= c->doc->path_budget) continue;
-        worker_status_warn(
-            c->status,
-            "%s: %" PRIu64 " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
-            " all the same: that is the least%s",
-            job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method, c->fitted.n,
-            least, m->option->n_start + pipeline_n_nested_start(c, i) > 1 ? " for so many starts" : "");
+        worker_status_warn(c->status,
+                           "%s: %" PRIu64
+                           " paths are too few, the fit of %s by %s to these %zu rows takes up to %" PRIu64
+                           " all the same: that is the least%s",
+                           job_option_key(OPTION_PATH_BUDGET), c->doc->path_budget, m->appearance.id, c->doc->method,
+                           c->fitted.n, least,
+                           c->number.n > 0                                          ? " with numbers of the cloth"
+                           : m->option->n_start + pipeline_n_nested_start(c, i) > 1 ? " for so many starts"
+                                                                                    : "");
     }
     return STATUS_OK;
 }

@@ -11,8 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the job states no path budget, that of the method is multiplied by this. */
-enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6 };
+/* BUDGET_FACTOR: where the job states no path budget, that of the method is multiplied by it. LEAST_FITS: joint and
+ * final fit have at least so many times the least paths of the method. */
+enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6, LEAST_FITS = 2 };
 /* Shares of the paths: at most, and of the final fit. */
 static const double screen_share = 0.3, final_share = 0.15;
 
@@ -219,13 +220,27 @@ void pipeline_cloth_close(struct pipeline_cloth_trace *t)
 
 /* ---- the search ---- */
 
-/* Divides the paths between screening, joint fit, whose estimates trace n_free cloths for their differences, and final
- * fit. Extra starts are screened however small the budget is. */
+/* Numbers that are fitted: each estimate of the joint fit traces so many more cloths, for the differences. */
+static double n_free_number(const struct pipeline_context *c)
+{
+    double n_free = 0.0;
+    for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
+    return n_free;
+}
+
+uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t least, size_t n_start, size_t n_extra)
+{
+    double n_screen = n_extra > 0 ? 1.0 + (double)n_extra : 0.0, n_final = n_extra > 0 ? 2.0 : 1.0;
+    double joint = fmax(LEAST_FITS, (double)n_start) * (1.0 + n_free_number(c));
+    return (uint64_t)((2.0 * SCREEN_ITERATIONS * n_screen + joint + LEAST_FITS * n_final) * (double)least);
+}
+
+/* Divides the paths between screening, joint fit and final fit. Extra starts are screened however small the budget is.
+ */
 static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
                         struct fit_problem *problem, struct cloth_search *q)
 {
-    double n_free = 0.0, least = (double)method->least_budget(problem);
-    for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
+    double n_free = n_free_number(c), least = (double)method->least_budget(problem);
     double whole =
         (double)(c->doc->path_budget > 0 ? c->doc->path_budget : BUDGET_FACTOR * method->info->default_path_budget);
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
@@ -233,9 +248,9 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));
     q->n_screen = n_screen >= 2.0 ? (size_t)n_screen : 0;
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
-    q->final_budget = (uint64_t)fmax(final_share * whole, 2.0 * least);
+    q->final_budget = (uint64_t)fmax(final_share * whole, LEAST_FITS * least);
     double left = (1.0 - final_share) * whole - (double)q->n_screen * per_cloth;
-    problem->path_budget = (uint64_t)fmax(left / (1.0 + n_free), 2.0 * least);
+    problem->path_budget = (uint64_t)fmax(left / (1.0 + n_free), LEAST_FITS * least);
     q->screen_share = 0.25;
     q->final_share = 0.15;
 }
