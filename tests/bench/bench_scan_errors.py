@@ -53,7 +53,8 @@ def fit(arguments, folder, source, seed, photographs, option):
     """Fits the cloth of `source` (scan or truth); returns the rows of parameters with their true values."""
     cloth = {"scan": {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}}, "truth": {"fibers": {"file": "truth.hair"}}}[source]
     files = [os.path.join(folder, f) for f in [{"scan": "scan.tif", "truth": "truth.hair"}[source]] + [p["file"] for p in photographs]]
-    document = {"sample": f"{source} {seed}", **cloth, "photographs": photographs, "fit": dict({"model": "two_lobe.v1", "seed": seed, "render_px": 16, "render_samples": 4}, **option)}
+    given = dict({"model": "two_lobe.v1", "seed": seed, "render_px": 16, "render_samples": 4}, **option)
+    document = {"sample": f"{source} {seed}", **cloth, "photographs": photographs, "fit": given}
     result, seconds = run_job(arguments.build, os.path.join(folder, source), document, files)
     with open(os.path.join(folder, "truth.json"), encoding="utf-8") as f:
         truth = json.load(f)["parameter"]

@@ -106,7 +106,8 @@ def test_parameters_of_two_groups(real, browser, tmp_path):
     (tmp_path / "rows.csv").write_text(small_cloth.TABLE)
     (tmp_path / "job.json").write_text(json.dumps({
         "sample": "two colours", "fibers": {"file": "cloth.hair", "groups": ["weft", "warp"]}, "measurements": {"file": "rows.csv"},
-        "fit": {"model": "two_lobe.v1", "path_budget": 100000, "tied": [["beta_TT"], ["gamma_TT"]], "fixed": {"weft.beta_R": 5}, "render_px": 16, "render_samples": 4}}))
+        "fit": {"model": "two_lobe.v1", "path_budget": 100000, "tied": [["beta_TT"], ["gamma_TT"]], "fixed": {"weft.beta_R": 5},
+                "render_px": 16, "render_samples": 4}}))
     job = selvedge.Server(url).submit(str(tmp_path / "job.json"))
     job.wait()
     browser.get(f"{url}/#{job.id}")
