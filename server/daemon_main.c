@@ -1,6 +1,6 @@
 /* selvedged, the daemon: HTTP server, database of jobs and supervision of workers. It never reads volumes or
  * pictures and computes nothing; workers do. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/version.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"

@@ -20,7 +20,7 @@ columns:           ## no line of a C source is longer than 120 columns, comments
 	@/usr/bin/python3 tests/check_columns.py $(FORMATTED)
 
 # benchmarks and fuzzers, which no other target of continuous integration compiles, are part of it
-EVERY_PROGRAM = all build-tests $(BENCH_BINS) $(BUILD)/tests/bench/documentation_pictures $(call objs,$(wildcard tests/fuzz/*.c))
+EVERY_PROGRAM = all build-tests $(BENCH_BINS) $(BUILD)/tests/bench/pictures/documentation_pictures $(call objs,$(wildcard tests/fuzz/*.c))
 every-program: $(EVERY_PROGRAM)
 
 clang:             ## clang compiles every source, benchmarks and fuzzers too, without a warning (gcc does in every build)

@@ -1,6 +1,6 @@
 #include "clients/cli/cli_http.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <errno.h>
 #include <fcntl.h>

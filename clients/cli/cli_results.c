@@ -1,7 +1,7 @@
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_text.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <fcntl.h>
 #include <math.h>

@@ -3,7 +3,7 @@
 #include "clients/cli/cli_text.h"
 
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <math.h>
 #include <sodium.h>

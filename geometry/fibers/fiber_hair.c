@@ -1,5 +1,5 @@
 /* Reads and writes Cem Yuksel's .hair; docs/file-formats.md has the byte layout. All numbers are little-endian. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* Fibers as text: a line "x y z radius" or "x y z radius group" in millimetres for each vertex, and a blank line
  * between fibers (docs/file-formats.md). */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_GEOMETRY_CONSENSUS_H
 #define SELVEDGE_GEOMETRY_CONSENSUS_H
 
-#include "base/scratch_space.h"
+#include "base/files/scratch_space.h"
 #include "base/thread_pool.h"
 
 #include <stdbool.h>

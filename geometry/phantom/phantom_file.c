@@ -1,4 +1,4 @@
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/phantom/phantom.h"
 
 #include <errno.h>

@@ -4,11 +4,11 @@
  * The centre of voxel (i, j, k) is at (i + 1/2, j + 1/2, k + 1/2) * voxel_size_m; the corner of the grid is the
  * origin. The index of voxel (i, j, k) is (k * n[1] + j) * n[0] + i. The caller initialises and releases the
  * structs, which own their arrays. The arrays come from the scratch space, which may keep them in files
- * (base/scratch_space.h), or from malloc if space is NULL. */
+ * (base/files/scratch_space.h), or from malloc if space is NULL. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_H
 #define SELVEDGE_GEOMETRY_VOLUME_H
 
-#include "base/scratch_space.h"
+#include "base/files/scratch_space.h"
 #include "base/status.h"
 
 #include <stdint.h>

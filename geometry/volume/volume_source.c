@@ -1,7 +1,7 @@
 #include "geometry/volume/volume_source.h"
 #include "base/option_id.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/volume/format/raw_source.h"
 #include "geometry/volume/volume_reader.h"
 

@@ -1,7 +1,7 @@
 #include "geometry/volume/voxel_stream.h"
 #include "base/option_id.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <errno.h>
 #include <math.h>

@@ -1,6 +1,6 @@
 #include "optimizer/phantom/phantom_photographs.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/rng.h"
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/fit/photographs/observation.h"

@@ -1,5 +1,5 @@
 #include "optimizer/worker/pipeline_context.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
 #include "renderer/transport/light/environment.h"

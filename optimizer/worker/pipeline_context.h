@@ -5,9 +5,9 @@
 #define SELVEDGE_OPTIMIZER_PIPELINE_CONTEXT_H
 
 #include "base/catalogue/model_sets.h"
+#include "base/files/scratch_space.h"
 #include "base/log.h"
 #include "base/progress.h"
-#include "base/scratch_space.h"
 #include "base/thread_pool.h"
 #include "geometry/cloth/cloth.h"
 #include "geometry/fibers/fiber_set.h"

@@ -1,6 +1,6 @@
 /* Reads and checks the inputs of a job before its first stage: the document, the parameters of its models, the
  * observations. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/fit/photographs/observation_load.h"

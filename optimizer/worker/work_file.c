@@ -1,5 +1,5 @@
 #include "optimizer/worker/work_file.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <errno.h>
 #include <stdint.h>

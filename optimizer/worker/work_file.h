@@ -5,7 +5,7 @@
 #ifndef SELVEDGE_OPTIMIZER_WORK_FILE_H
 #define SELVEDGE_OPTIMIZER_WORK_FILE_H
 
-#include "base/scratch_space.h"
+#include "base/files/scratch_space.h"
 #include "base/status.h"
 
 enum { WORK_FILE_MAX_SECTION = 32, WORK_FILE_TAG_BYTES = 16 };

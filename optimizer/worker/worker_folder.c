@@ -1,5 +1,5 @@
 #include "optimizer/worker/worker_folder.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 
 #include <errno.h>

@@ -1,8 +1,8 @@
 /* selvedge-worker JOBDIR: one job from its folder to its results. Layout of the folder: optimizer/job/job_folder.h. */
 #include "base/log.h"
 #include "base/thread_pool.h"
-#include "optimizer/job/catalogue_json.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/json/catalogue_json.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/result_json.h"
 

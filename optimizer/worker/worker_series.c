@@ -1,5 +1,5 @@
 #include "optimizer/worker/worker_series.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"
 

@@ -1,6 +1,6 @@
 #include "optimizer/worker/worker_status.h"
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/utf8.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"

@@ -1,6 +1,6 @@
 /* Creates jobs, and replaces the documents of existing jobs. */
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_access.h"

@@ -2,7 +2,7 @@
  * An entry that cannot be processed is logged and skipped, because one bad folder must not make all other jobs
  * unavailable. */
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_service.h"

@@ -1,6 +1,6 @@
 #include "server/jobs/job_view.h"
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "server/jobs/job_paths.h"

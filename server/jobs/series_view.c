@@ -2,7 +2,7 @@
  * order. The records requested are found by bisection (record_seek), counted, and merged while they are read. So the
  * cost of a request depends on the size of its reply and not of the file, and memory holds only the points. */
 #include "server/jobs/series_view.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"

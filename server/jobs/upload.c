@@ -1,5 +1,5 @@
 #include "server/jobs/upload.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 

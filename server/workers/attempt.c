@@ -1,6 +1,6 @@
 #include "server/workers/attempt.h"
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"

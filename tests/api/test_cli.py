@@ -16,7 +16,7 @@ import pytest
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
 CLI = os.path.join(BUILD, "bin", "selvedge")
-STUB = os.path.join(ROOT, "tests", "support", "client_stub_worker.py")
+STUB = os.path.join(ROOT, "tests", "support", "python", "client_stub_worker.py")
 sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
 import selvedge  # noqa: E402
 

@@ -48,21 +48,21 @@ docs-fit-curve: | deps-test ## draw docs/images/fit-curve.svg anew: error agains
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@mkdir -p $(BUILD)/bench-fit docs/images
 	@$(BUILD)/tests/bench/bench_fit analytic > $(BUILD)/bench-fit/analytic.json
-	@/usr/bin/python3 tests/bench/plot_fit_curve.py $(BUILD)/bench-fit/analytic.json docs/images/fit-curve.svg
+	@/usr/bin/python3 tests/bench/pictures/plot_fit_curve.py $(BUILD)/bench-fit/analytic.json docs/images/fit-curve.svg
 
 docs-grazing: | deps-test ## draw docs/images/microflake-grazing.svg anew: what each model makes of grazing highlights (minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@mkdir -p $(BUILD)/bench-fit docs/images
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit grazing > $(BUILD)/bench-fit/grazing.json
-	@/usr/bin/python3 tests/bench/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
+	@/usr/bin/python3 tests/bench/pictures/plot_grazing.py $(BUILD)/bench-fit/grazing.json docs/images/microflake-grazing.svg
 
 docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,cloth-numbers}.png anew (minutes)
-	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/documentation_pictures $(BUILD)/tests/bench/cloth_pictures
-	@$(BUILD)/tests/bench/cloth_pictures weaves docs/images/cloth-weaves.png
-	@$(BUILD)/tests/bench/cloth_pictures numbers docs/images/cloth-numbers.png
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/documentation_pictures $(BUILD)/tests/bench/pictures/cloth_pictures
+	@$(BUILD)/tests/bench/pictures/cloth_pictures weaves docs/images/cloth-weaves.png
+	@$(BUILD)/tests/bench/pictures/cloth_pictures numbers docs/images/cloth-numbers.png
 	@mkdir -p docs/images
-	@$(BUILD)/tests/bench/documentation_pictures twill docs/images/twill.png
-	@$(BUILD)/tests/bench/documentation_pictures derivatives docs/images/derivatives.png
+	@$(BUILD)/tests/bench/pictures/documentation_pictures twill docs/images/twill.png
+	@$(BUILD)/tests/bench/pictures/documentation_pictures derivatives docs/images/derivatives.png
 
 bench-weave: | deps-test ## share of drawn weaves whose yarns and draft are found (3 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_weave >&2
@@ -80,5 +80,5 @@ docs-weave: $(BUILD)/bin/selvedge-phantom ## draw docs/images/weave-drafts.svg a
 		$< detect --photograph $(WEAVE_DATA)/$${n}_$$k.png --overlay $(BUILD)/docs-weave/$${n}_$$k.png >/dev/null || exit 1; done; \
 		$< detect --photograph $(WEAVE_DATA)/$${n}_R.png --photograph $(WEAVE_DATA)/$${n}_T.png \
 			> $(BUILD)/docs-weave/$$n.json || exit 1; done
-	@/usr/bin/python3 tests/bench/plot_weave.py docs/images/weave-drafts.svg \
+	@/usr/bin/python3 tests/bench/pictures/plot_weave.py docs/images/weave-drafts.svg \
 		$(foreach n,$(WEAVE_PAIRS),$(n)=$(BUILD)/docs-weave/$(n).json)

@@ -1,7 +1,7 @@
 /* Measured tables: figures fit.real.* and fit.real_all_rotations.* of bench_fit. */
 #include "base/angle.h"
 #include "base/catalogue/method_catalogue.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "tests/bench/fit_bench.h"
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
 from browser_page import ROOT, start_daemon, stop_daemon  # noqa: E402
 
 DRIVER = shutil.which("chromedriver") or "/usr/bin/chromedriver"
@@ -16,7 +16,7 @@ FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "-
 @pytest.fixture(scope="module")
 def stub(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stub")
-    process, url = start_daemon(folder, "--worker", os.path.join(ROOT, "tests", "support", "client_stub_worker.py"))
+    process, url = start_daemon(folder, "--worker", os.path.join(ROOT, "tests", "support", "python", "client_stub_worker.py"))
     yield url, folder
     stop_daemon(process)
 

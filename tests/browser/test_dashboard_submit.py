@@ -131,7 +131,7 @@ def test_form_edits_a_dropped_document(stub, browser):
 
 
 def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
-    process, url = start_daemon(tmp_path / "data", "--worker", os.path.join(ROOT, "tests", "support", "client_stub_worker.py"),
+    process, url = start_daemon(tmp_path / "data", "--worker", os.path.join(ROOT, "tests", "support", "python", "client_stub_worker.py"),
                                 "--set", f"upload.max_patch_bytes={1 << 20}")
     try:
         _, sample = submit(url, tmp_path, "large twill")

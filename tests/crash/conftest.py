@@ -3,14 +3,14 @@ import sys
 
 import pytest
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
 from daemon_under_test import Daemon  # noqa: E402
 from system_calls import build_shim  # noqa: E402
 
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory):
-    """One daemon for all tests of a file. Its worker is tests/support/fake_worker.py."""
+    """One daemon for all tests of a file. Its worker is tests/support/python/fake_worker.py."""
     with Daemon(tmp_path_factory.mktemp("daemon") / "data") as d:
         yield d
 
@@ -31,5 +31,5 @@ def daemon_maker(tmp_path):
 
 @pytest.fixture(scope="module")
 def shim(tmp_path_factory):
-    """The library that makes system calls fail or records them (support/system_calls.py)."""
+    """The library that makes system calls fail or records them (support/python/system_calls.py)."""
     return build_shim(tmp_path_factory.mktemp("shim"))

@@ -1,7 +1,7 @@
 /* The MetaImage format: a text header "Key = value" (.mhd) with the data in a file beside it, or header and data in
  * one file (.mha, ElementDataFile = LOCAL). Lengths are in DistanceUnits, by default millimetres. Compressed data is
  * zlib's. Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/volume_reader.h"
 #include "geometry/volume/voxel_stream.h"

@@ -2,7 +2,7 @@
  * file beside it (.nhdr). Supported are three dimensions of scalars and the encodings raw and gzip. Lengths come
  * from "spacings" or from the lengths of "space directions", in the stated unit or by default in millimetres.
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/volume_reader.h"
 #include "geometry/volume/voxel_stream.h"

@@ -1,7 +1,7 @@
 #include "geometry/volume/format/raw_source.h"
 #include "base/option_id.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>

@@ -1,7 +1,7 @@
 /* TIFF volumes: one multi-page file, or several files in order. libtiff decodes them, so all its compressions are
  * supported. Its messages go to a handler per file handle (TIFFOpenOptions, libtiff 4.5) and from there into our
  * error texts. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/format/tiff_page.h"
 #include "geometry/volume/volume_reader.h"

@@ -1,7 +1,7 @@
 #include "geometry/volume/format/vol_file.h"
 #include "base/option_id.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/volume/volume_reader.h"
 
 #include <endian.h>

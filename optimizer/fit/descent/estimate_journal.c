@@ -1,6 +1,6 @@
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "base/clock.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <errno.h>
 #include <fcntl.h>

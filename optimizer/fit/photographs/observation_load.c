@@ -1,5 +1,5 @@
 #include "optimizer/fit/photographs/observation_load.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/fit/photographs/photograph.h"

@@ -1,6 +1,6 @@
 #include "optimizer/fit/photographs/photograph.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "optimizer/fit/photographs/photograph_contrast.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/fit/photographs/photograph.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* 8/16-bit PNG through libpng. Its longjmp stays in this file. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "optimizer/fit/photographs/photograph.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* Checks of the set-up, of the measurements, and of the document as a whole. */
 #include "optimizer/job/job_document.h"
-#include "optimizer/job/json_field.h"
+#include "optimizer/job/json/json_field.h"
 #include "optimizer/job/options/option_checks.h"
 
 #include <stdio.h>

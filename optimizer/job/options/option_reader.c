@@ -1,5 +1,5 @@
 #include "optimizer/job/options/option_reader.h"
-#include "optimizer/job/json_field.h"
+#include "optimizer/job/json/json_field.h"
 #include "optimizer/job/options/option_table.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 #include "optimizer/worker/report/result_pictures.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/volume/format/vol_file.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"

@@ -1,6 +1,6 @@
 #include "tests/support/cloth/fit_phantom.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/rng.h"
 #include "geometry/fibers/voxelise.h"
 #include "optimizer/fit/objective/objective.h"

@@ -1,6 +1,6 @@
 #include "tests/support/cloth/kept_estimate.h"
 
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <stdio.h>
 #include <stdlib.h>

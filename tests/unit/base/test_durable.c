@@ -1,5 +1,5 @@
 /* Replacement of whole files, and record files: which data survive a failure, and which damage is detected. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "tests/support/scratch_folder.h"
 
 #include <errno.h>

@@ -1,6 +1,6 @@
 /* Arrays beyond the memory limit are kept in files. Their contents are the same after they leave memory, the resident
  * memory stays within the limit, and a disk that is too small gives an error. */
-#include "base/scratch_space.h"
+#include "base/files/scratch_space.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <setjmp.h>

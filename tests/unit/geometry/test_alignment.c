@@ -1,6 +1,6 @@
 /* Main directions of cloths that are turned and sheared by known matrices, and the choice of a box that tiles. */
 #include "base/angle.h"
-#include "base/scratch_space.h"
+#include "base/files/scratch_space.h"
 #include "geometry/orientation/alignment.h"
 #include "geometry/orientation/repeat_direction.h"
 #include "geometry/reconstruct.h"

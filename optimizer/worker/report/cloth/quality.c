@@ -1,5 +1,5 @@
 #include "optimizer/worker/report/cloth/quality.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom.h"
 #include "optimizer/job/job_folder.h"

@@ -1,7 +1,7 @@
 #include "optimizer/worker/report/cloth/result_cloth.h"
 
 #include "base/angle.h"
-#include "optimizer/job/cloth_json.h"
+#include "optimizer/job/json/cloth_json.h"
 #include "optimizer/worker/report/json_number.h"
 
 static json_t *numbers_json(const struct cloth_description *d, const double *number)

@@ -1,7 +1,7 @@
 /* The set-up of a job, from its document to the estimates that a fit is made from, against the same set-up put together
  * by hand: kind of lamp, camera, environments, shared camera paths. */
 #include "base/angle.h"
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"

@@ -1,5 +1,5 @@
 /* Files of the worker: checkpoints, the lock of a job folder, the series of a resumed fit, the inputs. */
-#include "base/durable.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/pipeline_context.h"

@@ -1,4 +1,4 @@
-#include "geometry/weave/weave_streaks.h"
+#include "geometry/weave/spectrum/weave_streaks.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
 BIN = os.path.join(BUILD, "bin")
 sys.path.insert(0, os.path.join(ROOT, "clients", "python"))

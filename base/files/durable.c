@@ -1,4 +1,4 @@
-#include "base/durable.h"
+#include "base/files/durable.h"
 
 #include <errno.h>
 #include <fcntl.h>

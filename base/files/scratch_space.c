@@ -1,4 +1,4 @@
-#include "base/scratch_space.h"
+#include "base/files/scratch_space.h"
 
 #include <errno.h>
 #include <fcntl.h>

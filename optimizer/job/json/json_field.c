@@ -1,4 +1,4 @@
-#include "optimizer/job/json_field.h"
+#include "optimizer/job/json/json_field.h"
 
 #include <math.h>
 #include <stdio.h>

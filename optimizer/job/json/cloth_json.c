@@ -1,4 +1,4 @@
-#include "optimizer/job/cloth_json.h"
+#include "optimizer/job/json/cloth_json.h"
 
 json_t *cloth_draft_json(const struct cloth_description *d)
 {

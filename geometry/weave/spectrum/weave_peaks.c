@@ -1,4 +1,4 @@
-#include "geometry/weave/weave_peaks.h"
+#include "geometry/weave/spectrum/weave_peaks.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-#include "optimizer/job/catalogue_json.h"
+#include "optimizer/job/json/catalogue_json.h"
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/model_catalogue.h"
 #include "base/catalogue/stop_reason.h"

@@ -13,9 +13,9 @@ import requests
 
 from openapi_check import OpenApiCheck
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 BUILD = os.path.join(ROOT, os.environ.get("SELVEDGE_BUILD") or "build")
-FAKE_WORKER = os.path.join(ROOT, "tests", "support", "fake_worker.py")
+FAKE_WORKER = os.path.join(ROOT, "tests", "support", "python", "fake_worker.py")
 TUS = {"Tus-Resumable": "1.0.0"}
 DOCUMENT = {"sample": "fake: succeed", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
             "measurements": {"file": "rows.csv"}}

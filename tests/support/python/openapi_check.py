@@ -6,7 +6,7 @@ import re
 
 import jsonschema
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 METHODS = ("get", "put", "post", "delete", "head", "patch", "options")
 # replies that any request can get (docs/api.md, Errors): bad framing, Host or Origin, and errors of the machine
 GENERAL = {"400", "403", "500", "503", "507"}

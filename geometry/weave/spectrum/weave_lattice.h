@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_GEOMETRY_WEAVE_LATTICE_H
 #define SELVEDGE_GEOMETRY_WEAVE_LATTICE_H
 
-#include "geometry/weave/weave_peaks.h"
+#include "geometry/weave/spectrum/weave_peaks.h"
 
 enum { WEAVE_LATTICE_MAX = 4 };
 

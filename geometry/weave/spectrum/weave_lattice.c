@@ -1,4 +1,4 @@
-#include "geometry/weave/weave_lattice.h"
+#include "geometry/weave/spectrum/weave_lattice.h"
 
 #include <math.h>
 #include <stdbool.h>
