@@ -3,8 +3,8 @@
  * zlib's. Source: the MetaIO documentation (itk.org/Wiki/MetaIO). */
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "geometry/volume/format/volume_header.h"
 #include "geometry/volume/volume_reader.h"
-#include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
 #include <errno.h>
@@ -13,21 +13,15 @@
 #include <string.h>
 #include <strings.h>
 
-enum { MAX_HEADER_BYTES = 65536 };
-
 struct metaimage {
-    char *name; /* of the header file, for errors */
-    char *data_path;
-    struct voxel_layout layout;
+    struct volume_header header;
     double spacing[3], unit_m; /* metres per unit of spacing */
     bool is_local, has_type, has_size, has_data;
-    struct voxel_stream *stream;
 };
 
 static status bad(const struct metaimage *m, struct error *err, const char *what, const char *value)
 {
-    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s '%s'", m->name, what,
-                           value);
+    return volume_header_refuse(&m->header, what, value, err);
 }
 
 static const struct {
@@ -43,7 +37,7 @@ static status parse_element(struct metaimage *m, const char *value, struct error
 {
     for (size_t i = 0; i < sizeof element / sizeof *element; i++)
         if (strcmp(value, element[i].name) == 0) {
-            m->layout.sample = element[i].type;
+            m->header.layout.sample = element[i].type;
             m->has_type = true;
             return STATUS_OK;
         }
@@ -52,18 +46,9 @@ static status parse_element(struct metaimage *m, const char *value, struct error
 
 static status parse_size(struct metaimage *m, const char *value, struct error *err)
 {
-    const char *p = value;
-    for (int a = 0; a < 3; a++) {
-        char *end;
-        errno = 0;
-        unsigned long long n = strtoull(p, &end, 10);
-        if (end == p || errno != 0 || n == 0 || n > VOXEL_STREAM_MAX_EDGE || strchr(value, '-') != NULL)
-            return bad(m, err, "DimSize is not three positive numbers:", value);
-        m->layout.n[a] = (size_t)n;
-        p = end;
-    }
+    const char *end;
     m->has_size = true;
-    return STATUS_OK;
+    return volume_header_sizes(&m->header, value, "DimSize is not three positive numbers:", &end, err);
 }
 
 static status parse_spacing(struct metaimage *m, const char *value, struct error *err)
@@ -99,16 +84,12 @@ static status parse_data_file(struct metaimage *m, const char *header_path, cons
     m->has_data = true;
     if (strcmp(value, "LOCAL") == 0 || strcmp(value, "Local") == 0) {
         m->is_local = true;
-        m->data_path = strdup(header_path);
-        return m->data_path != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+        m->header.data_path = strdup(header_path);
+        return m->header.data_path != NULL ? STATUS_OK
+                                           : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     }
-    if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
-        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': data in a list of files is not supported", m->name);
-    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not refer to files outside its own folder */
-        return bad(m, err, "ElementDataFile must be a file beside the header, not", value);
-    m->data_path = voxel_stream_beside(header_path, value);
-    return m->data_path != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+    return volume_header_data_file(&m->header, header_path, value,
+                                   "ElementDataFile must be a file beside the header, not", err);
 }
 
 static bool is_true(const char *value) { return value[0] == 'T' || value[0] == 't' || value[0] == '1'; }
@@ -124,11 +105,11 @@ static status parse_line(struct metaimage *m, const char *header_path, const cha
     if (strcmp(key, "ElementSize") == 0) return isnan(m->spacing[0]) ? parse_spacing(m, value, err) : STATUS_OK;
     if (strcmp(key, "DistanceUnits") == 0) return parse_unit(m, value, err);
     if (strcmp(key, "ElementByteOrderMSB") == 0 || strcmp(key, "BinaryDataByteOrderMSB") == 0) {
-        m->layout.swap = is_true(value) != (BYTE_ORDER == BIG_ENDIAN);
+        m->header.layout.swap = is_true(value) != (BYTE_ORDER == BIG_ENDIAN);
         return STATUS_OK;
     }
     if (strcmp(key, "CompressedData") == 0) {
-        m->layout.compressed = is_true(value);
+        m->header.layout.compressed = is_true(value);
         return STATUS_OK;
     }
     if (strcmp(key, "BinaryData") == 0)
@@ -137,9 +118,9 @@ static status parse_line(struct metaimage *m, const char *header_path, const cha
         return strcmp(value, "1") == 0 ? STATUS_OK : bad(m, err, "one channel expected, not", value);
     if (strcmp(key, "HeaderSize") == 0) {
         char *end;
-        m->layout.offset_bytes = strtoll(value, &end, 10);
-        return end != value && m->layout.offset_bytes >= -1 ? STATUS_OK
-                                                            : bad(m, err, "HeaderSize is not valid:", value);
+        m->header.layout.offset_bytes = strtoll(value, &end, 10);
+        return end != value && m->header.layout.offset_bytes >= -1 ? STATUS_OK
+                                                                   : bad(m, err, "HeaderSize is not valid:", value);
     }
     if (strcmp(key, "ElementDataFile") == 0) return parse_data_file(m, header_path, value, err);
     return STATUS_OK; /* other keys do not concern the voxels */
@@ -150,7 +131,7 @@ static status parse_header(struct metaimage *m, const char *path, FILE *file, st
 {
     char line[4096];
     while (!m->has_data && fgets(line, sizeof line, file) != NULL) {
-        if (ftell(file) > MAX_HEADER_BYTES) break;
+        if (ftell(file) > VOLUME_HEADER_MAX_BYTES) break;
         char *equal = strchr(line, '=');
         if (equal == NULL) continue;
         char *key_end = equal, *key = line + strspn(line, " \t"), *value = equal + 1 + strspn(equal + 1, " \t");
@@ -172,9 +153,7 @@ static void metaimage_close(void *handle)
 {
     struct metaimage *m = handle;
     if (m == NULL) return;
-    voxel_stream_close(m->stream);
-    free(m->name);
-    free(m->data_path);
+    volume_header_release(&m->header);
     free(m);
 }
 
@@ -183,31 +162,28 @@ static status metaimage_open(const char *const *path, size_t n_path, void **hand
 {
     struct metaimage *m = calloc(1, sizeof *m);
     status s = STATUS_OK;
-    if (m != NULL) m->name = strdup(path_file_name(path[0]));
-    if (m == NULL || m->name == NULL) {
-        s = error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
-        goto fail;
-    }
+    if (m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
+    s = volume_header_init(&m->header, path[0], err);
+    if (s != STATUS_OK) goto fail;
     m->spacing[0] = m->spacing[1] = m->spacing[2] = NAN;
     m->unit_m = 1e-3;
     FILE *header = fopen(path[0], "rbe");
     if (header == NULL) {
-        s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->name);
+        s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->header.name);
         goto fail;
     }
     s = parse_header(m, path[0], header, err);
-    if (s == STATUS_OK && m->is_local) m->layout.offset_bytes = ftell(header);
-    if (m->layout.compressed && m->layout.offset_bytes < 0) m->layout.offset_bytes = 0;
+    if (s == STATUS_OK && m->is_local) m->header.layout.offset_bytes = ftell(header);
+    if (m->header.layout.compressed && m->header.layout.offset_bytes < 0) m->header.layout.offset_bytes = 0;
     fclose(header);
     if (s == STATUS_OK && n_path > 1) /* uploads name the data file as well; other files are an error */
         for (size_t i = 1; i < n_path && s == STATUS_OK; i++)
-            if (strcmp(path[i], m->data_path) != 0)
+            if (strcmp(path[i], m->header.data_path) != 0)
                 s = bad(m, err, "its ElementDataFile is not", path_file_name(path[i]));
-    if (s == STATUS_OK) s = voxel_stream_open(m->name, m->data_path, &m->layout, &m->stream, err);
-    if (s == STATUS_OK) s = voxel_stream_check_order(m->stream, err);
+    if (s == STATUS_OK) s = volume_header_open_data(&m->header, err);
     if (s != STATUS_OK) goto fail;
-    *info = (struct volume_source_info){.sample = sample_name(m->layout.sample)};
-    memcpy(info->n, m->layout.n, sizeof info->n);
+    *info = (struct volume_source_info){.sample = sample_name(m->header.layout.sample)};
+    memcpy(info->n, m->header.layout.n, sizeof info->n);
     for (int a = 0; a < 3; a++) info->voxel_size_m[a] = m->spacing[a] * m->unit_m;
     *handle = m;
     return STATUS_OK;
@@ -219,7 +195,7 @@ fail:
 static status metaimage_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err)
 {
     struct metaimage *m = handle;
-    return voxel_stream_read(m->stream, i_slice, n_slice, value, err);
+    return voxel_stream_read(m->header.stream, i_slice, n_slice, value, err);
 }
 
 static bool metaimage_recognise(const uint8_t b[16], const char *path)

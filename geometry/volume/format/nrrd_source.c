@@ -4,8 +4,8 @@
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "geometry/volume/format/volume_header.h"
 #include "geometry/volume/volume_reader.h"
-#include "geometry/volume/voxel_stream.h"
 
 #include <endian.h>
 #include <errno.h>
@@ -14,22 +14,16 @@
 #include <string.h>
 #include <strings.h>
 
-enum { MAX_HEADER_BYTES = 65536 };
-
 struct nrrd {
-    char *name;      /* of the header file, for errors */
-    char *data_path; /* detached data, or NULL */
-    struct voxel_layout layout;
+    struct volume_header header; /* data_path: NULL until open_parsed where the data follows the header */
     double spacing[3], direction_length[3], unit_m[3];
     long long line_skip, byte_skip;
     bool has_dimension, has_size, has_type, has_endian, big_endian, has_encoding;
-    struct voxel_stream *stream;
 };
 
 static status bad(const struct nrrd *m, struct error *err, const char *what, const char *value)
 {
-    return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES, "cannot read volume '%s': %s '%.100s'", m->name, what,
-                           value);
+    return volume_header_refuse(&m->header, what, value, err);
 }
 
 static const struct {
@@ -70,7 +64,7 @@ static status parse_type(struct nrrd *m, const char *value, struct error *err)
 {
     for (size_t i = 0; i < sizeof type_name / sizeof *type_name; i++)
         if (strcasecmp(value, type_name[i].name) == 0) {
-            m->layout.sample = type_name[i].type;
+            m->header.layout.sample = type_name[i].type;
             m->has_type = true;
             return STATUS_OK;
         }
@@ -85,17 +79,11 @@ static status parse_dimension(struct nrrd *m, const char *value, struct error *e
 
 static status parse_sizes(struct nrrd *m, const char *value, struct error *err)
 {
-    const char *p = value;
-    for (int a = 0; a < 3; a++) {
-        char *end;
-        errno = 0;
-        unsigned long long n = strtoull(p, &end, 10);
-        if (end == p || errno != 0 || n == 0 || n > VOXEL_STREAM_MAX_EDGE || strchr(value, '-') != NULL)
-            return bad(m, err, "sizes are not three positive numbers:", value);
-        m->layout.n[a] = (size_t)n;
-        p = end;
-    }
-    if (p[strspn(p, " \t")] != '\0') return bad(m, err, "sizes are not three positive numbers:", value);
+    static const char complaint[] = "sizes are not three positive numbers:";
+    const char *end;
+    status s = volume_header_sizes(&m->header, value, complaint, &end, err);
+    if (s != STATUS_OK) return s;
+    if (end[strspn(end, " \t")] != '\0') return bad(m, err, complaint, value);
     m->has_size = true;
     return STATUS_OK;
 }
@@ -175,11 +163,11 @@ static status parse_units(struct nrrd *m, const char *value, struct error *err)
 static status parse_encoding(struct nrrd *m, const char *value, struct error *err)
 {
     m->has_encoding = true;
-    m->layout.compressed = strcasecmp(value, "gzip") == 0 || strcasecmp(value, "gz") == 0;
-    if (m->layout.compressed || strcasecmp(value, "raw") == 0) return STATUS_OK;
+    m->header.layout.compressed = strcasecmp(value, "gzip") == 0 || strcasecmp(value, "gz") == 0;
+    if (m->header.layout.compressed || strcasecmp(value, "raw") == 0) return STATUS_OK;
     return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
                            "cannot read volume '%s': encoding '%.40s' is not supported; save it as raw or gzip",
-                           m->name, value);
+                           m->header.name, value);
 }
 
 static status parse_endian(struct nrrd *m, const char *value, struct error *err)
@@ -188,19 +176,6 @@ static status parse_endian(struct nrrd *m, const char *value, struct error *err)
     m->big_endian = strcasecmp(value, "big") == 0;
     return m->big_endian || strcasecmp(value, "little") == 0 ? STATUS_OK
                                                              : bad(m, err, "endian must be little or big, not", value);
-}
-
-static status parse_data_file(struct nrrd *m, const char *path, const char *value, struct error *err)
-{
-    if (strchr(value, '%') != NULL || strncmp(value, "LIST", 4) == 0)
-        return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': data in a list of files is not supported", m->name);
-    if (strncmp(value, "./", 2) == 0) value += 2;
-    if (strchr(value, '/') != NULL || value[0] == '\0') /* a header must not refer to files outside its own folder */
-        return bad(m, err, "the data file must be beside the header, not", value);
-    free(m->data_path);
-    m->data_path = voxel_stream_beside(path, value);
-    return m->data_path != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
 }
 
 static status parse_skip(struct nrrd *m, const char *value, long long least, long long *skip, struct error *err)
@@ -224,7 +199,7 @@ static status parse_field(struct nrrd *m, const char *path, const char *key, con
     if (strcasecmp(key, "encoding") == 0) return parse_encoding(m, value, err);
     if (strcasecmp(key, "endian") == 0) return parse_endian(m, value, err);
     if (strcasecmp(key, "data file") == 0 || strcasecmp(key, "datafile") == 0)
-        return parse_data_file(m, path, value, err);
+        return volume_header_data_file(&m->header, path, value, "the data file must be beside the header, not", err);
     if (strcasecmp(key, "line skip") == 0 || strcasecmp(key, "lineskip") == 0)
         return parse_skip(m, value, 0, &m->line_skip, err);
     if (strcasecmp(key, "byte skip") == 0 || strcasecmp(key, "byteskip") == 0)
@@ -239,9 +214,10 @@ static status check_complete(const struct nrrd *m, struct error *err)
                           : !m->has_type     ? "type"
                           : !m->has_encoding ? "encoding"
                                              : NULL;
-    if (missing == NULL && !m->has_endian && sample_bytes(m->layout.sample) > 1) missing = "endian";
+    if (missing == NULL && !m->has_endian && sample_bytes(m->header.layout.sample) > 1) missing = "endian";
     if (missing != NULL) return bad(m, err, "the header lacks", missing);
-    if (m->layout.compressed && m->byte_skip < 0) return bad(m, err, "compressed data cannot have byte skip", "-1");
+    if (m->header.layout.compressed && m->byte_skip < 0)
+        return bad(m, err, "compressed data cannot have byte skip", "-1");
     return STATUS_OK;
 }
 
@@ -254,7 +230,7 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
         return bad(m, err, "it does not begin with", "NRRD000");
     while (!ended && fgets(line, sizeof line, file) != NULL) {
         size_t n = strlen(line);
-        if (n + 1 == sizeof line || ftell(file) > MAX_HEADER_BYTES)
+        if (n + 1 == sizeof line || ftell(file) > VOLUME_HEADER_MAX_BYTES)
             return bad(m, err, "the header does not end within", "65536 bytes");
         while (n > 0 && strchr(" \t\r\n", line[n - 1]) != NULL) line[--n] = '\0';
         ended = n == 0;
@@ -264,7 +240,7 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
         status s = parse_field(m, path, line, colon + 1 + strspn(colon + 1, " \t"), err);
         if (s != STATUS_OK) return s;
     }
-    if (!ended && m->data_path == NULL)
+    if (!ended && m->header.data_path == NULL)
         return bad(m, err, "no data: no empty line ends the header, and it names no", "data file");
     return check_complete(m, err);
 }
@@ -273,7 +249,7 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
 static status find_data(struct nrrd *m, FILE *header, struct error *err)
 {
     FILE *file = header;
-    if (m->data_path != NULL) file = fopen(m->data_path, "rbe");
+    if (m->header.data_path != NULL) file = fopen(m->header.data_path, "rbe");
     if (file == NULL) return STATUS_OK; /* voxel_stream_open reports the error */
     for (long long i = 0; i < m->line_skip; i++) {
         int c;
@@ -281,13 +257,13 @@ static status find_data(struct nrrd *m, FILE *header, struct error *err)
         while (c != '\n' && c != EOF);
         if (c == EOF) break;
     }
-    m->layout.offset_bytes = ftello(file);
-    status s = m->layout.offset_bytes >= 0
+    m->header.layout.offset_bytes = ftello(file);
+    status s = m->header.layout.offset_bytes >= 0
                    ? STATUS_OK
-                   : error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->name);
+                   : error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->header.name);
     if (file != header) fclose(file);
-    m->layout.skip_bytes = m->byte_skip > 0 ? m->byte_skip : 0;
-    if (m->byte_skip == -1) m->layout.offset_bytes = -1;
+    m->header.layout.skip_bytes = m->byte_skip > 0 ? m->byte_skip : 0;
+    if (m->byte_skip == -1) m->header.layout.offset_bytes = -1;
     return s;
 }
 
@@ -295,38 +271,34 @@ static void nrrd_close(void *handle)
 {
     struct nrrd *m = handle;
     if (m == NULL) return;
-    voxel_stream_close(m->stream);
-    free(m->name);
-    free(m->data_path);
+    volume_header_release(&m->header);
     free(m);
 }
 
 static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path, struct error *err)
 {
-    const char *data = m->data_path != NULL ? m->data_path : path[0];
+    if (m->header.data_path == NULL) m->header.data_path = strdup(path[0]);
+    if (m->header.data_path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     for (size_t i = 1; i < n_path; i++) /* uploads name the data file as well; other files are an error */
-        if (strcmp(path[i], data) != 0) return bad(m, err, "its data file is not", path_file_name(path[i]));
-    m->layout.swap = m->big_endian != (BYTE_ORDER == BIG_ENDIAN);
-    status s = voxel_stream_open(m->name, data, &m->layout, &m->stream, err);
-    return s == STATUS_OK ? voxel_stream_check_order(m->stream, err) : s;
+        if (strcmp(path[i], m->header.data_path) != 0)
+            return bad(m, err, "its data file is not", path_file_name(path[i]));
+    m->header.layout.swap = m->big_endian != (BYTE_ORDER == BIG_ENDIAN);
+    return volume_header_open_data(&m->header, err);
 }
 
 static status nrrd_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
                         struct error *err)
 {
     struct nrrd *m = calloc(1, sizeof *m);
-    if (m != NULL) m->name = strdup(path_file_name(path[0]));
-    if (m == NULL || m->name == NULL) {
-        nrrd_close(m);
-        return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
-    }
+    if (m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     for (int a = 0; a < 3; a++) {
         m->spacing[a] = m->direction_length[a] = NAN;
         m->unit_m[a] = 1e-3;
     }
-    status s = STATUS_OK;
-    FILE *header = fopen(path[0], "rbe");
-    if (header == NULL) s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->name);
+    status s = volume_header_init(&m->header, path[0], err);
+    FILE *header = s == STATUS_OK ? fopen(path[0], "rbe") : NULL;
+    if (s == STATUS_OK && header == NULL)
+        s = error_set_errno_at(err, __func__, OPTION_SCAN_FILES, "cannot read volume '%s'", m->header.name);
     if (s == STATUS_OK) s = parse_header(m, path[0], header, err);
     if (s == STATUS_OK) s = find_data(m, header, err);
     if (header != NULL) fclose(header);
@@ -335,8 +307,8 @@ static status nrrd_open(const char *const *path, size_t n_path, void **handle, s
         nrrd_close(m);
         return s;
     }
-    *info = (struct volume_source_info){.sample = sample_name(m->layout.sample)};
-    memcpy(info->n, m->layout.n, sizeof info->n);
+    *info = (struct volume_source_info){.sample = sample_name(m->header.layout.sample)};
+    memcpy(info->n, m->header.layout.n, sizeof info->n);
     for (int a = 0; a < 3; a++)
         info->voxel_size_m[a] = (isnan(m->direction_length[a]) ? m->spacing[a] : m->direction_length[a]) * m->unit_m[a];
     *handle = m;
@@ -346,7 +318,7 @@ static status nrrd_open(const char *const *path, size_t n_path, void **handle, s
 static status nrrd_read(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err)
 {
     struct nrrd *m = handle;
-    return voxel_stream_read(m->stream, i_slice, n_slice, value, err);
+    return voxel_stream_read(m->header.stream, i_slice, n_slice, value, err);
 }
 
 static bool nrrd_recognise(const uint8_t b[16], const char *path)
