@@ -2,7 +2,7 @@
 .PHONY: bench bench-cloth bench-scan-errors bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
-$(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing)
+$(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
 
 ##@ Benchmarks and pictures
 bench: | deps-test ## every figure, one JSON object a line

@@ -57,5 +57,6 @@ void bench_photograph(const struct bench *b, struct fit_phantom *f);
 /* The parts of bench_fit in other files. */
 void bench_real(const struct bench *b, bool all_rotations); /* fit_tables.c */
 void bench_grazing(const struct bench *b);                  /* fit_grazing.c */
+void bench_analytic(void);                                  /* fit_analytic.c */
 
 #endif
