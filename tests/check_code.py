@@ -1,5 +1,6 @@
-"""The sizes that keep the code readable: no function of the product has more than 60 lines or more than 8 parameters, no
-source file more than 400 lines, no folder more than 20 source files at one level. Exceptions stand here with their reason.
+"""The sizes that keep the code readable: no function of the product has more than 60 lines, or more than 7 parameters
+besides the error record that comes last; no source file, tests included, has more than 400 lines, and no folder more
+than 20 source files at one level, headers included. Exceptions stand here with their reason.
 Prints each breach; exit status 1 when there is one."""
 import collections
 import os
@@ -8,8 +9,8 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = ("base/", "geometry/", "renderer/", "optimizer/", "server/", "clients/")
-FUNCTION_LINES, FILE_LINES, FOLDER_FILES, PARAMETERS = 60, 400, 20, 8
+FOLDERS = ("base/", "geometry/", "renderer/", "optimizer/", "server/", "clients/", "tests/")
+FUNCTION_LINES, FILE_LINES, FOLDER_FILES, PARAMETERS = 60, 400, 20, 7
 # longer files, and why they are one file
 LONG_FILES = {}
 # longer parameter lists, and why
@@ -38,7 +39,7 @@ def head_start(lines, opening):
 def n_parameter(head):
     """The number of parameters in a function's head, commas inside of inner brackets left out."""
     inner = head[head.index("(") + 1:]
-    depth, n = 0, 1
+    depth, n = 0, 0 if "struct error *err)" in inner else 1
     for c in inner:
         depth += c in "(["
         depth -= c in ")]"
@@ -73,9 +74,8 @@ def main():
             lines = source.read().split("\n")
         if len(lines) - 1 > FILE_LINES and path not in LONG_FILES:
             breaches.append(f"{path}: {len(lines) - 1} lines, the limit is {FILE_LINES}")
-        if not path.endswith(".h"):
-            folder[os.path.dirname(path)] += 1
-        if path.endswith((".c", ".cpp")):
+        folder[os.path.dirname(path)] += 1
+        if path.endswith((".c", ".cpp")) and not path.startswith("tests/"):
             check_functions(path, lines, breaches)
     breaches += [f"{name}/: {n} source files at one level, the limit is {FOLDER_FILES}"
                  for name, n in folder.items() if n > FOLDER_FILES]

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { END_FIT = 7, NEAR_END = 4, MAX_WALK = 256 };
+enum { END_FIT = 7, NEAR_END = 4, MAX_WALK = 256, MAX_NEAR = 64 };
 static const float FLOOR = 0.15f;
 
 /* A grid of vertices to which more can be added: one linked list per cell. */
@@ -56,13 +56,22 @@ static bool grid_add(struct live_grid *g, const float x[3], uint32_t line, bool 
     return true;
 }
 
-/* Finds at most max vertices of other lines within `reach` of x. *least2: squared distance of the nearest. */
-static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t line, float reach, float (*found)[3],
-                         size_t max, float *least2, uint32_t *nearest)
+/* Vertices of other lines near a point. */
+struct near_vertices {
+    float at[MAX_NEAR][3]; /* some of them, n */
+    size_t n;
+    uint32_t nearest; /* index of its entry; UINT32_MAX: there is none */
+    float least2;     /* squared distance of the nearest; infinite without one */
+};
+
+/* Finds the vertices of other lines than `line` within `reach` of x. */
+static void find_near(const struct live_grid *g, const float x[3], uint32_t line, float reach,
+                      struct near_vertices *near)
 {
-    size_t n = 0, from[3], to[3], c[3];
-    *least2 = INFINITY;
-    *nearest = UINT32_MAX;
+    size_t from[3], to[3], c[3];
+    near->n = 0;
+    near->least2 = INFINITY;
+    near->nearest = UINT32_MAX;
     for (int a = 0; a < 3; a++) {
         float lo = (x[a] - reach) / g->cell, hi = (x[a] + reach) / g->cell, last = (float)(g->n[a] - 1);
         from[a] = (size_t)fminf(fmaxf(lo, 0.0f), last);
@@ -77,20 +86,19 @@ static size_t neighbours(const struct live_grid *g, const float x[3], uint32_t l
                     float d2 = 0.0f;
                     for (int a = 0; a < 3; a++) d2 += (x[a] - e->x[a]) * (x[a] - e->x[a]);
                     if (d2 > reach * reach) continue;
-                    if (d2 < *least2) {
-                        *least2 = d2;
-                        *nearest = i - 1;
+                    if (d2 < near->least2) {
+                        near->least2 = d2;
+                        near->nearest = i - 1;
                     }
-                    if (n < max) memcpy(found[n++], e->x, sizeof *found);
+                    if (near->n < MAX_NEAR) memcpy(near->at[near->n++], e->x, sizeof *near->at);
                 }
-    return n;
 }
 
 /* Finds the material in the disk of radius r and thickness 1.5 around x, perpendicular to t, that is nearer to x
  * than to the neighbours: its mean perpendicular offset, and the mean density within half of r of x. Near a face
  * only voxels whose mirror image through x lies in the volume count, or the walk would turn along the face. */
-static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r, float (*other)[3],
-                          size_t n_other, float offset[3], float *core)
+static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r,
+                          const struct near_vertices *near, float offset[3], float *core)
 {
     const size_t *n = w->v->n;
     float sum = 0.0f, core_sum = 0.0f, core_n = 0.0f;
@@ -114,10 +122,10 @@ static bool disk_centroid(const struct walk *w, const float x[3], const float t[
                 for (int a = 0; a < 3; a++) mirrored = mirrored && x[a] - p[a] >= 0.0f && x[a] - p[a] <= (float)n[a];
                 if (!mirrored || fabsf(along) > 0.75f || across2 > r * r) continue;
                 bool mine = true;
-                for (size_t k = 0; k < n_other && mine; k++) {
+                for (size_t k = 0; k < near->n && mine; k++) {
                     float e2 = 0.0f;
                     for (int a = 0; a < 3; a++) {
-                        float e = p[a] + x[a] - other[k][a];
+                        float e = p[a] + x[a] - near->at[k][a];
                         e2 += e * e;
                     }
                     mine = e2 > across2;
@@ -149,20 +157,20 @@ static float normalise(float t[3])
  * another line did not follow a fiber of its own, so all of it is discarded. */
 static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], float (*path)[3])
 {
-    float other[64][3], r = 0.5f * w->o->diameter_voxel, stop2 = 0.25f * w->o->diameter_voxel * w->o->diameter_voxel;
+    struct near_vertices near;
+    float r = 0.5f * w->o->diameter_voxel, stop2 = 0.25f * w->o->diameter_voxel * w->o->diameter_voxel;
     int n = 0;
     while (n < w->o->max_step && n < MAX_WALK) {
-        float y[3], offset[3], core, least2;
-        uint32_t nearest;
+        float y[3], offset[3], core;
         bool outside = false;
         for (int a = 0; a < 3; a++) {
             y[a] = x[a] + t[a];
             outside = outside || y[a] < 0.0f || y[a] > (float)w->v->n[a];
         }
         if (outside) break;
-        size_t n_other = neighbours(&w->grid, y, line, r + w->o->diameter_voxel, other, 64, &least2, &nearest);
-        if (least2 < stop2) return w->grid.entry[nearest].is_end ? n : 0;
-        if (!disk_centroid(w, y, t, r, other, n_other, offset, &core) || core < w->o->eps_d) break;
+        find_near(&w->grid, y, line, r + w->o->diameter_voxel, &near);
+        if (near.least2 < stop2) return w->grid.entry[near.nearest].is_end ? n : 0;
+        if (!disk_centroid(w, y, t, r, &near, offset, &core) || core < w->o->eps_d) break;
         float u[3], cosine = 0.0f, length;
         for (int a = 0; a < 3; a++) {
             y[a] += fminf(0.5f, fmaxf(-0.5f, offset[a]));

@@ -74,11 +74,11 @@ static bool foot_of(const struct segment *g, const float p[3], float *t, float o
     return true;
 }
 
-/* Finds the part of a row of voxel centres, from x on relative to a, whose nearest points lie within a voxel of the
+/* Finds the part of a row of n voxel centres, from p on relative to the segment's begin, whose nearest points lie within a voxel of the
  * segment. */
-static void row_range(const float u[3], float length2, float x, float y, float z, size_t n, size_t *from, size_t *to)
+static void row_range(const float u[3], float length2, const float p[3], size_t n, size_t *from, size_t *to)
 {
-    float margin = sqrtf(length2), fixed = y * u[1] + z * u[2];
+    float margin = sqrtf(length2), x = p[0], fixed = p[1] * u[1] + p[2] * u[2];
     *from = 0;
     *to = n;
     if (fabsf(u[0]) < 0.2f * margin) {
@@ -114,7 +114,7 @@ static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const si
             size_t i0, i1;
             float p[3] = {(float)(from[0] + lo[0]) + 0.5f - g->a[0], (float)(from[1] + j) + 0.5f - g->a[1],
                           (float)(from[2] + k) + 0.5f - g->a[2]};
-            row_range(u, length2, p[0], p[1], p[2], hi[0] - lo[0], &i0, &i1);
+            row_range(u, length2, p, hi[0] - lo[0], &i0, &i1);
             p[0] += (float)i0;
             for (size_t i = lo[0] + i0; i < lo[0] + i1; i++, p[0] += 1.0f) {
                 float t, offset[3], d2;
@@ -179,7 +179,7 @@ static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const 
 
 /* Visits all lines of a brick in turn: adds either their densities to the model or their normal equations. */
 static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t i_brick, const size_t from[3],
-                      const size_t n[3], bool pulls, uint32_t *slot, struct brick_sum *sum)
+                      const size_t n[3], uint32_t *slot, struct brick_sum *sum)
 {
     const struct segment_bricks *b = job->bricks;
     for (size_t e = b->first[i_brick], end; e < b->first[i_brick + 1]; e = end) {
@@ -189,7 +189,7 @@ static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t
             n_touched = stamp(job, s, from, n, b->index[end], n_touched);
             if (b->index[end] < lowest) lowest = b->index[end];
         }
-        if (pulls) {
+        if (slot != NULL) {
             for (size_t i = e; i < end; i++) slot[b->index[i] - lowest] = (uint32_t)(i - b->first[i_brick]);
             add_pulls(job, s, from, n_touched, lowest, slot, sum);
         } else {
@@ -251,8 +251,8 @@ static void fit_brick(void *context, size_t i_brick, size_t i_thread)
             s->own[i] = UINT32_MAX;
         }
         segment_brick_box(b, i_brick, from, n);
-        each_line(job, s, i_brick, from, n, false, slot, sum);
-        each_line(job, s, i_brick, from, n, true, slot, sum);
+        each_line(job, s, i_brick, from, n, NULL, sum);
+        each_line(job, s, i_brick, from, n, slot, sum);
         add_profile(job, s, from, n, sum);
     }
     free(slot);

@@ -33,41 +33,39 @@ static float perpendicular2(const struct center *c, size_t u, size_t v)
     return du * du + dv * dv - along * along / (1.0f + c->slope_u * c->slope_u + c->slope_v * c->slope_v);
 }
 
-static void claim_pixels(const struct center *center, size_t n, float r, size_t width, size_t height, float *owner,
-                         float *distance)
+static void claim_pixels(const struct refine_slice *s, const struct center *center, size_t n, float r)
 {
     struct box b;
     /* clear only the pixels that centers can reach, because no others are read later */
     for (size_t i = 0; i < n; i++) {
-        if (!pixel_box(&center[i], r, width, height, &b)) continue;
+        if (!pixel_box(&center[i], r, s->width, s->height, &b)) continue;
         for (size_t v = b.v0; v <= b.v1; v++)
-            for (size_t u = b.u0; u <= b.u1; u++) distance[v * width + u] = r * r;
+            for (size_t u = b.u0; u <= b.u1; u++) s->distance[v * s->width + u] = r * r;
     }
     for (size_t i = 0; i < n; i++) {
-        if (!pixel_box(&center[i], r, width, height, &b)) continue;
+        if (!pixel_box(&center[i], r, s->width, s->height, &b)) continue;
         for (size_t v = b.v0; v <= b.v1; v++)
             for (size_t u = b.u0; u <= b.u1; u++) {
                 float d2 = perpendicular2(&center[i], u, v);
-                if (d2 >= distance[v * width + u]) continue;
-                distance[v * width + u] = d2;
-                owner[v * width + u] = (float)i;
+                if (d2 >= s->distance[v * s->width + u]) continue;
+                s->distance[v * s->width + u] = d2;
+                s->owner[v * s->width + u] = (float)i;
             }
     }
 }
 
-static void move_to_centroid(const float *image, struct center *c, float index, float r, size_t width, size_t height,
-                             const float *owner, const float *distance)
+static void move_to_centroid(const struct refine_slice *s, struct center *c, float index, float r)
 {
     struct box b;
     float sum = 0.0f, su = 0.0f, sv = 0.0f;
-    if (!pixel_box(c, r, width, height, &b)) return;
+    if (!pixel_box(c, r, s->width, s->height, &b)) return;
     for (size_t v = b.v0; v <= b.v1; v++)
         for (size_t u = b.u0; u <= b.u1; u++) {
-            size_t at = v * width + u;
-            if (distance[at] >= r * r || owner[at] != index) continue;
-            float w = image[at] - FLOOR;
+            size_t at = v * s->width + u;
+            if (s->distance[at] >= r * r || s->owner[at] != index) continue;
+            float w = s->image[at] - FLOOR;
             float mirror_u = 2.0f * c->u - (float)u - 0.5f, mirror_v = 2.0f * c->v - (float)v - 0.5f;
-            if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)width || mirror_v > (float)height)
+            if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)s->width || mirror_v > (float)s->height)
                 continue; /* its mirror image is cut off by the border */
             if (w <= 0.0f) continue;
             sum += w;
@@ -79,12 +77,11 @@ static void move_to_centroid(const float *image, struct center *c, float index, 
     c->v += fminf(1.0f, fmaxf(-1.0f, sv / sum));
 }
 
-void centers_refine(const float *image, size_t width, size_t height, double diameter_voxel, struct center *center,
-                    size_t n, float *owner, float *distance)
+void centers_refine(const struct refine_slice *slice, double diameter_voxel, struct center *center, size_t n)
 {
     float r = WINDOW_RADII * 0.5f * (float)diameter_voxel;
     for (int round = 0; round < N_ROUND; round++) {
-        claim_pixels(center, n, r, width, height, owner, distance);
-        for (size_t i = 0; i < n; i++) move_to_centroid(image, &center[i], (float)i, r, width, height, owner, distance);
+        claim_pixels(slice, center, n, r);
+        for (size_t i = 0; i < n; i++) move_to_centroid(slice, &center[i], (float)i, r);
     }
 }

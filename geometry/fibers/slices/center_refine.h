@@ -10,8 +10,12 @@
 
 #include "geometry/fibers/slices/centers.h"
 
-/* image: width x height densities of the slice; owner, distance: scratch arrays of the same size. */
-void centers_refine(const float *image, size_t width, size_t height, double diameter_voxel, struct center *center,
-                    size_t n, float *owner, float *distance);
+struct refine_slice {
+    const float *image; /* width x height densities */
+    size_t width, height;
+    float *owner, *distance; /* scratch arrays of the same size */
+};
+
+void centers_refine(const struct refine_slice *slice, double diameter_voxel, struct center *center, size_t n);
 
 #endif

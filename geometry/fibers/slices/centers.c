@@ -259,7 +259,8 @@ static void detect_slice(void *context, size_t i_task, size_t i_thread)
     if (!collect_peaks(job, &w, r) || !thin_out(job, &w, r))
         r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
     move_centers(r, -w.origin[0], -w.origin[1]);
-    centers_refine(w.image, w.width, w.height, job->diameter, r->center, r->n, w.response, w.response + n_pixel);
+    const struct refine_slice slice = {w.image, w.width, w.height, w.response, w.response + n_pixel};
+    centers_refine(&slice, job->diameter, r->center, r->n);
     move_centers(r, w.origin[0], w.origin[1]);
     if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
