@@ -35,7 +35,7 @@ struct strand_set {
     double (*p)[3];     /* where it is now */
 };
 
-/* Random streams of the parts of a cloth; STREAM_NOISE and STREAM_RING are those of a simulated scan. */
+/* Random streams of the parts of a cloth; STREAM_NOISE, STREAM_RING and STREAM_WHITE are those of a simulated scan. */
 enum cloth_stream {
     STREAM_YARN = 1,
     STREAM_FLYAWAY,
@@ -47,7 +47,10 @@ enum cloth_stream {
     STREAM_DISORDER,
     STREAM_HAIR,
     STREAM_NAP,
-    STREAM_WEB
+    STREAM_WEB,
+    STREAM_SPREAD,
+    STREAM_SECTION,
+    STREAM_WHITE
 };
 
 void strand_set_release(struct strand_set *s);

@@ -211,7 +211,7 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
 {
     float *distance = calloc(w->n + 1, sizeof *distance), *angle = calloc(w->n + 1, sizeof *angle);
     size_t n = 0, n_second = 0;
-    double sum2 = 0.0, angle_sum = 0.0, ratio_sum = 0.0;
+    double sum2 = 0.0, angle_sum = 0.0, ratio_sum = 0.0, ratio2_sum = 0.0;
     if (distance == NULL || angle == NULL) {
         free(distance);
         free(angle);
@@ -228,7 +228,9 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
         angle[n] = (float)angle_to_deg(acos((double)s->cosine));
         sum2 += (double)distance[n] * (double)distance[n];
         angle_sum += (double)angle[n];
-        ratio_sum += (double)found->radius_m[s->fiber] / (double)truth->radius_m[s->other] - 1.0;
+        double ratio = (double)found->radius_m[s->fiber] / (double)truth->radius_m[s->other] - 1.0;
+        ratio_sum += ratio;
+        ratio2_sum += ratio * ratio;
         n++;
     }
     r->center_precision = w->n > 0 ? (double)(n - n_second) / (double)w->n : NAN;
@@ -237,6 +239,7 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
     r->direction_mean_deg = n > 0 ? angle_sum / (double)n : NAN;
     r->direction_p95_deg = percentile_95(angle, n);
     r->radius_bias_percent = n > 0 ? 100.0 * ratio_sum / (double)n : NAN;
+    r->radius_rms_percent = n > 0 ? 100.0 * sqrt(ratio2_sum / (double)n) : NAN;
     free(distance);
     free(angle);
     return STATUS_OK;

@@ -44,6 +44,7 @@ struct compare_report {
     /* Frobenius norm of the difference of the mean orientation tensors (mean of d d^T over all samples). */
     double orientation_frobenius;
     double radius_bias_percent; /* mean over matched found samples of found / true radius - 1 */
+    double radius_rms_percent;  /* root of the mean square of the same */
 };
 
 /* Figures without samples are NaN. The tile size of the found set is not used. STATUS_INVALID (invalid sets, no

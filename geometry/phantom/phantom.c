@@ -1,5 +1,6 @@
 #include "geometry/phantom/phantom.h"
 
+#include "base/rng.h"
 #include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom_strand.h"
 
@@ -87,6 +88,7 @@ static status check(struct phantom_option *o, struct error *err)
         {"fiber_radius_m", o->fiber_radius_m[0], 1e-7, 1e-3},
         {"fiber_radius_m", o->fiber_radius_m[1], 1e-7, 1e-3},
         {"fiber_radius_m", o->fiber_radius_m[2], 1e-7, 1e-3},
+        {"radius_spread", o->radius_spread, 0.0, 0.3},
         {"n_fiber_per_yarn", (double)o->n_fiber_per_yarn, 1, o->weave == PHANTOM_FELT ? 100000 : 1000},
         {"packing", o->packing, 0.3, 0.9},
         {"flatness", o->flatness, 1.0, 4.0},
@@ -105,7 +107,22 @@ static status check(struct phantom_option *o, struct error *err)
         status st = check_range(range[i].field, range[i].value, range[i].lower, range[i].upper, err);
         if (st != STATUS_OK) return st;
     }
-    return STATUS_OK;
+    return phantom_section_check(&o->section, err);
+}
+
+/* Gives every strand a radius of its own. */
+static void spread_radii(const struct phantom_option *o, struct strand_set *s)
+{
+    static const double cut = 2.0, cut_sd = 0.8796; /* standard deviation of a normal that is cut at +-2 */
+    const struct rng_key key = {.seed = o->seed, .iteration = STREAM_SPREAD};
+    for (size_t i = 0; i < s->n_strand && o->radius_spread > 0.0; i++) {
+        struct rng rng;
+        double normal[2];
+        rng_start(&rng, &key, (uint32_t)i, 0);
+        do rng_normal_pair(&rng, normal);
+        while (!(fabs(normal[0]) <= cut));
+        s->strand[i].radius_m *= 1.0 + o->radius_spread / cut_sd * normal[0];
+    }
 }
 
 static status make(struct phantom_strands *s, const struct phantom_option *o, struct phantom_report *r,
@@ -151,14 +168,18 @@ status phantom_generate(const struct phantom_option *option, struct thread_pool 
     struct strand_fit fit = {0};
     *report = (struct phantom_report){0};
     status st = check(&o, err);
+    double room = phantom_section_spacing(&o.section);
+    for (int a = 0; a < 3; a++) o.fiber_radius_m[a] *= room;
     if (st == STATUS_OK) st = make(&s, &o, report, err);
     report->plied = s.plied;
+    spread_radii(&o, &s.set);
     if (st == STATUS_OK)
         st = strand_relax(&s.set, &(struct strand_relax_option){.n_round = o.n_relax}, pool, progress, &fit, err);
     report->overlap_mean = fit.overlap_mean;
     report->overlap_max = fit.overlap_max;
     report->strain_p95 = fit.strain_p95;
     if (st == STATUS_OK) st = strand_emit(&s.set, o.vertex_spacing_m, o.margin_m, f, err);
+    for (size_t i = 0; i < f->n_fiber && st == STATUS_OK; i++) f->radius_m[i] = (float)((double)f->radius_m[i] / room);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK) st = report_fill(&o, f, report, err);
     strand_set_release(&s.set);

@@ -14,6 +14,7 @@
 
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/phantom/phantom_section.h"
 #include "geometry/volume/volume.h"
 
 #include <stdbool.h>
@@ -56,6 +57,10 @@ struct phantom_option {
     uint64_t seed;
     double voxel_size_m;
     double fiber_radius_m[3]; /* of weft, warp, pile fibers; felt uses the first, knit the first */
+    /* Standard deviation of the radii over their mean, 0 .. 0.3: each strand has its own, normal and cut at twice that.
+     * Pieces of a fiber at the faces of the tile have the same. */
+    double radius_spread;
+    struct phantom_section_law section; /* makes room for flat sections; the scan draws them */
     /* Yarns per tile: wefts (rows) and warps (columns), or for a knit courses and wales. Multiples of the repeat of
      * the weave: plain and velvet 2, twill 4, satin 5, knit 1. 0: one repeat. */
     size_t n_yarn[2];
@@ -118,6 +123,10 @@ struct phantom_scan_option {
     double poisson_count;  /* counts at signal 1, a tenth of them in void; 0: no Poisson noise */
     double ring_amplitude; /* standard deviation of concentric rings about an axis along z */
     double gradient;       /* relative change of the signal from x = 0 to the opposite face */
+    double noise_sd_voxel; /* of the Gaussian that correlates the Gaussian noise, whose strength stays; 0: white */
+    double beam_hardening; /* share of the signal that is lost amid material; 0: none */
+    double phase_fringes;  /* strength of the fringes at outlines; 0: none (phantom_raster.c) */
+    struct phantom_section_law section; /* that with which the fibers were made */
 };
 
 void phantom_scan_option_default(struct phantom_scan_option *o);
@@ -147,5 +156,8 @@ status phantom_write_tiff(const struct volume *v, const struct phantom_file_opti
 /* Writes MetaImage: path ends in ".mhd", and the data goes to a file ".raw" beside it. Spacing is in millimetres. */
 status phantom_write_metaimage(const struct volume *v, const struct phantom_file_option *o, const char *path,
                                struct error *err);
+/* Writes a CSV table with radius and section of each fiber, one line a fiber. Angles are those of phantom_section.h. */
+status phantom_write_sections(const struct fiber_set *f, const struct phantom_section_law *law, const char *path,
+                              struct error *err);
 
 #endif

@@ -1,3 +1,4 @@
+#include "base/angle.h"
 #include "base/files/durable.h"
 #include "geometry/phantom/phantom.h"
 
@@ -157,4 +158,25 @@ status phantom_write_metaimage(const struct volume *v, const struct phantom_file
     if (n < 0 || n >= (int)sizeof header)
         return error_set(err, STATUS_INVALID, "cannot write volume '%s': the name is too long", path);
     return durable_replace(path, header, (size_t)n, err);
+}
+
+status phantom_write_sections(const struct fiber_set *f, const struct phantom_section_law *law, const char *path,
+                              struct error *err)
+{
+    char *text = NULL;
+    size_t length = 0;
+    FILE *file = open_memstream(&text, &length);
+    if (file == NULL) return error_set_errno(err, "cannot write '%s'", path);
+    fputs("fiber,radius_um,lumen,aspect,bean,angle_deg,turn_deg_per_um\n", file);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        struct phantom_section c = phantom_section_of(law, i);
+        fprintf(file, "%zu,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", i, 1e6 * (double)f->radius_m[i], c.lumen, c.aspect, c.bean,
+                angle_to_deg(c.angle_rad), 1e-6 * angle_to_deg(c.turn_rad_per_m));
+    }
+    bool ok = ferror(file) == 0;
+    ok = fclose(file) == 0 && ok;
+    status st = ok ? durable_replace(path, text, length, err)
+                   : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    free(text);
+    return st;
 }

@@ -193,6 +193,7 @@ static json_t *report_json(const struct compare_report *r)
         {"direction_p95_deg", r->direction_p95_deg},
         {"orientation_frobenius", r->orientation_frobenius},
         {"radius_bias_percent", r->radius_bias_percent},
+        {"radius_rms_percent", r->radius_rms_percent},
     };
     json_object_set_new(j, "n_true", json_integer((json_int_t)r->n_true));
     json_object_set_new(j, "n_true_piece", json_integer((json_int_t)r->n_true_piece));

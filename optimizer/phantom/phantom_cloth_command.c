@@ -16,8 +16,8 @@
 static const char usage[] =
     "selvedge-phantom cloth --out DIR [options]\n"
     "\n"
-    "Writes DIR/scan.tif (the CT volume), DIR/truth.hair and DIR/truth.txt (the fibers), DIR/phantom.json (all "
-    "numbers), and the pictures\n"
+    "Writes DIR/scan.tif (the CT volume), DIR/truth.hair, DIR/truth.txt and DIR/truth-sections.csv (the fibers),\n"
+    "DIR/phantom.json (all numbers), and the pictures\n"
     "DIR/top.png (heights from above) and DIR/slice-x.png, slice-y.png, slice-z.png (through the middle).\n"
     "\n"
     "DIR/cloth.json describes the cloth as the section \"cloth\" of a job document does (not for --yarn).\n"
@@ -45,10 +45,23 @@ static const char usage[] =
     "  --yarn-true-size        keep the lengths of the yarn file; otherwise the yarn is scaled to --packing\n"
     "  --flyaways N            hairs that leave each yarn                                                 [0]\n"
     "  --pile-um H             velvet: height of the pile                                                 [200]\n"
-    "  --felt-tile-um S, --felt-thickness-um H                                                           [320, 120]\n"
+    "  --felt-tile-um S, --felt-thickness-um H                                                           [320, 120]\n";
+
+/* The rest of the text, because a string of C has 4095 characters at most. */
+static const char usage_scan[] =
+    "fibers that are not alike, and not discs (truth-sections.csv lists radius and section of each)\n"
+    "  --diameter-spread S     standard deviation of the diameters over their mean, 0 .. 0.3              [0]\n"
+    "  --lumen L               hollow: width of the lumen over that of the fiber, 0 .. 0.8                [0]\n"
+    "  --aspect A              flat: largest ratio of the axes of a section, 1 .. 4; each fiber has its\n"
+    "                          own between 1 and A                                                        [1]\n"
+    "  --bean B                bend of the long axis of a section, 0 .. 0.5                               [0]\n"
+    "  --section-turns T       turns of a section per millimetre of its fiber                             [1]\n"
     "scan\n"
     "  --snr S                 (fiber - void) / noise sd; 0: none                                         [5]\n"
     "  --blur B                point spread, sd in voxels                                                 [0.7]\n"
+    "  --noise-sd B            sd in voxels of the blur that correlates the noise; 0: white               [0]\n"
+    "  --hardening H           beam hardening: share of the signal that is lost amid material             [0]\n"
+    "  --fringes F             phase fringes: strength of the bright and dark rims of fibers              [0]\n"
     "  --poisson N             photon counts at full signal; 0: no Poisson noise                          [0]\n"
     "  --rings A               sd of ring artefacts, in units of the signal                               [0]\n"
     "  --gradient G            relative change of the signal from face to face in x                       [0]\n"
@@ -88,6 +101,7 @@ static status path_in(const char *folder, const char *name, char path[4096], str
 struct cloth_input {
     const char *weave_name;
     double voxel_um, diameter[3], pile_um, felt_um[2]; /* diameter: in voxels */
+    double turns_per_mm;
     size_t bits;
 };
 
@@ -106,7 +120,11 @@ static status take_input(struct cloth *c, const struct cloth_input *in, struct e
     c->phantom.pile_height_m = 1e-6 * in->pile_um;
     c->phantom.felt_tile_m = 1e-6 * in->felt_um[0];
     c->phantom.felt_thickness_m = 1e-6 * in->felt_um[1];
-    c->scan.seed = c->phantom.seed;
+    c->scan.seed = c->phantom.section.seed = c->phantom.seed;
+    c->phantom.section.turns_per_m = 1e3 * in->turns_per_mm;
+    c->scan.section = c->phantom.section;
+    if (c->described != NULL && (!phantom_section_is_disc(&c->scan.section) || c->phantom.radius_spread > 0.0))
+        return error_set(err, STATUS_INVALID, "sections and --diameter-spread do not go with --description");
     return STATUS_OK;
 }
 
@@ -117,6 +135,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
                              .diameter = {7.0, 7.0, 7.0},
                              .pile_um = 200.0,
                              .felt_um = {320.0, 120.0},
+                             .turns_per_mm = 1.0,
                              .bits = 16};
     enum phantom_weave weave;
     c->memory_mib = 2048;
@@ -139,6 +158,14 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "pile-um", .kind = OPTION_NUMBER, .to = &in.pile_um},
         {.name = "felt-tile-um", .kind = OPTION_NUMBER, .to = &in.felt_um[0]},
         {.name = "felt-thickness-um", .kind = OPTION_NUMBER, .to = &in.felt_um[1]},
+        {.name = "diameter-spread", .kind = OPTION_NUMBER, .to = &c->phantom.radius_spread},
+        {.name = "lumen", .kind = OPTION_NUMBER, .to = &c->phantom.section.lumen},
+        {.name = "aspect", .kind = OPTION_NUMBER, .to = &c->phantom.section.aspect},
+        {.name = "bean", .kind = OPTION_NUMBER, .to = &c->phantom.section.bean},
+        {.name = "section-turns", .kind = OPTION_NUMBER, .to = &in.turns_per_mm},
+        {.name = "noise-sd", .kind = OPTION_NUMBER, .to = &c->scan.noise_sd_voxel},
+        {.name = "hardening", .kind = OPTION_NUMBER, .to = &c->scan.beam_hardening},
+        {.name = "fringes", .kind = OPTION_NUMBER, .to = &c->scan.phase_fringes},
         {.name = "snr", .kind = OPTION_NUMBER, .to = &c->scan.snr},
         {.name = "blur", .kind = OPTION_NUMBER, .to = &c->scan.blur_sd_voxel},
         {.name = "poisson", .kind = OPTION_NUMBER, .to = &c->scan.poisson_count},
@@ -240,6 +267,15 @@ static json_t *describe(const struct cloth *c)
                              c->scan.blur_sd_voxel, "poisson_count", c->scan.poisson_count, "ring_amplitude",
                              c->scan.ring_amplitude, "gradient", c->scan.gradient, "bits", c->file.bits, "void_value",
                              c->file.void_value, "fiber_value", c->file.fiber_value);
+    if (cloth != NULL && scan != NULL) {
+        json_object_update_new(cloth,
+                               json_pack("{s:f,s:f,s:f,s:f,s:f}", "diameter_spread", o->radius_spread, "lumen",
+                                         o->section.lumen, "aspect", fmax(1.0, o->section.aspect), "bean",
+                                         o->section.bean, "section_turns_per_mm", 1e-3 * o->section.turns_per_m));
+        json_object_update_new(scan,
+                               json_pack("{s:f,s:f,s:f}", "noise_sd_voxel", c->scan.noise_sd_voxel, "beam_hardening",
+                                         c->scan.beam_hardening, "phase_fringes", c->scan.phase_fringes));
+    }
     json_t *size = json_pack("{s:[i,i,i],s:[f,f],s:[f,f],s:i,s:i,s:f,s:f,s:f,s:f,s:f,s:f}", "n_voxel",
                              (int)r->n_voxel[0], (int)r->n_voxel[1], (int)r->n_voxel[2], "tile_mm",
                              1e3 * c->fibers.tile_size_m[0], 1e3 * c->fibers.tile_size_m[1], "yarn_spacing_um",
@@ -297,6 +333,8 @@ static status write_files(struct cloth *c, struct error *err)
     if (st == STATUS_OK) st = fiber_set_write_hair(&c->fibers, path, err);
     if (st == STATUS_OK) st = path_in(c->out, "truth.txt", path, err);
     if (st == STATUS_OK) st = fiber_set_write_text(&c->fibers, path, err);
+    if (st == STATUS_OK) st = path_in(c->out, "truth-sections.csv", path, err);
+    if (st == STATUS_OK) st = phantom_write_sections(&c->fibers, &c->scan.section, path, err);
     if (st == STATUS_OK) st = write_pictures(c, err);
     if (st == STATUS_OK) st = write_description(c, err);
     if (st == STATUS_OK) st = path_in(c->out, "phantom.json", path, err);
@@ -331,6 +369,7 @@ int phantom_command_cloth(int argc, char **argv)
     for (int i = 1; i < argc; i++)
         if (strcmp(argv[i], "--help") == 0) {
             fputs(usage, stdout);
+            fputs(usage_scan, stdout);
             return 0;
         }
     if (parse_cloth(&c, argc, argv, &err) != STATUS_OK) {

@@ -13,9 +13,11 @@ bench-transport: | deps-test ## the renderer's figures (paths a second, time to 
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
 
+# WEAVES, CONDITIONS: comma-separated, such as WEAVES=twill CONDITIONS=spread,hollow; then without time and memory
 bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2
-	@for b in $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)); do $$b || exit 1; done
+	@$(BUILD)/tests/bench/bench_geometry $(if $(WEAVES),--weaves $(WEAVES)) $(if $(CONDITIONS),--conditions $(CONDITIONS))
+	@$(if $(WEAVES)$(CONDITIONS),,$(BUILD)/tests/bench/bench_geometry_size)
 
 # FIT: some of the figures only, such as FIT="gabardine seeds"
 bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing highlights, real tables (1 h 45 min on 2 quiet cores; photographs are kept in build)

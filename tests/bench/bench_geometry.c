@@ -1,15 +1,20 @@
 /* Accuracy of reconstructed fibers on phantoms of all weaves (definitions: geometry/phantom/compare.h). Prints one JSON
  * object on each line.
  *
- *   geometry.<weave>.d<diameter in voxels>.snr<signal-to-noise>.<figure>, where <figure> is
+ *   geometry.<weave>.d<diameter in voxels>.snr<signal-to-noise>.<figure>: fibers that are alike, white noise
  *       precision, recall, length_recovered      shares
  *       fragments_per_fiber, merges              counts per fiber
  *       centerline_rms_voxel, direction_mean_deg, direction_p95_deg
  *       radius_bias                              |found / true - 1|
+ *   geometry.<weave>.<condition>.<figure>: one of the conditions of the table below
+ *       precision, recall, fragments, merges, axis_rms_voxel, direction_mean_deg, direction_p95_deg, radius_bias
+ *       radius_rms                               root of the mean square of found / true - 1 of single fibers
+ *       cpu_us_per_material_voxel                processor time of the reconstruction
  *   geometry.weave_ct.axis_class_accuracy        share of the labelled tow voxels of a real weave in the right class
  *
- * bench_geometry [--pictures DIR] [TEXT...]
- *   TEXT   run only those of plain.d4.snr2 ... felt.d12.snr5 and weave_ct whose name contains a TEXT
+ * bench_geometry [--pictures DIR] [--weaves NAMES] [--conditions NAMES] [TEXT...]
+ *   NAMES  comma-separated; run only these weaves, and only these conditions (d7.snr5 and the like are conditions too)
+ *   TEXT   run only those of plain.d4.snr2 ... felt.fringes and weave_ct whose name contains a TEXT
  *   DIR    slices with the fibers drawn on them are written there
  * Progress, times and counts go to standard error.
  */
@@ -25,13 +30,48 @@
 
 static const enum phantom_weave weave[] = {PHANTOM_PLAIN, PHANTOM_TWILL_2_2, PHANTOM_SATIN_5,
                                            PHANTOM_KNIT,  PHANTOM_VELVET,    PHANTOM_FELT};
-static const int diameter[] = {4, 7, 12}, snr[] = {2, 5};
+
+/* A cloth and a scan of it. A scan has a blur of 0.7 voxels. */
+struct condition {
+    const char *name;
+    int plain; /* fibers that are alike and white noise, whose figures have their own names */
+    double diameter_voxel, snr, radius_spread, noise_sd_voxel, beam_hardening, phase_fringes;
+    struct phantom_section_law section;
+};
+
+static const struct condition condition[] = {
+    {"d4.snr2", 1, 4.0, 2.0, .radius_spread = 0.0},
+    {"d4.snr5", 1, 4.0, 5.0, .radius_spread = 0.0},
+    {"d7.snr2", 1, 7.0, 2.0, .radius_spread = 0.0},
+    {"d7.snr5", 1, 7.0, 5.0, .radius_spread = 0.0},
+    {"d12.snr2", 1, 12.0, 2.0, .radius_spread = 0.0},
+    {"d12.snr5", 1, 12.0, 5.0, .radius_spread = 0.0},
+    {"spread", 0, 7.0, 5.0, .radius_spread = 0.2, .noise_sd_voxel = 0.5},
+    {"spread_snr2", 0, 7.0, 2.0, .radius_spread = 0.2, .noise_sd_voxel = 0.5},
+    {"spread_d4", 0, 4.0, 5.0, .radius_spread = 0.2, .noise_sd_voxel = 0.5},
+    {"spread_d12", 0, 12.0, 5.0, .radius_spread = 0.2, .noise_sd_voxel = 0.5},
+    {"correlated_snr2", 0, 7.0, 2.0, .noise_sd_voxel = 0.5},
+    {"hollow", 0, 7.0, 5.0, .section = {.seed = 1, .lumen = 0.4}},
+    {"flat", 0, 7.0, 5.0, .section = {.seed = 1, .aspect = 2.5, .turns_per_m = 1e3}},
+    {"cotton", 0, 7.0, 5.0, 0.15, 0.5, .section = {1, .lumen = 0.3, .aspect = 2.0, .bean = 0.3, .turns_per_m = 2e3}},
+    {"hardening", 0, 7.0, 5.0, .beam_hardening = 0.4},
+    {"fringes", 0, 7.0, 5.0, .phase_fringes = 1.0},
+};
 
 struct selection {
     char **text;
     int n;
-    const char *pictures;
+    const char *pictures, *weaves, *conditions; /* NULL: all */
 };
+
+/* Whether a comma-separated list has the name; NULL has all. */
+static bool listed(const char *list, const char *name)
+{
+    size_t length = strlen(name);
+    for (const char *at = list; at != NULL && (at = strstr(at, name)) != NULL; at += length)
+        if ((at == list || at[-1] == ',') && (at[length] == '\0' || at[length] == ',')) return true;
+    return list == NULL;
+}
 
 static bool selected(const struct selection *s, const char *name)
 {
@@ -73,14 +113,39 @@ static status write_pictures(const char *folder, const char *name, const struct 
     return s;
 }
 
-static status bench_phantom(const struct selection *s, const char *name, enum phantom_weave w, int d, int noise,
-                            struct error *err)
+static void print_figures(const char *name, const struct condition *k, const struct phantom_reconstruction *r)
+{
+    const struct compare_report *c = &r->compare;
+    print(name, "precision", c->center_precision, "1", "higher");
+    print(name, "recall", c->center_recall, "1", "higher");
+    print(name, k->plain ? "centerline_rms_voxel" : "axis_rms_voxel", c->centerline_rms_voxel, "voxel", "lower");
+    if (k->plain) print(name, "length_recovered", c->length_recovered, "1", "higher");
+    print(name, k->plain ? "fragments_per_fiber" : "fragments", c->fragments_per_fiber, "1", "lower");
+    print(name, "merges", c->merges_per_fiber, "1", "lower");
+    print(name, "direction_mean_deg", c->direction_mean_deg, "deg", "lower");
+    print(name, "direction_p95_deg", c->direction_p95_deg, "deg", "lower");
+    print(name, "radius_bias", 0.01 * fabs(c->radius_bias_percent), "1", "lower");
+    if (k->plain) return;
+    print(name, "radius_rms", 0.01 * c->radius_rms_percent, "1", "lower");
+    print(name, "cpu_us_per_material_voxel", 1e6 * r->cpu_s / (double)r->report.n_material_voxel, "us", "lower");
+}
+
+static status bench_phantom(const struct selection *s, const char *name, enum phantom_weave w,
+                            const struct condition *k, struct error *err)
 {
     struct phantom_option o;
+    struct phantom_scan_option scan;
     struct phantom_reconstruction r = {0};
-    phantom_cloth_of_diameter(&o, w, d);
+    phantom_cloth_of_diameter(&o, w, k->diameter_voxel);
+    o.radius_spread = k->radius_spread;
+    o.section = k->section;
+    phantom_scan_option_default(&scan);
+    scan.snr = k->snr;
+    scan.noise_sd_voxel = k->noise_sd_voxel;
+    scan.beam_hardening = k->beam_hardening;
+    scan.phase_fringes = k->phase_fringes;
     reconstruct_option_default(&r.option);
-    status st = phantom_reconstruct(&o, noise, &r, err);
+    status st = phantom_reconstruct_scan(&o, &scan, &r, err);
     if (st == STATUS_OK && s->pictures != NULL) st = write_pictures(s->pictures, name, &r.v, &r.found, err);
     const struct compare_report *c = &r.compare;
     if (st == STATUS_OK) {
@@ -89,15 +154,7 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
                 "radius %+.1f %%\n",
                 name, r.v.n[0], r.v.n[1], r.v.n[2], c->n_true, c->n_true_piece, c->n_found, r.wall_s,
                 r.report.fiber_diameter_voxel, c->radius_bias_percent);
-        print(name, "precision", c->center_precision, "1", "higher");
-        print(name, "recall", c->center_recall, "1", "higher");
-        print(name, "centerline_rms_voxel", c->centerline_rms_voxel, "voxel", "lower");
-        print(name, "length_recovered", c->length_recovered, "1", "higher");
-        print(name, "fragments_per_fiber", c->fragments_per_fiber, "1", "lower");
-        print(name, "merges", c->merges_per_fiber, "1", "lower");
-        print(name, "direction_mean_deg", c->direction_mean_deg, "deg", "lower");
-        print(name, "direction_p95_deg", c->direction_p95_deg, "deg", "lower");
-        print(name, "radius_bias", 0.01 * fabs(c->radius_bias_percent), "1", "lower");
+        print_figures(name, k, &r);
     }
     phantom_reconstruction_release(&r);
     return st;
@@ -146,20 +203,27 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
 
 int main(int argc, char **argv)
 {
-    struct selection select = {argv + 1, argc - 1, NULL};
+    struct selection select = {0};
     struct error err = {0};
     status s = STATUS_OK;
-    if (argc > 2 && strcmp(argv[1], "--pictures") == 0) select = (struct selection){argv + 3, argc - 3, argv[2]};
+    int at = 1;
+    for (; at + 1 < argc && strncmp(argv[at], "--", 2) == 0; at += 2)
+        *(strcmp(argv[at], "--pictures") == 0 ? &select.pictures
+          : strcmp(argv[at], "--weaves") == 0 ? &select.weaves
+                                              : &select.conditions) = argv[at + 1];
+    select.text = argv + at;
+    select.n = argc - at;
     for (size_t w = 0; w < sizeof weave / sizeof *weave; w++)
-        for (size_t d = 0; d < sizeof diameter / sizeof *diameter; d++)
-            for (size_t n = 0; n < sizeof snr / sizeof *snr && s == STATUS_OK; n++) {
-                char name[64];
-                snprintf(name, sizeof name, "%s.d%d.snr%d", phantom_weave_name(weave[w]), diameter[d], snr[n]);
-                if (!selected(&select, name)) continue;
-                s = bench_phantom(&select, name, weave[w], diameter[d], snr[n], &err);
-                if (s != STATUS_OK) fprintf(stderr, "bench_geometry: %s: %s\n", name, err.text);
-            }
-    if (s == STATUS_OK && selected(&select, "weave_ct")) {
+        for (size_t k = 0; k < sizeof condition / sizeof *condition && s == STATUS_OK; k++) {
+            char name[64];
+            snprintf(name, sizeof name, "%s.%s", phantom_weave_name(weave[w]), condition[k].name);
+            if (!selected(&select, name) || !listed(select.weaves, phantom_weave_name(weave[w])) ||
+                !listed(select.conditions, condition[k].name))
+                continue;
+            s = bench_phantom(&select, name, weave[w], &condition[k], &err);
+            if (s != STATUS_OK) fprintf(stderr, "bench_geometry: %s: %s\n", name, err.text);
+        }
+    if (s == STATUS_OK && selected(&select, "weave_ct") && listed(select.weaves, "weave_ct")) {
         s = bench_weave_ct(&select, &err);
         if (s != STATUS_OK) fprintf(stderr, "bench_geometry: weave_ct: %s\n", err.text);
     }

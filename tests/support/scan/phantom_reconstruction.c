@@ -3,6 +3,8 @@
 #include "base/clock.h"
 #include "geometry/volume/density_map.h"
 
+#include <sys/resource.h>
+
 void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weave, double diameter_voxel)
 {
     phantom_option_default(o, weave);
@@ -27,28 +29,44 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     return s;
 }
 
-status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r,
-                           struct error *err)
+static double processor_s(void)
+{
+    struct rusage u;
+    getrusage(RUSAGE_SELF, &u);
+    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+}
+
+status phantom_reconstruct_scan(const struct phantom_option *o, const struct phantom_scan_option *option,
+                                struct phantom_reconstruction *r, struct error *err)
 {
     struct thread_pool *pool = NULL;
-    struct phantom_scan_option scan;
+    struct phantom_scan_option scan = *option;
     struct phantom_report made;
     fiber_set_init(&r->truth);
     fiber_set_init(&r->found);
     r->v = (struct volume){0};
-    phantom_scan_option_default(&scan);
     scan.voxel_size_m = o->voxel_size_m;
-    scan.snr = snr;
+    scan.section = o->section;
     status s = thread_pool_new(0, &pool, err);
     if (s == STATUS_OK) s = phantom_generate(o, pool, NULL, &r->truth, &made, err);
     if (s == STATUS_OK) s = phantom_scan(&r->truth, made.n_voxel, &scan, pool, NULL, &r->v, err);
-    double start = clock_monotonic_s();
+    double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
     if (s == STATUS_OK) s = reconstruct(r, pool, err);
-    r->wall_s = clock_monotonic_s() - start;
+    r->wall_s = clock_monotonic_s() - start_s;
+    r->cpu_s = processor_s() - start_cpu_s;
     const struct compare_option c = {.voxel_size_m = o->voxel_size_m};
     if (s == STATUS_OK) s = compare_fibers(&r->truth, &r->found, &c, &r->compare, err);
     thread_pool_free(pool);
     return s;
+}
+
+status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r,
+                           struct error *err)
+{
+    struct phantom_scan_option scan;
+    phantom_scan_option_default(&scan);
+    scan.snr = snr;
+    return phantom_reconstruct_scan(o, &scan, r, err);
 }
 
 void phantom_reconstruction_release(struct phantom_reconstruction *r)

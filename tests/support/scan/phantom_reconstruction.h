@@ -12,7 +12,7 @@ struct phantom_reconstruction {
     struct compare_report compare;
     struct reconstruct_option option;
     struct reconstruct_report report;
-    double wall_s; /* of the reconstruction */
+    double wall_s, cpu_s; /* of the reconstruction */
 };
 
 /* Options for a cloth whose fibers are diameter_voxel voxels of 2 um thick: the default phantom of the weave with all
@@ -22,6 +22,9 @@ void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weav
  * the caller sets before (reconstruct_option_default). */
 status phantom_reconstruct(const struct phantom_option *o, double snr, struct phantom_reconstruction *r,
                            struct error *err);
+/* The same with all options of the scan; its voxel size and sections are those of o. */
+status phantom_reconstruct_scan(const struct phantom_option *o, const struct phantom_scan_option *scan,
+                                struct phantom_reconstruction *r, struct error *err);
 void phantom_reconstruction_release(struct phantom_reconstruction *r);
 
 #endif

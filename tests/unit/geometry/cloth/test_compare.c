@@ -96,6 +96,7 @@ static void test_identical(void **state)
     check_near(r.direction_mean_deg, 0.0, 1e-6);
     check_near(r.orientation_frobenius, 0.0, 1e-9);
     check_near(r.radius_bias_percent, 0.0, 1e-6);
+    check_near(r.radius_rms_percent, 0.0, 1e-6);
 }
 
 static void test_shifted_and_thicker(void **state)
@@ -112,6 +113,7 @@ static void test_shifted_and_thicker(void **state)
     check_near(r.centerline_p95_voxel, 0.2, 1e-4);
     check_near(r.center_recall, 1.0, 0);
     check_near(r.radius_bias_percent, 10.0, 1e-4);
+    check_near(r.radius_rms_percent, 10.0, 1e-4);
     for (size_t i = 0; i < N_FIBER; i++) p[i].z += 4.0; /* farther than one radius, so nothing matches */
     r = compare(p, N_FIBER);
     check_near(r.center_recall, 0.0, 0);

@@ -1,0 +1,155 @@
+/* Draws fibers as chains of capsules; the shares of voxels are explained in phantom_raster.c. */
+#include "geometry/phantom/phantom_draw.h"
+
+#include <math.h>
+#include <string.h>
+
+struct capsule {
+    double a[3], d[3], length2;            /* voxels */
+    double r, r_ramp, scale;               /* scale: below 1 for fibers thinner than the ramp */
+    const struct phantom_section *section; /* NULL: a full disc */
+    double across[2][3];                   /* frame of the section's angle */
+    double angle[2];                       /* of the long axis at both ends */
+    /* The ends of a fiber are flat, so that it joins its continuation in the next tile without a bulge. */
+    double end[2][3], outward[2][3], end_reach;
+};
+
+/* q: offset of p from the nearest point of the axis. Returns its length. */
+static double axis_distance(const struct capsule *c, const double p[3], double q[3], double *at)
+{
+    for (int a = 0; a < 3; a++) q[a] = p[a] - c->a[a];
+    double t = (q[0] * c->d[0] + q[1] * c->d[1] + q[2] * c->d[2]) / c->length2;
+    t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
+    for (int a = 0; a < 3; a++) q[a] -= t * c->d[a];
+    *at = t;
+    return sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+}
+
+static bool behind_an_end(const struct capsule *c, const double p[3])
+{
+    for (int e = 0; e < 2; e++) {
+        double along = 0.0, distance2 = 0.0;
+        for (int a = 0; a < 3; a++) {
+            double q = p[a] - c->end[e][a];
+            along += q * c->outward[e][a];
+            distance2 += q * q;
+        }
+        if (distance2 < 2.0 * c->end_reach * c->end_reach && (e == 0 ? along > 0.0 : along >= 0.0)) return true;
+    }
+    return false;
+}
+
+static void fiber_ends(struct capsule *c, const struct fiber_set *f, size_t i, double per_m)
+{
+    size_t first = f->first_vertex[i], last = f->first_vertex[i + 1] - 1;
+    const size_t at[2] = {first, last}, inner[2] = {first + 1, last - 1};
+    for (int e = 0; e < 2; e++)
+        for (size_t a = 0; a < 3; a++) {
+            c->end[e][a] = (double)f->position_m[3 * at[e] + a] * per_m;
+            c->outward[e][a] = c->end[e][a] - (double)f->position_m[3 * inner[e] + a] * per_m;
+        }
+}
+
+/* The nearest segment of a fiber decides about its share, because a section may be empty inside. */
+static void add_share(struct phantom_slab *s, size_t at, uint32_t fiber, float share, float distance)
+{
+    if (s->owner[at] != fiber) {
+        s->owner[at] = fiber;
+        s->share[at] = 0.0f;
+        if (s->apart != NULL) s->apart[at] = INFINITY;
+    }
+    if (s->apart == NULL ? share <= s->share[at] : distance >= s->apart[at]) return;
+    s->drawn[at] += share - s->share[at];
+    s->share[at] = share;
+    if (s->apart != NULL) s->apart[at] = distance;
+}
+
+/* Share of a voxel whose centre is q from the axis, at a distance d from it and at the part t of the segment. */
+static double share_at(const struct capsule *c, const double q[3], double d, double t)
+{
+    if (c->section == NULL) return c->scale * fmin(fmax(0.0, 0.5 + c->r_ramp - d), 1.0);
+    double x = 0.0, y = 0.0, angle = c->angle[0] + t * (c->angle[1] - c->angle[0]);
+    for (int a = 0; a < 3; a++) {
+        x += q[a] * c->across[0][a];
+        y += q[a] * c->across[1][a];
+    }
+    return phantom_section_share(c->section, c->r, cos(angle) * x + sin(angle) * y, cos(angle) * y - sin(angle) * x);
+}
+
+static void draw_capsule(struct phantom_slab *s, const struct capsule *c, uint32_t fiber, long z_from, long z_to)
+{
+    long low[3], high[3], n[2] = {(long)s->n[0], (long)s->n[1]};
+    double reach = c->section == NULL ? c->r_ramp + 0.5 : phantom_section_reach(c->section, c->r);
+    for (int a = 0; a < 3; a++) {
+        low[a] = (long)floor(fmin(c->a[a], c->a[a] + c->d[a]) - reach - 0.5);
+        high[a] = (long)ceil(fmax(c->a[a], c->a[a] + c->d[a]) + reach - 0.5);
+    }
+    low[2] = low[2] < z_from ? z_from : low[2];
+    high[2] = high[2] >= z_to ? z_to - 1 : high[2];
+    for (long k = low[2]; k <= high[2]; k++)
+        for (long j = low[1]; j <= high[1]; j++)
+            for (long i = low[0]; i <= high[0]; i++) {
+                double p[3] = {(double)i + 0.5, (double)j + 0.5, (double)k + 0.5}, q[3], t;
+                double d = axis_distance(c, p, q, &t);
+                if (!(d < reach) || behind_an_end(c, p)) continue;
+                size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
+                add_share(s, volume_index(s->n, x, y, (size_t)k - s->first), fiber, (float)share_at(c, q, d, t),
+                          (float)d);
+            }
+}
+
+/* Frame of the section's angle (phantom_section.h), from the direction of the segment. */
+static void set_frame(struct capsule *c, uint8_t axis_class)
+{
+    const double ref[3] = {axis_class == 2 ? 1.0 : 0.0, 0.0, axis_class == 2 ? 0.0 : 1.0};
+    double length = sqrt(c->length2), t[3], across2 = 0.0, *e = c->across[0], *o = c->across[1];
+    for (int a = 0; a < 3; a++) t[a] = c->d[a] / length;
+    for (int a = 0; a < 3; a++) {
+        e[a] = ref[(a + 1) % 3] * t[(a + 2) % 3] - ref[(a + 2) % 3] * t[(a + 1) % 3];
+        across2 += e[a] * e[a];
+    }
+    for (int a = 0; a < 3; a++) e[a] = across2 > 1e-12 ? e[a] / sqrt(across2) : a == 1 ? 1.0 : 0.0;
+    for (int a = 0; a < 3; a++) o[a] = t[(a + 1) % 3] * e[(a + 2) % 3] - t[(a + 2) % 3] * e[(a + 1) % 3];
+}
+
+static void draw_fiber(struct phantom_slab *s, size_t i, long z_from, long z_to)
+{
+    const struct fiber_set *f = s->f;
+    double per_m = 1.0 / s->voxel_size_m, r = (double)f->radius_m[i] * per_m, along_m = 0.0;
+    struct phantom_section section = phantom_section_of(s->section, i);
+    struct capsule c = {.r = r, .r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0)), .scale = 1.0};
+    if (!phantom_section_is_disc(s->section)) c.section = &section;
+    double reach = c.section != NULL ? phantom_section_reach(c.section, r) + 0.5 : r + 1.0;
+    if (c.r_ramp < 0.5) {
+        c.r_ramp = 0.5;
+        c.scale = 3.0 * r * r;
+    }
+    c.end_reach = reach;
+    fiber_ends(&c, f, i, per_m);
+    for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
+        const float *p = f->position_m + 3 * k;
+        double z0 = (double)p[2] * per_m, z1 = (double)p[5] * per_m;
+        c.length2 = 0.0;
+        for (int a = 0; a < 3; a++) {
+            c.a[a] = (double)p[a] * per_m;
+            c.d[a] = (double)p[3 + a] * per_m - c.a[a];
+            c.length2 += c.d[a] * c.d[a];
+        }
+        c.angle[0] = section.angle_rad + along_m * section.turn_rad_per_m;
+        along_m += sqrt(c.length2) * s->voxel_size_m;
+        c.angle[1] = section.angle_rad + along_m * section.turn_rad_per_m;
+        bool here = fmax(z0, z1) + reach >= (double)z_from && fmin(z0, z1) - reach <= (double)z_to;
+        if (!here || c.length2 <= 0.0) continue;
+        if (c.section != NULL) set_frame(&c, f->axis_class[i]);
+        draw_capsule(s, &c, (uint32_t)i + 1, z_from, z_to);
+    }
+}
+
+void phantom_slab_draw(struct phantom_slab *s, size_t from, size_t to)
+{
+    size_t at = volume_index(s->n, 0, 0, from), end = volume_index(s->n, 0, 0, to);
+    memset(s->drawn + at, 0, (end - at) * sizeof *s->drawn);
+    memset(s->owner + at, 0, (end - at) * sizeof *s->owner);
+    for (size_t i = 0; i < s->f->n_fiber; i++) draw_fiber(s, i, (long)(s->first + from), (long)(s->first + to));
+    for (; at < end; at++) s->drawn[at] = fminf(s->drawn[at], 1.0f);
+}
