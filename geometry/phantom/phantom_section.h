@@ -25,7 +25,7 @@ struct phantom_section_law {
 struct phantom_section {
     double lumen, aspect, bean;
     /* Angle of the long axis at the first vertex and its change, from the direction that is perpendicular to the fiber
-     * and to z (to x for fibers of class 2), towards the third axis of a right-handed frame whose first is the fiber. */
+     * and z (to x for fibers of class 2), towards the third axis of a right-handed frame whose first is the fiber. */
     double angle_rad, turn_rad_per_m;
 };
 

@@ -52,8 +52,7 @@ static const char usage_scan[] =
     "fibers that are not alike, and not discs (truth-sections.csv lists radius and section of each)\n"
     "  --diameter-spread S     standard deviation of the diameters over their mean, 0 .. 0.3              [0]\n"
     "  --lumen L               hollow: width of the lumen over that of the fiber, 0 .. 0.8                [0]\n"
-    "  --aspect A              flat: largest ratio of the axes of a section, 1 .. 4; each fiber has its\n"
-    "                          own between 1 and A                                                        [1]\n"
+    "  --aspect A              flat: each fiber has its own ratio of axes between 1 and A, 1 .. 4         [1]\n"
     "  --bean B                bend of the long axis of a section, 0 .. 0.5                               [0]\n"
     "  --section-turns T       turns of a section per millimetre of its fiber                             [1]\n"
     "scan\n"
@@ -128,6 +127,21 @@ static status take_input(struct cloth *c, const struct cloth_input *in, struct e
     return STATUS_OK;
 }
 
+static status set_defaults(struct cloth *c, const char *weave_name, struct error *err)
+{
+    enum phantom_weave weave;
+    status st = phantom_weave_find(weave_name, &weave, err);
+    if (st != STATUS_OK) return st;
+    phantom_option_default(&c->phantom, weave);
+    if (c->yarn != NULL) {
+        c->phantom.packing = 0.5;
+        c->phantom.flatness = 1.0;
+    }
+    phantom_scan_option_default(&c->scan);
+    phantom_file_option_default(&c->file);
+    return STATUS_OK;
+}
+
 static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *err)
 {
     struct cloth_input in = {.weave_name = "twill",
@@ -137,7 +151,6 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
                              .felt_um = {320.0, 120.0},
                              .turns_per_mm = 1.0,
                              .bits = 16};
-    enum phantom_weave weave;
     c->memory_mib = 2048;
     const struct command_option option[] = {
         {.name = "out", .kind = OPTION_TEXT, .to = &c->out},
@@ -181,15 +194,8 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
     };
     /* The options are read twice, because weave and yarn set the defaults of the others. */
     status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
-    if (st == STATUS_OK) st = phantom_weave_find(in.weave_name, &weave, err);
+    if (st == STATUS_OK) st = set_defaults(c, in.weave_name, err);
     if (st != STATUS_OK) return st;
-    phantom_option_default(&c->phantom, weave);
-    if (c->yarn != NULL) {
-        c->phantom.packing = 0.5;
-        c->phantom.flatness = 1.0;
-    }
-    phantom_scan_option_default(&c->scan);
-    phantom_file_option_default(&c->file);
     st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st == STATUS_OK && c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
     if (st == STATUS_OK && c->description != NULL) st = phantom_described_read(c->description, &c->described, err);
