@@ -37,25 +37,64 @@ struct resample {
     double start[3];     /* voxel coordinate in `in` (centres at whole numbers) of voxel 0, 0, 0 of `out` */
 };
 
-static float trilinear(const struct volume *v, const double x[3])
+enum { N_TAP = 6 };
+
+/* The voxels along one axis that an interpolated value is made of. */
+struct taps {
+    size_t n, at[N_TAP];
+    float weight[N_TAP];
+};
+
+/* Six-point Lagrange interpolation, which is exact for polynomials of degree 5; one voxel where x is a voxel's centre.
+ * Beyond the ends the last voxel goes on. Returns false outside of the volume. */
+static bool taps_at(double x, size_t n, struct taps *t)
 {
-    size_t i[3], j[3];
-    float f[3];
-    for (int a = 0; a < 3; a++) {
-        double last = (double)v->n[a] - 1.0;
-        if (x[a] < -0.5 || x[a] > last + 0.5) return VOLUME_OUTSIDE;
-        double c = fmin(fmax(x[a], 0.0), last), whole = floor(c);
-        i[a] = (size_t)whole;
-        j[a] = i[a] + 1 < v->n[a] ? i[a] + 1 : i[a];
-        f[a] = (float)(c - whole);
+    double last = (double)n - 1.0;
+    if (x < -0.5 || x > last + 0.5) return false;
+    double c = fmin(fmax(x, 0.0), last), whole = floor(c + 1e-6), f = c - whole;
+    t->n = fabs(f) < 1e-6 ? 1 : N_TAP;
+    if (t->n == 1) {
+        t->at[0] = (size_t)whole;
+        t->weight[0] = 1.0f;
+        return true;
     }
-    const float *d = v->density;
-    const size_t *n = v->n;
-#define ROW(y, z) ((1.0f - f[0]) * d[volume_index(n, i[0], y, z)] + f[0] * d[volume_index(n, j[0], y, z)])
-    float low = (1.0f - f[1]) * ROW(i[1], i[2]) + f[1] * ROW(j[1], i[2]);
-    float high = (1.0f - f[1]) * ROW(i[1], j[2]) + f[1] * ROW(j[1], j[2]);
-#undef ROW
-    return (1.0f - f[2]) * low + f[2] * high;
+    for (int k = 0; k < N_TAP; k++) {
+        double at = fmin(fmax(whole + k - 2, 0.0), last), weight = 1.0;
+        for (int m = 0; m < N_TAP; m++)
+            if (m != k) weight *= (f + 2 - m) / (double)(k - m);
+        t->at[k] = (size_t)at;
+        t->weight[k] = (float)weight;
+    }
+    return true;
+}
+
+/* What stands for a sum that is not finite: a voxel that is not a number or infinite in the file, which is refused
+ * later, else the outside of the scan. */
+static float not_finite(const struct volume *v, const struct taps t[3])
+{
+    for (size_t c = 0; c < t[2].n; c++)
+        for (size_t b = 0; b < t[1].n; b++)
+            for (size_t a = 0; a < t[0].n; a++) {
+                float d = v->density[volume_index(v->n, t[0].at[a], t[1].at[b], t[2].at[c])];
+                if (!isfinite(d) && d != VOLUME_OUTSIDE) return d;
+            }
+    return VOLUME_OUTSIDE;
+}
+
+static float interpolate(const struct volume *v, const double x[3])
+{
+    struct taps t[3];
+    float sum = 0.0f;
+    for (int a = 0; a < 3; a++)
+        if (!taps_at(x[a], v->n[a], &t[a])) return VOLUME_OUTSIDE;
+    for (size_t c = 0; c < t[2].n; c++)
+        for (size_t b = 0; b < t[1].n; b++) {
+            const float *row = v->density + volume_index(v->n, 0, t[1].at[b], t[2].at[c]);
+            float of_row = 0.0f;
+            for (size_t a = 0; a < t[0].n; a++) of_row += t[0].weight[a] * row[t[0].at[a]];
+            sum += t[1].weight[b] * t[2].weight[c] * of_row;
+        }
+    return isfinite(sum) ? sum : not_finite(v, t);
 }
 
 static void resample_slice(void *context, size_t k, size_t i_thread)
@@ -70,7 +109,7 @@ static void resample_slice(void *context, size_t k, size_t i_thread)
             for (int a = 0; a < 3; a++)
                 x[a] = r->start[a] + (double)i * r->column[0][a] + (double)j * r->column[1][a] +
                        (double)k * r->column[2][a];
-            r->out->density[volume_index(n, i, j, k)] = trilinear(r->in, x);
+            r->out->density[volume_index(n, i, j, k)] = interpolate(r->in, x);
         }
     }
 }
@@ -95,17 +134,17 @@ status volume_resample(const struct volume *in, const double matrix[9], double v
     if (!invert(matrix, inverse))
         return error_set_field(err, STATUS_INVALID, OPTION_MATRIX,
                                "cannot align the volume: the matrix has no inverse");
-    size_t n_all[3], n[3];
-    volume_resampled_shape(in->n, in->voxel_size_m, voxel_m, n_all);
+    size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = box[3 + a] - box[a];
     status s = volume_init_in(out, n, (double[3]){voxel_m, voxel_m, voxel_m}, in->space, err);
     if (s != STATUS_OK) return s;
     struct resample r = {.in = in, .out = out};
     for (int a = 0; a < 3; a++) { /* a: axis of `in` */
         double first = 0.0;
-        for (int b = 0; b < 3; b++) { /* b: axis of `out`; voxel centres are at (i + 1/2) voxel_m */
+        for (int b = 0; b < 3; b++) { /* b: axis of `out`; voxel centres are at (i + 1/2) voxel_m, as in `in` */
+            double middle = 0.5 * (double)in->n[b] * (in->voxel_size_m[b] / voxel_m);
             r.column[b][a] = inverse[3 * a + b] * voxel_m / in->voxel_size_m[a];
-            first += r.column[b][a] * ((double)box[b] + 0.5 - 0.5 * (double)n_all[b]);
+            first += r.column[b][a] * ((double)box[b] + 0.5 - middle);
         }
         r.start[a] = first + 0.5 * (double)in->n[a] - 0.5;
     }

@@ -14,7 +14,7 @@
  *
  * bench_geometry [--pictures DIR] [--weaves NAMES] [--conditions NAMES] [TEXT...]
  *   NAMES  comma-separated; run only these weaves, and only these conditions (d7.snr5 and the like are conditions too)
- *   TEXT   run only those of plain.d4.snr2 ... felt.fringes and weave_ct whose name contains a TEXT
+ *   TEXT   run only those of plain.d4.snr2 ... felt.thick and weave_ct whose name contains a TEXT
  *   DIR    slices with the fibers drawn on them are written there
  * Progress, times and counts go to standard error.
  */
@@ -35,7 +35,7 @@ static const enum phantom_weave weave[] = {PHANTOM_PLAIN, PHANTOM_TWILL_2_2, PHA
 struct condition {
     const char *name;
     int plain; /* fibers that are alike and white noise, whose figures have their own names */
-    double diameter_voxel, snr, radius_spread, noise_sd_voxel, beam_hardening, phase_fringes;
+    double diameter_voxel, snr, radius_spread, noise_sd_voxel, beam_hardening, phase_fringes, slice_voxel;
     struct phantom_section_law section;
 };
 
@@ -56,6 +56,7 @@ static const struct condition condition[] = {
     {"cotton", 0, 7.0, 5.0, 0.15, 0.5, .section = {1, .lumen = 0.3, .aspect = 2.0, .bean = 0.3, .turns_per_m = 2e3}},
     {"hardening", 0, 7.0, 5.0, .beam_hardening = 0.4},
     {"fringes", 0, 7.0, 5.0, .phase_fringes = 1.0},
+    {"thick", 0, 7.0, 5.0, .slice_voxel = 1.5},
 };
 
 struct selection {
@@ -135,7 +136,7 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
 {
     struct phantom_option o;
     struct phantom_scan_option scan;
-    struct phantom_reconstruction r = {0};
+    struct phantom_reconstruction r = {.slice_voxel = k->slice_voxel};
     phantom_cloth_of_diameter(&o, w, k->diameter_voxel);
     o.radius_spread = k->radius_spread;
     o.section = k->section;

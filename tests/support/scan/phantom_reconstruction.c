@@ -1,8 +1,11 @@
 #include "tests/support/scan/phantom_reconstruction.h"
 
 #include "base/clock.h"
+#include "base/rng.h"
 #include "geometry/volume/density_map.h"
+#include "geometry/volume/volume_align.h"
 
+#include <math.h>
 #include <sys/resource.h>
 
 void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weave, double diameter_voxel)
@@ -29,6 +32,53 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     return s;
 }
 
+/* Replaces the scan by one with thicker slices: means over blocks of a scan with voxels of half the size. The noise is
+ * that of the option. */
+static status thicken(const struct phantom_option *o, const struct phantom_scan_option *scan, const size_t n_voxel[3],
+                      struct phantom_reconstruction *r, struct thread_pool *pool, struct error *err)
+{
+    struct phantom_scan_option fine_scan = *scan;
+    const size_t block[3] = {2, 2, (size_t)lround(2.0 * r->slice_voxel)};
+    size_t n_fine[3] = {2 * n_voxel[0], 2 * n_voxel[1], 2 * n_voxel[2] / block[2] * block[2]}, n[3];
+    struct volume fine;
+    fine_scan.voxel_size_m = 0.5 * o->voxel_size_m;
+    fine_scan.blur_sd_voxel *= 2.0;
+    fine_scan.snr = 0.0;
+    for (int a = 0; a < 3; a++) n[a] = n_fine[a] / block[a];
+    const double size_m[3] = {o->voxel_size_m, o->voxel_size_m, o->voxel_size_m * r->slice_voxel};
+    status s = phantom_scan(&r->truth, n_fine, &fine_scan, pool, NULL, &fine, err);
+    if (s == STATUS_OK) s = volume_init(&r->v, n, size_m, err);
+    for (size_t at = 0; at < volume_n_voxel(n_fine) && s == STATUS_OK; at++) {
+        size_t i = at % n_fine[0], j = at / n_fine[0] % n_fine[1], k = at / (n_fine[0] * n_fine[1]);
+        r->v.density[volume_index(n, i / 2, j / 2, k / block[2])] += fine.density[at] / (float)(4 * block[2]);
+    }
+    volume_release(&fine);
+    const struct rng_key key = {.seed = scan->seed};
+    for (size_t at = 0; at < volume_n_voxel(n) && s == STATUS_OK && scan->snr > 0.0; at++) {
+        struct rng rng;
+        double normal[2];
+        rng_start(&rng, &key, (uint32_t)at, 0);
+        rng_normal_pair(&rng, normal);
+        r->v.density[at] += (float)(normal[0] / scan->snr);
+    }
+    return s;
+}
+
+/* Makes cubes of the voxels, as a job does. */
+static status make_cubes(struct phantom_reconstruction *r, struct thread_pool *pool, struct error *err)
+{
+    static const double identity[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    struct volume cubes;
+    size_t n[3];
+    volume_resampled_shape(r->v.n, r->v.voxel_size_m, r->v.voxel_size_m[0], n);
+    const size_t box[6] = {0, 0, 0, n[0], n[1], n[2]};
+    status s = volume_resample(&r->v, identity, r->v.voxel_size_m[0], box, pool, NULL, &cubes, err);
+    if (s != STATUS_OK) return s;
+    volume_release(&r->v);
+    r->v = cubes;
+    return STATUS_OK;
+}
+
 static double processor_s(void)
 {
     struct rusage u;
@@ -49,8 +99,12 @@ status phantom_reconstruct_scan(const struct phantom_option *o, const struct pha
     scan.section = o->section;
     status s = thread_pool_new(0, &pool, err);
     if (s == STATUS_OK) s = phantom_generate(o, pool, NULL, &r->truth, &made, err);
-    if (s == STATUS_OK) s = phantom_scan(&r->truth, made.n_voxel, &scan, pool, NULL, &r->v, err);
+    if (s == STATUS_OK && r->slice_voxel > 0.0)
+        s = thicken(o, &scan, made.n_voxel, r, pool, err);
+    else if (s == STATUS_OK)
+        s = phantom_scan(&r->truth, made.n_voxel, &scan, pool, NULL, &r->v, err);
     double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
+    if (s == STATUS_OK && r->slice_voxel > 0.0) s = make_cubes(r, pool, err);
     if (s == STATUS_OK) s = reconstruct(r, pool, err);
     r->wall_s = clock_monotonic_s() - start_s;
     r->cpu_s = processor_s() - start_cpu_s;

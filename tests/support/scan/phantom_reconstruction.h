@@ -11,6 +11,7 @@ struct phantom_reconstruction {
     struct fiber_set truth, found;
     struct compare_report compare;
     struct reconstruct_option option;
+    double slice_voxel; /* spacing of the scan's slices in voxels, as thick as that: 0 (1), or a multiple of 0.5 */
     struct reconstruct_report report;
     double wall_s, cpu_s; /* of the reconstruction */
 };
