@@ -31,6 +31,7 @@ struct reconstruct_option {
     bool crop;                        /* choose the box that tiles best (tile_crop.h); a given box has precedence */
     double crop_keep;                 /* least share of each edge that is kept, 0.5 by default */
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
+    double fiber_diameter_voxel;      /* typical diameter, from which scales and reaches follow */
     double s, t;                      /* filter widths, per square voxel (thesis Table 5.2) */
     size_t h;                         /* edge of the filter's cube, voxels */
     double eps_d, eps_j;
@@ -55,10 +56,13 @@ struct reconstruct_report {
     struct seam_density seam_density;         /* of the volume as used */
     struct fiber_seam seam_found, seam_fiber; /* of the fibers as found, and as used with their ends joined */
     size_t n_seam_joined;
-    double density_low, density_high;      /* scanner values */
-    double separability;                   /* of void and material in the histogram, 0..1 (density_map.h) */
-    double noise_sd;                       /* of the mapped density in voxels without material */
-    double fiber_diameter_voxel;           /* measured from the volume before the filter */
+    double density_low, density_high; /* scanner values */
+    double separability;              /* of void and material in the histogram, 0..1 (density_map.h) */
+    double noise_sd;                  /* of the mapped density in voxels without material */
+    double fiber_diameter_voxel;      /* given, or measured from the volume before the filter */
+    /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
+     * there is none, or the diameter was given. */
+    double other_diameter_voxel, diameter_noise_share, other_diameter_noise_share;
     size_t n_material_voxel, n_kept_voxel; /* V >= eps_d; V >= eps_d and J <= eps_j */
     size_t n_class_voxel[3];
     size_t n_center[3], n_chain[3], n_short_dropped[3];

@@ -11,7 +11,7 @@
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/consensus.h"
-#include "geometry/orientation/fiber_diameter.h"
+#include "geometry/orientation/diameter/fiber_diameter.h"
 #include "geometry/orientation/lines/line_bound.h"
 #include "geometry/orientation/lines/line_descent.h"
 #include "geometry/orientation/lines/line_filter.h"
@@ -345,6 +345,21 @@ static status count_voxels(const struct orientation_job *o, const struct reconst
                            report->n_material_voxel, option->eps_d, option->eps_j);
 }
 
+/* Takes the fiber diameter of the job, or measures it. */
+static status find_diameter(const struct volume *v, const struct reconstruct_option *option, struct thread_pool *pool,
+                            const struct progress *progress, struct reconstruct_report *report, struct error *err)
+{
+    struct fiber_diameter d = {.voxel = option->fiber_diameter_voxel, .noise_share = NAN, .other_voxel = NAN};
+    status s = STATUS_OK;
+    d.other_noise_share = NAN;
+    if (isnan(d.voxel)) s = fiber_diameter_measure(v, pool, progress, &d, err);
+    report->fiber_diameter_voxel = d.voxel;
+    report->diameter_noise_share = d.noise_share;
+    report->other_diameter_voxel = d.other_voxel;
+    report->other_diameter_noise_share = d.other_noise_share;
+    return s;
+}
+
 status reconstruct_orientation(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
                                const struct progress *progress, struct direction_volume *d,
                                struct reconstruct_report *report, struct error *err)
@@ -353,7 +368,7 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     struct progress_part part = {progress, 0.0, 0.1};
     const struct progress inner = progress_of_part(&part);
     *d = (struct direction_volume){0};
-    status s = fiber_diameter_measure(v, pool, &inner, &report->fiber_diameter_voxel, err);
+    status s = find_diameter(v, option, pool, &inner, report, err);
     if (s != STATUS_OK) return s;
     filter_choose(option, v, report->fiber_diameter_voxel);
     s = filter_check(option, err);

@@ -21,6 +21,7 @@ void reconstruct_option_default(struct reconstruct_option *o)
         .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         .density_low = NAN,
         .density_high = NAN,
+        .fiber_diameter_voxel = NAN,
         .s = NAN,
         .t = NAN,
         .eps_d = NAN,

@@ -71,6 +71,27 @@ void reconstruct_warn_volume(const struct reconstruct_option *o, const struct re
                      r->noise_sd);
 }
 
+/* Says which of two diameters was taken. The tracing follows from it, so a wrong one makes wrong fibers. */
+static void warn_diameter(const struct warning_sink *warn, const struct reconstruct_report *r)
+{
+    double chosen = r->fiber_diameter_voxel, other = r->other_diameter_voxel;
+    if (other < chosen)
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "a fiber diameter of %.1f voxels was chosen over one of %.1f, because %.0f %% of the response "
+                     "there is noise; give the diameter if this is wrong",
+                     chosen, other, 100.0 * r->other_diameter_noise_share);
+    else if (other > chosen)
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "a fiber diameter of %.1f voxels was chosen over one of %.1f, which responds more strongly but "
+                     "may be that of yarns; give the diameter if this is wrong",
+                     chosen, other);
+    else if (r->diameter_noise_share > 0.5)
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "the fiber diameter of %.1f voxels is uncertain, because %.0f %% of the response at its scale is "
+                     "noise; give the diameter if it is known",
+                     chosen, 100.0 * r->diameter_noise_share);
+}
+
 void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
                              const struct warning_sink *warn)
 {
@@ -87,6 +108,7 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
                      "fibers: a mean radius of %.3g um is not that of a textile fiber (2 to 100 um); check "
                      "the voxel size of the scan, or the unit of the fiber file",
                      radius * 1e6);
+    warn_diameter(warn, r);
     if (r->fiber_diameter_voxel > 0.0 && r->fiber_diameter_voxel < 4.0)
         warning_send(
             warn, OPTION_NONE,

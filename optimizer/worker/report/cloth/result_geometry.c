@@ -117,6 +117,8 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "separability", json_number(g->separability));
     json_object_set_new(json, "noise_sd", json_number(g->noise_sd));
     json_object_set_new(json, "fiber_diameter_voxel", json_number(g->fiber_diameter_voxel));
+    json_object_set_new(json, "fiber_diameter_noise_share", json_number(g->diameter_noise_share));
+    json_object_set_new(json, "fiber_diameter_other_voxel", json_number(g->other_diameter_voxel));
     json_object_set_new(json, "n_material_voxel", json_count(g->n_material_voxel));
     json_object_set_new(json, "n_kept_voxel", json_count(g->n_kept_voxel));
     json_object_set_new(json, "n_class_voxel", json_count_list(g->n_class_voxel, 3));

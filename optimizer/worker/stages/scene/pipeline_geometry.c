@@ -30,6 +30,7 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
     if (!isnan(doc->crop_keep)) o->crop_keep = doc->crop_keep;
     o->density_low = doc->density_low;
     o->density_high = doc->density_high;
+    o->fiber_diameter_voxel = doc->fiber_diameter_voxel;
     if (!isnan(doc->filter_s)) o->s = doc->filter_s;
     if (!isnan(doc->filter_t)) o->t = doc->filter_t;
     if (doc->filter_h > 0) o->h = doc->filter_h;
