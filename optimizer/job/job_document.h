@@ -136,7 +136,8 @@ struct job_document {
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
 
-/* Puts the section "cloth" before the field that a check or the builder of a described cloth named. */
+/* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text
+ * too. */
 void job_cloth_name_field(struct error *err);
 
 struct param_info;

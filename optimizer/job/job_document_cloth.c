@@ -8,13 +8,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-void job_cloth_name_field(struct error *err)
+/* Puts the section before the field, and before its name where the text quotes it. */
+static void name_section(const char *section, struct error *err)
 {
-    char field[sizeof err->field];
-    if (err == NULL || strncmp(err->field, "cloth.", 6) == 0) return;
-    snprintf(field, sizeof field, "cloth.%.100s", err->field);
+    char field[sizeof err->field], text[sizeof err->text], quoted[sizeof err->field];
+    const size_t n = strlen(section);
+    if (err == NULL || (strncmp(err->field, section, n) == 0 && strchr(".[", err->field[n]) != NULL)) return;
+    snprintf(quoted, sizeof quoted, "'%.100s'", err->field);
+    const char *at = err->field[0] != '\0' ? strstr(err->text, quoted) : NULL;
+    if (at != NULL) {
+        snprintf(text, sizeof text, "%.*s'%s.%s", (int)(at - err->text), err->text, section, at + 1);
+        memcpy(err->text, text, sizeof text);
+    }
+    snprintf(field, sizeof field, "%s%s%.100s", section, err->field[0] != '\0' ? "." : "", err->field);
     memcpy(err->field, field, sizeof field);
 }
+
+void job_cloth_name_field(struct error *err) { name_section("cloth", err); }
 
 static status read_draft(const json_t *list, struct cloth_description *d, struct error *err)
 {
@@ -222,10 +232,6 @@ status job_check_correction(const struct option_value *v, struct error *err)
     correction_numbers_init(doc->correction);
     for (int k = 0; k < CORRECTION_N && s == STATUS_OK; k++) s = read_number(&f, &doc->correction[k], err);
     if (s == STATUS_OK) s = correction_numbers_check(doc->correction, err);
-    if (s == STATUS_INVALID && err != NULL && strncmp(err->field, "correction", 10) != 0) {
-        char field[sizeof err->field];
-        snprintf(field, sizeof field, "correction.%.100s", err->field);
-        memcpy(err->field, field, sizeof field);
-    }
+    if (s == STATUS_INVALID) name_section("correction", err);
     return s;
 }

@@ -166,12 +166,14 @@ static void test_mistakes_are_named(void **state)
 static void test_what_would_have_no_effect(void **state)
 {
     (void)state;
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{},{}]"), "cloth.yarns[1]", "no yarn is of the kind");
+    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{},{}]"), "cloth.yarns[1]", "the kind 'cloth.yarns[1]': name");
     check_error(CLOTH("\"weave\":\"jersey\",\"warp\":[0]"), "cloth.warp", "jersey has none");
     check_error(CLOTH("\"weave\":\"jersey\",\"weft_per_cm\":9"), "cloth.weft_per_cm", "jersey has none");
     check_error(CLOTH("\"weave\":\"felt\",\"tile_wefts\":4"), "cloth.tile_wefts", "felt has none");
-    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{},{}]"), "cloth.yarns", "one kind");
-    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{\"plies\":2}]"), "cloth.yarns[0].plies", "no plies");
+    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{},{}]"), "cloth.yarns",
+                "one kind of fibers, 'cloth.yarns' has 2");
+    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{\"plies\":2}]"), "cloth.yarns[0].plies",
+                "'cloth.yarns[0].plies': fibers");
     check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"plies\":2}]"), "cloth.yarns[1].plies", "no plies");
     check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"melange_with\":0}]"), "cloth.yarns[1].melange_with",
                 "of one kind");
