@@ -2,8 +2,8 @@
 
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
---quick runs the checks, the unit tests and the quick API tests, C beside Python: two compute while the other waits for
-daemons. --programs leaves out the checks of the sources, which neither sanitizers nor coverage change.
+--quick runs the checks, the unit tests and the quick API tests, C beside Python: two compute while two wait for daemons
+most of the time. --programs leaves out the checks of the sources, which neither sanitizers nor coverage change.
 """
 import argparse
 import concurrent.futures
@@ -102,10 +102,12 @@ def main():
     def wanted(name):
         return arguments.only is None or arguments.only in name
 
-    def run_checks():
-        for name in [] if arguments.programs else CHECKS if arguments.quick else CHECKS + SLOW_CHECKS:
-            if wanted(name):
-                totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], TIMEOUT_S, environment))
+    def checks():
+        names = [] if arguments.programs else CHECKS if arguments.quick else CHECKS + SLOW_CHECKS
+        return [name for name in names if wanted(name)]
+
+    def run_check(name):
+        totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], TIMEOUT_S, environment))
 
     def c_tests():
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
@@ -120,32 +122,35 @@ def main():
                                     dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
         totals.add(name, junit, code, output, seconds)
 
-    def run_python(folder):
+    def python_tests():
         for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:
             for source in sorted(pathlib.Path(ROOT, "tests", kind).rglob("test_*.py")):
                 name = str(source.relative_to(os.path.join(ROOT, "tests")))[:-3]  # "api/worker/test_skill"
-                if not wanted(name):
-                    continue
-                junit = os.path.join(folder, name.replace("/", ".") + ".xml")
-                command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider",
-                           f"--junitxml={junit}", str(source.relative_to(ROOT))]
-                if arguments.quick:
-                    command += ["-m", "not slow"]
-                code, output, seconds = run(command, PYTEST_TIMEOUT_S, environment)
-                if code == 5 and arguments.quick:  # all tests of the file are slow ones
-                    continue
-                totals.add(name, junit, code, output, seconds)
+                if wanted(name):
+                    yield name
 
-    with tempfile.TemporaryDirectory() as folder:
-        run_checks()
-        # quick: one lane waits for daemons most of the time, two compute
-        with concurrent.futures.ThreadPoolExecutor(max_workers=3 if arguments.quick else 1) as lanes:
-            first = [lanes.submit(run_python, folder)] if arguments.quick else []
-            runs = first + [lanes.submit(run_c, folder, name) for name in c_tests()]
-            if not arguments.quick:
-                runs.append(lanes.submit(run_python, folder))
-            for done in runs:
-                done.result()
+    def run_python(folder, name):
+        junit = os.path.join(folder, name.replace("/", ".") + ".xml")
+        command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider",
+                   f"--junitxml={junit}", os.path.join("tests", name + ".py")]
+        if arguments.quick:
+            command += ["-m", "not slow"]
+        code, output, seconds = run(command, PYTEST_TIMEOUT_S, environment)
+        if code == 5 and arguments.quick:  # all tests of the file are slow ones
+            return
+        totals.add(name, junit, code, output, seconds)
+
+    def lanes(n):
+        return concurrent.futures.ThreadPoolExecutor(max_workers=n)
+
+    # quick: two lanes compute, two wait for daemons most of the time; otherwise everything comes one after the other
+    with tempfile.TemporaryDirectory() as folder, lanes(2 if arguments.quick else 1) as computing, lanes(2) as waiting:
+        runs = [computing.submit(run_check, name) for name in checks()]
+        runs += [computing.submit(run_c, folder, name) for name in c_tests()]
+        python = waiting if arguments.quick else computing
+        runs += [python.submit(run_python, folder, name) for name in python_tests()]
+        for done in runs:
+            done.result()
 
     tail = f", {totals.skipped} skipped" if totals.skipped else ""
     print(f"{totals.passed} passed, {totals.failed} failed{tail}", flush=True)

@@ -3,7 +3,7 @@
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
-PHYSICS_RENDERER := $(filter-out %reconstruct_phantom %reconstruct_real %fit_density,$(filter $(BUILD)/tests/physics/%,$(TEST_BINS)))
+PHYSICS_RENDERER := $(filter-out %reconstruct_phantom %reconstruct_real %fit_density %fit_groups,$(filter $(BUILD)/tests/physics/%,$(TEST_BINS)))
 TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)

@@ -7,6 +7,7 @@ import subprocess
 
 import pytest
 from daemon_under_test import program
+from small_cloth import TABLE, hair
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 TRUTH = {"C_R": [0.06, 0.05, 0.08], "C_TT": [0.7, 0.5, 0.3], "beta_R": 6, "beta_TT": 20, "gamma_TT": 20}
@@ -30,24 +31,35 @@ def sample(tmp_path_factory):
     return folder
 
 
-def job_of(tmp_path, sample, fit, **document):
+def run_job(job, document):
+    (job / "job.json").write_text(json.dumps(document))
+    return subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)]).returncode
+
+
+@pytest.fixture
+def small(tmp_path):
+    """Runs a job of the smallest cloth with corrections."""
+    def run(correction):
+        (tmp_path / "input").mkdir()
+        (tmp_path / "input" / "cloth.hair").write_bytes(hair(radius_mm=0.007))
+        (tmp_path / "input" / "rows.csv").write_text(TABLE)
+        return run_job(tmp_path, {"sample": "small", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "correction": correction,
+                                  "fit": {"model": "two_lobe.v1", "path_budget": 40000, "max_iterations": 1, **OUTPUT}})
+    return run
+
+
+@pytest.mark.slow
+def test_a_wrong_radius_is_corrected(tmp_path, sample):
+    known = {k: v for k, v in TRUTH.items() if k != "C_TT"}
     job = tmp_path / "job"
     (job / "input").mkdir(parents=True)
     photographs = json.loads((sample / "photographs.json").read_text())
     for name in ["thin.txt"] + [p["file"] for p in photographs]:
         shutil.copy(sample / name, job / "input")
     tile = json.loads((sample / "phantom.json").read_text())["result"]["tile_mm"]
-    (job / "job.json").write_text(json.dumps({"sample": "thin", "fibers": {"file": "thin.txt", "tile_mm": tile}, "photographs": photographs,
-                                              "fit": {"model": "two_lobe.v1", **fit, **OUTPUT}, **document}))
-    code = subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(job)]).returncode
-    return code, job
-
-
-@pytest.mark.slow
-def test_a_wrong_radius_is_corrected(tmp_path, sample):
-    known = {k: v for k, v in TRUTH.items() if k != "C_TT"}
-    code, job = job_of(tmp_path, sample, {"path_budget": 1200000, "fixed": known}, correction={"radius": {"lower": 0.8, "upper": 1.4}})
-    assert code == 0
+    fit = {"model": "two_lobe.v1", "path_budget": 1200000, "fixed": known, **OUTPUT}
+    assert run_job(job, {"sample": "thin", "fibers": {"file": "thin.txt", "tile_mm": tile}, "photographs": photographs,
+                         "correction": {"radius": {"lower": 0.8, "upper": 1.4}}, "fit": fit}) == 0
     result = json.loads((job / "results" / "result.json").read_text())
     (radius,) = result["cloth_numbers"]
     print(radius["value"], radius["standard_error"], result["heldout_rel_rms"], result["without_corrections"])
@@ -58,21 +70,20 @@ def test_a_wrong_radius_is_corrected(tmp_path, sample):
     assert "without these corrections" in (job / "results" / "summary.txt").read_text()
 
 
-def test_given_corrections_are_applied(tmp_path, sample):
-    code, job = job_of(tmp_path, sample, {"path_budget": 40000, "max_iterations": 1}, correction={"radius": 1.1, "smoothing_um": {"value": 5, "fit": False}})
-    assert code == 0
-    result = json.loads((job / "results" / "result.json").read_text())
-    assert abs(result["geometry"]["mean_radius_um"] - 7 * THIN * 1.1) < 0.01
+def test_given_corrections_are_applied(tmp_path, small):
+    assert small({"radius": 1.1, "smoothing_um": {"value": 5, "fit": False}}) == 0
+    result = json.loads((tmp_path / "results" / "result.json").read_text())
+    assert abs(result["geometry"]["mean_radius_um"] - 7 * 1.1) < 0.01
     assert "cloth_numbers" not in result and "without_corrections" not in result
 
 
 @pytest.mark.parametrize("correction, field, text", [
-    ({"radius": 3}, "correction.radius", "0.7"),
+    ({"radius": 3}, "correction.radius", "'correction.radius' is 3, but must be between 0.7"),
     ({"compression": {"lower": 1.2, "upper": 0.8}}, "correction.compression", "bounds"),
     ({"hairs_per_mm2": {"prior": [1, 0]}}, "correction.hairs_per_mm2", "prior"),
     ({"flatness": 2}, "correction.flatness", "flatness"),
 ])
-def test_refused(tmp_path, sample, correction, field, text):
-    code, job = job_of(tmp_path, sample, {}, correction=correction)
-    error = json.loads((job / "status.json").read_text())["error"]
+def test_refused(tmp_path, small, correction, field, text):
+    code = small(correction)
+    error = json.loads((tmp_path / "status.json").read_text())["error"]
     assert code != 0 and error["field"] == field and text in error["text"], error

@@ -6,7 +6,7 @@ import pytest
 from daemon_under_test import program
 from small_cloth import TABLE
 
-pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"max_iterations": 2, "path_budget": 60000, "render_px": 8, "render_samples": 1}
 
 
