@@ -36,7 +36,7 @@ export class JobCharts {
     this.charts = [];
     this.parameterCharts = null;
     this.models = [];
-    this.chosen = null; // the model that is shown; null: the one that is being fitted
+    this.chosen = null; // the model that the user has chosen
     this.fitCard.replaceChildren(el("p", { class: "hint" }, "The curve appears when the fit has started."));
     this.parameterCard.replaceChildren(el("p", { class: "hint" }, "The curves appear when the fit has started."));
   }
@@ -54,11 +54,18 @@ export class JobCharts {
       if (this.points.length > 2 * MAX_POINT) { this.points = []; this.after = -1; continue; }
       this.draw(job);
     }
+    if (this.charts.length > 0 && this.shown !== this.wanted(job)) this.draw(job); // the job has ended without new points
+  }
+
+  // The model to be shown: the user's choice, else the best one of a finished job, else the one that is being fitted.
+  wanted(job) {
+    const best = this.models.findIndex((m) => m.id === job.result?.model);
+    return this.chosen ?? (best >= 0 ? best : this.points[this.points.length - 1].i_model ?? 0);
   }
 
   // Draws the curves of one model at a time, because different models have different parameters.
   draw(job) {
-    const model = this.chosen ?? this.points[this.points.length - 1].i_model ?? 0;
+    const model = this.wanted(job);
     if (this.charts.length === 0 || this.shown !== model) this.build(job, model);
     this.drawTabs(job);
     const p = this.points.filter((x) => (x.i_model ?? 0) === model);

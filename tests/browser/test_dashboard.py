@@ -57,11 +57,14 @@ def test_real_job_live_and_finished(real, browser):
     def titles():
         return [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
     wait_for(browser, "document.querySelectorAll('#models-shown button').length === 2")
-    assert any(t.startswith("alpha") for t in titles()) and not any(t.startswith("C_TT") for t in titles())
-    keep(browser, "second-model")
-    browser.find_element(By.CSS_SELECTOR, "#models-shown button").click()
+    # the curves of the best model, although the other was fitted last
+    wait_for(browser, "document.querySelector('#models-shown button.main').textContent === 'two_lobe.v1'")
     wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 14")
     assert any(t.startswith("beta_TT (°)") for t in titles()) and not any(t.startswith("alpha") for t in titles())
+    browser.find_elements(By.CSS_SELECTOR, "#models-shown button")[1].click()
+    wait_for(browser, "[...document.querySelectorAll('.chart-title')].some((e) => e.textContent.startsWith('alpha'))")
+    assert not any(t.startswith("C_TT") for t in titles())
+    keep(browser, "second-model")
     compared = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#models tbody tr")]
     assert [c.split()[0] for c in compared] == ["two_lobe.v1", "microflake.v1"] and sum("best" in c for c in compared) == 1 and "best" in compared[0]
     result = job.state()["result"]
