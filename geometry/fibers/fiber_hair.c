@@ -93,7 +93,7 @@ static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, 
 }
 
 /* The colours of groups are the corners of the rgb cube: group 0 is white, and bit c of the group clears channel c. */
-static float group_channel(uint8_t group, size_t c) { return (group >> c & 1u) != 0 ? 0.0f : 1.0f; }
+static float group_channel(uint8_t group, size_t c) { return ((uint32_t)group >> c & 1u) != 0 ? 0.0f : 1.0f; }
 
 /* to: the arrays of the file, after the header. */
 static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups)
