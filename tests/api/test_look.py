@@ -72,4 +72,5 @@ def test_lights_and_cameras_of_photographs(tmp_path):
     sky, changed = picture("sky", "--environment", "0.5,0.5,0.5")
     assert sky["environment"]["radiance"] == [0.5, 0.5, 0.5] and all(a > b for a, b in zip(changed, mean))
     soft, _ = picture("soft", "--blur-mm", 0.02)
-    assert soft["camera"]["blur_mm"] == 0.02
+    file = soft["photographs"][0]["file"]  # its mean hardly changes
+    assert soft["camera"]["blur_mm"] == 0.02 and (tmp_path / "soft" / file).read_bytes() != (tmp_path / "plain" / file).read_bytes()

@@ -11,6 +11,11 @@ from small_png import png  # noqa: E402
 ROWS = [bytes((40 * x + 7 * y + 90 * c) % 256 for x in range(5) for c in range(3)) for y in range(5)]
 
 
+def predictor(left, above, corner):
+    """Paeth's: the neighbour nearest to left + above - corner; the first of the three where two are as near."""
+    return min((left, above, corner), key=lambda v: abs(left + above - corner - v))
+
+
 def filtered(rows, n=3):
     """The scan lines of rows, each row y under filter y of the PNG specification."""
     lines, above = b"", bytes(len(rows[0]))
@@ -18,7 +23,7 @@ def filtered(rows, n=3):
         predicted = []
         for x, _ in enumerate(row):
             left, corner = (row[x - n], above[x - n]) if x >= n else (0, 0)
-            predicted.append([0, left, above[x], (left + above[x]) // 2, png_picture.paeth(left, above[x], corner)][kind])
+            predicted.append([0, left, above[x], (left + above[x]) // 2, predictor(left, above[x], corner)][kind])
         lines += bytes([kind]) + bytes((v - p) % 256 for v, p in zip(row, predicted))
         above = row
     return lines

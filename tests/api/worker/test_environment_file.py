@@ -2,7 +2,7 @@
 import os
 
 import pytest
-from daemon_under_test import Daemon, program
+from daemon_under_test import program
 from small_cloth import TABLE, hair
 from small_exr import exr
 
@@ -10,12 +10,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selved
 FIT = {"model": "two_lobe.v1", "fixed": {"C_R": 0.1, "C_TT": 0.6, "beta_TT": 20, "gamma_TT": 20},
        "max_iterations": 1, "path_budget": 20000, "render_px": 8, "render_samples": 1}
 GREY = (0.25, 0.5, 1.0)
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    with Daemon(tmp_path_factory.mktemp("environment") / "data", worker=program("selvedge-worker")) as d:
-        yield d
 
 
 def finish(d, environment, picture=None, state="succeeded"):

@@ -49,8 +49,8 @@ static void test_noise_is_as_stated(void **state)
         make_fibers(&f);
         fiber_roughen(&f, &r);
         double sd = direction_sd(&f);
-        print_message("direction %.4f, stated %.4f\n", sd, r.direction_sd);
-        assert_true(fabs(sd / r.direction_sd - 1.0) < 0.05);
+        print_message("direction %.4f, stated %.4f\n", sd, r.direction_sd_rad);
+        assert_true(fabs(sd / r.direction_sd_rad - 1.0) < 0.05);
         fiber_set_release(&f);
     }
 }
