@@ -50,15 +50,13 @@ void fiber_set_classify(struct fiber_set *f);
  * diameter in millimetres. The 88-byte text of the header contains "selvedge tile_mm=<x>,<y>", the tile size;
  * without it the tile size is 0 after reading and the caller must set it. If a fiber has another group than 0, the text
  * goes on with " groups=rgb" and the colours of the points are the groups; colours without this text are ignored.
- * Reading sets axis classes from the
- * directions, takes half the mean thickness of a fiber's points as its radius, and applies default segments and
- * thickness of files of other programs. It checks the header against the length of the file before it allocates. It
- * replaces the content of f, or leaves f unchanged on failure. A fiber of more than 65,536 vertices is written as
- * several strands that share a vertex, and is read back as several fibers. Errors name the file without its folder:
- * STATUS_FORMAT (not a .hair file, counts that contradict each other or the length, no thickness, not finite, a
- * colour that is no group),
- * STATUS_TOO_LARGE (more vertices than the header can count, 2^32), STATUS_NOT_FOUND, STATUS_IO, STATUS_DISK_FULL,
- * STATUS_NO_MEMORY. */
+ * Reading sets axis classes from the directions, takes half the mean thickness of a fiber's points as its radius, and
+ * applies default segments and thickness of files of other programs. It checks the header against the length of the
+ * file before it allocates. It replaces the content of f, or leaves f unchanged on failure. A fiber of more than 65,536
+ * vertices is written as several strands that share a vertex, and is read back as several fibers. Errors name the file
+ * without its folder: STATUS_FORMAT (not a .hair file, counts that contradict each other or the length, no thickness,
+ * not finite, a colour that is no group), STATUS_TOO_LARGE (more vertices than the header can count, 2^32),
+ * STATUS_NOT_FOUND, STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
 status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err);
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err);
 /* Text: a line "x y z radius" in millimetres for each vertex, and a blank line between fibers. If a fiber has another

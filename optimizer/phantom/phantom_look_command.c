@@ -14,10 +14,9 @@
 static const char usage[] =
     "selvedge-phantom look --photograph FILE --rendering FILE.exr --period-px P [options]\n"
     "\n"
-    "Compares a rendering with a photograph of the same piece of cloth, as JSON: mean colors, contrast of the texture "
-    "at "
-    "half\n"
-    "of, at and at twice the period P of the weave (docs/weave-detection.md), and the relative errors of both.\n"
+    "Compares a rendering with a photograph of the same piece of cloth, as JSON: mean colors, contrast of the texture\n"
+    "at half of, at and at twice the period P of the weave (docs/weave-detection.md), and the relative errors of "
+    "both.\n"
     "\n"
     "  --photograph FILE       .png (sRGB) or .exr\n"
     "  --crop-px X0,Y0,X1,Y1   the piece of the photograph that the rendering shows               [all of it]\n"

@@ -74,8 +74,8 @@ static bool foot_of(const struct segment *g, const float p[3], float *t, float o
     return true;
 }
 
-/* Finds the part of a row of n voxel centres, from p on relative to the segment's begin, whose nearest points lie within a voxel of the
- * segment. */
+/* Finds the part of a row of n voxel centres, from p on relative to the segment's begin, whose nearest points lie
+ * within a voxel of the segment. */
 static void row_range(const float u[3], float length2, const float p[3], size_t n, size_t *from, size_t *to)
 {
     float margin = sqrtf(length2), x = p[0], fixed = p[1] * u[1] + p[2] * u[2];

@@ -26,7 +26,7 @@ static void choose_waves(double wave[WAVES])
 static void roughen_fiber(struct fiber_set *f, size_t i, const double wave[WAVES], const struct fiber_roughness *r)
 {
     const struct rng_key key = {.seed = 0x726f756768u};
-    const double each = r->direction_sd * sqrt(2.0 / WAVES);
+    const double each = r->direction_sd_rad * sqrt(2.0 / WAVES);
     double phase[3][WAVES], along_m = 0.0, before[3] = {0.0, 0.0, 0.0};
     struct rng random;
     rng_start(&random, &key, (uint32_t)i, 0);
@@ -52,7 +52,7 @@ static void roughen_fiber(struct fiber_set *f, size_t i, const double wave[WAVES
 void fiber_roughen(struct fiber_set *f, const struct fiber_roughness *r)
 {
     double wave[WAVES];
-    if (!(r->direction_sd > 0.0)) return;
+    if (!(r->direction_sd_rad > 0.0)) return;
     choose_waves(wave);
     for (size_t i = 0; i < f->n_fiber; i++) roughen_fiber(f, i, wave, r);
 }

@@ -11,8 +11,8 @@
 #include "geometry/fibers/fiber_set.h"
 
 struct fiber_roughness {
-    double length_m;     /* l, above 0 */
-    double direction_sd; /* of one component of the direction, radians; 0 adds nothing */
+    double length_m;         /* l, above 0 */
+    double direction_sd_rad; /* of one component of the direction; 0 adds nothing */
 };
 
 /* Moves the vertices of f. Random phases follow from the fiber's index, so the result changes smoothly with r. */

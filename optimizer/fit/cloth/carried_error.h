@@ -15,7 +15,8 @@ void carried_error_leave_out(const struct uncertainty *u, size_t first, size_t n
 
 /* Adds S V S' to `out`, which lacks the n_number entries from `first` on that the joint uncertainty has. Standard
  * errors grow in the same proportion. variance: of each number in its fit coordinate, independent of each other; NULL:
- * V = C_xx. Numbers without variance in C are left out. */
+ * V = C_xx. Numbers without variance in C are left out. Nothing is added where C_xx cannot be
+ * inverted. */
 void carried_error_add(const struct uncertainty *joint, size_t first, size_t n_number, const double *variance,
                        struct uncertainty *out);
 

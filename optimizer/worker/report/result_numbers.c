@@ -67,6 +67,15 @@ void result_numbers_put(json_t *json, const struct pipeline_context *c, const st
     json_object_set_new(json, "cloth_screening", screening_json(c, &m->cloth));
 }
 
+static void print_uncorrected(const struct pipeline_model *m, FILE *out)
+{
+    const struct pipeline_uncorrected *u = &m->scan_error.uncorrected;
+    if (!u->measured) return;
+    fprintf(out, "         without these corrections: relative RMS error %.4f fitted", u->fit_rel_rms);
+    if (isfinite(u->heldout_rel_rms)) fprintf(out, ", %.4f held out", u->heldout_rel_rms);
+    fputs("\n", out);
+}
+
 void result_numbers_print(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
     const struct fit_result *r = &m->cloth.joint;
@@ -78,8 +87,6 @@ void result_numbers_print(const struct pipeline_context *c, const struct pipelin
                 r->uncertainty.determined[p] ? "" : " these measurements do not tell it",
                 bound != NULL ? " at its bound: " : "", bound != NULL ? bound : "");
     }
-    if (m->scan_error.uncorrected.measured)
-        fprintf(out, "         without these corrections: relative RMS error %.4f fitted, %.4f held out\n",
-                m->scan_error.uncorrected.fit_rel_rms, m->scan_error.uncorrected.heldout_rel_rms);
+    print_uncorrected(m, out);
     if (c->number.n > 0) fprintf(out, "         the errors of the parameters contain those of these numbers\n\n");
 }
