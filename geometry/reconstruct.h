@@ -12,6 +12,7 @@
 #include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/fibers/shape/radius.h"
+#include "geometry/grade/scan_grade.h"
 #include "geometry/orientation/alignment.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
@@ -75,9 +76,10 @@ struct reconstruct_report {
     double profile_radius_m;
     /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
     double axis_position_se_m, axis_direction_se_rad;
-    bool radius_per_axis;             /* each class has a radius of its own */
-    double dice;                      /* overlap of fibers of radius r with kept voxels */
-    double direction_noise_deg[2];    /* before and after the transfer (direction_noise.h) */
+    bool radius_per_axis;          /* each class has a radius of its own */
+    double dice;                   /* overlap of fibers of radius r with kept voxels */
+    struct scan_grade grade;       /* how clearly the scan shows the fibers; set by the caller of reconstruct_fibers */
+    double direction_noise_deg[2]; /* before and after the transfer (direction_noise.h) */
     double direction_change_mean_deg; /* between filtered and transferred directions */
 };
 

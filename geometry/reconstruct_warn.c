@@ -92,6 +92,21 @@ static void warn_diameter(const struct warning_sink *warn, const struct reconstr
                      chosen, 100.0 * r->diameter_noise_share);
 }
 
+static void warn_grade(const struct warning_sink *warn, const struct scan_grade *g)
+{
+    if (g->verdict == GRADE_UNRESOLVED)
+        warning_send(warn, OPTION_SCAN_FILES,
+                     "the scan does not resolve single fibers: around the traced fibers it has %.0f %% of the contrast "
+                     "that such fibers would have, and only %.0f %% of their length is sure; take them as guesses, and "
+                     "use a volume model, which needs directions and density alone, or scan with smaller voxels",
+                     100.0 * fmax(0.0, g->contrast), 100.0 * g->safe_share);
+    if (g->verdict == GRADE_PARTLY)
+        warning_send(warn, OPTION_SCAN_FILES,
+                     "the scan resolves single fibers in part: %.0f %% of the traced length is sure, elsewhere the "
+                     "density hardly shows the fibers",
+                     100.0 * g->safe_share);
+}
+
 void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
                              const struct warning_sink *warn)
 {
@@ -115,6 +130,7 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
             "fibers: they are only %.1f voxels thick; touching fibers are distinguished reliably from 7 voxels "
             "on, and hardly below 4",
             r->fiber_diameter_voxel);
+    warn_grade(warn, &r->grade);
     if (r->n[0] > 0 && r->dice > 0.0 && r->dice < 0.5)
         warning_send(warn, OPTION_NONE,
                      "fibers: they explain little of the material (Dice %.2f, where 1 is all of it); check the slices",

@@ -10,6 +10,8 @@ const radius = (g) => (g.radius_per_axis ? g.radius_um.map((r, i) => withError(r
 export function qualityRows(g) {
   const rows = [["fibers", `${g.n_fiber}, ${number(g.total_length_mm)} mm`, ""], ["radius", radius(g), g.radius_per_axis ? "weft / warp / pile" : ""]];
   if (g.input === "volume") rows.push(
+    ["fibers in the scan", g.grade ? `${g.grade.verdict}, ${percent(g.grade.safe_share, 0)} of the length is sure` : "–", "whether the scan shows single fibers, and for which share of their length"],
+    ["valley between neighbours", isNumber(g.grade?.valley_depth) ? percent(g.grade.valley_depth, 0) : "–", "median fall of the density between fibers side by side; small also where they touch"],
     ["material explained (Dice)", number(g.dice), "overlap of fibers and material; 1 is complete"],
     ["gaps bridged, pieces joined", `${g.n_gap_bridged}, ${g.n_joined}`, ""],
     ["fiber diameter", `${number(g.fiber_diameter_voxel)} voxels`, "fibers are distinguished from 4 on"],

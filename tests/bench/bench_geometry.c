@@ -6,6 +6,7 @@
  *       fragments_per_fiber, merges              counts per fiber
  *       centerline_rms_voxel, direction_mean_deg, direction_p95_deg
  *       radius_bias                              |found / true - 1|
+ *       contrast, valley_depth, safe_share       the grade of the scan (geometry/grade/scan_grade.h), here and below
  *   geometry.<weave>.<condition>.<figure>: one of the conditions of the table below
  *       precision, recall, fragments, merges, axis_rms_voxel, direction_mean_deg, direction_p95_deg, radius_bias
  *       radius_rms                               root of the mean square of found / true - 1 of single fibers
@@ -126,6 +127,9 @@ static void print_figures(const char *name, const struct condition *k, const str
     print(name, "direction_mean_deg", c->direction_mean_deg, "deg", "lower");
     print(name, "direction_p95_deg", c->direction_p95_deg, "deg", "lower");
     print(name, "radius_bias", 0.01 * fabs(c->radius_bias_percent), "1", "lower");
+    print(name, "contrast", r->grade.contrast, "1", "higher");
+    print(name, "valley_depth", r->grade.valley_depth, "1", "higher");
+    print(name, "safe_share", r->grade.safe_share, "1", "higher");
     if (k->plain) return;
     print(name, "radius_rms", 0.01 * c->radius_rms_percent, "1", "lower");
     print(name, "cpu_us_per_material_voxel", 1e6 * r->cpu_s / (double)r->report.n_material_voxel, "us", "lower");
@@ -178,6 +182,7 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     struct volume v = {0};
     struct direction_volume d = {0};
     struct fiber_set f;
+    struct scan_grade grade;
     const char *path = scan;
     double accuracy = NAN, kept = NAN;
     fiber_set_init(&f);
@@ -189,9 +194,13 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     if (s == STATUS_OK) s = reconstruct_orientation(&v, &o, pool, NULL, &d, &r, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&v, &d, &o, pool, NULL, &f, &r, err);
     if (s == STATUS_OK) s = reconstruct_transfer(&f, &d, pool, NULL, &r, err);
+    if (s == STATUS_OK) s = scan_grade_measure(&v, &f, pool, NULL, &grade, NULL, err);
     if (s == STATUS_OK) s = weave_label_accuracy(&d, label, &accuracy, &kept, err);
     if (s == STATUS_OK && select->pictures != NULL) s = write_pictures(select->pictures, "weave_ct", &v, &f, err);
     if (s == STATUS_OK) {
+        print("weave_ct", "contrast", grade.contrast, "1", "lower");
+        print("weave_ct", "valley_depth", grade.valley_depth, "1", "lower");
+        print("weave_ct", "safe_share", grade.safe_share, "1", "lower");
         fprintf(stderr, "weave_ct: %zu fibers, %.1f %% of the labelled tow voxels kept\n", f.n_fiber, 100.0 * kept);
         print("weave_ct", "axis_class_accuracy", accuracy, "1", "higher");
     }

@@ -73,10 +73,13 @@ static void reconstruct_scan(const char *path, const char *axes, const char *nam
     if (edge > 0) volume_crop(&s->v, box);
     assert_int_equal(reconstruct_orientation(&s->v, &s->o, pool, NULL, &s->d, &s->r, &err), STATUS_OK);
     assert_int_equal(reconstruct_fibers(&s->v, &s->d, &s->o, pool, NULL, &s->f, &s->r, &err), STATUS_OK);
+    assert_int_equal(scan_grade_measure(&s->v, &s->f, pool, NULL, &s->r.grade, NULL, &err), STATUS_OK);
     assert_int_equal(reconstruct_transfer(&s->f, &s->d, pool, NULL, &s->r, &err), STATUS_OK);
     s->seconds = clock_monotonic_s() - start;
     thread_pool_free(pool);
     save_pictures(s, name);
+    print_message("%s: %s, valley %.3f, %.1f %% of the length is sure\n", name, grade_verdict_name(s->r.grade.verdict),
+                  s->r.grade.valley_depth, 100.0 * s->r.grade.safe_share);
     print_message("%s: %zu fibers, %zu vertices, %.1f mm, radius %.2f um at %.1f um voxels (diameter %.1f voxels), "
                   "dice %.3f, %zu gaps, "
                   "%zu joins, direction change %.1f deg, %.1f s\n",
@@ -104,6 +107,7 @@ static void test_fiber_ct(void **state)
      * edges they are 7 to 9 voxels wide, as the description of the data states. */
     assert_true(diameter > 4.5 && diameter < 6.0);
     assert_true(s.r.dice > 0.84); /* 0.858 */
+    assert_true(s.r.grade.verdict == GRADE_RESOLVED && s.r.grade.valley_depth > 0.3);
     /* Fibers of the fitted radius have as much material as the scan. */
     double model = M_PI * s.r.radius_m[0] * s.r.radius_m[0] * s.r.total_length_m;
     double voxel_m3 = s.v.voxel_size_m[0] * s.v.voxel_size_m[1] * s.v.voxel_size_m[2];
@@ -127,6 +131,8 @@ static void test_weave_ct(void **state)
                   100.0 * kept, 100.0 * accuracy);
     assert_true(accuracy >= 0.9);
     assert_true(kept >= 0.9);
+    assert_int_equal(s.r.grade.verdict, GRADE_UNRESOLVED); /* its tows show hardly any single fibers */
+    assert_true(s.r.grade.valley_depth < 0.15);
     release(&s);
 }
 

@@ -141,6 +141,9 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
     if (c->doc->has_volume)
+        fprintf(out, "         the scan shows single fibers: %s, %.0f %% of their length is sure\n",
+                grade_verdict_name(c->geometry.grade.verdict), 100.0 * c->geometry.grade.safe_share);
+    if (c->doc->has_volume)
         fprintf(out,
                 "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those "
                 "inside\n",

@@ -62,6 +62,7 @@ def test_alignment_and_crop_can_be_repeated(real, phantom):
     found, corners = (result(real, j)["result"] for j in jobs)
     g = found["geometry"]
     assert g["alignment"]["outcome"] == "found" and abs(g["alignment"]["rotation_deg"]) < 3
+    assert g["grade"]["verdict"] in ("resolved", "partly") and 0.5 < g["grade"]["safe_share"] <= 1
     assert g["crop"]["keep"] == 0.6 and len(g["crop"]["mismatch"]) == 2
     assert all(r > 0 for r in g["seam_density"]["ratio"]) and len(g["direction_noise_deg"]) == 2
     assert any("corners from outside of the scan" in w for w in corners["warnings"]) and corners["geometry"]["alignment"] is None

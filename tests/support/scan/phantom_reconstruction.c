@@ -110,6 +110,7 @@ status phantom_reconstruct_scan(const struct phantom_option *o, const struct pha
     r->cpu_s = processor_s() - start_cpu_s;
     const struct compare_option c = {.voxel_size_m = o->voxel_size_m};
     if (s == STATUS_OK) s = compare_fibers(&r->truth, &r->found, &c, &r->compare, err);
+    if (s == STATUS_OK) s = scan_grade_measure(&r->v, &r->found, pool, NULL, &r->grade, NULL, err);
     thread_pool_free(pool);
     return s;
 }

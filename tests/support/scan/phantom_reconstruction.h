@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_TESTS_PHANTOM_RECONSTRUCTION_H
 #define SELVEDGE_TESTS_PHANTOM_RECONSTRUCTION_H
 
+#include "geometry/grade/scan_grade.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/phantom/phantom.h"
 #include "geometry/reconstruct.h"
@@ -10,6 +11,7 @@ struct phantom_reconstruction {
     struct volume v; /* the scan with densities mapped to [0, 1] */
     struct fiber_set truth, found;
     struct compare_report compare;
+    struct scan_grade grade;
     struct reconstruct_option option;
     double slice_voxel; /* spacing of the scan's slices in voxels, as thick as that: 0 (1), or a multiple of 0.5 */
     struct reconstruct_report report;

@@ -81,6 +81,14 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
     open_table(out, "Against the scan");
+    row(out, "fibers in the scan", "whether it shows single fibers", "%s", grade_verdict_name(g->grade.verdict));
+    row(out, "length that is sure", "share of the traced length where the density shows single fibers", "%.0f %%",
+        100.0 * g->grade.safe_share);
+    row(out, "contrast of the fibers", "measured over expected, median; 1 if the scan shows them", "%.2f",
+        g->grade.contrast);
+    if (isfinite(g->grade.valley_depth))
+        row(out, "valley between neighbours", "median fall of the density; small also between fibers that touch",
+            "%.0f %%", 100.0 * g->grade.valley_depth);
     row(out, "material explained (Dice)", "overlap of fibers and kept voxels; 1 is complete", "%.3f", g->dice);
     row(out, "voxels of material", "density of at least eps_d", "%zu", g->n_material_voxel);
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);

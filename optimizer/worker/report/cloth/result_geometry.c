@@ -88,6 +88,14 @@ static json_t *texture_json(const struct pipeline_context *c)
     return json;
 }
 
+/* How clearly the scan shows the fibers. */
+static json_t *grade_json(const struct scan_grade *g)
+{
+    return json_pack("{s:s, s:o, s:o, s:o, s:o}", "verdict", grade_verdict_name(g->verdict), "contrast",
+                     json_number(g->contrast), "valley_depth", json_number(g->valley_depth), "beside_share",
+                     json_number(g->beside_share), "safe_share", json_number(g->safe_share));
+}
+
 json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -135,6 +143,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "radius_per_axis", json_boolean(g->radius_per_axis));
     json_object_set_new(json, "radius_score", json_number_list(g->radius_score, 3, 1.0));
     json_object_set_new(json, "dice", json_number(g->dice));
+    json_object_set_new(json, "grade", grade_json(&g->grade));
     json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));
     json_object_set_new(json, "direction_change_mean_deg", json_number(g->direction_change_mean_deg));
     json_object_set_new(json, "alignment", alignment_json(o, g));

@@ -268,6 +268,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
         if (s == STATUS_OK)
             s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &c->progress, &c->fiber,
                                    &c->geometry, err);
+        if (s == STATUS_OK) s = scan_grade_measure(&c->volume, &c->fiber, c->pool, NULL, &c->geometry.grade, NULL, err);
         volume_release(&c->volume);
         memset(&c->volume, 0, sizeof c->volume);
         if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);

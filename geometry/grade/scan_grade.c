@@ -1,0 +1,276 @@
+#include "geometry/grade/scan_grade.h"
+
+#include "geometry/grade/grade_points.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* N_PLACE: places of the profile to a neighbour; N_RING, N_AROUND: rings of places around an axis and places of each;
+ * N_NEAR: fibers that are considered there. Points are a quarter of a diameter apart. */
+enum { N_PLACE = 9, N_RING = 4, N_AROUND = 6, N_NEAR = 24, POINTS_PER_WINDOW = 4 * GRADE_WINDOW_DIAMETERS };
+/* Radius of the last ring in radii of the fiber, and width of a blurred edge in voxels. */
+static const double PATCH_RADII = 1.6, EDGE_VOXEL = 2.0;
+/* Distances of neighbours in sums of radii: nearer ones are the same fiber, farther ones have others between. */
+static const double LEAST_APART = 0.5, MOST_APART = 1.6;
+
+const char *grade_verdict_name(enum grade_verdict v)
+{
+    static const char *const name[] = {"none", "resolved", "partly", "unresolved"};
+    return name[v];
+}
+
+/* Points of one fiber, first .. first + n. */
+struct window {
+    size_t first, n;
+    bool is_beside;
+    double depth, contrast;
+};
+
+/* Sums for the slope of measured on expected densities. */
+struct slope {
+    double n, x, y, xx, xy;
+};
+
+struct grade_job {
+    const struct volume *v;
+    struct grade_points points;
+    struct window *window;
+    size_t n_window;
+};
+
+static double density_at(const struct volume *v, const double x[3])
+{
+    size_t i[3];
+    double f[3], sum = 0.0;
+    for (int a = 0; a < 3; a++) {
+        double c = fmin(fmax(x[a] - 0.5, 0.0), (double)v->n[a] - 1.0);
+        i[a] = (size_t)c;
+        if (i[a] + 1 == v->n[a] && i[a] > 0) i[a]--;
+        f[a] = v->n[a] > 1 ? c - (double)i[a] : 0.0;
+    }
+    for (size_t corner = 0; corner < 8; corner++) {
+        double weight = 1.0;
+        size_t at[3];
+        for (size_t a = 0; a < 3; a++) {
+            size_t up = corner >> a & 1;
+            weight *= up ? f[a] : 1.0 - f[a];
+            at[a] = i[a] + (v->n[a] > 1 ? up : 0);
+        }
+        if (weight > 0.0) sum += weight * (double)v->density[volume_index(v->n, at[0], at[1], at[2])];
+    }
+    return sum;
+}
+
+/* Adds the densities on the way from p by `way`. */
+static void add_profile(const struct volume *v, const float p[3], const double way[3], double weight,
+                        double profile[N_PLACE])
+{
+    for (int k = 0; k < N_PLACE; k++) {
+        double x[3];
+        for (int a = 0; a < 3; a++) x[a] = (double)p[a] + way[a] * k / (N_PLACE - 1);
+        profile[k] += weight * density_at(v, x);
+    }
+}
+
+static void add_beside(const struct grade_job *j, const struct grade_point *p, const struct grade_point *q,
+                       double profile[N_PLACE])
+{
+    double way[3], along = 0.0;
+    for (int a = 0; a < 3; a++) along += ((double)q->p[a] - (double)p->p[a]) * (double)p->t[a];
+    for (int a = 0; a < 3; a++) way[a] = (double)q->p[a] - (double)p->p[a] - along * (double)p->t[a];
+    add_profile(j->v, p->p, way, 1.0, profile);
+}
+
+/* Density at x if the scan shows the fibers: those near are full discs with blurred edges. */
+static double expected_at(const struct grade_job *j, const struct grade_point *const *near, size_t n, const double x[3])
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        const struct grade_point *q = near[i];
+        double along = 0.0, d2 = 0.0;
+        for (int a = 0; a < 3; a++) {
+            double d = x[a] - (double)q->p[a];
+            along += d * (double)q->t[a];
+            d2 += d * d;
+        }
+        double inside = (j->points.radius[q->fiber] - sqrt(fmax(0.0, d2 - along * along))) / EDGE_VOXEL;
+        sum += fmax(0.0, fmin(1.0, 0.5 + inside));
+    }
+    return fmin(1.0, sum);
+}
+
+/* Two unit vectors across a direction. */
+static void across(const float t[3], double e[3], double o[3])
+{
+    double norm = 0.0;
+    int least = 0;
+    for (int a = 1; a < 3; a++)
+        if (fabsf(t[a]) < fabsf(t[least])) least = a;
+    for (int a = 0; a < 3; a++) {
+        e[a] = (a == least ? 1.0 : 0.0) - (double)t[least] * (double)t[a];
+        norm += e[a] * e[a];
+    }
+    for (int a = 0; a < 3; a++) e[a] /= sqrt(norm);
+    for (int a = 0; a < 3; a++)
+        o[a] = (double)t[(a + 1) % 3] * e[(a + 2) % 3] - (double)t[(a + 2) % 3] * e[(a + 1) % 3];
+}
+
+/* Adds the densities at the axis and on rings around it. */
+static void add_patch(const struct grade_job *j, size_t i_point, struct slope *s)
+{
+    const struct grade_point *p = &j->points.point[i_point], *near[N_NEAR];
+    const double outer = PATCH_RADII * j->points.radius[p->fiber];
+    size_t n = grade_points_near(&j->points, i_point, outer + 0.5 * EDGE_VOXEL, near, N_NEAR);
+    double e[3], o[3];
+    across(p->t, e, o);
+    for (int ring = 0; ring <= N_RING; ring++)
+        for (int k = 0; k < (ring == 0 ? 1 : N_AROUND); k++) {
+            double angle = 2.0 * M_PI * (k + 0.5 * (ring % 2)) / N_AROUND, away = outer * ring / N_RING, x[3];
+            for (int a = 0; a < 3; a++) x[a] = (double)p->p[a] + away * (cos(angle) * e[a] + sin(angle) * o[a]);
+            double expected = expected_at(j, near, n, x), measured = density_at(j->v, x);
+            s->n += 1.0;
+            s->x += expected;
+            s->y += measured;
+            s->xx += expected * expected;
+            s->xy += expected * measured;
+        }
+}
+
+/* 0 where the expected densities are all the same, because no scan could show the fibers there. */
+static double slope_of(const struct slope *s)
+{
+    double var = s->xx - s->x * s->x / s->n, least = 1e-4 * s->n;
+    return var > least ? (s->xy - s->x * s->y / s->n) / var : 0.0;
+}
+
+static double highest(const double *x, int from, int to)
+{
+    double most = x[from];
+    for (int k = from + 1; k <= to; k++) most = fmax(most, x[k]);
+    return most;
+}
+
+static double lowest(const double *x, int from, int to)
+{
+    double least = x[from];
+    for (int k = from + 1; k <= to; k++) least = fmin(least, x[k]);
+    return least;
+}
+
+/* The ridge need not lie on the axis, because a fiber may be hollow. */
+static double depth_of(const double p[N_PLACE])
+{
+    const int last = N_PLACE - 1;
+    double ridge = 0.5 * (highest(p, 0, 2) + highest(p, last - 2, last));
+    return ridge > 0.0 ? 1.0 - lowest(p, 3, last - 3) / ridge : 0.0;
+}
+
+static void grade_window(void *context, size_t i_task, size_t i_thread)
+{
+    struct grade_job *j = context;
+    struct window *w = &j->window[i_task];
+    struct slope slope = {0};
+    double profile[N_PLACE] = {0.0};
+    size_t n_beside = 0;
+    (void)i_thread;
+    scratch_keep_within(j->v->space);
+    for (size_t i = w->first; i < w->first + w->n; i++) {
+        const struct grade_point *q = grade_points_beside(&j->points, i, LEAST_APART, MOST_APART);
+        if (q != NULL) add_beside(j, &j->points.point[i], q, profile);
+        n_beside += q != NULL;
+        add_patch(j, i, &slope);
+    }
+    w->is_beside = 2 * n_beside >= w->n;
+    w->depth = depth_of(profile);
+    w->contrast = slope_of(&slope);
+}
+
+/* Cuts the points of every fiber into windows of about equal length. */
+static status make_windows(struct grade_job *j, const struct fiber_set *f, struct error *err)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < f->n_fiber; i++) n += (j->points.first[i + 1] - j->points.first[i]) / POINTS_PER_WINDOW + 1;
+    j->window = calloc(n + 1, sizeof *j->window);
+    if (j->window == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        size_t first = j->points.first[i], n_point = j->points.first[i + 1] - first;
+        size_t n_part = (n_point + POINTS_PER_WINDOW / 2) / POINTS_PER_WINDOW;
+        if (n_point > 0 && n_part == 0) n_part = 1;
+        for (size_t k = 0; k < n_part; k++) {
+            size_t from = n_point * k / n_part, to = n_point * (k + 1) / n_part;
+            j->window[j->n_window++] = (struct window){.first = first + from, .n = to - from};
+        }
+    }
+    return STATUS_OK;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Medians of the depth beside neighbours and of the contrast. */
+static status medians(const struct grade_job *j, struct scan_grade *grade, struct error *err)
+{
+    double *depth = malloc((j->n_window + 1) * sizeof *depth), *contrast = malloc((j->n_window + 1) * sizeof *contrast);
+    size_t n = 0;
+    if (depth == NULL || contrast == NULL) {
+        free(depth);
+        free(contrast);
+        return error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
+    }
+    for (size_t i = 0; i < j->n_window; i++) {
+        if (j->window[i].is_beside) depth[n++] = j->window[i].depth;
+        contrast[i] = j->window[i].contrast;
+    }
+    qsort(depth, n, sizeof *depth, ascending);
+    qsort(contrast, j->n_window, sizeof *contrast, ascending);
+    grade->valley_depth = n > 0 ? depth[n / 2] : NAN;
+    grade->contrast = j->n_window > 0 ? contrast[j->n_window / 2] : NAN;
+    free(depth);
+    free(contrast);
+    return STATUS_OK;
+}
+
+/* Adds up lengths; a point stands for half a radius of its fiber. */
+static void sum_lengths(const struct grade_job *j, struct scan_grade *grade, float *safe)
+{
+    double all = 0.0, beside = 0.0, sure = 0.0;
+    for (size_t i = 0; i < j->n_window; i++) {
+        const struct window *w = &j->window[i];
+        size_t fiber = j->points.point[w->first].fiber;
+        double length = (double)w->n * j->points.radius[fiber];
+        all += length;
+        beside += w->is_beside ? length : 0.0;
+        if (w->contrast < GRADE_SAFE_CONTRAST) continue;
+        sure += length;
+        if (safe != NULL)
+            safe[fiber] += (float)((double)w->n / (double)(j->points.first[fiber + 1] - j->points.first[fiber]));
+    }
+    grade->beside_share = all > 0.0 ? beside / all : NAN;
+    grade->safe_share = all > 0.0 ? sure / all : NAN;
+    grade->verdict = !(all > 0.0)                                 ? GRADE_NONE
+                     : grade->safe_share >= GRADE_RESOLVED_SHARE  ? GRADE_RESOLVED
+                     : grade->safe_share < GRADE_UNRESOLVED_SHARE ? GRADE_UNRESOLVED
+                                                                  : GRADE_PARTLY;
+}
+
+status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
+                          const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err)
+{
+    struct grade_job j = {.v = v};
+    *grade = (struct scan_grade){.valley_depth = NAN, .contrast = NAN};
+    for (size_t i = 0; i < f->n_fiber && safe != NULL; i++) safe[i] = 0.0f;
+    status s = grade_points_make(&j.points, f, v->voxel_size_m[0], MOST_APART, err);
+    if (s == STATUS_OK) s = make_windows(&j, f, err);
+    if (s == STATUS_OK) {
+        s = thread_pool_run(pool, j.n_window, grade_window, &j, progress);
+        if (s != STATUS_OK) error_set(err, s, "grading the scan was cancelled");
+    }
+    if (s == STATUS_OK) sum_lengths(&j, grade, safe);
+    if (s == STATUS_OK) s = medians(&j, grade, err);
+    free(j.window);
+    grade_points_release(&j.points);
+    return s;
+}

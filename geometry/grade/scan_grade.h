@@ -1,0 +1,39 @@
+/* How clearly a scan shows the fibers that were traced in it.
+ *
+ * Where the scan shows a fiber, densities around its axis are those that fibers of the traced radii at the traced places
+ * would have: high within them, low between them. `contrast` is the slope of the measured on these expected densities,
+ * over windows of GRADE_WINDOW_DIAMETERS along a fiber, because single voxels are noisy: 1 where the scan shows the fibers,
+ * and near 0 where it shows material but no single fibers, so that lines there are invented. `valley_depth` is easier
+ * to see in a picture: from the axis of a fiber to that of its nearest neighbour the density falls by this share. It is
+ * small also where fibers are pressed together. */
+#ifndef SELVEDGE_GEOMETRY_SCAN_GRADE_H
+#define SELVEDGE_GEOMETRY_SCAN_GRADE_H
+
+#include "base/thread_pool.h"
+#include "geometry/fibers/fiber_set.h"
+#include "geometry/volume/volume.h"
+
+enum { GRADE_WINDOW_DIAMETERS = 4 };
+/* Contrast from which on a window is safe, and shares of safe length for the verdicts. */
+#define GRADE_SAFE_CONTRAST 0.5
+#define GRADE_RESOLVED_SHARE 0.85
+#define GRADE_UNRESOLVED_SHARE 0.5
+
+enum grade_verdict { GRADE_NONE, GRADE_RESOLVED, GRADE_PARTLY, GRADE_UNRESOLVED };
+
+struct scan_grade {
+    enum grade_verdict verdict; /* GRADE_NONE: not measured */
+    double contrast;            /* median over windows; NaN without fibers */
+    double valley_depth;        /* median over windows beside a neighbour; NaN if no fiber has one */
+    double beside_share;        /* share of the length that lies beside a neighbour */
+    double safe_share;          /* share of the length in windows with a contrast of at least GRADE_SAFE_CONTRAST */
+};
+
+/* "none", "resolved", "partly" or "unresolved". */
+const char *grade_verdict_name(enum grade_verdict v);
+/* v: densities in [0, 1] in cubic voxels. safe: n_fiber shares of safe length, or NULL. The result does not depend on
+ * the number of threads. STATUS_NO_MEMORY, STATUS_CANCELLED. */
+status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
+                          const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err);
+
+#endif
