@@ -35,10 +35,20 @@ status cli_log(struct cli *cli, int *exit_code, struct error *err);
 status cli_series(struct cli *cli, int *exit_code, struct error *err);
 status cli_delete(struct cli *cli, int *exit_code, struct error *err);
 
+status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
+
+/* Creates a job of a document, uploads its files from `folder` and starts it. id receives the job's id. */
+enum { CLI_ID_BYTES = 80 };
+status cli_submit_document(struct cli *cli, const json_t *document, const char *folder, char id[CLI_ID_BYTES],
+                           struct error *err);
+/* Downloads the results of job `id` to --out, or to selvedge-ID. */
+status cli_results_of(struct cli *cli, const char *id, struct error *err);
 /* Follows job `id` until it ends, and prints the fitted parameters. */
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
 /* Writes "/v1/jobs/ID" + tail to path. STATUS_INVALID when the id has characters that no id has. */
 status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err);
+/* The folder of a path: "." if it has none. */
+void cli_folder_of(const char *path, char *folder, size_t n_bytes);
 /* Width of the terminal behind `note`; 80 if it is unknown. */
 size_t cli_columns(const struct cli *cli);
 

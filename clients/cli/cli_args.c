@@ -16,7 +16,10 @@ enum {
     OPT_DRAFT = 256,
     OPT_HELP = 512,
     OPT_VERSION = 1024,
-    OPT_ID_FILE = 2048
+    OPT_ID_FILE = 2048,
+    OPT_VOXEL = 4096,
+    OPT_AXES = 8192,
+    OPT_ALIGN = 16384
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
@@ -30,6 +33,12 @@ static const struct cli_command {
          "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
          "continues a submit that was interrupted. Prints the job's id on standard output.\n",
          OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE},
+    [CLI_RECONSTRUCT] =
+        {"reconstruct", "SCAN", "trace the fibers of a scan, without photographs, and download the results",
+         "SCAN is a file (TIFF, .mhd, .mha, .nrrd, .nhdr, .vol) or a folder of TIFF slices. The job ends with the\n"
+         "geometry; a later job goes on from it (\"geometry\": {\"job\": ID} in its document). The results go to the\n"
+         "folder of --out (default: selvedge-ID).\n",
+         OPT_VOXEL | OPT_AXES | OPT_ALIGN | OPT_OUT | OPT_ID_FILE},
     [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
     [CLI_WATCH] =
         {"watch", "ID", "follow a job until it ends",
@@ -63,6 +72,9 @@ static const struct cli_option {
      "                      if the files are in the current folder or --input-dir)"},
     {OPT_DRAFT, 0, "draft", NULL, "upload everything but do not start the job"},
     {OPT_ID_FILE, 0, "id-file", "FILE", "write the job's id to FILE as soon as there is one (for scripts)"},
+    {OPT_VOXEL, 0, "voxel-um", "UM", "edge of a voxel in micrometres, or three, such as 2,2,3 (default: the file's)"},
+    {OPT_AXES, 0, "axes", "XYZ", "which axis of the file is weft, warp and height, such as xzy (default: xyz)"},
+    {OPT_ALIGN, 0, "align", NULL, "turn weft and warp to x and y, and crop to what repeats"},
     {OPT_JSON, 0, "json", NULL, "print the server's JSON"},
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
@@ -143,6 +155,15 @@ static void apply(struct cli_args *a, int bit, const char *value)
         break;
     case OPT_ID_FILE:
         a->id_file = value;
+        break;
+    case OPT_VOXEL:
+        a->voxel_um = value;
+        break;
+    case OPT_AXES:
+        a->axes = value;
+        break;
+    case OPT_ALIGN:
+        a->align = true;
         break;
     case OPT_WATCH:
         a->watch = true;
@@ -226,8 +247,10 @@ static status check(const struct cli_args *a, int given, struct error *err)
     bool may_lack = a->command == CLI_SUBMIT && a->resume_id != NULL;
     if (c->operand != NULL && a->operand == NULL && !may_lack)
         return error_set(err, STATUS_INVALID, "'selvedge %s' needs %s: selvedge %s %s", c->name,
-                         a->command == CLI_SUBMIT ? "a job document" : "a job id (`selvedge list` shows them)", c->name,
-                         c->operand);
+                         a->command == CLI_SUBMIT        ? "a job document"
+                         : a->command == CLI_RECONSTRUCT ? "a scan"
+                                                         : "a job id (`selvedge list` shows them)",
+                         c->name, c->operand);
     if (c->operand == NULL && a->operand != NULL)
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
     if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0)

@@ -12,6 +12,7 @@
 
 enum cli_command_id {
     CLI_SUBMIT,
+    CLI_RECONSTRUCT,
     CLI_STATUS,
     CLI_WATCH,
     CLI_LIST,
@@ -28,12 +29,14 @@ enum cli_command_id {
 struct cli_args {
     enum cli_command_id command;
     const char *server, *token;
-    const char *operand;   /* a job document for submit, a job id for the other commands */
+    const char *operand;   /* a job document for submit, a scan for reconstruct, a job id for the other commands */
     const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */
     const char *id_file;   /* --id-file */
-    bool watch, json, follow, draft;
+    const char *voxel_um;  /* --voxel-um */
+    const char *axes;      /* --axes */
+    bool watch, json, follow, draft, align;
     bool help; /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;

@@ -204,6 +204,17 @@ static void print_radius(const json_t *radius, FILE *out)
             json_is_true(json_object_get(radius, "at_bound")) ? "  at the edge of its range" : "");
 }
 
+/* The geometry of a job without a fit. */
+static void print_geometry(const json_t *g, FILE *out)
+{
+    const json_t *grade = json_object_get(g, "grade");
+    fprintf(out, "fibers: %.0f, %.4g mm in all, mean radius %.4g um\n", member_number(g, "n_fiber"),
+            member_number(g, "total_length_mm"), member_number(g, "mean_radius_um"));
+    if (json_is_object(grade))
+        fprintf(out, "single fibers in the scan: %s, %.0f %% of their length is sure\n", member_text(grade, "verdict"),
+                100.0 * member_number(grade, "safe_share"));
+}
+
 void report_result(const json_t *job, FILE *out)
 {
     static const struct {
@@ -211,6 +222,10 @@ void report_result(const json_t *job, FILE *out)
     } residual[] = {{"fit_rel_rms", "relative RMS error, fitted"}, {"heldout_rel_rms", "relative RMS error, held out"}};
     size_t i;
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
+    if (json_is_object(result) && json_array_size(json_object_get(result, "models")) == 0) {
+        print_geometry(json_object_get(result, "geometry"), out);
+        return;
+    }
     print_models(json_object_get(result, "models"), member_text(result, "chosen_by"), out);
     print_radius(json_object_get(result, "radius"), out);
     print_parameters(parameters, out);

@@ -78,23 +78,27 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
 status cli_results(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
+    return cli_results_of(cli, cli->args->operand, err);
+}
+
+status cli_results_of(struct cli *cli, const char *id, struct error *err)
+{
     char path[256], folder[4096], size[CLI_SHORT_TEXT];
     struct transfer t = {.cli = cli};
     json_t *list = NULL, *file;
     size_t i, n_fetched = 0;
-    status s = cli_job_path(cli->args->operand, "/results", path, sizeof path, err);
+    status s = cli_job_path(id, "/results", path, sizeof path, err);
     if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &list, err);
     if (s != STATUS_OK) return s;
     const json_t *files = json_object_get(list, "files");
     if (json_array_size(files) == 0) {
-        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` waits for them",
-                      cli->args->operand, cli->args->operand);
+        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` waits for them", id, id);
         goto out;
     }
     if (cli->args->out_dir != NULL)
         snprintf(folder, sizeof folder, "%s", cli->args->out_dir);
     else
-        snprintf(folder, sizeof folder, "selvedge-%s", cli->args->operand);
+        snprintf(folder, sizeof folder, "selvedge-%s", id);
     json_array_foreach(files, i, file) t.n_total += (uint64_t)json_integer_value(json_object_get(file, "size"));
     json_array_foreach(files, i, file)
     {

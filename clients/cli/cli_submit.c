@@ -14,7 +14,7 @@ struct submit {
     struct cli *cli;
     json_t *document, *job;
     struct cli_file_list list;
-    char id[80];
+    char id[CLI_ID_BYTES];
     /* progress over all files */
     const char *verb, *name;
     uint64_t n_total, n_before, n_now;
@@ -70,6 +70,16 @@ static bool hashed(void *context, uint64_t n_done)
 
 /* ---- steps ---- */
 
+void cli_folder_of(const char *path, char *folder, size_t n_bytes)
+{
+    const char *slash = strrchr(path, '/');
+    snprintf(folder, n_bytes, "%.*s",
+             slash == NULL   ? 1
+             : slash == path ? 1
+                             : (int)(slash - path),
+             slash == NULL ? "." : path);
+}
+
 static status read_document(struct submit *u, const char *path, struct error *err)
 {
     json_error_t where;
@@ -89,11 +99,10 @@ static status list_files(struct submit *u, struct error *err)
 {
     const struct cli_args *a = u->cli->args;
     char folder[4096] = ".";
-    const char *slash = a->operand == NULL ? NULL : strrchr(a->operand, '/');
     if (a->input_dir != NULL)
         snprintf(folder, sizeof folder, "%s", a->input_dir);
-    else if (slash != NULL)
-        snprintf(folder, sizeof folder, "%.*s", slash == a->operand ? 1 : (int)(slash - a->operand), a->operand);
+    else if (a->operand != NULL)
+        cli_folder_of(a->operand, folder, sizeof folder);
     return cli_job_files_list(u->document, folder, &u->list, err);
 }
 
@@ -223,6 +232,24 @@ static status start_job(struct submit *u, struct error *err)
     status s = cli_job_path(u->id, "/start", path, sizeof path, err);
     if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, NULL, NULL, err);
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot start the job");
+}
+
+status cli_submit_document(struct cli *cli, const json_t *document, const char *folder, char id[CLI_ID_BYTES],
+                           struct error *err)
+{
+    struct submit u = {.cli = cli, .document = json_deep_copy(document)};
+    status s = u.document != NULL ? cli_job_files_list(u.document, folder, &u.list, err)
+                                  : error_set(err, STATUS_NO_MEMORY, "cannot make the job document: out of memory");
+    if (s == STATUS_OK) s = hash_files(&u, err);
+    if (s == STATUS_OK) s = create_job(&u, err);
+    if (s == STATUS_OK) s = send_files(&u, err);
+    if (s == STATUS_OK) s = start_job(&u, err);
+    draw_end(&u);
+    snprintf(id, CLI_ID_BYTES, "%s", u.id);
+    cli_job_files_release(&u.list);
+    json_decref(u.document);
+    json_decref(u.job);
+    return s;
 }
 
 status cli_submit(struct cli *cli, int *exit_code, struct error *err)

@@ -131,7 +131,8 @@ export function jobPage(page, id) {
     const compete = models(job), radius = radiusSearch(job);
     results.append(
       compete.length > 1 ? card("Models compared", modelTable(compete, choiceOf(job))) : "",
-      el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
+      job.result && !job.result.models?.length ? "" : // a job of geometry only has none
+        el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
       details ? card("More results of the fit", details) : "",
       radius ? card("Fiber radius", radiusPlot(radius)) : "",
       compared.length ? card("Measured and rendered pictures", gallery(compared, job.result?.png_exposure)) : "",

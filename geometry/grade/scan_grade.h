@@ -1,11 +1,11 @@
 /* How clearly a scan shows the fibers that were traced in it.
  *
- * Where the scan shows a fiber, densities around its axis are those that fibers of the traced radii at the traced places
- * would have: high within them, low between them. `contrast` is the slope of the measured on these expected densities,
- * over windows of GRADE_WINDOW_DIAMETERS along a fiber, because single voxels are noisy: 1 where the scan shows the fibers,
- * and near 0 where it shows material but no single fibers, so that lines there are invented. `valley_depth` is easier
- * to see in a picture: from the axis of a fiber to that of its nearest neighbour the density falls by this share. It is
- * small also where fibers are pressed together. */
+ * Where the scan shows a fiber, densities around its axis are those that fibers of the traced radii at the traced
+ * places would have: high within them, low between them. `contrast` is the slope of the measured on these expected
+ * densities, over windows of GRADE_WINDOW_DIAMETERS along a fiber, because single voxels are noisy: near 1 where the
+ * scan shows the fibers, and near 0 where it shows material but no single fibers, so that lines there are invented.
+ * `valley_depth` is easier to see in a picture: from the axis of a fiber to that of its nearest neighbour the density
+ * falls by this share. It is small also where fibers are pressed together. */
 #ifndef SELVEDGE_GEOMETRY_SCAN_GRADE_H
 #define SELVEDGE_GEOMETRY_SCAN_GRADE_H
 

@@ -37,6 +37,11 @@ void job_document_free(struct job_document *doc)
     free(doc);
 }
 
+bool job_document_geometry_only(const struct job_document *doc)
+{
+    return doc->n_photograph == 0 && doc->measurement_file[0] == '\0';
+}
+
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err)
 {
     struct job_document *d = NULL;

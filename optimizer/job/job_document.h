@@ -77,7 +77,8 @@ struct job_document {
     size_t filter_h;                                                                  /* 0: not given */
     double link_sigma_voxel, radius_um;                                               /* NaN: not given */
     size_t min_vertex;
-    int radius_per_axis; /* 1: one radius for each axis class, 0: one for all, -1: the measurement decides */
+    int radius_per_axis;   /* 1: one radius for each axis class, 0: one for all, -1: the measurement decides */
+    char geometry_job[64]; /* geometry: id of another job; "" when none is given */
     /* fibers */
     char fiber_file[JOB_MAX_NAME_BYTES];
     double tile_mm[2]; /* NaN: from the file */
@@ -135,6 +136,8 @@ struct job_document {
  * job_document_free. */
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
+/* Whether the job ends with the geometry of its scan, because it has neither photographs nor measurements. */
+bool job_document_geometry_only(const struct job_document *doc);
 
 /* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text
  * too. */

@@ -12,18 +12,19 @@ struct stage_code {
     status (*run)(struct pipeline_context *c, struct error *err);
     status (*load)(struct pipeline_context *c, struct error *err); /* NULL: the stage is cheap, or always runs */
     bool of_volume;                                                /* skipped when the job gives fibers */
+    bool of_fit;                                                   /* skipped when the job ends with the geometry */
 };
 
 /* In the order of pipeline_stage_table (a test compares the names). */
 static const struct stage_code stage_code[] = {
-    {"volume", stage_volume, stage_volume_load, true},
-    {"orientation", stage_orientation, stage_orientation_load, true},
-    {"fibers", stage_fibers, stage_fibers_load, false},
-    {"directions", stage_directions, stage_directions_load, true},
-    {"scene", stage_scene, NULL, false},
-    {"fit", stage_fit, stage_fit_load, false},
-    {"validation", stage_validation, stage_validation_load, false},
-    {"report", stage_report, NULL, false},
+    {"volume", stage_volume, stage_volume_load, true, false},
+    {"orientation", stage_orientation, stage_orientation_load, true, false},
+    {"fibers", stage_fibers, stage_fibers_load, false, false},
+    {"directions", stage_directions, stage_directions_load, true, false},
+    {"scene", stage_scene, NULL, false, true},
+    {"fit", stage_fit, stage_fit_load, false, true},
+    {"validation", stage_validation, stage_validation_load, false, true},
+    {"report", stage_report, NULL, false, false},
 };
 
 static void report_fraction(void *context, double fraction)
@@ -55,6 +56,8 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
             worker_status_restart_eta(c->status);
             return STATUS_OK;
         }
+        if (c->doc->geometry_job[0] != '\0' && !code->of_fit)
+            return job_option_name_field(pipeline_geometry_lost(c, why.text, err), err);
         log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
     }
     status s = code->load != NULL && !*earlier_ran ? unmark_from(c, i, err) : STATUS_OK;
@@ -65,6 +68,12 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
     c->stage_wall_s[i] = clock_monotonic_s() - start_s;
     log_info(c->log, "stage %s: %.1f s", code->name, c->stage_wall_s[i]);
     return worker_folder_mark_stage(c->folder, code->name, err);
+}
+
+static bool is_skipped(const struct pipeline_context *c, size_t i)
+{
+    return (stage_code[i].of_volume && !c->doc->has_volume) ||
+           (stage_code[i].of_fit && job_document_geometry_only(c->doc));
 }
 
 status pipeline_run(struct pipeline_context *c, struct error *err)
@@ -80,10 +89,9 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
         if (s != STATUS_OK) return s;
     }
     c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
-    for (size_t i = 0; i < n_stage; i++)
-        if (c->doc->has_volume || !stage_code[i].of_volume) total += info[i].weight;
+    for (size_t i = 0; i < n_stage; i++) total += is_skipped(c, i) ? 0.0 : info[i].weight;
     for (size_t i = 0; i < n_stage; i++) {
-        if (!c->doc->has_volume && stage_code[i].of_volume) continue;
+        if (is_skipped(c, i)) continue;
         worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage, done / total, info[i].weight / total);
         status s = do_stage(c, i, &earlier_ran, err);
         if (s == STATUS_OK && progress_cancelled(&c->progress)) s = error_set(err, STATUS_CANCELLED, "cancelled");

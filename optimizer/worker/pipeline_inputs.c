@@ -9,6 +9,7 @@
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/scene/pipeline_adopt.h"
 #include "optimizer/worker/stages/scene/pipeline_texture.h"
 #include "optimizer/worker/stages/scene/texture_start.h"
 #include "renderer/transport/light/environment.h"
@@ -184,6 +185,11 @@ static uint32_t program_sum(void)
     return sum;
 }
 
+uint64_t pipeline_fingerprint(const char *document, size_t n_bytes)
+{
+    return crc32_z(program_sum(), (const void *)document, n_bytes);
+}
+
 static status read_document(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -192,13 +198,15 @@ static status read_document(struct pipeline_context *c, struct error *err)
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
     s = job_document_parse(text, n, &c->doc, err);
-    c->fingerprint = crc32_z(program_sum(), (const void *)text, n);
+    c->fingerprint = pipeline_fingerprint(text, n);
     free(text);
+    if (s == STATUS_OK && c->doc->geometry_job[0] != '\0') c->doc->has_volume = true; /* the other job has it */
     return s;
 }
 
 static status read_rows(struct pipeline_context *c, struct error *err)
 {
+    if (job_document_geometry_only(c->doc)) return claim_inputs(c, err);
     status s = set_models(c, err);
     if (s == STATUS_OK) s = pipeline_read_texture(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_inputs(c, err);
@@ -215,5 +223,7 @@ static status read_rows(struct pipeline_context *c, struct error *err)
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
 {
     status s = read_document(c, err);
-    return s == STATUS_OK ? job_option_name_field(read_rows(c, err), err) : s;
+    if (s == STATUS_OK) s = read_rows(c, err);
+    if (s == STATUS_OK) s = pipeline_adopt_geometry(c, err);
+    return job_option_name_field(s, err);
 }

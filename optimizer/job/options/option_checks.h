@@ -9,6 +9,8 @@
 status job_check_document(const struct option_value *v, struct error *err);
 status job_check_sample(const struct option_value *v, struct error *err);
 /* the cloth */
+/* Refuses ids that could leave the folder of the jobs. */
+status job_check_geometry_job(const struct option_value *v, struct error *err);
 status job_check_volume(const struct option_value *v, struct error *err);
 status job_check_raw(const struct option_value *v, struct error *err);
 status job_check_axes(const struct option_value *v, struct error *err);

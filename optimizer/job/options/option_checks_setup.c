@@ -17,6 +17,14 @@ status job_check_sample(const struct option_value *v, struct error *err)
     return STATUS_OK;
 }
 
+status job_check_geometry_job(const struct option_value *v, struct error *err)
+{
+    const char *id = v->doc->geometry_job;
+    size_t n = strspn(id, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-");
+    if (n > 0 && id[n] == '\0') return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path, "'%s' is '%s', which is not the id of a job", v->path, id);
+}
+
 status job_check_lamp(const struct option_value *v, struct error *err)
 {
     if (v->doc->lamp_directional || v->doc->lamp_side_cm <= 2.0 * v->doc->lamp_distance_cm) return STATUS_OK;
@@ -69,9 +77,9 @@ static bool given(const struct option_value *document, const char *key)
 
 static status check_one_cloth(const struct option_value *v, struct error *err)
 {
-    static const char *const key[] = {"volume", "fibers", "cloth"};
+    static const char *const key[] = {"volume", "geometry", "fibers", "cloth"};
     const char *first = NULL;
-    for (size_t i = 0; i < 3; i++) {
+    for (size_t i = 0; i < sizeof key / sizeof *key; i++) {
         if (!given(v, key[i])) continue;
         if (first != NULL)
             return error_set_field(err, STATUS_INVALID, key[i], "'%s' and '%s' are both given: a job takes one of them",
@@ -79,9 +87,10 @@ static status check_one_cloth(const struct option_value *v, struct error *err)
         first = key[i];
     }
     if (first != NULL) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "volume",
-                           "'volume' is missing: give a scan ('volume'), a fiber file ('fibers') or a description "
-                           "('cloth')");
+    return error_set_field(
+        err, STATUS_INVALID, "volume",
+        "'volume' is missing: give a scan ('volume'), the geometry of another job ('geometry'), a fiber "
+        "file ('fibers') or a description ('cloth')");
 }
 
 static status check_one_measurement(const struct option_value *v, struct error *err)
@@ -89,9 +98,17 @@ static status check_one_measurement(const struct option_value *v, struct error *
     if (given(v, "measurements") && given(v, "photographs"))
         return error_set_field(err, STATUS_INVALID, "photographs",
                                "'measurements' and 'photographs' are both given: a job takes one of them");
-    if (!given(v, "measurements") && !given(v, "photographs"))
+    if (given(v, "measurements") || given(v, "photographs")) return STATUS_OK;
+    if (!given(v, "volume"))
         return error_set_field(err, STATUS_INVALID, "photographs",
                                "'photographs' is missing: give a list of photographs, or 'measurements' with a table");
+    for (int i = 0; i < 2; i++)
+        if (given(v, i == 0 ? "fit" : "correction"))
+            return error_set_field(err, STATUS_INVALID, "photographs",
+                                   "'photographs' is missing: '%s' is given, so the job fits, and needs a list of "
+                                   "photographs, or 'measurements' with a table; without all of them the job ends with "
+                                   "the geometry of the scan",
+                                   i == 0 ? "fit" : "correction");
     return STATUS_OK;
 }
 

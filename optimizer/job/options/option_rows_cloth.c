@@ -6,17 +6,22 @@ static const char *const sample_type[] = {"uint8", "int8",    "uint16",  "int16"
 static const char *const byte_order[] = {"little", "big", NULL};
 static const char *const none_auto[] = {"none", "auto", NULL};
 
-/* Schemas of two or three keys of which exactly one must be given. */
-#define ONE_OF_THREE(a, b, c)                                                                                          \
-    "{\"oneOf\": [{\"required\": [\"" a "\"]}, {\"required\": [\"" b "\"]}, {\"required\": [\"" c "\"]}]}"
-#define ONE_OF(a, b) "{\"oneOf\": [{\"required\": [\"" a "\"]}, {\"required\": [\"" b "\"]}]}"
+/* Schemas of two or four keys of which exactly one must be given, and of four of which none may be. */
+#define REQUIRED(a) "{\"required\": [\"" a "\"]}"
+#define ONE_OF_FOUR(a, b, c, d) "{\"oneOf\": [" REQUIRED(a) ", " REQUIRED(b) ", " REQUIRED(c) ", " REQUIRED(d) "]}"
+#define ONE_OF(a, b) "{\"oneOf\": [" REQUIRED(a) ", " REQUIRED(b) "]}"
+#define NONE_OF_FOUR(a, b, c, d)                                                                                       \
+    "{\"not\": {\"anyOf\": [" REQUIRED(a) ", " REQUIRED(b) ", " REQUIRED(c) ", " REQUIRED(d) "]}}"
+/* A job of geometry only: a scan without photographs. */
+#define GEOMETRY_ONLY                                                                                                  \
+    "{\"allOf\": [" REQUIRED("volume") ", " NONE_OF_FOUR("measurements", "photographs", "fit", "correction") "]}"
 
 const struct job_option option_rows_cloth[] = {
     {.path = "",
      .kind = OPTION_SECTION,
      .check = job_check_document,
-     .schema =
-         "{\"allOf\": [" ONE_OF_THREE("volume", "fibers", "cloth") ", " ONE_OF("measurements", "photographs") "]}",
+     .schema = "{\"allOf\": [" ONE_OF_FOUR("volume", "geometry", "fibers", "cloth") ", {\"anyOf\": [" ONE_OF(
+         "measurements", "photographs") ", " GEOMETRY_ONLY "]}]}",
      .meaning = "Units, defaults and meaning: docs/sample-preparation.md, section 4. The daemon checks every field and "
                 "names the one at fault."},
     {.path = "sample",
@@ -28,12 +33,27 @@ const struct job_option option_rows_cloth[] = {
      .schema = "{\"minLength\": 1, \"maxLength\": 200}",
      .meaning = "A name for people."},
 
+    {.path = "geometry",
+     .kind = OPTION_SECTION,
+     .left_out = "this, `volume`, `fibers` or `cloth`",
+     .meaning = "The geometry of an earlier job, which is not made again."},
+    {.path = "geometry.job",
+     .kind = OPTION_TEXT,
+     .id = OPTION_GEOMETRY_JOB,
+     TEXT_INTO(geometry_job),
+     .required = true,
+     .check = job_check_geometry_job,
+     .allowed = "the id of a job with `volume`",
+     .meaning =
+         "The job whose scan, fibers and directions are taken over. Its stages up to `directions` must be done, by "
+         "the same version of the program. It may be deleted once this job runs."},
+
     {.path = "volume",
      .kind = OPTION_SECTION,
      INTO(has_volume),
      .check = job_check_volume,
-     .left_out = "this, `fibers` or `cloth`",
-     .meaning = "The cloth as a micro-CT scan."},
+     .left_out = "this, `geometry`, `fibers` or `cloth`",
+     .meaning = "The cloth as a micro-CT scan. Without photographs and measurements the job ends with the geometry."},
     {.path = "volume.files",
      .kind = OPTION_FILE_NAMES,
      .id = OPTION_SCAN_FILES,

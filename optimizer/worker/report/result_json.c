@@ -251,6 +251,16 @@ static json_t *skill_json(const struct pipeline_context *c)
     return json_pack("{s:o, s:o}", "plain_brdf", plain, "heldout_ratio", json_number(twin / c->skill.heldout_rel_rms));
 }
 
+/* Adds what every job has, also one of geometry only. */
+static void put_job(json_t *json, struct pipeline_context *c)
+{
+    json_object_set_new(json, "geometry", result_geometry_json(c));
+    json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
+    json_object_set_new(json, "stages", stages_json(c));
+    json_object_set_new(json, "warnings", result_warnings_json(c));
+    json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
+}
+
 static json_t *result_json(struct pipeline_context *c, picture_name *picture)
 {
     const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
@@ -265,28 +275,37 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     json_object_set_new(json, "models", models);
     json_object_set_new(json, "skill", skill_json(c));
     json_object_set_new(json, "radius", radius_json(c));
-    json_object_set_new(json, "geometry", result_geometry_json(c));
-    json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
     json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));
-    json_object_set_new(json, "stages", stages_json(c));
-    json_object_set_new(json, "warnings", result_warnings_json(c));
-    json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
+    put_job(json, c);
     return json;
+}
+
+/* Writes result.json, and releases json. */
+static status write_result(const struct pipeline_context *c, json_t *json, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    char *text = json_dumps(json, JSON_REAL_PRECISION(17) | JSON_INDENT(1));
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "result.json", path);
+    status s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
+                            : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    free(text);
+    json_decref(json);
+    return s;
+}
+
+status result_geometry_json_write(struct pipeline_context *c, struct error *err)
+{
+    json_t *json = json_pack("{s:i, s:s, s:n, s:n, s:[], s:[], s:[]}", "format", 1, "sample", c->doc->sample, "model",
+                             "method", "parameters", "rows", "models");
+    put_job(json, c);
+    return write_result(c, json, err);
 }
 
 status result_json_write(struct pipeline_context *c, struct error *err)
 {
-    char path[WORKER_PATH_BYTES];
     picture_name *picture = NULL;
     status s = result_picture_names(&c->observation, &picture, err);
-    if (s != STATUS_OK) return s;
-    json_t *json = result_json(c, picture);
-    char *text = json_dumps(json, JSON_REAL_PRECISION(17) | JSON_INDENT(1));
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "result.json", path);
-    s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
-                     : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
-    free(text);
-    json_decref(json);
+    if (s == STATUS_OK) s = write_result(c, result_json(c, picture), err);
     free(picture);
     return s;
 }

@@ -43,6 +43,8 @@ status result_picture_names(const struct observation_set *o, picture_name **name
 /* Exposure of all PNG pictures. It brings the 90th percentile of the brightest measured channels to 0.8. */
 double result_png_exposure(const struct observation_set *o);
 
+/* The same of a job that ends with the geometry: without parameters, rows and models. */
+status result_geometry_json_write(struct pipeline_context *c, struct error *err);
 status result_json_write(struct pipeline_context *c, struct error *err);
 status result_summary_write(struct pipeline_context *c, struct error *err);
 

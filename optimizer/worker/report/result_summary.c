@@ -129,15 +129,8 @@ static void print_skill(const struct pipeline_context *c, FILE *out)
     fprintf(out, "\n");
 }
 
-static void print_summary(struct pipeline_context *c, FILE *out)
+static void print_cloth(const struct pipeline_context *c, FILE *out)
 {
-    char text[600];
-    const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
-    fprintf(out, "%s\n\n", c->doc->sample);
-    if (c->n_model > 1) print_comparison(c, out);
-    fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
-    fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
-    fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
     if (c->doc->has_volume)
@@ -149,6 +142,24 @@ static void print_summary(struct pipeline_context *c, FILE *out)
                 "inside\n",
                 c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
     fprintf(out, "         quality.html shows how good the geometry is\n\n");
+}
+
+static void print_warnings(struct pipeline_context *c, FILE *out)
+{
+    char text[600];
+    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
+        fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
+}
+
+static void print_summary(struct pipeline_context *c, FILE *out)
+{
+    const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
+    fprintf(out, "%s\n\n", c->doc->sample);
+    if (c->n_model > 1) print_comparison(c, out);
+    fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
+    fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
+    fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
+    print_cloth(c, out);
     result_numbers_print(c, m, out);
     if (c->doc->fit_radius)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m, 1e6 * c->radius.se_m,
@@ -161,8 +172,15 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     print_parameters(m, out);
     result_summary_options(c, m, out);
     print_rows(c, m, out);
-    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
-        fprintf(out, "%swarning: %s\n", i == 0 ? "\n" : "", text);
+    print_warnings(c, out);
+}
+
+/* Of a job that ends with the geometry. */
+static void print_geometry(struct pipeline_context *c, FILE *out)
+{
+    fprintf(out, "%s\n\ngeometry only: the job has no photographs\n", c->doc->sample);
+    print_cloth(c, out);
+    print_warnings(c, out);
 }
 
 status result_summary_write(struct pipeline_context *c, struct error *err)
@@ -171,7 +189,10 @@ status result_summary_write(struct pipeline_context *c, struct error *err)
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the summary: out of memory");
-    print_summary(c, out);
+    if (job_document_geometry_only(c->doc))
+        print_geometry(c, out);
+    else
+        print_summary(c, out);
     fclose(out);
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "summary.txt", path);
     status s = worker_folder_replace(c->folder, path, text, n, err);

@@ -38,6 +38,12 @@ static void test_commands(void **state)
     assert_null(args.operand);
     assert_int_equal(PARSE("log", "-f", "5e0c"), STATUS_OK);
     assert_true(args.follow);
+    assert_int_equal(PARSE("reconstruct", "scan.tif", "--voxel-um", "2,2,3", "--axes", "xzy", "--align", "-o", "o"),
+                     STATUS_OK);
+    assert_int_equal(args.command, CLI_RECONSTRUCT);
+    assert_string_equal(args.voxel_um, "2,2,3");
+    assert_string_equal(args.axes, "xzy");
+    assert_true(args.align);
     assert_int_equal(PARSE("status", "--", "-odd"), STATUS_OK);
     assert_string_equal(args.operand, "-odd");
 }

@@ -117,6 +117,8 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     if (c->texture.found) json_object_set_new(json, "texture", texture_json(c));
     if (!c->doc->has_volume) return json;
     const struct reconstruct_option *o = &c->option;
+    json_object_set_new(json, "from_job",
+                        c->doc->geometry_job[0] != '\0' ? json_string(c->doc->geometry_job) : json_null());
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));
     json_object_set_new(json, "voxel_size_um", json_number_list(g->voxel_size_m, 3, um));
     json_object_set_new(json, "file_voxel_size_um", json_number_list(g->file_voxel_size_m, 3, um));

@@ -9,8 +9,19 @@
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "optimizer/worker/stages/result/pipeline_skill.h"
 
+/* Of a job that ends with the geometry. */
+static status report_geometry(struct pipeline_context *c, struct error *err)
+{
+    reconstruct_warn_fibers(&c->geometry, &c->fiber, &(struct warning_sink){pipeline_warn, c});
+    status s = result_geometry_json_write(c, err);
+    if (s == STATUS_OK) s = result_summary_write(c, err);
+    if (s == STATUS_OK) s = result_geometry_write(c, err);
+    return s == STATUS_OK ? quality_write(c, err) : s;
+}
+
 status stage_report(struct pipeline_context *c, struct error *err)
 {
+    if (job_document_geometry_only(c->doc)) return report_geometry(c, err);
     status s = pipeline_certify(c, err);
     if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);

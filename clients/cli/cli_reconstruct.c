@@ -1,0 +1,136 @@
+/* selvedge reconstruct SCAN: a job of geometry only, for one who has a scan and wants its fibers. */
+#include "clients/cli/cli.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static bool ends_with(const char *text, const char *end)
+{
+    size_t n = strlen(text), m = strlen(end);
+    return n >= m && strcmp(text + n - m, end) == 0;
+}
+
+static const char *name_of(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
+
+/* The TIFF files of a folder in the order of their names, which is that of the slices. */
+static status list_slices(const char *folder, json_t *files, struct error *err)
+{
+    DIR *d = opendir(folder);
+    if (d == NULL) return error_set_errno(err, "cannot read the folder '%s'", folder);
+    char **name = NULL;
+    size_t n = 0;
+    bool ok = true;
+    for (struct dirent *e; ok && (e = readdir(d)) != NULL;) {
+        if (e->d_name[0] == '.' || (!ends_with(e->d_name, ".tif") && !ends_with(e->d_name, ".tiff"))) continue;
+        char **more = realloc(name, (n + 1) * sizeof *name);
+        ok = more != NULL;
+        if (ok) name = more;
+        if (ok) ok = (name[n] = strdup(e->d_name)) != NULL;
+        n += ok;
+    }
+    closedir(d);
+    if (n > 0) qsort(name, n, sizeof *name, by_name);
+    for (size_t i = 0; i < n; i++) {
+        json_array_append_new(files, json_string(name[i]));
+        free(name[i]);
+    }
+    free(name);
+    if (!ok) return error_set(err, STATUS_NO_MEMORY, "cannot list the folder '%s': out of memory", folder);
+    return n > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "the folder '%s' has no TIFF files", folder);
+}
+
+/* Adds the data file that a header names: the rest of the line that begins with `key`. */
+static status add_data_file(const char *path, const char *key, char separator, json_t *files, struct error *err)
+{
+    char line[1024];
+    FILE *f = fopen(path, "re");
+    bool found = false;
+    if (f == NULL) return error_set_errno(err, "cannot read the scan '%s'", path);
+    while (!found && fgets(line, sizeof line, f) != NULL) {
+        char *value = strchr(line, separator);
+        if (strncmp(line, key, strlen(key)) != 0 || value == NULL) continue;
+        value += 1 + strspn(value + 1, " \t");
+        value[strcspn(value, "\r\n")] = '\0';
+        found = value[0] != '\0';
+        if (found) json_array_append_new(files, json_string(value));
+    }
+    fclose(f);
+    return found ? STATUS_OK : error_set(err, STATUS_FORMAT, "the scan '%s' does not name its data file", path);
+}
+
+/* Names of the scan's files, and the folder that they lie in. */
+static status list_scan(const char *scan, json_t *files, char *folder, size_t n_bytes, struct error *err)
+{
+    struct stat st;
+    if (stat(scan, &st) != 0) return error_set_errno(err, "cannot read the scan '%s'", scan);
+    if (S_ISDIR(st.st_mode)) {
+        snprintf(folder, n_bytes, "%s", scan);
+        return list_slices(scan, files, err);
+    }
+    cli_folder_of(scan, folder, n_bytes);
+    json_array_append_new(files, json_string(name_of(scan)));
+    if (ends_with(scan, ".mhd")) return add_data_file(scan, "ElementDataFile", '=', files, err);
+    return ends_with(scan, ".nhdr") ? add_data_file(scan, "data file", ':', files, err) : STATUS_OK;
+}
+
+/* "2" or "2,2,3": one edge for all axes, or three. */
+static status read_voxel(const char *text, json_t **voxel, struct error *err)
+{
+    double um[3];
+    char *end = NULL;
+    int n = 0;
+    for (const char *at = text; n < 3; at = end + 1) {
+        um[n] = strtod(at, &end);
+        if (end == at || !(um[n] > 0.0) || !isfinite(um[n])) break;
+        n++;
+        if (*end != ',') break;
+    }
+    if ((n != 1 && n != 3) || *end != '\0')
+        return error_set(err, STATUS_INVALID, "option '--voxel-um' takes one length or three, such as 2 or 2,2,3: '%s'",
+                         text);
+    *voxel = n == 1 ? json_real(um[0]) : json_pack("[f, f, f]", um[0], um[1], um[2]);
+    return STATUS_OK;
+}
+
+static status make_document(const struct cli_args *a, json_t **document, char *folder, size_t n_bytes,
+                            struct error *err)
+{
+    json_t *files = json_array(), *volume = json_object(), *voxel = NULL;
+    status s = list_scan(a->operand, files, folder, n_bytes, err);
+    if (s == STATUS_OK && a->voxel_um != NULL) s = read_voxel(a->voxel_um, &voxel, err);
+    json_object_set_new(volume, "files", files);
+    if (voxel != NULL) json_object_set_new(volume, "voxel_size_um", voxel);
+    if (a->axes != NULL) json_object_set_new(volume, "axes", json_string(a->axes));
+    if (a->align) {
+        json_object_set_new(volume, "align", json_string("auto"));
+        json_object_set_new(volume, "crop", json_string("auto"));
+    }
+    *document = json_pack("{s:s, s:o}", "sample", name_of(a->operand), "volume", volume);
+    if (s == STATUS_OK && *document == NULL)
+        s = error_set(err, STATUS_INVALID, "the name of the scan '%s' is not UTF-8", a->operand);
+    return s;
+}
+
+status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err)
+{
+    json_t *document = NULL;
+    char folder[4096], id[CLI_ID_BYTES] = "";
+    status s = make_document(cli->args, &document, folder, sizeof folder, err);
+    if (s == STATUS_OK) s = cli_submit_document(cli, document, folder, id, err);
+    if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_of(cli, id, err);
+    if (s != STATUS_OK && id[0] != '\0')
+        fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
+    json_decref(document);
+    return s;
+}

@@ -1,0 +1,13 @@
+/* A job that goes on from the geometry of another one: the checkpoints of that job become its own. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_ADOPT_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_ADOPT_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Links the checkpoints of the stages "volume" to "directions" of the job that the document names into the folder of
+ * this job, and marks these stages as done; what is there already stays. The folders of all jobs lie side by side.
+ * Nothing happens when the document names no job. STATUS_INVALID, field OPTION_GEOMETRY_JOB: there is no such job, its
+ * geometry is not done, or another version of the program made it. */
+status pipeline_adopt_geometry(struct pipeline_context *c, struct error *err);
+
+#endif

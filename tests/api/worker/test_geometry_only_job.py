@@ -1,0 +1,99 @@
+"""A job of geometry only: a scan without photographs. A later job goes on from its geometry without making it again, also
+when the first job is deleted meanwhile."""
+import json
+import os
+import subprocess
+
+import pytest
+from daemon_under_test import program
+from small_cloth import TABLE
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
+FIT = {"max_iterations": 1, "path_budget": 1000, "render_px": 8, "render_samples": 1}
+ROWS = {"measurements": {"file": "rows.csv"}, "fit": FIT}
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("phantom")
+    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--metaimage", "--out", str(folder)],
+                   check=True, capture_output=True)
+    return folder
+
+
+def start(d, document, files):
+    job = d.create({"sample": "cloth", **document})
+    for name, role, data in files:
+        d.upload(job, name, data, role)
+    assert d.post(f"/v1/jobs/{job}/start").status_code == 202
+    return job
+
+
+def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
+    first = start(real, {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}}, [("scan.tif", "volume", (scan / "scan.tif").read_bytes())])
+    state = real.wait_state(first, "succeeded", timeout_s=120)
+    made = state["result"]
+    assert made["parameters"] == made["rows"] == made["models"] == [] and made["model"] is None
+    assert made["geometry"]["n_fiber"] > 20 and made["geometry"]["grade"]["verdict"] == "resolved" and made["geometry"]["from_job"] is None
+    done = {s["name"]: s["wall_s"] for s in made["stages"]}
+    assert done["directions"] is not None and done["scene"] is None and done["fit"] is None
+    listed = {f["path"] for f in real.get(f"/v1/jobs/{first}/results").json()["files"]}
+    assert {"result.json", "summary.txt", "fibers.hair", "direction.vol", "density.vol", "quality.html", "pictures/slice-x.png"} <= listed
+
+    second = start(real, {"geometry": {"job": first}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
+    fitted = real.wait_state(second, "succeeded", timeout_s=120)["result"]
+    assert fitted["geometry"]["from_job"] == first and len(fitted["parameters"]) > 3
+    for key in ("n_fiber", "total_length_mm", "radius_um", "dice", "grade", "options"):
+        assert fitted["geometry"][key] == made["geometry"][key]
+    wall_s = {s["name"]: s["wall_s"] for s in fitted["stages"]}
+    assert all(wall_s[stage] is None for stage in ("volume", "orientation", "fibers", "directions")) and wall_s["fit"] is not None
+    hair = [real.get(f"/v1/jobs/{job}/results/fibers.hair").content for job in (first, second)]
+    assert hair[0] == hair[1]
+
+    # Its own checkpoints: the first job may go, and the second can be retried or gone on from.
+    assert real.delete(f"/v1/jobs/{first}").status_code in (202, 204)
+    third = start(real, {"geometry": {"job": second}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
+    assert real.wait_state(third, "succeeded", timeout_s=120)["result"]["geometry"]["n_fiber"] == made["geometry"]["n_fiber"]
+    lost = start(real, {"geometry": {"job": first}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
+    error = real.wait_state(lost, "failed", timeout_s=60)["error"]
+    assert error["field"] == "geometry.job" and "there is no such job" in error["text"]
+
+
+def reconstruct(d, *words):
+    return subprocess.run([program("selvedge"), "reconstruct", *map(str, words)], env=dict(os.environ, SELVEDGE_SERVER=d.url, SELVEDGE_TOKEN=""),
+                          capture_output=True, text=True, timeout=300)
+
+
+def test_command_line(real, scan, tmp_path):
+    """The header names its data file, which is sent too, and states the voxel size."""
+    done = reconstruct(real, scan / "scan.mhd", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "2 files in place" in done.stderr and "single fibers in the scan: resolved" in done.stdout and "fitted parameters" not in done.stdout
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["geometry"]["voxel_size_um"] == pytest.approx([2, 2, 2])
+    assert (tmp_path / "out" / "fibers.hair").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("words,text", [
+    (["nothing.tif"], "cannot read the scan 'nothing.tif'"), ([".", "--voxel-um", "2"], "has no TIFF files"),
+    (["scan.tif", "--voxel-um", "2,3"], "--voxel-um"), (["scan.tif", "--voxel-um", "2,,3"], "--voxel-um"), (["scan.tif", "--voxel-um", "-2"], "--voxel-um"),
+    (["lost.mhd"], "does not name its data file"),
+])
+def test_command_line_errors(real, tmp_path, monkeypatch, words, text):
+    monkeypatch.chdir(tmp_path)
+    if words[0] == "scan.tif":
+        (tmp_path / "scan.tif").write_bytes(b"II*")
+    (tmp_path / "lost.mhd").write_text("NDims = 3\n")
+    done = reconstruct(real, *words)
+    assert done.returncode == 1 and text in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("document,field,text", [
+    ({"volume": {"files": ["a.tif"]}, "fit": FIT}, "photographs", "'fit' is given"),
+    ({"fibers": {"file": "a.hair"}}, "photographs", "missing"),
+    ({"geometry": {"job": "x"}}, "photographs", "missing"),
+    ({"geometry": {"job": "../x"}, **ROWS}, "geometry.job", "not the id of a job"),
+    ({"geometry": {"job": "x"}, "volume": {"files": ["a.tif"]}, **ROWS}, "geometry", "one of them"),
+])
+def test_documents_that_are_refused(real, document, field, text):
+    reply = real.post("/v1/jobs", json={"sample": "s", **document})
+    assert reply.status_code == 422 and reply.json()["field"] == field and text in reply.json()["detail"]
