@@ -177,8 +177,6 @@ status stage_validation(struct pipeline_context *c, struct error *err);
 status stage_validation_load(struct pipeline_context *c, struct error *err);
 status stage_report(struct pipeline_context *c, struct error *err);
 
-/* Checksum of a document's text and this build of the program. */
-uint64_t pipeline_fingerprint(const char *document, size_t n_bytes);
 /* The error of a job that took over a geometry (pipeline_adopt.h) which cannot be read. */
 status pipeline_geometry_lost(const struct pipeline_context *c, const char *why, struct error *err);
 

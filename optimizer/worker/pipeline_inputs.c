@@ -6,6 +6,7 @@
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
+#include "optimizer/worker/document_fingerprint.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
@@ -171,25 +172,6 @@ static status select_rows(struct pipeline_context *c, struct error *err)
                : s;
 }
 
-enum { PROGRAM_MAX_BYTES = 256 << 20 };
-
-/* Checksum of the running program, because another build may trace other numbers, which must not be mixed with those
- * of an earlier run. 0 where the system does not show the program. */
-static uint32_t program_sum(void)
-{
-    char *text = NULL;
-    size_t n = 0;
-    if (file_read_all("/proc/self/exe", PROGRAM_MAX_BYTES, &text, &n, NULL) != STATUS_OK) return 0;
-    uint32_t sum = (uint32_t)crc32_z(0, (const void *)text, n);
-    free(text);
-    return sum;
-}
-
-uint64_t pipeline_fingerprint(const char *document, size_t n_bytes)
-{
-    return crc32_z(program_sum(), (const void *)document, n_bytes);
-}
-
 static status read_document(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -198,7 +180,7 @@ static status read_document(struct pipeline_context *c, struct error *err)
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
     s = job_document_parse(text, n, &c->doc, err);
-    c->fingerprint = pipeline_fingerprint(text, n);
+    c->fingerprint = document_fingerprint(text, n);
     free(text);
     if (s == STATUS_OK && c->doc->geometry_job[0] != '\0') c->doc->has_volume = true; /* the other job has it */
     return s;

@@ -2,6 +2,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/worker/document_fingerprint.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -31,7 +32,7 @@ static status other_folder(const struct pipeline_context *c, struct worker_folde
                            "cannot take over the geometry of job '%s': there is no such job", c->doc->geometry_job);
 }
 
-/* The first half of a fingerprint depends on the document and on the program (pipeline_inputs.c). */
+/* The first half of a fingerprint depends on the document and on the program (document_fingerprint.h). */
 static status check_program(const struct pipeline_context *c, const struct worker_folder *f, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *document = NULL, *claimed = NULL;
@@ -42,7 +43,7 @@ static status check_program(const struct pipeline_context *c, const struct worke
     worker_folder_path(f, JOB_FOLDER_WORK, "inputs.fingerprint", path);
     if (s == STATUS_OK) s = file_read_all(path, 64, &claimed, &n_claimed, NULL);
     bool same = s == STATUS_OK && sscanf(claimed, "%16" SCNx64, &have) == 1 &&
-                have >> 32 == (pipeline_fingerprint(document, n_document) & 0xffffffffu);
+                have >> 32 == (document_fingerprint(document, n_document) & 0xffffffffu);
     free(document);
     free(claimed);
     if (same) return STATUS_OK;
