@@ -33,21 +33,6 @@ const struct job_option option_rows_cloth[] = {
      .schema = "{\"minLength\": 1, \"maxLength\": 200}",
      .meaning = "A name for people."},
 
-    {.path = "geometry",
-     .kind = OPTION_SECTION,
-     .left_out = "this, `volume`, `fibers` or `cloth`",
-     .meaning = "The geometry of an earlier job, which is not made again."},
-    {.path = "geometry.job",
-     .kind = OPTION_TEXT,
-     .id = OPTION_GEOMETRY_JOB,
-     TEXT_INTO(geometry_job),
-     .required = true,
-     .check = job_check_geometry_job,
-     .allowed = "the id of a job with `volume`",
-     .meaning =
-         "The job whose scan, fibers and directions are taken over. Its stages up to `directions` must be done, by "
-         "the same version of the program. It may be deleted once this job runs."},
-
     {.path = "volume",
      .kind = OPTION_SECTION,
      INTO(has_volume),
@@ -264,6 +249,21 @@ const struct job_option option_rows_cloth[] = {
      .left_out = "from the measured radii",
      .meaning = "`true`: one radius for weft, warp and pile each. `false`: one for all. Left out: one each when two "
                 "differ by more than three standard errors and by more than 5 %."},
+
+    {.path = "geometry",
+     .kind = OPTION_SECTION,
+     .left_out = "this, `volume`, `fibers` or `cloth`",
+     .meaning = "The geometry of an earlier job, which is not made again."},
+    {.path = "geometry.job",
+     .kind = OPTION_TEXT,
+     .id = OPTION_GEOMETRY_JOB,
+     TEXT_INTO(geometry_job),
+     .required = true,
+     .check = job_check_geometry_job,
+     .allowed = "the id of a job with `volume`",
+     .meaning =
+         "The job whose scan, fibers and directions are taken over. Its stages up to `directions` must be done, by "
+         "the same version of the program. It may be deleted once this job runs."},
 
     {.path = "fibers",
      .kind = OPTION_SECTION,
