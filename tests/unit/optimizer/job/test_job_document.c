@@ -71,6 +71,21 @@ static void test_everything_given(void **state)
     job_document_free(d);
 }
 
+static void test_geometry_only(void **state)
+{
+    (void)state;
+    struct job_document *doc = NULL;
+    const char *alone = "{\"sample\":\"s\"," VOLUME "}",
+               *on = "{\"sample\":\"s\",\"geometry\":{\"job\":\"5e0c-1\"},\"measurements\":{\"file\":\"a.csv\"}}";
+    assert_int_equal(job_document_parse(alone, strlen(alone), &doc, NULL), STATUS_OK);
+    assert_true(job_document_geometry_only(doc) && doc->has_volume && doc->geometry_job[0] == '\0');
+    job_document_free(doc);
+    assert_int_equal(job_document_parse(on, strlen(on), &doc, NULL), STATUS_OK);
+    assert_true(!job_document_geometry_only(doc) && !doc->has_volume);
+    assert_string_equal(doc->geometry_job, "5e0c-1");
+    job_document_free(doc);
+}
+
 static void test_structure(void **state)
 {
     (void)state;
@@ -83,7 +98,11 @@ static void test_structure(void **state)
     check_error("{\"sample\":\"a\\u0001b\"}", "sample", "control");
     check_error("{\"sample\":\"s\"}", "volume", "missing");
     check_error("{\"sample\":\"s\"," VOLUME ",\"fibers\":{\"file\":\"a.hair\"}}", "fibers", "one of them");
-    check_error("{\"sample\":\"s\"," VOLUME "}", "photographs", "missing");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"fit\":{}}", "photographs", "'fit' is given");
+    check_error("{\"sample\":\"s\"," VOLUME ",\"correction\":{}}", "photographs", "'correction' is given");
+    check_error("{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"}}", "photographs", "missing");
+    check_error("{\"sample\":\"s\",\"geometry\":{\"job\":\"x\"}}", "photographs", "missing");
+    check_error("{\"sample\":\"s\",\"geometry\":{\"job\":\"a/b\"}}", "geometry.job", "not the id of a job");
     check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"photographs\":[" PHOTO "]}",
                 "photographs", "one of them");
     check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[]}", "photographs", "1 to 1024");
@@ -243,10 +262,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_defaults),      cmocka_unit_test(test_everything_given),
-        cmocka_unit_test(test_structure),     cmocka_unit_test(test_volume),
-        cmocka_unit_test(test_alignment),     cmocka_unit_test(test_photographs),
-        cmocka_unit_test(test_file_names),    cmocka_unit_test(test_damage),
-        cmocka_unit_test(test_stage_weights), cmocka_unit_test(test_raw_volume),
+        cmocka_unit_test(test_geometry_only), cmocka_unit_test(test_structure),
+        cmocka_unit_test(test_volume),        cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_photographs),   cmocka_unit_test(test_file_names),
+        cmocka_unit_test(test_damage),        cmocka_unit_test(test_stage_weights),
+        cmocka_unit_test(test_raw_volume),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
