@@ -222,11 +222,12 @@ void report_result(const json_t *job, FILE *out)
     } residual[] = {{"fit_rel_rms", "relative RMS error, fitted"}, {"heldout_rel_rms", "relative RMS error, held out"}};
     size_t i;
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
-    if (json_is_object(result) && json_array_size(json_object_get(result, "models")) == 0) {
+    const json_t *models = json_object_get(result, "models");
+    if (json_is_array(models) && json_array_size(models) == 0) { /* of geometry only */
         print_geometry(json_object_get(result, "geometry"), out);
         return;
     }
-    print_models(json_object_get(result, "models"), member_text(result, "chosen_by"), out);
+    print_models(models, member_text(result, "chosen_by"), out);
     print_radius(json_object_get(result, "radius"), out);
     print_parameters(parameters, out);
     for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {

@@ -131,7 +131,7 @@ export function jobPage(page, id) {
     const compete = models(job), radius = radiusSearch(job);
     results.append(
       compete.length > 1 ? card("Models compared", modelTable(compete, choiceOf(job))) : "",
-      job.result && !job.result.models?.length ? "" : // a job of geometry only has none
+      job.result?.models?.length === 0 ? "" : // a job of geometry only has none
         el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
       details ? card("More results of the fit", details) : "",
       radius ? card("Fiber radius", radiusPlot(radius)) : "",
