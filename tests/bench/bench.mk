@@ -24,13 +24,13 @@ bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing h
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_fit >&2
 	@$(BUILD)/tests/bench/bench_fit --folder $(BUILD)/bench-fit $(FIT)
 
-# TABLES: a folder of tables of measured reflectance, each judged by the same procedure. CLOTH: some of the tables, recoveries or photo
-# pairs only
+# TABLES: a folder of tables of measured reflectance, each judged by the same procedure. CLOTH: some of the tables, recoveries and photo
+# pairs only, and of scanned cloths "demo" and "scan"
 bench-cloth: | deps-test ## described cloths: fit of measured tables, recovery of known cloths, photo pairs (two hours on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_cloth.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(CLOTH)
 	@$(if $(TABLES),,/usr/bin/python3 tests/bench/bench_pairs.py --build $(BUILD) $(CLOTH))
-	@$(if $(TABLES)$(CLOTH),,/usr/bin/python3 tests/bench/bench_scan_errors.py --build $(BUILD))
+	@$(if $(TABLES),,/usr/bin/python3 tests/bench/bench_scan_errors.py --build $(BUILD) $(CLOTH))
 
 bench-scan-errors: | deps-test ## scanned cloths: whether the stated errors contain the truth (an hour and a half on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

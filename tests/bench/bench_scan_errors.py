@@ -1,10 +1,11 @@
 """Do the stated errors of a fit to scanned fibers contain the truth? Prints figures cloth.demo.* and cloth.scan.*, one JSON
 object on a line.
 
-    bench_scan_errors.py [--build DIR] [--keep DIR] [--seeds N] [--phantoms N] [--true N]
+    bench_scan_errors.py [--build DIR] [--keep DIR] [--seeds N] [--phantoms N] [--true N] [WHAT ...]
 
-The demo's cloth, scan and photographs are made with N seeds, and its nine parameters are fitted to the reconstructed
-fibers. The first --true of them are fitted to the true fibers too, for the ratio of the stated errors. Then --phantoms
+WHAT: demo, scan; default: both.
+demo: the demo's cloth, scan and photographs are made with N seeds, and its nine parameters are fitted to the reconstructed
+fibers. The first --true of them are fitted to the true fibers too, for the ratio of the stated errors. scan: --phantoms
 small cloths go the same way, with other parameters each, for the coverage of two standard errors. Only fitted rows are
 made. The jobs' folders are kept in --keep, and a job that is there already is not run again.
 """
@@ -107,11 +108,13 @@ def main():
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--phantoms", type=int, default=20)
     parser.add_argument("--true", type=int, default=3)
+    parser.add_argument("what", nargs="*", help="demo, scan; other names, of other benchmarks, are passed over")
     arguments = parser.parse_args()
     arguments.keep = arguments.keep or os.path.join(arguments.build, "bench-scan")
     os.makedirs(arguments.keep, exist_ok=True)
-    bench_phantoms(arguments)
-    bench_demo(arguments)
+    for name, bench in (("scan", bench_phantoms), ("demo", bench_demo)):
+        if not arguments.what or name in arguments.what:
+            bench(arguments)
 
 
 if __name__ == "__main__":
