@@ -147,7 +147,7 @@ class Selection:
         if path.endswith(".js"):
             return [t for t in self.tests if t.name.startswith("browser/")]
         if path.endswith(".py"):
-            return [t for t in self.tests if "clients/python" in self.source[t.name] or pathlib.Path(path).name in self.source[t.name]]
+            return [t for t in self.tests if re.search(r'clients"?(/|, )"?python|import ' + pathlib.Path(path).stem, self.source[t.name])]
         return [t for t in self.tests if name + ".o" in self.contents[t.program or t.name]]
 
     def likeliness(self, test, path):

@@ -52,7 +52,7 @@ def series(step):
 def results():
     os.makedirs(path("results", "renderings"), exist_ok=True)
     parameters = [{"name": n, "unit": "" if n[0] == "C" else "deg", "value": 0.1 + i, "standard_error": 0.01, "lower": 0.001, "upper": 45.0,
-                   "determined": n != "beta_R", "at_bound": False, "fixed": False} for i, n in enumerate(NAMES)]
+                   "determined": n != "beta_R", "at_bound": "upper" if n == "gamma_TT" else None, "fixed": False} for i, n in enumerate(NAMES)]
     with open(path("results", "result.json"), "w", encoding="utf-8") as f:
         json.dump({"fit_rel_rms": 0.02, "heldout_rel_rms": 0.03, "converged": True, "parameters": parameters, "rows": []}, f)
     with open(path("results", "renderings", "fit-00.bin"), "wb") as f:

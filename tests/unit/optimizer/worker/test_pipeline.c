@@ -54,6 +54,23 @@ static void test_work_file(void **state)
     free(bytes);
 }
 
+/* A section that is written and read in more than one piece comes back as it was. */
+static void test_work_file_of_a_large_section(void **state)
+{
+    const char *path = scratch_path(state, "large.bin");
+    const size_t n = (8 << 20) + 12345;
+    unsigned char *data = malloc(n);
+    assert_non_null(data);
+    for (size_t i = 0; i < n; i++) data[i] = (unsigned char)(i * 2654435761u >> 13);
+    struct work_section out = {data, n}, in = {NULL, 0};
+    assert_int_equal(work_file_write(path, "t.1", &out, 1, NULL), STATUS_OK);
+    assert_int_equal(work_file_read(path, "t.1", &in, 1, NULL), STATUS_OK);
+    assert_int_equal(in.n_bytes, n);
+    assert_memory_equal(in.data, data, n);
+    free(in.data);
+    free(data);
+}
+
 /* As many sections as a job with the largest number of models needs, and not one more. */
 static void test_work_file_of_many_sections(void **state)
 {
@@ -217,9 +234,12 @@ static void test_fibers_wider_than_the_tile(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_work_file), cmocka_unit_test(test_work_file_of_many_sections),
-        cmocka_unit_test(test_folder),    cmocka_unit_test(test_series),
-        cmocka_unit_test(test_inputs),    cmocka_unit_test(test_fibers_wider_than_the_tile)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_work_file_of_a_large_section),
+                                       cmocka_unit_test(test_work_file),
+                                       cmocka_unit_test(test_work_file_of_many_sections),
+                                       cmocka_unit_test(test_folder),
+                                       cmocka_unit_test(test_series),
+                                       cmocka_unit_test(test_inputs),
+                                       cmocka_unit_test(test_fibers_wider_than_the_tile)};
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
