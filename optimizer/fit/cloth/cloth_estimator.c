@@ -7,7 +7,7 @@
 /* Share of the range by which a number moves for its derivative. Radiance is noisy and bends slowly with the numbers of
  * a cloth, so a wide difference is the better one: its noise falls with the width, and the central difference of a wide
  * one is off by its square only. */
-static const double difference_share = 0.25;
+static const double difference_share = 0.15;
 
 status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source *source, size_t n_scattering,
                             size_t n_configuration, const struct param_info *info,
@@ -26,13 +26,18 @@ status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source
         e->fixed[k] = parameter[k].fixed;
     }
     e->moved = calloc(n_configuration > 0 ? n_configuration : 1, sizeof *e->moved);
-    return e->moved != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
+    e->n_path = calloc(n_configuration > 0 ? n_configuration : 1, sizeof *e->n_path);
+    return e->moved != NULL && e->n_path != NULL
+               ? STATUS_OK
+               : error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
 }
 
 void cloth_estimator_release(struct cloth_estimator *e)
 {
     free(e->moved);
+    free(e->n_path);
     e->moved = NULL;
+    e->n_path = NULL;
 }
 
 /* Spreads the derivatives of the scattering model to their columns of the wider matrix, in place. */
@@ -44,6 +49,8 @@ static void widen(size_t n_scattering, size_t n_number, double *matrix)
         memset(matrix + c * wide + n_scattering, 0, n_number * sizeof *matrix);
     }
 }
+
+/* ---- one number after the other ---- */
 
 /* Moves number k to the side of the iteration, or to the other one where the bound is too near. Returns the distance in
  * the fit coordinate with its sign; 0 where the bounds leave no room. */
@@ -74,45 +81,155 @@ static void fill_column(const struct cloth_estimator *e, size_t k, double slope,
     }
 }
 
-static status add_column(const struct cloth_estimator *e, size_t k, const struct estimator_call *call,
-                         const struct progress *progress, struct estimate *out, double *wall_s, struct error *err)
+static status add_single(const struct cloth_estimator *e, size_t k, const struct estimator_call *call,
+                         const struct progress *progress, struct estimate *out, double *seconds, struct error *err)
 {
-    double number[CLOTH_MAX_FITTED], seconds = 0.0;
+    double number[CLOTH_MAX_FITTED];
     memcpy(number, call->param + e->n_scattering, e->source.n_number * sizeof *number);
     double slope = coordinate_slope(&e->coordinate[k], number[k]);
     double distance = move_number(e, k, call->iteration, number);
     if (distance == 0.0) return STATUS_OK;
     struct estimator_call moved = *call;
     moved.want_jacobian = false;
-    status s = e->source.estimate(e->source.context, number, &moved, progress, e->moved, &seconds, err);
-    if (s != STATUS_OK) return s;
-    fill_column(e, k, slope, distance, out);
-    *wall_s += seconds;
-    return STATUS_OK;
+    status s = e->source.estimate(e->source.context, number, &moved, progress, e->moved, seconds, err);
+    if (s == STATUS_OK) fill_column(e, k, slope, distance, out);
+    return s;
+}
+
+/* ---- all numbers at once ---- */
+
+/* Whether i is a square modulo the prime q, or 0. */
+static bool is_square(size_t i, size_t q)
+{
+    for (size_t r = 0; r < q; r++)
+        if (r * r % q == i % q) return true;
+    return false;
+}
+
+/* Sign of column j in row i of the design of q + 1 rows: the shifted quadratic residues, and a last row of -1. Columns
+ * are orthogonal, and each has as many +1 as -1. */
+static double design_sign(size_t i, size_t j, size_t q) { return i < q && is_square(i + j, q) ? 1.0 : -1.0; }
+
+size_t cloth_estimator_n_moved(enum cloth_moves moves, size_t n_free)
+{
+    static const size_t prime[] = {3, 7, 11, 19, 23, 31, 43}; /* 3 modulo 4 */
+    size_t i = 0;
+    if (n_free == 0 || moves == CLOTH_MOVES_SINGLE) return n_free;
+    while (prime[i] < n_free) i++;
+    return prime[i] + 1;
+}
+
+double cloth_estimator_cost(enum cloth_moves moves, size_t n_free)
+{
+    return 1.0 + (moves == CLOTH_MOVES_SINGLE ? (double)n_free : n_free > 0 ? 1.0 : 0.0);
+}
+
+static size_t free_numbers(const struct cloth_estimator *e)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < e->source.n_number; k++) n += !e->fixed[k];
+    return n;
+}
+
+/* The numbers of one moved cloth, and what its means are multiplied with in each column. */
+struct move {
+    double number[CLOTH_MAX_FITTED], factor[CLOTH_MAX_FITTED];
+};
+
+static void make_move(const struct cloth_estimator *e, size_t i_cloth, size_t n_moved,
+                      const struct estimator_call *call, struct move *out)
+{
+    memset(out, 0, sizeof *out);
+    memcpy(out->number, call->param + e->n_scattering, e->source.n_number * sizeof *out->number);
+    for (size_t k = 0, j = 0; k < e->source.n_number; k++) {
+        if (e->fixed[k]) continue;
+        const struct coordinate *c = &e->coordinate[k];
+        double x = coordinate_from_param(c, out->number[k]), width = e->difference * (c->upper - c->lower);
+        double sign = (call->iteration % 2 == 1 ? -1.0 : 1.0) * design_sign(i_cloth, j++, n_moved - 1);
+        double low = fmax(c->lower, x - width), high = fmin(c->upper, x + width);
+        double slope = coordinate_slope(c, out->number[k]);
+        if (!(high > low)) continue;
+        out->number[k] = coordinate_to_param(c, sign > 0.0 ? high : low);
+        out->factor[k] = 2.0 * sign / ((double)n_moved * (high - low) * slope);
+    }
+}
+
+static void add_move(const struct cloth_estimator *e, const struct move *move, struct estimate *out)
+{
+    size_t n = e->n_scattering + e->source.n_number;
+    for (size_t i = 0; i < e->n_configuration; i++) {
+        if (out[i].n_path == 0 || e->moved[i].n_path == 0) continue;
+        for (size_t c = 0; c < 3; c++)
+            for (size_t k = 0; k < e->source.n_number; k++) {
+                size_t at = c * n + e->n_scattering + k;
+                out[i].jac[at] += e->moved[i].mean[c] * move->factor[k];
+                out[i].jac_var[at] += e->moved[i].var[c] * move->factor[k] * move->factor[k];
+            }
+        out[i].n_bounce += e->moved[i].n_bounce;
+    }
+}
+
+/* Paths of a moved cloth: its share of those of the cloth itself, in whole blocks. */
+static void share_paths(const struct cloth_estimator *e, size_t n_moved, const struct estimator_call *call)
+{
+    for (size_t i = 0; i < e->n_configuration; i++) {
+        size_t n_block = call->n_path[i] / (n_moved * RADIANCE_BLOCK_PATHS);
+        e->n_path[i] = call->n_path[i] == 0 ? 0 : RADIANCE_BLOCK_PATHS * (n_block > 0 ? n_block : 1);
+    }
+}
+
+static status add_balanced(const struct cloth_estimator *e, size_t i_cloth, const struct estimator_call *call,
+                           const struct progress *progress, struct estimate *out, double *seconds, struct error *err)
+{
+    const size_t n_moved = cloth_estimator_n_moved(e->moves, free_numbers(e));
+    struct estimator_call moved = *call;
+    struct move move;
+    make_move(e, i_cloth, n_moved, call, &move);
+    share_paths(e, n_moved, call);
+    moved.n_path = e->n_path;
+    moved.want_jacobian = false;
+    status s = e->source.estimate(e->source.context, move.number, &moved, progress, e->moved, seconds, err);
+    if (s == STATUS_OK) add_move(e, &move, out);
+    return s;
+}
+
+/* ---- the estimator ---- */
+
+static status add_columns(const struct cloth_estimator *e, const struct estimator_call *call,
+                          const struct progress *progress, struct estimate *out, double *wall_s, struct error *err)
+{
+    const bool single = e->moves == CLOTH_MOVES_SINGLE;
+    const size_t m = free_numbers(e), n_moved = cloth_estimator_n_moved(e->moves, m);
+    const size_t n = single ? e->source.n_number : n_moved;
+    const double first = 1.0 / cloth_estimator_cost(e->moves, m), share = (1.0 - first) / (double)n_moved;
+    double done = 0.0;
+    status s = STATUS_OK;
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        struct progress_part part;
+        double seconds = 0.0;
+        if (single && e->fixed[i]) continue;
+        struct progress next = progress_begin_part(&part, progress, first + share * done, share);
+        s = (single ? add_single : add_balanced)(e, i, call, &next, out, &seconds, err);
+        *wall_s += seconds;
+        done += 1.0;
+    }
+    return s;
 }
 
 static status run(void *context, const struct estimator_call *call, const struct progress *progress,
                   struct estimate *out, double *wall_s, struct error *err)
 {
     const struct cloth_estimator *e = context;
-    const size_t m = e->source.n_number;
-    const bool differ = call->want_jacobian && e->number_derivatives;
-    double n_cloth = 1.0, done = 1.0;
-    for (size_t k = 0; k < m && differ; k++) n_cloth += !e->fixed[k];
+    const bool differ = call->want_jacobian && e->number_derivatives && free_numbers(e) > 0;
+    const double share = differ ? 1.0 / cloth_estimator_cost(e->moves, free_numbers(e)) : 1.0;
     struct progress_part part;
-    struct progress first = progress_begin_part(&part, progress, 0.0, 1.0 / n_cloth);
+    struct progress first = progress_begin_part(&part, progress, 0.0, share);
     status s = e->source.estimate(e->source.context, call->param + e->n_scattering, call, &first, out, wall_s, err);
     for (size_t i = 0; i < e->n_configuration && s == STATUS_OK; i++) {
-        widen(e->n_scattering, m, out[i].jac);
-        widen(e->n_scattering, m, out[i].jac_var);
+        widen(e->n_scattering, e->source.n_number, out[i].jac);
+        widen(e->n_scattering, e->source.n_number, out[i].jac_var);
     }
-    for (size_t k = 0; k < m && differ && s == STATUS_OK; k++) {
-        if (e->fixed[k]) continue;
-        struct progress next = progress_begin_part(&part, progress, done / n_cloth, 1.0 / n_cloth);
-        s = add_column(e, k, call, &next, out, wall_s, err);
-        done += 1.0;
-    }
-    return s;
+    return s == STATUS_OK && differ ? add_columns(e, call, progress, out, wall_s, err) : s;
 }
 
 struct estimator cloth_estimator(struct cloth_estimator *e)

@@ -2,25 +2,34 @@
  * yarns, their packing, ...). A method of descent then fits both together.
  *
  * Paths have no derivative by a number of the cloth, because moving a fiber changes what a path hits. These columns are
- * therefore differences between two cloths: the mean radiance at number k moved by `difference` of its range in the fit
- * coordinate, minus that of the cloth itself, over the distance. Even iterations move up and odd ones down, and a fit
- * averages the derivatives of all its iterations: that is a central difference (error of second order) for the price of
- * a one-sided one. Both replicas of an iteration see the same cloths, so each cloth is built once. Where a move would
- * leave the bounds it goes to the other side. All cloths are traced with the same random numbers, and the
- * variance of a difference is stated as if the two means were independent, which is an upper limit where they are
- * positively correlated.
+ * therefore differences between cloths whose numbers are moved by `difference` of their ranges in the fit coordinate:
  *
- * A fit of m numbers thus traces m + 1 cloths for each estimate. The scattering parameters are not searched again at
- * every cloth: minimising the linearised residuals over both blocks at once gives the same step as variable projection
- * (Golub and Pereyra 1973, section 2; Kaufman 1975 for the form of the Jacobian used here), which removes the
- * scattering parameters first.
+ * CLOTH_MOVES_BALANCED, the default. All numbers move at once, up in half of the cloths and down in the other half, by
+ * the columns of a Hadamard matrix (Plackett and Burman 1946; quadratic residues, Paley 1933). Every moved cloth thus
+ * says something about every number. All moved cloths together take as many paths as the cloth itself. Compared with m
+ * numbers moved one after the other, the same paths give columns of an (m + 1)th of the variance and means of two
+ * (m + 1)ths. Odd iterations take the opposite moves, which removes what pairs of numbers do together.
+ *
+ * CLOTH_MOVES_SINGLE. One cloth for each number, with as many paths as the cloth itself: its mean minus that of the
+ * cloth. Even iterations move up and odd ones down. For estimates of a single iteration.
+ *
+ * Where a move would leave the bounds, a balanced one ends there, and a single one goes to the other side. Both replicas
+ * of an iteration see the same cloths, so each cloth is built once. All cloths are traced with the same random numbers,
+ * and variances are stated as if the means were independent, which is an upper limit where they are positively
+ * correlated.
+ *
+ * The scattering parameters are not searched again at every cloth: minimising the linearised residuals over both
+ * blocks at once gives the same step as variable projection (Golub and Pereyra 1973, section 2; Kaufman 1975 for the
+ * form of the Jacobian used here), which removes the scattering parameters first.
  */
 #ifndef SELVEDGE_OPTIMIZER_CLOTH_ESTIMATOR_H
 #define SELVEDGE_OPTIMIZER_CLOTH_ESTIMATOR_H
 
 #include "optimizer/fit/descent/descent.h"
 
-enum { CLOTH_MAX_FITTED = 32 };
+enum { CLOTH_MAX_FITTED = 32, CLOTH_MAX_MOVED = 44 };
+
+enum cloth_moves { CLOTH_MOVES_BALANCED, CLOTH_MOVES_SINGLE };
 
 /* Gives estimates of one cloth after the other. estimate: `number` has n_number values in internal units; call->param
  * are the scattering parameters alone, and the derivatives in `out` are by these. The result must depend on its
@@ -39,8 +48,10 @@ struct cloth_estimator {
     struct coordinate coordinate[CLOTH_MAX_FITTED]; /* of the numbers, with the bounds of the fit */
     bool fixed[CLOTH_MAX_FITTED];                   /* no differences are made; their derivatives are 0 */
     bool number_derivatives;                        /* whether estimates have them; without, they trace one cloth */
-    double difference;                              /* share of the range, in (0, 0.5] */
-    struct estimate *moved;                         /* n_configuration, owned */
+    enum cloth_moves moves;
+    double difference;      /* share of the range, in (0, 0.5] */
+    struct estimate *moved; /* of one cloth, n_configuration, owned */
+    size_t *n_path;         /* of a moved cloth, n_configuration, owned */
 };
 
 /* info, parameter: of the numbers. STATUS_INVALID for more than CLOTH_MAX_FITTED numbers; STATUS_NO_MEMORY. */
@@ -48,6 +59,11 @@ status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source
                             size_t n_configuration, const struct param_info *info,
                             const struct fit_parameter *parameter, struct error *err);
 void cloth_estimator_release(struct cloth_estimator *e);
+/* Cloths that an estimate with derivatives by n_free numbers traces besides the cloth itself. */
+size_t cloth_estimator_n_moved(enum cloth_moves moves, size_t n_free);
+/* Paths of such an estimate over those of the cloth itself, where they are many; a moved cloth takes a block of paths of
+ * each configuration at least. */
+double cloth_estimator_cost(enum cloth_moves moves, size_t n_free);
 /* It has n_scattering + n_number parameters and uses e, which must not move in memory. */
 struct estimator cloth_estimator(struct cloth_estimator *e);
 

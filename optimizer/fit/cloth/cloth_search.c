@@ -105,6 +105,16 @@ static status fit_on_cloth(struct search *s, const double *number, const double 
     return st;
 }
 
+/* Whether cloth i is better than the best one so far. An extra start, which is the result of another fit, is when its
+ * objective is lower at all. Of the others it takes two standard errors, because the lowest of many noisy objectives is
+ * often a matter of chance, and the cloth of the start values is the likeliest one beforehand. */
+static bool is_better(const struct search *s, size_t i)
+{
+    const struct cloth_screened *best = &s->result->screened[s->result->i_best], *new = &s->result->screened[i];
+    double doubt = extra_start(s->search, i) != NULL ? 0.0 : 2.0 * hypot(new->objective_se, best->objective_se);
+    return new->objective < best->objective - doubt;
+}
+
 /* Fits the scattering parameters to cloth i, and keeps them as the start of what follows when it is the best so far. */
 static status screen_cloth(struct search *s, size_t i, double *best_param, struct fit_result *fit, struct error *err)
 {
@@ -124,7 +134,7 @@ static status screen_cloth(struct search *s, size_t i, double *best_param, struc
     to->objective = fit->objective.value + fit->prior_penalty;
     to->objective_se = fit->objective.se;
     to->n_path = fit->n_path;
-    if (i > 0 && !(to->objective < s->result->screened[s->result->i_best].objective)) return STATUS_OK;
+    if (i > 0 && !is_better(s, i)) return STATUS_OK;
     s->result->i_best = i;
     memcpy(best_param, fit->param, n_scattering(q) * sizeof *best_param);
     return STATUS_OK;

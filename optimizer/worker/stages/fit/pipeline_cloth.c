@@ -15,7 +15,7 @@
  * final fit have at least so many times the least paths of the method. */
 enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6, LEAST_FITS = 2 };
 /* Shares of the paths: at most, and of the final fit. */
-static const double screen_share = 0.3, final_share = 0.15;
+static const double screen_share = 0.2, final_share = 0.4;
 
 /* ---- the numbers ---- */
 
@@ -102,6 +102,14 @@ status pipeline_joint_init(const struct pipeline_context *c, size_t i_model, str
     return STATUS_OK;
 }
 
+/* Numbers that are fitted. */
+static size_t n_free_number(const struct pipeline_context *c)
+{
+    size_t n_free = 0;
+    for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
+    return n_free;
+}
+
 /* ---- one cloth after the other ---- */
 
 struct pipeline_cloth_trace {
@@ -115,7 +123,7 @@ struct pipeline_cloth_trace {
     struct built {
         double number[CLOTH_MAX_FITTED];
         struct scene *scene;
-    } built[CLOTH_MAX_FITTED + 1];
+    } built[CLOTH_MAX_MOVED + 1];
 };
 
 /* Makes the fibers at given values of the fitted numbers. Where these contradict each other (a crimp that yarns cannot
@@ -200,8 +208,7 @@ status pipeline_cloth_open(struct pipeline_context *c, size_t i_model, const str
     status s = cloth_estimator_init(&t->cloth, &source, j->n_scattering, c->row.n, j->param + j->n_scattering,
                                     j->parameter + j->n_scattering, err);
     if (s != STATUS_OK) return s;
-    t->n_built = 1;
-    for (size_t k = 0; k < c->number.n; k++) t->n_built += !c->number.range[k].fixed;
+    t->n_built = 1 + cloth_estimator_n_moved(t->cloth.moves, n_free_number(c));
     t->live = cloth_estimator(&t->cloth);
     s = pipeline_trace_journal(c, "fit", "estimates.journal", i_model, &t->live, &t->journal, err);
     *journal = t->journal;
@@ -220,18 +227,14 @@ void pipeline_cloth_close(struct pipeline_cloth_trace *t)
 
 /* ---- the search ---- */
 
-/* Numbers that are fitted: each estimate of the joint fit traces so many more cloths, for the differences. */
-static double n_free_number(const struct pipeline_context *c)
-{
-    double n_free = 0.0;
-    for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
-    return n_free;
-}
-
 uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t least, size_t n_start, size_t n_extra)
 {
     double n_screen = n_extra > 0 ? 1.0 + (double)n_extra : 0.0, n_final = n_extra > 0 ? 2.0 : 1.0;
-    double joint = fmax(LEAST_FITS, (double)n_start) * (1.0 + n_free_number(c));
+    size_t n_free = n_free_number(c);
+    /* a moved cloth takes a block of paths at least, a quarter of those of the cloth itself */
+    double moved = 0.25 * (double)cloth_estimator_n_moved(CLOTH_MOVES_BALANCED, n_free);
+    double joint = fmax(LEAST_FITS, (double)n_start) *
+                   fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
     return (uint64_t)((2.0 * SCREEN_ITERATIONS * n_screen + joint + LEAST_FITS * n_final) * (double)least);
 }
 
@@ -240,7 +243,7 @@ uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t 
 static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
                         struct fit_problem *problem, struct cloth_search *q)
 {
-    double n_free = n_free_number(c), least = (double)method->least_budget(problem);
+    double n_free = (double)n_free_number(c), least = (double)method->least_budget(problem);
     double whole =
         (double)(c->doc->path_budget > 0 ? c->doc->path_budget : BUDGET_FACTOR * method->info->default_path_budget);
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
@@ -250,9 +253,9 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
     q->final_budget = (uint64_t)fmax(final_share * whole, LEAST_FITS * least);
     double left = (1.0 - final_share) * whole - (double)q->n_screen * per_cloth;
-    problem->path_budget = (uint64_t)fmax(left / (1.0 + n_free), LEAST_FITS * least);
-    q->screen_share = 0.25;
-    q->final_share = 0.15;
+    problem->path_budget = (uint64_t)fmax(left / cloth_estimator_cost(q->cloth->moves, n_free_number(c)), LEAST_FITS * least);
+    q->screen_share = 0.2;
+    q->final_share = 0.35;
 }
 
 static void log_cloth(const struct pipeline_context *c, const struct pipeline_model *m)

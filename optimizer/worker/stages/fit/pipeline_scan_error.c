@@ -14,7 +14,7 @@
 
 enum { RADIUS, NOISE, N_NUMBER };
 
-/* The move of a number is a quarter of these ranges (cloth_estimator.h): 9 % of the radius, and a noise of twice the
+/* The move of a number is a quarter of these ranges: 9 % of the radius, and a noise of twice the
  * stated direction error. Both are far above the errors, so that the noise of tracing is small beside the change. */
 static const struct param_info number_info[N_NUMBER] = {
     [RADIUS] = {.name = "radius",
@@ -29,8 +29,8 @@ static const struct param_info number_info[N_NUMBER] = {
 /* Between the axes as they should be and as they are: noise may have been left in them (-1), or as much of their own
  * waves been smoothed away (1). Uniform between the two. */
 static const double noise_sd = 0.57735;
-/* Paths of one of the cloths, as a share of those of the fit. */
-static const double path_share = 0.1;
+/* Paths of one of the cloths, as a share of those of the fit; move of a number as a share of its range. */
+static const double path_share = 0.1, difference_share = 0.25;
 
 struct scan_trace {
     struct pipeline_context *c;
@@ -119,6 +119,8 @@ static status run_joint(struct scan_trace *t, struct pipeline_joint *j, const st
     const struct cloth_source source = {t, N_NUMBER, estimate};
     status s = cloth_estimator_init(&t->cloth, &source, n, c->row.n, j->param + n, j->parameter + n, err);
     if (s != STATUS_OK) return s;
+    t->cloth.moves = CLOTH_MOVES_SINGLE; /* a single iteration */
+    t->cloth.difference = difference_share;
     struct estimator e = cloth_estimator(&t->cloth);
     const struct fit_problem problem = {.n_param = j->info.n_param,
                                         .info = j->param,
