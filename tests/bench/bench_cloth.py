@@ -204,7 +204,8 @@ def make_truth(arguments, folder, cloth, sets, groups):
         for key, value in values.items():
             parameters += ["--param", f"{group + '.' if len(groups) > 1 else ''}{key}={value}"]
     run(arguments, "selvedge-phantom", "photograph", "--fibers", os.path.join(folder, "truth.hair"), "--out", folder,
-        "--table", os.path.join(folder, "views.csv"), "--model", arguments.recovery_model, "--paths", "262144", "--px", "32", "--noise", "0.005", "--seed", "11", "--quiet", *parameters,
+        "--table", os.path.join(folder, "views.csv"), "--model", arguments.recovery_model, "--paths", "262144",
+        "--px", "32", "--noise", "0.005", "--seed", "11", "--quiet", *parameters,
         *(["--groups", ",".join(groups)] if len(groups) > 1 else []))
     with open(os.path.join(folder, "photographs.json"), encoding="utf-8") as f:
         photographs = json.load(f)

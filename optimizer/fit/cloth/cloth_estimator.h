@@ -13,9 +13,9 @@
  * CLOTH_MOVES_SINGLE. One cloth for each number, with as many paths as the cloth itself: its mean minus that of the
  * cloth. Even iterations move up and odd ones down. For estimates of a single iteration.
  *
- * Where a move would leave the bounds, a balanced one ends there, and a single one goes to the other side. Both replicas
- * of an iteration see the same cloths, so each cloth is built once. All cloths are traced with the same random numbers,
- * and variances are stated as if the means were independent, which is an upper limit where they are positively
+ * Where a move would leave the bounds, a balanced one ends there, and a single one goes to the other side. Both
+ * replicas of an iteration see the same cloths, so each cloth is built once. All cloths are traced with the same random
+ * numbers, and variances are stated as if the means were independent, which is an upper limit where they are positively
  * correlated.
  *
  * The scattering parameters are not searched again at every cloth: minimising the linearised residuals over both
@@ -61,8 +61,8 @@ status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source
 void cloth_estimator_release(struct cloth_estimator *e);
 /* Cloths that an estimate with derivatives by n_free numbers traces besides the cloth itself. */
 size_t cloth_estimator_n_moved(enum cloth_moves moves, size_t n_free);
-/* Paths of such an estimate over those of the cloth itself, where they are many; a moved cloth takes a block of paths of
- * each configuration at least. */
+/* Paths of such an estimate over those of the cloth itself, where they are many; a moved cloth takes a block of paths
+ * of each configuration at least. */
 double cloth_estimator_cost(enum cloth_moves moves, size_t n_free);
 /* It has n_scattering + n_number parameters and uses e, which must not move in memory. */
 struct estimator cloth_estimator(struct cloth_estimator *e);

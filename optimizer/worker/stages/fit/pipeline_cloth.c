@@ -15,7 +15,7 @@
  * final fit have at least so many times the least paths of the method. */
 enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6, LEAST_FITS = 2 };
 /* Shares of the paths: at most, and of the final fit. */
-static const double screen_share = 0.2, final_share = 0.4;
+static const double screen_share = 0.25, final_share = 0.4;
 
 /* ---- the numbers ---- */
 
@@ -233,8 +233,8 @@ uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t 
     size_t n_free = n_free_number(c);
     /* a moved cloth takes a block of paths at least, a quarter of those of the cloth itself */
     double moved = 0.25 * (double)cloth_estimator_n_moved(CLOTH_MOVES_BALANCED, n_free);
-    double joint = fmax(LEAST_FITS, (double)n_start) *
-                   fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
+    double joint =
+        fmax(LEAST_FITS, (double)n_start) * fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
     return (uint64_t)((2.0 * SCREEN_ITERATIONS * n_screen + joint + LEAST_FITS * n_final) * (double)least);
 }
 
@@ -253,8 +253,9 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
     q->final_budget = (uint64_t)fmax(final_share * whole, LEAST_FITS * least);
     double left = (1.0 - final_share) * whole - (double)q->n_screen * per_cloth;
-    problem->path_budget = (uint64_t)fmax(left / cloth_estimator_cost(q->cloth->moves, n_free_number(c)), LEAST_FITS * least);
-    q->screen_share = 0.2;
+    problem->path_budget =
+        (uint64_t)fmax(left / cloth_estimator_cost(q->cloth->moves, n_free_number(c)), LEAST_FITS * least);
+    q->screen_share = 0.25;
     q->final_share = 0.35;
 }
 

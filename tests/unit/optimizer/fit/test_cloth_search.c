@@ -85,8 +85,8 @@ static status linear_mean(void *context, const double *number, const struct esti
     return STATUS_OK;
 }
 
-/* Moves of all numbers at once give each number its own derivative, for every count of numbers, and pairs of them cancel
- * between two iterations. A fixed number takes no part. */
+/* Moves of all numbers at once give each number its own derivative, for every count of numbers, and pairs of them
+ * cancel between two iterations. A fixed number takes no part. */
 static void test_balanced_moves(void **state)
 {
     (void)state;
