@@ -88,16 +88,45 @@ static void compare(struct comparison *c, double a, double var_a, double b, doub
     c->largest = fmax(c->largest, fabs(z));
 }
 
+/* Estimates one view with guided paths, or with plain ones. */
+static void estimate_view(const struct view *v, const struct scene *scene, int plain, struct thread_pool *pool,
+                          struct estimate *e)
+{
+    const struct scattering_model *m = scattering_find(v->model);
+    const size_t n_path = 250000;
+    const struct configuration c = {.light_theta_rad = v->lamp_theta_deg * RAD_PER_DEG,
+                                    .light_phi_rad = v->lamp_phi_deg * RAD_PER_DEG,
+                                    .camera_theta_rad = v->camera_theta_deg * RAD_PER_DEG,
+                                    .camera_phi_rad = v->camera_phi_deg * RAD_PER_DEG,
+                                    .light_distance_m = 0.61,
+                                    .lamp_side_m = 0.1,
+                                    .camera_distance_m = 1,
+                                    .crop_m = 0.01,
+                                    .light = v->light};
+    double param[SCATTERING_MAX_PARAM];
+    struct error err = {0};
+    for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
+    struct appearance model;
+    struct estimate_request q = {.input = trace_input_surface(scene, m, param, &model),
+                                 .configuration = &c,
+                                 .n_configuration = 1,
+                                 .n_path = &n_path,
+                                 .seed = 11,
+                                 .iteration = (uint32_t)plain};
+    q.input.want_derivative = true;
+    q.input.plain_paths = plain == 1;
+    if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+}
+
 static void test_same_means(void **state)
 {
     (void)state;
-    enum { PATHS = 250000 };
     struct thread_pool *pool;
     struct scene *weave[2];
     struct fiber_set f;
     struct comparison all = {0};
     double gain = 0;
-    size_t n_view = sizeof view / sizeof view[0], n_path = PATHS;
+    size_t n_view = sizeof view / sizeof view[0];
     assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
     hand_weave_small(&f);
     for (int i = 0; i < 2; i++)
@@ -105,32 +134,9 @@ static void test_same_means(void **state)
     for (size_t i = 0; i < n_view; i++) {
         const struct view *v = &view[i];
         const struct scattering_model *m = scattering_find(v->model);
-        struct configuration c = {.light_theta_rad = v->lamp_theta_deg * RAD_PER_DEG,
-                                  .light_phi_rad = v->lamp_phi_deg * RAD_PER_DEG,
-                                  .camera_theta_rad = v->camera_theta_deg * RAD_PER_DEG,
-                                  .camera_phi_rad = v->camera_phi_deg * RAD_PER_DEG,
-                                  .light_distance_m = 0.61,
-                                  .lamp_side_m = 0.1,
-                                  .camera_distance_m = 1,
-                                  .crop_m = 0.01,
-                                  .light = v->light};
-        double param[SCATTERING_MAX_PARAM];
         struct estimate e[2];
-        struct error err = {0};
         assert_non_null(m);
-        for (size_t p = 0; p < m->n_param; p++) param[p] = m->param[p].start;
-        for (int plain = 0; plain < 2; plain++) {
-            struct appearance model;
-            struct estimate_request q = {.input = trace_input_surface(weave[v->black_sheet], m, param, &model),
-                                         .configuration = &c,
-                                         .n_configuration = 1,
-                                         .n_path = &n_path,
-                                         .seed = 11,
-                                         .iteration = (uint32_t)plain};
-            q.input.want_derivative = true;
-            q.input.plain_paths = plain == 1;
-            if (estimate_run(&q, pool, NULL, &e[plain], &err) != STATUS_OK) fail_msg("%s", err.text);
-        }
+        for (int plain = 0; plain < 2; plain++) estimate_view(v, weave[v->black_sheet], plain, pool, &e[plain]);
         struct comparison here = {0};
         for (int k = 0; k < 3; k++) compare(&here, e[0].mean[k], e[0].var[k], e[1].mean[k], e[1].var[k]);
         for (size_t k = 0; k < 3 * m->n_param; k++)

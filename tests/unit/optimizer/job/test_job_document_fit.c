@@ -200,7 +200,7 @@ static void test_texture(void **state)
                 "stray_light");
 }
 
-static void test_fit_option_errors(void **state)
+static void test_errors_of_ties_and_bounds(void **state)
 {
     (void)state;
     check_error(FIT_OF("{\"tied\":[\"C_R\"]}"), "fit.tied[0]", "list of parameter names");
@@ -230,7 +230,11 @@ static void test_fit_option_errors(void **state)
     check_error(FIT_OF("{\"model\":\"two_lobe.v1\",\"tied\":[{\"beta_TT\":1,\"gamma_TT\":2}],\"fixed\":{\"gamma_TT\":"
                        "30},\"start\":{\"beta_TT\":20}}"),
                 "fit.start", "'beta_TT', which 'fit.fixed' holds fixed");
-    check_error(FIT_OF("{\"fit_radius\":1}"), "fit.fit_radius", "true, false or an object of lower_um and upper_um");
+}
+
+static void test_errors_of_priors(void **state)
+{
+    (void)state;
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5}}}"), "fit.priors.beta_R.se", "missing");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":50,\"se\":1}}}"), "fit.priors.beta_R.mean", "1 to 30");
     check_error(FIT_OF("{\"priors\":{\"beta_R\":{\"mean\":5,\"se\":0}}}"), "fit.priors.beta_R.se", "0");
@@ -249,6 +253,12 @@ static void test_fit_option_errors(void **state)
                "\"priors\":{\"gamma_TT\":{\"mean\":10,\"se\":1}}}"),
         "fit.priors", "'gamma_TT' at 10 +- 1, its bounds are 15 and 20");
     job_document_free(parse(FIT_OF("{\"bounds\":{\"beta_R\":[2,4]},\"priors\":{\"beta_R\":{\"mean\":5,\"se\":1}}}")));
+}
+
+static void test_errors_of_nuisance_and_candidates(void **state)
+{
+    (void)state;
+    check_error(FIT_OF("{\"fit_radius\":1}"), "fit.fit_radius", "true, false or an object of lower_um and upper_um");
     check_error(FIT_OF("{\"nuisance\":{\"stray_light\":true},\"method\":\"published_sgd.v1\"}"), "fit.nuisance",
                 method_gauss_newton.id);
     check_error(FIT_OF("{\"nuisance\":{\"gain\":\"each\"}}"), "fit.nuisance.gain", "per_photograph");
@@ -341,7 +351,9 @@ int main(void)
         cmocka_unit_test(test_groups_and_volume_models),
         cmocka_unit_test(test_start_of_density),
         cmocka_unit_test(test_texture),
-        cmocka_unit_test(test_fit_option_errors),
+        cmocka_unit_test(test_errors_of_ties_and_bounds),
+        cmocka_unit_test(test_errors_of_priors),
+        cmocka_unit_test(test_errors_of_nuisance_and_candidates),
         cmocka_unit_test(test_bounds_are_values),
         cmocka_unit_test(test_methods_get_what_they_take),
         cmocka_unit_test(test_density_row),
