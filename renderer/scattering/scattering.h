@@ -36,6 +36,10 @@ struct scattering_model {
      * shade a part of the width; the latter keeps light transport through dense cloth reciprocal. */
     bool across_width;
 
+    /* Whether the model distinguishes directions by their azimuth about the fiber: then v of the fiber frame must be
+     * the normal of the flat section (fiber_frame_flat). */
+    bool flat_section;
+
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
     status (*prepare)(const double *param, struct scattering_state **state, struct error *err);
     void (*release)(struct scattering_state *state);

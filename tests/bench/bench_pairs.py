@@ -110,7 +110,7 @@ def copies(arguments, name, photographs):
 
 def run_pair(arguments, name, found):
     """Runs the job of a pair. A crop that the worker refuses as saturated is left out."""
-    fit = {"models": ["textile.v2"], "path_budget": arguments.path_budget, "render_px": CROP_PX, "render_samples": 64, "tied": TIED,
+    fit = {"models": ["textile.v3"], "path_budget": arguments.path_budget, "render_px": CROP_PX, "render_samples": 64, "tied": TIED,
            "nuisance": {"gain": "global", "gain_prior_rel": 0.15}}
     photographs = everything = crops(name, found)
     while True:

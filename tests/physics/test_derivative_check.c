@@ -219,15 +219,15 @@ static void wrong_scores_are_found(void **state)
     assert_true(!check.checked[6] && check.error[6] == 0.0 && check.error[check.worst] < 2e-3);
 }
 
-/* At the upper bounds of textile.v2, where differences are noisiest. Hardly any light is in the lobe TT there, so its
+/* At the upper bounds of textile.v3, where differences are noisiest. Hardly any light is in the lobe TT there, so its
  * widths, which hardly act, are left out: their errors refer to a least slope (derivative_check.h). */
 static void small_faults_at_the_bounds_are_found(void **state)
 {
     enum { P_BETA_TT = 7, P_GAMMA_TT = 8 };
     const struct fixture *x = *state;
-    for (size_t p = 0; p < scattering_find("textile.v2")->n_param; p++) {
+    for (size_t p = 0; p < scattering_find("textile.v3")->n_param; p++) {
         if (p == P_BETA_TT || p == P_GAMMA_TT) continue;
-        const struct scattering_model wrong = faulty_model("textile.v2", p, 1.02f);
+        const struct scattering_model wrong = faulty_model("textile.v3", p, 1.02f);
         static struct derivative_check check;
         struct appearance m;
         double param[SCATTERING_MAX_PARAM];
@@ -263,14 +263,14 @@ static void check_many_rows(const struct fixture *x, const struct appearance *m,
     assert_int_equal(check->n_path, 2 * N_ROW);
 }
 
-/* At the upper bounds of textile.v2, as above, noise alone gives errors of 4 % (beta_TT), which is many of its standard
+/* At the upper bounds of textile.v3, as above, noise alone gives errors of 4 % (beta_TT), which is many of its standard
  * deviations and no fault. */
 static void noise_of_many_rows_is_no_fault(void **state)
 {
     enum { P_BETA_TT = 7 };
     static struct derivative_check check;
     struct appearance m;
-    assert_true(appearance_find("textile.v2", &m));
+    assert_true(appearance_find("textile.v3", &m));
     for (uint64_t seed = 1; seed <= 2; seed++) {
         check_many_rows(*state, &m, UPPER_BOUNDS, seed, &check);
         assert_true(check.error[P_BETA_TT] - 3.0 * check.noise_se[P_BETA_TT] > 0.01);
@@ -284,8 +284,8 @@ static void noise_of_many_rows_is_no_fault(void **state)
 static void small_faults_of_many_rows_are_found(void **state)
 {
     static struct derivative_check check;
-    for (size_t p = 0; p < scattering_find("textile.v2")->n_param; p++) {
-        const struct scattering_model wrong = faulty_model("textile.v2", p, 1.02f);
+    for (size_t p = 0; p < scattering_find("textile.v3")->n_param; p++) {
+        const struct scattering_model wrong = faulty_model("textile.v3", p, 1.02f);
         struct appearance m;
         appearance_from_surface(&wrong, &m);
         check_many_rows(*state, &m, DEFAULTS, 1, &check);

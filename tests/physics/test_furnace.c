@@ -183,7 +183,7 @@ static void balanced_is_lossless_from_both_sides(void **state)
 {
     (void)state;
     enum { N_RANDOM = 10 };
-    static const char *const id[] = {"two_lobe_balanced.v1", "textile.v2"};
+    static const char *const id[] = {"two_lobe_balanced.v1", "textile.v3"};
     for (size_t i = 0; i < sizeof id / sizeof id[0]; i++) {
         const struct scattering_model *m = scattering_find(id[i]);
         struct rng r;
@@ -277,13 +277,14 @@ static void whole_cloth_balanced(void **state)
     struct scene *scene = small_cloth(false);
     struct configuration c[16];
     orbit_configurations_16(c);
-    /* textile.v2 has two more parameters: the shares w and s */
-    const double set[3][11] = {
-        {0.05, 0.05, 0.05, 0.999, 0.998, 0.997, 8 * RAD_PER_DEG, 25 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0.3, 0.9},
-        {0.3, 0.3, 0.3, 0.999, 0.998, 0.997, 2 * RAD_PER_DEG, 12 * RAD_PER_DEG, 30 * RAD_PER_DEG, 0.1, 0.5},
-        {0.001, 0.001, 0.001, 0.999, 0.998, 0.997, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG, 0.8, 0.1}};
+    /* textile.v3 has three more parameters: the shares w and s, and the flatness f */
+    const double set[3][12] = {
+        {0.05, 0.05, 0.05, 0.999, 0.998, 0.997, 8 * RAD_PER_DEG, 25 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0.3, 0.9, 0.3},
+        {0.3, 0.3, 0.3, 0.999, 0.998, 0.997, 2 * RAD_PER_DEG, 12 * RAD_PER_DEG, 30 * RAD_PER_DEG, 0.1, 0.5, 0.98},
+        {0.001, 0.001, 0.001, 0.999, 0.998, 0.997, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG, 0.8, 0.1,
+         0.1}};
     for (int i = 0; i < 6; i++) check_whole_cloth(scene, "two_lobe_balanced.v1", set[i % 3], &c[i]);
-    for (int i = 6; i < 9; i++) check_whole_cloth(scene, "textile.v2", set[i % 3], &c[i]);
+    for (int i = 6; i < 9; i++) check_whole_cloth(scene, "textile.v3", set[i % 3], &c[i]);
     scene_free(scene);
 }
 

@@ -35,7 +35,7 @@ const struct job_option option_rows_fit[] = {
      .id = OPTION_MODEL,
      TEXT_INTO(model[0].id),
      .choice_at = job_model_id,
-     .standard = "\"textile.v2\"",
+     .standard = "\"textile.v3\"",
      .meaning = "The scattering model; docs/model.md describes each. `two_lobe.v1` is the published one, with nine "
                 "parameters."},
     {.path = "fit.models",

@@ -1,4 +1,4 @@
-/* textile.v2: evaluation with scores, and sampling (textile.h states the model).
+/* textile.v3: evaluation with scores, and sampling (textile.h states the model).
  *
  * Sampling of wi: one of four terms, by its energy at th_o and the weights of the channels. R with the azimuth of a
  * smooth cylinder; R with a uniform azimuth, which also serves Schlick's rise, whose azimuth has no peak; TT; D, with
@@ -28,6 +28,8 @@ static status prepare(const double *param, struct scattering_state **state, stru
     two_lobe_state_init(&t->lobes, param);
     t->w = (float)param[TEXTILE_P_W];
     t->s = (float)param[TEXTILE_P_S];
+    t->f = (float)param[TEXTILE_P_F];
+    textile_section(t);
     st = textile_balance(t, param, err);
     if (st != STATUS_OK) {
         free(t);
@@ -47,13 +49,31 @@ static struct textile_entry entry_at(const struct textile_state *t, float theta_
     return e;
 }
 
+/* What a flat section makes of one direction. */
+struct side {
+    float v, d_ln_v, t, d_ln_t[TEXTILE_N_SLOPE]; /* d_ln_v: by f */
+};
+
+static struct side side_of(const struct textile_state *t, const struct fiber_direction *d)
+{
+    float cos2 = d->azimuth[0] * d->azimuth[0], x = fabsf(d->azimuth[0]) * TEXTILE_N_SECTION, f2 = t->f * t->f;
+    int i = x < TEXTILE_N_SECTION - 1 ? (int)x : TEXTILE_N_SECTION - 1;
+    const struct textile_section_entry *a = &t->section[i], *b = a + 1;
+    x -= (float)i;
+    float v2 = f2 + (1 - f2) * cos2;
+    struct side y = {.v = sqrtf(v2), .d_ln_v = t->f * (1 - cos2) / v2, .t = two_lobe_mix(a->t, b->t, x)};
+    for (int k = 0; k < TEXTILE_N_SLOPE; k++) y.d_ln_t[k] = two_lobe_mix(a->d_ln_t[k], b->d_ln_t[k], x);
+    return y;
+}
+
 /* The three terms without colours, and what their derivatives need. */
 struct terms {
-    float r, azimuth, rise; /* R = r azimuth (C_R + (1 - C_R) rise) */
-    float tt_whole, tt, d;  /* TT = tt = tt_whole (1 - K) */
-    float cos_half_azimuth; /* cos(ph / 2) */
-    float cos_d;            /* cos((th_i - th_o) / 2) */
-    float d_scale[2];       /* d ln of the scales of R and TT by their own widths */
+    float r, azimuth, rise;           /* R = r azimuth (C_R + (1 - C_R) rise) */
+    float tt_whole, tt, d;            /* TT = tt = tt_whole (1 - K) */
+    float d_tt[TEXTILE_N_SLOPE], d_d; /* d ln TT by way of t, and d ln D by f */
+    float cos_half_azimuth;           /* cos(ph / 2) */
+    float cos_d;                      /* cos((th_i - th_o) / 2) */
+    float d_scale[2];                 /* d ln of the scales of R and TT by their own widths */
 };
 
 static struct terms terms_of(const struct textile_state *t, const struct fiber_direction *di,
@@ -68,9 +88,13 @@ static struct terms terms_of(const struct textile_state *t, const struct fiber_d
     m.azimuth = (1 - t->s) * (float)(0.5 / M_PI) + t->s * 0.25f * m.cos_half_azimuth;
     m.rise = two_lobe_schlick(m.cos_d * m.cos_half_azimuth);
     m.r = l->g[TWO_LOBE_R] * scale_i[TWO_LOBE_R] * scale_o[TWO_LOBE_R];
-    m.tt_whole = l->g[TWO_LOBE_TT] * scale_i[TWO_LOBE_TT] * scale_o[TWO_LOBE_TT] * l->von_mises;
+    const struct side in = side_of(t, di), out = side_of(t, dout);
+    m.tt_whole = l->g[TWO_LOBE_TT] * scale_i[TWO_LOBE_TT] * scale_o[TWO_LOBE_TT] * l->von_mises * in.t * out.t;
+    for (int k = 0; k < TEXTILE_N_SLOPE; k++) m.d_tt[k] = in.d_ln_t[k] + out.d_ln_t[k];
     m.tt = m.tt_whole * (1 - textile_polynomial(t->share, m.cos_d));
     m.d = entry_at(t, di->theta_rad).q * entry_at(t, dout->theta_rad).q * t->inv_z;
+    m.d *= in.v * out.v * t->inv_mean_v;
+    m.d_d = in.d_ln_v + out.d_ln_v - t->d_ln_mean_v;
     for (int k = 0; k < 2; k++) m.d_scale[k] = score_i[k] + score_o[k];
     return m;
 }
@@ -96,7 +120,8 @@ static struct slopes slopes_of(const struct textile_state *t, const struct fiber
     y.tt[0] = m->tt * (two_lobe_cross_at(s, di->theta_rad) + two_lobe_cross_at(s, dout->theta_rad));
     y.tt[1] = m->tt * (ei.cross_s + eo.cross_s) - m->tt_whole * textile_polynomial(t->d_share, m->cos_d);
     y.tt[2] = m->tt * width[TWO_LOBE_TT];
-    y.tt[3] = m->tt * (s->azimuth.score_at_peak - s->azimuth.score_slope * l->one_minus_cos);
+    y.tt[3] =
+        m->tt * (s->azimuth.score_at_peak - s->azimuth.score_slope * l->one_minus_cos + m->d_tt[TEXTILE_BY_GAMMA]);
     for (int k = 0; k < 2; k++) y.d[k] = m->d * (ei.d_q[k] + eo.d_q[k]);
     return y;
 }
@@ -106,7 +131,7 @@ static void eval_terms(const struct textile_state *t, const struct fiber_directi
 {
     const struct scattering_state *s = &t->lobes;
     const struct terms m = terms_of(t, di, dout, l);
-    float inside = (1 - t->w) * m.tt + t->w * m.d, base = m.r * m.azimuth, part_r[3];
+    float inside = m.tt + t->w * m.d, base = m.r * m.azimuth, part_r[3];
     for (int c = 0; c < 3; c++) {
         part_r[c] = base * (s->c_r[c] + s->not_c_r[c] * m.rise);
         s_rgb[c] = part_r[c] + s->c_tt[c] * s->not_c_r[c] * inside;
@@ -116,28 +141,30 @@ static void eval_terms(const struct textile_state *t, const struct fiber_directi
     for (int j = 0; j < 3 * TEXTILE_N_PARAM; j++) score[j] = 0;
     for (int c = 0; c < 3; c++) {
         float *h = score + c * TEXTILE_N_PARAM, inv = s_rgb[c] > 1e-30f ? 1 / s_rgb[c] : 0;
-        float body = s->c_tt[c] * s->not_c_r[c] * inv, lobe = (1 - t->w) * body, diffuse = t->w * body;
+        float body = s->c_tt[c] * s->not_c_r[c] * inv, diffuse = t->w * body;
         h[TWO_LOBE_P_C_R + c] = (base * (1 - m.rise) - s->c_tt[c] * inside) * inv;
         h[TWO_LOBE_P_C_TT + c] = s->not_c_r[c] * inside * inv;
-        h[TWO_LOBE_P_BETA_R] = part_r[c] * inv * y.r[0] + lobe * y.tt[0] + diffuse * y.d[0];
-        h[TWO_LOBE_P_BETA_TT] = lobe * y.tt[2];
-        h[TWO_LOBE_P_GAMMA_TT] = lobe * y.tt[3];
-        h[TEXTILE_P_W] = body * (m.d - m.tt);
-        h[TEXTILE_P_S] = part_r[c] * inv * y.r[1] + lobe * y.tt[1] + diffuse * y.d[1];
+        h[TWO_LOBE_P_BETA_R] = part_r[c] * inv * y.r[0] + body * y.tt[0] + diffuse * y.d[0];
+        h[TWO_LOBE_P_BETA_TT] = body * y.tt[2];
+        h[TWO_LOBE_P_GAMMA_TT] = body * y.tt[3];
+        h[TEXTILE_P_W] = body * (m.d + m.tt * m.d_tt[TEXTILE_BY_W]);
+        h[TEXTILE_P_F] = body * m.tt * m.d_tt[TEXTILE_BY_F] + diffuse * m.d * m.d_d;
+        h[TEXTILE_P_S] = part_r[c] * inv * y.r[1] + body * y.tt[1] + diffuse * y.d[1];
     }
 }
 
 /* Probabilities of the terms: least summed variance of the channels, so in proportion to the root of their summed
  * squares. */
-static void choose(const struct textile_state *t, const struct two_lobe_sampling_entry *e, const float *weight_rgb,
-                   float p[N_TERM])
+static void choose(const struct textile_state *t, const struct two_lobe_sampling_entry *e, float cos_psi,
+                   const float *weight_rgb, float p[N_TERM])
 {
     const struct scattering_state *s = &t->lobes;
+    float f2 = t->f * t->f, diffuse = t->w * sqrtf(f2 + (1 - f2) * cos_psi * cos_psi);
     float square[N_TERM] = {0}, sum = 0;
     for (int c = 0; c < 3; c++) {
         float weight = weight_rgb != NULL ? weight_rgb[c] : 1, body = s->c_tt[c] * s->not_c_r[c] * e->energy[2];
         const float energy[N_TERM] = {t->s * s->c_r[c], (1 - t->s) * s->c_r[c] + s->not_c_r[c] * e->energy[1],
-                                      (1 - t->w) * body, t->w * body};
+                                      (1 - diffuse) * body, diffuse * body};
         for (int k = 0; k < N_TERM; k++) square[k] += weight * energy[k] * weight * energy[k];
     }
     for (int k = 0; k < N_TERM; k++) sum += p[k] = sqrtf(square[k]);
@@ -152,7 +179,7 @@ static float pdf_terms(const struct textile_state *t, const struct fiber_directi
 {
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(&t->lobes, dout->theta_rad);
     float p[N_TERM], density[2], cos_i = fmaxf(di->cos_theta, FIBER_COS_MIN);
-    choose(t, &e, weight_rgb, p);
+    choose(t, &e, dout->azimuth[0], weight_rgb, p);
     for (int k = 0; k < 2; k++) density[k] = l->g[k] * 2 / (e.near[k] + e.far[k]);
     float azimuth = p[SMOOTH_R] * 0.25f * sqrtf(0.5f * l->one_minus_cos) + p[UNIFORM_R] * (float)(0.5 / M_PI);
     float lobes = density[TWO_LOBE_R] * azimuth + p[LOBE_TT] * density[TWO_LOBE_TT] * l->von_mises;
@@ -207,7 +234,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     struct fiber_direction dout = fiber_direction_of(wo);
     struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);
     float p[N_TERM], rest = u[0], phi; /* phi: from the azimuth of wo */
-    choose(t, &e, weight_rgb, p);
+    choose(t, &e, dout.azimuth[0], weight_rgb, p);
     enum term k = pick(p, &rest);
     if (k == DIFFUSE) {
         sample_diffuse(rest, u + 1, wi);
@@ -225,6 +252,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 const struct scattering_model scattering_textile = {
-    SURFACE_MODEL_ROW(textile), .across_width = true, .prepare = prepare,   .release = two_lobe_release, .eval = eval,
-    .sample = sample,           .pdf = pdf,           .eval_pdf = eval_pdf,
+    SURFACE_MODEL_ROW(textile),  .across_width = true, .flat_section = true, .prepare = prepare,
+    .release = two_lobe_release, .eval = eval,         .sample = sample,     .pdf = pdf,
+    .eval_pdf = eval_pdf,
 };

@@ -1,4 +1,5 @@
-/* textile.v2: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside.
+/* textile.v3: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside, whose
+ * section may be flat.
  * Reciprocal; lossless from both sides where C_TT = 1.
  *
  *     d     = (th_i - th_o) / 2,  ph = ph_o - ph_i       difference angle and relative azimuth
@@ -6,9 +7,16 @@
  *     k     = (1 - cos d cos(ph / 2))^5                  Schlick's rise at the half angle of both directions
  *     K(d)  = integral of N k dph                        a polynomial in cos d
  *     R  = a(th_i) a(th_o) g(th_o; -th_i, beta_R) N(ph) (C_R + (1 - C_R) k)
- *     TT = b(th_i) b(th_o) g(th_o; -th_i, beta_TT) (1 - K(d)) f(ph_o; ph_i + pi, gamma_TT)
- *     D  = q(th_i) q(th_o) / Z,  q = 1 - rho
- *     S  = R + C_TT (1 - C_R) ((1 - w) TT + w D)
+ *     v(ph) = sqrt(f^2 + (1 - f^2) cos^2 ph)             width of the section seen from ph over its largest width
+ *     TT = b(th_i) b(th_o) g(th_o; -th_i, beta_TT) (1 - K(d)) t(ph_i) t(ph_o) f(ph_o; ph_i + pi, gamma_TT)
+ *     D  = q(th_i) q(th_o) / Z v(ph_i) v(ph_o) / (mean of v),  q = 1 - rho
+ *     S  = R + C_TT (1 - C_R) (TT + w D)
+ *
+ * ph = 0 and ph = pi are the normals of the flat section, an ellipse of height over width f; for a flat fiber in a cloth
+ * they lie as near to the cloth's normal as the fiber's direction lets them (fiber_frame.h). The tube that stands for
+ * the fiber in the scene is as wide as the ellipse: of the light from ph, the share w v(ph) meets it and is scattered
+ * inside, and the rest goes on in TT. t solves t(ph) (f * t)(ph) = 1 - w v(ph) (textile_section.c), so both take all
+ * light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w).
  *
  * Light enters the fiber at a random place of its width (scattering_model.across_width).
  *
@@ -25,9 +33,11 @@
 enum {
     TEXTILE_N_PARAM = surface_textile_n_param,
     TEXTILE_P_W = TWO_LOBE_N_PARAM, /* the parameters of two_lobe.v1 come first */
-    TEXTILE_P_S
+    TEXTILE_P_S,
+    TEXTILE_P_F
 };
-enum { TEXTILE_DEGREE = 5 };
+enum { TEXTILE_DEGREE = 5, TEXTILE_N_SECTION = 64 };
+enum textile_section_slope { TEXTILE_BY_GAMMA, TEXTILE_BY_W, TEXTILE_BY_F, TEXTILE_N_SLOPE };
 
 struct textile_entry { /* by |th| */
     float q;           /* 1 - rho */
@@ -35,17 +45,25 @@ struct textile_entry { /* by |th| */
     float cross_s;     /* d ln b / d s */
 };
 
+struct textile_section_entry { /* by |cos ph| */
+    float t, d_ln_t[TEXTILE_N_SLOPE];
+};
+
 struct textile_state {
     struct scattering_state lobes; /* scales, sampling tables and TT's azimuth; cross: d ln b / d beta_R */
-    float w, s;
+    float w, s, f;
     float share[TEXTILE_DEGREE + 1],
         d_share[TEXTILE_DEGREE + 1]; /* coefficients of K and of dK / ds in powers of 1 - cos d */
     float inv_z;
     struct textile_entry entry[TWO_LOBE_N_TABLE + 1];
+    float inv_mean_v, d_ln_mean_v; /* of v over ph, and by f */
+    struct textile_section_entry section[TEXTILE_N_SECTION + 1];
 };
 
 /* Fills in everything that needs the balanced scales. lobes, w and s are set. STATUS_NO_MEMORY. */
 status textile_balance(struct textile_state *t, const double *param, struct error *err);
+/* Fills in the mean of v and the table of t. lobes.azimuth, w and f are set. */
+void textile_section(struct textile_state *t);
 
 /* K or dK / ds from its coefficients. */
 static inline float textile_polynomial(const float c[TEXTILE_DEGREE + 1], float cos_d)

@@ -1,4 +1,4 @@
-/* What two_lobe.v1, two_lobe_balanced.v1, two_lobe_diffuse.v1 and textile.v2 share: state, evaluation with scores,
+/* What two_lobe.v1, two_lobe_balanced.v1, two_lobe_diffuse.v1 and textile.v3 share: state, evaluation with scores,
  * sampling. Included by those files only.
  *
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)

@@ -23,6 +23,20 @@ static inline void fiber_frame_from(struct fiber_frame *f, const float u[3])
     f->w[2] = -u[1];
 }
 
+/* u along the fiber, of either sign; v the direction across the fiber that is nearest to the cloth's normal: the normal
+ * of a section that lies flat in the cloth. Of a fiber along that normal, v is along x. */
+static inline void fiber_frame_flat(struct fiber_frame *f, const float u[3])
+{
+    float level = sqrtf(u[0] * u[0] + u[1] * u[1]), inv = level > 1e-6f ? 1 / level : 0;
+    memcpy(f->u, u, sizeof f->u);
+    f->v[0] = inv > 0 ? -u[2] * u[0] * inv : 1;
+    f->v[1] = -u[2] * u[1] * inv;
+    f->v[2] = level;
+    f->w[0] = u[1] * f->v[2] - u[2] * f->v[1];
+    f->w[1] = u[2] * f->v[0] - u[0] * f->v[2];
+    f->w[2] = u[0] * f->v[1] - u[1] * f->v[0];
+}
+
 static inline float fiber_frame_dot(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -182,7 +182,10 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
     const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
     b->hit = *hit;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
-    fiber_frame_from(&b->frame, hit->tangent);
+    if (w->s->model->flat_section)
+        fiber_frame_flat(&b->frame, hit->tangent);
+    else
+        fiber_frame_from(&b->frame, hit->tangent);
     fiber_frame_to_local(&b->frame, back, b->wo);
     if (w->s->n_set == 1) return;
     w->i_set = scene_group_of(w->s->scene, hit->i_segment);

@@ -31,7 +31,7 @@ static void test_defaults(void **state)
                 d->crop_cm == 1.0);
     assert_true(d->black_sheet);
     assert_int_equal(d->n_model, 1);
-    assert_string_equal(d->model[0].id, "textile.v2");
+    assert_string_equal(d->model[0].id, "textile.v3");
     assert_string_equal(d->method, method_gauss_newton.id);
     assert_int_equal(d->n_photograph, 0);
     assert_int_equal(d->radius_per_axis, -1);
