@@ -3,12 +3,16 @@ import json
 import os
 import random
 import subprocess
+import sys
 
 import pytest
 from daemon_under_test import program
 from small_png import png, weave
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "tests", "bench"))
+from png_picture import read_png  # noqa: E402
+
 PLAIN = weave(["10", "01"])
 PAIRS = os.path.join(os.environ.get("SELVEDGE_DATA") or os.path.join(ROOT, "..", "shared", "data"), "reflection-transmission-photos")
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-phantom"), os.X_OK), reason="no selvedge-phantom in the build folder")
@@ -83,3 +87,20 @@ def test_wrong_arguments():
     assert detect("--photograph", "a.png", "--px-per-mm", "-1")[0] == 2
     code, _, text = detect("--photograph", "/nonexistent.png")
     assert code == 1 and "nonexistent.png" in text
+
+
+@pytest.mark.parametrize("draft, rarer", [(["100", "010", "001"], "warp"), (["011", "101", "110"], "weft")])
+def test_rings_lie_around_the_rarer_crossings(tmp_path, draft, rarer):
+    """Orange ones where the warp is on top, blue ones where the weft is; the left half of the picture has none."""
+    photograph, overlay = write_png(tmp_path / "weave.png", 160, weave(draft)), tmp_path / "overlay.png"
+    code, answer, text = detect("--photograph", photograph, "--overlay", str(overlay))
+    assert code == 0 and answer["photographs"][0]["draft"] in turns(draft), text
+    colors = {"warp": 0, "weft": 0}
+    for row in read_png(overlay):
+        for x in range(0, len(row), 3):
+            difference = row[x] - row[x + 2]
+            if abs(difference) > 60:
+                assert x > len(row) // 2
+                colors["warp" if difference > 0 else "weft"] += 1
+    # a third of the crossings; around the other two thirds there would be twice as many pixels
+    assert colors[rarer] == pytest.approx(24000, rel=0.2) and sum(colors.values()) == colors[rarer]
