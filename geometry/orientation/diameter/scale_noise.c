@@ -96,8 +96,9 @@ bool scale_noise_variance(const struct scale_noise *s, double var[N_SCALE])
 {
     if (s->n[0] < MIN_VOID_VOXEL) return false;
     double gain = 1.0 + CLAMPED_GAIN * s->n_clamped / s->n_void;
-    for (int i = 0; i < N_SCALE; i++) {
-        double ratio = i > 0 ? scale_sigma(i - 1) / scale_sigma(i) : 1.0;
+    var[0] = gain * s->square[0] / s->n[0];
+    for (int i = 1; i < N_SCALE; i++) {
+        double ratio = scale_sigma(i - 1) / scale_sigma(i);
         var[i] = s->n[i] >= MIN_VOID_VOXEL ? gain * s->square[i] / s->n[i] : var[i - 1] * ratio * ratio * ratio;
     }
     return true;
