@@ -78,7 +78,7 @@ def test_given_corrections_are_applied(tmp_path, small):
 
 
 @pytest.mark.parametrize("correction, field, text", [
-    ({"radius": 3}, "correction.radius", "'correction.radius' is 3, but must be between 0.7"),
+    ({"radius": 3}, "correction.radius", "'correction.radius' is 3: allowed are 0.7 to 1.4"),
     ({"compression": {"lower": 1.2, "upper": 0.8}}, "correction.compression", "bounds"),
     ({"hairs_per_mm2": {"prior": [1, 0]}}, "correction.hairs_per_mm2", "prior"),
     ({"flatness": 2}, "correction.flatness", "flatness"),
