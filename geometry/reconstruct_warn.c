@@ -3,6 +3,7 @@
 #include "geometry/reconstruct.h"
 
 #include <math.h>
+#include <stdio.h>
 
 static void warn_spacing(const struct warning_sink *warn, const struct reconstruct_option *o,
                          const struct reconstruct_report *r)
@@ -94,12 +95,16 @@ static void warn_diameter(const struct warning_sink *warn, const struct reconstr
 
 static void warn_grade(const struct warning_sink *warn, const struct scan_grade *g)
 {
+    char what[200] = "take them as guesses, and use a volume model, which needs directions and density alone";
+    if (g->n_dropped > 0)
+        snprintf(what, sizeof what, "%zu of them were left out, and directions and density stand for their material",
+                 g->n_dropped);
     if (g->verdict == GRADE_UNRESOLVED)
         warning_send(warn, OPTION_SCAN_FILES,
                      "the scan does not resolve single fibers: around the traced fibers it has %.0f %% of the contrast "
-                     "that such fibers would have, and only %.0f %% of their length is sure; take them as guesses, and "
-                     "use a volume model, which needs directions and density alone, or scan with smaller voxels",
-                     100.0 * fmax(0.0, g->contrast), 100.0 * g->safe_share);
+                     "that such fibers would have, and only %.0f %% of their length is sure; %s, or scan with smaller "
+                     "voxels",
+                     100.0 * fmax(0.0, g->contrast), 100.0 * g->safe_share, what);
     if (g->verdict == GRADE_PARTLY)
         warning_send(warn, OPTION_SCAN_FILES,
                      "the scan resolves single fibers in part: %.0f %% of the traced length is sure, elsewhere the "

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* N_PLACE: places of the profile to a neighbour; N_RING, N_AROUND: rings of places around an axis and places of each;
  * N_NEAR: fibers that are considered there. Points are a quarter of a diameter apart. */
@@ -273,4 +274,42 @@ status scan_grade_measure(const struct volume *v, const struct fiber_set *f, str
     free(j.window);
     grade_points_release(&j.points);
     return s;
+}
+
+/* Appends the fibers that are safe, or those that are not, to `to`, which has room for them; n are there already. */
+static size_t append_fibers(const struct fiber_set *f, const float *safe, bool wanted, size_t n, struct fiber_set *to)
+{
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        size_t first = f->first_vertex[i], length = f->first_vertex[i + 1] - first;
+        if ((safe[i] >= 0.5f) != wanted) continue;
+        memcpy(to->position_m + 3 * to->first_vertex[n], f->position_m + 3 * first, 3 * length * sizeof *f->position_m);
+        to->radius_m[n] = f->radius_m[i];
+        to->axis_class[n] = f->axis_class[i];
+        to->group[n] = f->group[i];
+        to->first_vertex[n + 1] = to->first_vertex[n] + length;
+        n++;
+    }
+    return n;
+}
+
+status scan_grade_sort(struct fiber_set *f, const float *safe, struct scan_grade *grade, struct error *err)
+{
+    struct fiber_set sorted;
+    fiber_set_init(&sorted);
+    status s = fiber_set_reserve(&sorted, f->n_fiber, f->n_vertex, err);
+    if (s != STATUS_OK) return s;
+    memcpy(sorted.tile_size_m, f->tile_size_m, sizeof sorted.tile_size_m);
+    size_t n_safe = append_fibers(f, safe, true, 0, &sorted);
+    append_fibers(f, safe, false, n_safe, &sorted);
+    grade->n_dropped = n_safe > 0 ? f->n_fiber - n_safe : 0;
+    fiber_set_release(f);
+    *f = sorted;
+    return STATUS_OK;
+}
+
+void scan_grade_drop(struct fiber_set *f, const struct scan_grade *grade)
+{
+    if (grade->n_dropped >= f->n_fiber) return;
+    f->n_fiber -= grade->n_dropped;
+    f->n_vertex = f->first_vertex[f->n_fiber];
 }

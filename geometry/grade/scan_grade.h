@@ -27,6 +27,7 @@ struct scan_grade {
     double valley_depth;        /* median over windows beside a neighbour; NaN if no fiber has one */
     double beside_share;        /* share of the length that lies beside a neighbour */
     double safe_share;          /* share of the length in windows with a contrast of at least GRADE_SAFE_CONTRAST */
+    size_t n_dropped;           /* fibers that scan_grade_sort has put last; 0 after measuring */
 };
 
 /* "none", "resolved", "partly" or "unresolved". */
@@ -35,5 +36,10 @@ const char *grade_verdict_name(enum grade_verdict v);
  * the number of threads. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err);
+/* Puts the fibers of which less than half of the length is safe behind the others, and counts them in the grade as to be
+ * dropped; none if that is true of all. safe: as measured. STATUS_NO_MEMORY. */
+status scan_grade_sort(struct fiber_set *f, const float *safe, struct scan_grade *grade, struct error *err);
+/* Drops those fibers. */
+void scan_grade_drop(struct fiber_set *f, const struct scan_grade *grade);
 
 #endif

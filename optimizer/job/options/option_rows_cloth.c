@@ -148,6 +148,13 @@ const struct job_option option_rows_cloth[] = {
      INTO(join_seams),
      .standard = "true",
      .meaning = "Ends of fibers that meet across a seam within two radii are brought together."},
+    {.path = "volume.unresolved_fibers",
+     .kind = OPTION_BOOL,
+     INTO(unresolved_fibers),
+     .standard = "false",
+     .meaning =
+         "Whether traced fibers that the scan does not show are kept where it does not resolve single fibers. They "
+         "are always kept when a surface model is fitted, which needs fibers."},
     {.path = "volume.density_low",
      .kind = OPTION_NUMBER,
      .id = OPTION_DENSITY_LOW,

@@ -108,6 +108,32 @@ static void test_hollow_and_single_fibers(void **state)
     fiber_set_release(&one);
 }
 
+/* Fibers that are not there are left out, the others stay as they are. */
+static void test_unseen_fibers_are_left_out(void **state)
+{
+    (void)state;
+    struct fiber_set there = bundle(1, 1.0, 3.5), traced = bundle(2, 14.0, 3.5);
+    float safe[4];
+    for (int end = 0; end < 2; end++) /* the first of the traced fibers is the one that is there */
+        for (int a = 0; a < 3; a++) traced.position_m[3 * end + a] = there.position_m[3 * end + a];
+    struct scan_grade g = grade_of(&there, &traced, 0.7, 0.0, safe);
+    assert_int_equal(g.verdict, GRADE_UNRESOLVED);
+    const float turned[4] = {safe[1], safe[0], safe[2], safe[3]};
+    assert_int_equal(scan_grade_sort(&traced, turned, &g, NULL), STATUS_OK); /* the second comes first */
+    assert_int_equal(scan_grade_sort(&traced, turned, &g, NULL), STATUS_OK); /* and now the first again */
+    assert_true(traced.n_fiber == 4 && traced.n_vertex == 8);
+    scan_grade_drop(&traced, &g);
+    assert_true(traced.n_fiber == 1 && traced.n_vertex == 2 && g.n_dropped == 3);
+    assert_memory_equal(traced.position_m, there.position_m, 6 * sizeof(float));
+    assert_int_equal(fiber_set_validate(&traced, NULL), STATUS_OK);
+    safe[0] = 0.0f;
+    assert_int_equal(scan_grade_sort(&traced, safe, &g, NULL), STATUS_OK); /* not all */
+    scan_grade_drop(&traced, &g);
+    assert_int_equal(traced.n_fiber, 1);
+    fiber_set_release(&there);
+    fiber_set_release(&traced);
+}
+
 /* Without fibers there is no grade. */
 static void test_no_fibers(void **state)
 {
@@ -128,6 +154,7 @@ int main(void)
         cmocka_unit_test(test_invented_fibers),
         cmocka_unit_test(test_pressed_fibers),
         cmocka_unit_test(test_hollow_and_single_fibers),
+        cmocka_unit_test(test_unseen_fibers_are_left_out),
         cmocka_unit_test(test_no_fibers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -91,9 +91,10 @@ static json_t *texture_json(const struct pipeline_context *c)
 /* How clearly the scan shows the fibers. */
 static json_t *grade_json(const struct scan_grade *g)
 {
-    return json_pack("{s:s, s:o, s:o, s:o, s:o}", "verdict", grade_verdict_name(g->verdict), "contrast",
+    return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o}", "verdict", grade_verdict_name(g->verdict), "contrast",
                      json_number(g->contrast), "valley_depth", json_number(g->valley_depth), "beside_share",
-                     json_number(g->beside_share), "safe_share", json_number(g->safe_share));
+                     json_number(g->beside_share), "safe_share", json_number(g->safe_share), "n_dropped",
+                     json_count(g->n_dropped));
 }
 
 json_t *result_geometry_json(const struct pipeline_context *c)

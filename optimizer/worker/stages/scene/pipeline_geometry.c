@@ -175,15 +175,37 @@ status stage_orientation_load(struct pipeline_context *c, struct error *err)
     return load_direction(c, "orientation", err);
 }
 
+/* Whether a model of the job needs fibers, and not only density and directions. */
+static bool wants_fibers(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->n_model; i++)
+        if (c->model[i].appearance.kind == MODEL_SURFACE) return true;
+    return c->doc->unresolved_fibers;
+}
+
+/* Drops the fibers that the scan does not show, unless they are wanted. The voxels have taken their directions, which
+ * are smoother than those of the filter. */
+static void drop_unseen(struct pipeline_context *c)
+{
+    if (wants_fibers(c)) c->geometry.grade.n_dropped = 0;
+    scan_grade_drop(&c->fiber, &c->geometry.grade);
+    c->geometry.n_fiber = c->fiber.n_fiber;
+    c->geometry.n_vertex = c->fiber.n_vertex;
+    c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
+}
+
 status stage_directions(struct pipeline_context *c, struct error *err)
 {
     status s = reconstruct_transfer(&c->fiber, &c->direction, c->pool, &c->progress, &c->geometry, err);
+    if (s == STATUS_OK) drop_unseen(c);
     return s == STATUS_OK ? store_direction(c, "directions", err) : s;
 }
 
 status stage_directions_load(struct pipeline_context *c, struct error *err)
 {
-    return load_direction(c, "directions", err);
+    status s = load_direction(c, "directions", err);
+    if (s == STATUS_OK) drop_unseen(c);
+    return s;
 }
 
 /* ---- fibers ---- */
@@ -259,6 +281,18 @@ static status check_groups(struct pipeline_context *c, struct error *err)
     return STATUS_OK;
 }
 
+/* Grades the scan. Where it does not resolve the fibers, those that it does not show are put last. */
+static status grade_fibers(struct pipeline_context *c, struct error *err)
+{
+    struct reconstruct_report *g = &c->geometry;
+    float *safe = malloc((c->fiber.n_fiber + 1) * sizeof *safe);
+    if (safe == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
+    status s = scan_grade_measure(&c->volume, &c->fiber, c->pool, NULL, &g->grade, safe, err);
+    if (s == STATUS_OK && g->grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&c->fiber, safe, &g->grade, err);
+    free(safe);
+    return s;
+}
+
 status stage_fibers(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -268,7 +302,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
         if (s == STATUS_OK)
             s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &c->progress, &c->fiber,
                                    &c->geometry, err);
-        if (s == STATUS_OK) s = scan_grade_measure(&c->volume, &c->fiber, c->pool, NULL, &c->geometry.grade, NULL, err);
+        if (s == STATUS_OK) s = grade_fibers(c, err);
         volume_release(&c->volume);
         memset(&c->volume, 0, sizeof c->volume);
         if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
