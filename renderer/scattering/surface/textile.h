@@ -1,5 +1,5 @@
-/* textile.v3: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside, whose
- * section may be flat.
+/* textile.v3: a fiber with a surface lobe R between rough and smooth, a transmitted lobe TT, and scattering inside,
+ * whose section may be flat.
  * Reciprocal; lossless from both sides where C_TT = 1.
  *
  *     d     = (th_i - th_o) / 2,  ph = ph_o - ph_i       difference angle and relative azimuth
@@ -13,8 +13,8 @@
  *     S  = R + C_TT (1 - C_R) (TT + w D)
  *
  * ph = 0 and ph = pi are the normals of the flat section, an ellipse of height over width f; for a flat fiber in a cloth
- * they lie as near to the cloth's normal as the fiber's direction lets them (fiber_frame.h). The tube that stands for
- * the fiber in the scene is as wide as the ellipse: of the light from ph, the share w v(ph) meets it and is scattered
+ * they lie as near to the cloth's normal as the fiber's direction lets them (fiber_frame.h). The tube that stands
+ * for the fiber in the scene is as wide as the ellipse: of the light from ph, the share w v(ph) meets it and is scattered
  * inside, and the rest goes on in TT. t solves t(ph) (f * t)(ph) = 1 - w v(ph) (textile_section.c), so both take all
  * light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w).
  *
