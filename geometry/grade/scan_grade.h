@@ -36,8 +36,8 @@ const char *grade_verdict_name(enum grade_verdict v);
  * the number of threads. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err);
-/* Puts the fibers of which less than half of the length is safe behind the others, and counts them in the grade as to be
- * dropped; none if that is true of all. safe: as measured. STATUS_NO_MEMORY. */
+/* Puts the fibers of which less than half of the length is safe behind the others, and counts them in the grade as to
+ * be dropped; none if that is true of all. safe: as measured. STATUS_NO_MEMORY. */
 status scan_grade_sort(struct fiber_set *f, const float *safe, struct scan_grade *grade, struct error *err);
 /* Drops those fibers. */
 void scan_grade_drop(struct fiber_set *f, const struct scan_grade *grade);

@@ -12,11 +12,11 @@
  *     D  = q(th_i) q(th_o) / Z v(ph_i) v(ph_o) / (mean of v),  q = 1 - rho
  *     S  = R + C_TT (1 - C_R) (TT + w D)
  *
- * ph = 0 and ph = pi are the normals of the flat section, an ellipse of height over width f; for a flat fiber in a cloth
- * they lie as near to the cloth's normal as the fiber's direction lets them (fiber_frame.h). The tube that stands
- * for the fiber in the scene is as wide as the ellipse: of the light from ph, the share w v(ph) meets it and is scattered
- * inside, and the rest goes on in TT. t solves t(ph) (f * t)(ph) = 1 - w v(ph) (textile_section.c), so both take all
- * light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w).
+ * ph = 0 and ph = pi are the normals of the flat section, an ellipse of height over width f; for a flat fiber in a
+ * cloth they lie as near to the cloth's normal as the fiber's direction lets them (fiber_frame.h). The tube that stands
+ * for the fiber in the scene is as wide as the ellipse: of the light from ph, the share w v(ph) meets it and is
+ * scattered inside, and the rest goes on in TT. t solves t(ph) (f * t)(ph) = 1 - w v(ph) (textile_section.c), so both
+ * take all light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w).
  *
  * Light enters the fiber at a random place of its width (scattering_model.across_width).
  *

@@ -63,8 +63,8 @@ static double energy_from(const struct scattering_model *m, const struct scatter
 }
 
 /* A flat section: all light leaves it, from whatever azimuth it comes (C_TT = 0.999). Back towards the light and off
- * R's cone there is only D, which is w v(ph)^2 / (mean of v) times what a round section has: 1 / (mean of v) seen from the
- * flat side, and f^2 of that from the edge. */
+ * R's cone there is only D, which is w v(ph)^2 / (mean of v) times what a round section has: 1 / (mean of v) seen from
+ * the flat side, and f^2 of that from the edge. */
 static void flat_section_in_closed_form(void **unused)
 {
     (void)unused;
