@@ -2,7 +2,7 @@
 
 Works on tokens, not on a syntax tree: what does not compile is sorted out by the compiler. Left alone are comments, strings,
 preprocessor lines, array sizes in declarations, everything inside a call that logs, words a message or asserts, and answers to a
-lack of memory, which no test provokes.
+lack of memory, which no test provokes; and three kinds of places where every fault is equivalent (equivalent_places below).
 """
 import dataclasses
 import re
@@ -19,6 +19,7 @@ REST = (r"|(?P<string>[LuURrfb]?\"(?:[^\"\\\n]|\\.)*\"|[Lrfb]?'(?:[^'\\\n]|\\.)*
 SPOKEN = re.compile(r"^(log_\w+|error_set\w*|error_prefix|fprintf|printf|assert\w*|_Static_assert|print|console|fail\w*)$")
 # what is dropped here leaks or stays locked, which no test of a result can see
 RELEASES = re.compile(r"^(free|close|fclose|\w*_(release|free|close|unlock|lock|destroy|init|finalize)|log_\w+|assert\w*|print|progress_report)$")
+DESCRIPTOR = re.compile(r"^(\w*_)?fd$")
 TYPES = re.compile(r"^(char|int|float|double|bool|status|size_t|ssize_t|off_t|u?int\d+_t|unsigned|signed|long|short|struct|enum|union|"
                    r"const|static|extern|inline|void|typedef|let|var|def|class|import|from|restrict|_Atomic|atomic_\w+)$")
 CONTROL = {"if", "for", "while", "switch", "return", "sizeof", "else", "do", "case", "goto", "break", "continue", "default", "elif",
@@ -37,6 +38,7 @@ class Token:
     end: int
     spoken: bool = False
     in_size: bool = False
+    equivalent: bool = False
 
 
 @dataclasses.dataclass
@@ -57,6 +59,7 @@ def tokens_of(text, language):
     found = [Token(m.lastgroup, m.group(), m.start(), m.end()) for m in pattern.finditer(text) if m.lastgroup != "skip"]
     mark_spoken(found)
     mark_sizes(found)
+    mark_equivalent(found)
     return found
 
 
@@ -90,6 +93,37 @@ def mark_sizes(found):
         if t.text == "[" and found[statement_start(found, i)].kind == "word" and TYPES.match(found[statement_start(found, i)].text):
             for k in range(i, closing(found, i) + 1):
                 found[k].in_size = True
+
+
+def mark_equivalent(found):
+    """Places where a fault changes nothing that a program can see.
+
+    - The sign of a descriptor or of what snprintf returns: POSIX says -1 for a failure, a program with standard input,
+      output and error open never gets the descriptor 0, and no text of the product is empty or fails to be printed.
+    - The size of a buffer that is given to snprintf: buffers are larger than any text, as are the arrays of mark_sizes.
+    - The first value of a struct error, which is written before it is read.
+    """
+    printed = {found[i - 2].text for i, t in enumerate(found) if i > 1 and t.text == "snprintf" and found[i - 1].text == "="}
+    for i, t in enumerate(found[:-4]):
+        before, after = found[max(0, i - 1)], found[i + 1]
+        if t.text in ("<", ">=") and after.text == "0" and (DESCRIPTOR.match(before.text) or before.text in printed):
+            t.equivalent = after.equivalent = True
+        if t.text in ("snprintf", "vsnprintf") and after.text == "(":
+            mark_argument(found, i + 1, 1)
+        if t.text == "error" and before.text == "struct" and [x.text for x in found[i + 2:i + 4]] == ["=", "{"]:
+            found[i + 4].equivalent = True
+
+
+def mark_argument(found, bracket, wanted):
+    """Marks one argument of the call with this opening bracket as a place of equivalent faults."""
+    depth, argument = 0, 0
+    for k in range(bracket + 1, closing(found, bracket)):
+        depth += found[k].text in ("(", "[", "{")
+        depth -= found[k].text in (")", "]", "}")
+        if depth == 0 and found[k].text == ",":
+            argument += 1
+        elif argument == wanted:
+            found[k].equivalent = True
 
 
 def one_more(text):
@@ -221,7 +255,7 @@ def faults_of(path, text, language):
     for i, t in enumerate(found[:-2]):
         if t.spoken:
             continue
-        for fault in [*operator_faults(found, i), *condition_faults(found, i, language), *statement_faults(found, i, heads, language)]:
+        for fault in [*(operator_faults(found, i) if not t.equivalent else []), *condition_faults(found, i, language), *statement_faults(found, i, heads, language)]:
             add(*fault)
         for a, b in swapped_arguments(found, i) or []:
             first, second = (text[found[x[0]].start:found[x[1]].end] for x in (a, b))
