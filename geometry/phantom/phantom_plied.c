@@ -49,7 +49,7 @@ static void lay_out(struct plied *p, const struct phantom_option *o, const struc
     double tile = p->section.length_m / p->scale;                        /* in the lengths of the file */
     long long steps = llround(tile / y->ply_pitch_m * (double)y->n_ply); /* from one ply to the next */
     p->ply_turns = (double)steps / (double)y->n_ply;
-    p->n_period = y->n_ply / greatest_divisor(y->n_ply, (size_t)llabs(steps));
+    p->n_period = y->n_ply / strand_greatest_divisor(y->n_ply, (size_t)llabs(steps));
     p->fiber_turns = round(tile / y->fiber_pitch_m * (double)p->n_period) / (double)p->n_period;
 }
 

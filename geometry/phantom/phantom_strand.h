@@ -12,7 +12,10 @@ struct phantom_strands {
 };
 
 /* Greatest common divisor, where 0 is allowed. After a / gcd(a, k) steps of k a ring of length a is closed. */
-static inline size_t greatest_divisor(size_t a, size_t b) { return b == 0 ? a : greatest_divisor(b, a % b); }
+static inline size_t strand_greatest_divisor(size_t a, size_t b)
+{
+    return b == 0 ? a : strand_greatest_divisor(b, a % b);
+}
 
 /* The two functions below for yarns with plies. */
 double plied_section_radius_m(const struct phantom_option *o, double fiber_radius_m);

@@ -75,7 +75,7 @@ static status add_orbit(struct phantom_strands *s, const struct phantom_option *
 {
     size_t fold = rho_m > 0.0 ? LATTICE_FOLD : 1;
     size_t sixths = (size_t)llabs(llround(LATTICE_FOLD * c->twist_turns));
-    size_t n_period = fold / greatest_divisor(fold, sixths);
+    size_t n_period = fold / strand_greatest_divisor(fold, sixths);
     size_t per_tile = (size_t)ceil(c->length_m / y->radius_m);
     struct strand like = {.shift = {y->shift[0] * (double)n_period, y->shift[1] * (double)n_period},
                           .n_period = n_period,

@@ -1,4 +1,5 @@
 #include "geometry/weave/weave_detect.h"
+#include "base/angle.h"
 
 #include "geometry/vision/vision.h"
 #include "geometry/vision/vision_texture.h"
@@ -131,8 +132,8 @@ static void fill_guess(const struct piece *p, const struct finding *f, struct we
     const double *line = f->lattice[f->i_best].f[0];
     g->spacing_px[0] = 1.0 / hypot(d->f_warp[0], d->f_warp[1]);
     g->spacing_px[1] = 1.0 / hypot(d->f_weft[0], d->f_weft[1]);
-    g->direction_deg[0] = modulo_deg(atan2(d->step_weft_px[1], d->step_weft_px[0]) * 180.0 / M_PI, -45.0);
-    g->direction_deg[1] = modulo_deg(atan2(d->step_warp_px[1], d->step_warp_px[0]) * 180.0 / M_PI, -90.0);
+    g->direction_deg[0] = modulo_deg(angle_to_deg(atan2(d->step_weft_px[1], d->step_weft_px[0])), -45.0);
+    g->direction_deg[1] = modulo_deg(angle_to_deg(atan2(d->step_warp_px[1], d->step_warp_px[0])), -90.0);
     g->texture_period_px = p->px / hypot(line[0], line[1]);
     double explained = fmax(0.0, 1.0 - d->residual), odds = odds_to_confidence(d->score, d->score_other_yarns);
     g->yarns_confidence = odds * fmin(1.0, RESEMBLING + explained);

@@ -1,4 +1,5 @@
 #include "geometry/weave/weave_trial.h"
+#include "base/angle.h"
 
 #include <math.h>
 
@@ -73,7 +74,7 @@ bool weave_trial_init(struct weave_trial *t, const struct weave_lattice *lattice
     if (t->f_warp[0] <= 0.0 || t->f_weft[1] <= 0.0 || p > 1.0 || q > 1.0) return false;
     if (fabs(t->f_warp[0]) / p < fabs(t->f_weft[0]) / q) return false;
     double cosine = (t->f_warp[0] * t->f_weft[0] + t->f_warp[1] * t->f_weft[1]) / (p * q);
-    double skew_deg = asin(cosine) * 180.0 / M_PI, ratio = log(p / q);
+    double skew_deg = angle_to_deg(asin(cosine)), ratio = log(p / q);
     if (fabs(skew_deg) > LARGEST_SKEW_DEG || fabs(ratio) > log(LARGEST_RATIO)) return false;
     double narrow = fmax(0.0, log(2.0 * p)) + fmax(0.0, log(2.0 * q));
     t->prior = -0.5 * square(skew_deg / SKEW_SD_DEG) - 0.5 * square(ratio / RATIO_SD) - NARROW_COST * narrow -

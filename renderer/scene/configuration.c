@@ -1,4 +1,5 @@
 #include "renderer/scene/configuration.h"
+#include "base/angle.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -6,7 +7,7 @@
 
 void configuration_describe(const struct configuration *c, char text[CONFIGURATION_TEXT])
 {
-    const double degree = 180.0 / M_PI;
+    const double degree = DEG_PER_RAD;
     int n = c->light == LIGHT_NO_LAMP ? snprintf(text, CONFIGURATION_TEXT, "no lamp")
                                       : snprintf(text, CONFIGURATION_TEXT, "lamp %.4g/%.4g",
                                                  degree * c->light_theta_rad, degree * c->light_phi_rad);

@@ -197,7 +197,8 @@ def test_not_a_selvedge_server(tmp_path):
                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=dict(os.environ, PYTHONUNBUFFERED="1"))
     try:
         port = server.stdout.readline().split("port ")[1].split()[0]
-        assert "error:" in run(f"http://127.0.0.1:{port}", "list", expect=1).stderr
+        text = run(f"http://127.0.0.1:{port}", "list", expect=1).stderr
+        assert "error: the server replied with HTTP status 404 and no explanation" in text
     finally:
         server.terminate()
         server.wait(10)

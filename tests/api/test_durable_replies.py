@@ -3,8 +3,10 @@ database.
 
 A preloaded library records the order of the daemon's writes and syncs. The test cannot cut the power, but a missing
 sync shows in the record."""
+import errno
+
 import pytest
-from daemon_under_test import Daemon, document
+from daemon_under_test import Daemon, document, sha256
 from system_calls import Trace
 
 
@@ -68,3 +70,31 @@ def test_a_complete_file_is_durable_at_its_final_name(traced):
         moved = next((i for i, (c, path) in enumerate(calls) if c == "sync" and path.endswith(folder)), -1)
         assert 0 <= bytes_synced < moved < last(calls, "write", "selvedge.db-wal"), f"{folder}: {calls}"
     assert_database_is_durable(calls)
+
+
+@pytest.mark.parametrize("folder", ["/input", "/upload"])
+def test_a_file_whose_folder_cannot_be_synced_is_not_confirmed(shim, tmp_path, folder):
+    """Every sync of the folder fails once, from the first on, until none is left: a PATCH that meets it is refused, and
+    its repetition completes the file."""
+    n_refused, data = 0, b"x" * 1000
+    for n in range(1, 20):
+        mark = tmp_path / f"mark{n}"
+        fault = {"LD_PRELOAD": shim, "FAULT_CALL": "sync", "FAULT_AT": str(n), "FAULT_ERRNO": str(errno.EIO), "FAULT_PATH": folder,
+                 "FAULT_MARK": str(mark)}
+        with Daemon(tmp_path / f"data{n}", environment=fault) as d:
+            job = d.create(document("succeed"))
+            declaration = {"name": "scan.tif", "role": "volume", "size": len(data), "sha256": sha256(data)}
+            declared = d.post(f"/v1/jobs/{job}/files", json=declaration)
+            if mark.exists():
+                continue
+            url = declared.json()["upload_url"]
+            reply = d.patch(url, 0, data)
+            if not mark.exists():
+                assert reply.status_code == 204 and n_refused > 0, "no sync failed"
+                return
+            assert reply.status_code == 500, "the fault is not reported"
+            n_refused += 1
+            at = d.offset(url)
+            assert d.patch(url, at, data[at:]).status_code == 204
+            assert d.get(f"/v1/jobs/{job}/files/scan.tif").content == data
+    raise AssertionError("no end")

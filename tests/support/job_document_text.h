@@ -19,7 +19,7 @@
     ",\"photographs\":[{\"file\":\"p0.exr\",\"light_phi_deg\":0,\"camera_phi_deg\":180," extra "}]}"
 
 /* The document is refused: the error has this field, and its text holds this part. */
-static inline void check_error(const char *text, const char *field, const char *part)
+static inline void job_document_check_error(const char *text, const char *field, const char *part)
 {
     struct job_document *doc = NULL;
     struct error err = {0};
@@ -30,7 +30,7 @@ static inline void check_error(const char *text, const char *field, const char *
 }
 
 /* The document is accepted; the caller frees it. */
-static inline struct job_document *parse(const char *text)
+static inline struct job_document *job_document_of_text(const char *text)
 {
     struct job_document *doc = NULL;
     struct error err = {0};

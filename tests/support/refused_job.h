@@ -5,7 +5,7 @@
 #include "optimizer/worker/pipeline_context.h"
 
 /* The inputs of the job in the folder `path` are refused with an error of this field. */
-static inline void check_refused_job(const char *path, const char *field)
+static inline void refused_job_check(const char *path, const char *field)
 {
     struct worker_folder f;
     struct pipeline_context c;

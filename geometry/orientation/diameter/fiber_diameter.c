@@ -56,7 +56,7 @@ static struct energy bright_energy(const float *a, const uint8_t *far, const siz
             for (size_t i = 1; i + 1 < n[0]; i++, count++) {
                 const float *p = a + (ptrdiff_t)k * sz + (ptrdiff_t)j * sy + (ptrdiff_t)i;
                 if (p[0] < MIN_BLURRED || far[p - a] > NEAR_MATERIAL) continue;
-                float bright = s2 * minus_laplacian(p, sy, sz);
+                float bright = s2 * scale_minus_laplacian(p, sy, sz);
                 if (bright > 0.0f) raw += (double)(bright * bright * bright);
                 if (bright > 0.0f && bright * bright > q3) sum += (double)(bright * (bright * bright - q3));
             }

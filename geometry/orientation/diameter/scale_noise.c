@@ -64,7 +64,7 @@ static void add_scale(struct scale_noise *s, int i_scale, const float *a, const 
             for (size_t i = 2; i + 2 < n[0]; i++) {
                 size_t at = (k * n[1] + j) * n[0] + i;
                 if (!(far[at] > least)) continue;
-                double r = sigma * sigma * (double)minus_laplacian(a + at, sy, sz);
+                double r = sigma * sigma * (double)scale_minus_laplacian(a + at, sy, sz);
                 square += r * r;
                 count += 1.0;
             }
@@ -133,7 +133,7 @@ void scale_noise_white(double noise_var, float *a, float *b, double var[N_SCALE]
         double sigma = scale_sigma(i), sum = 0.0;
         scale_blur_on(a, b, n, i);
         for (ptrdiff_t at = sz + sy + 1; at < EDGE * sz - sz - sy - 1; at++) {
-            double r = sigma * sigma * (double)minus_laplacian(a + at, sy, sz);
+            double r = sigma * sigma * (double)scale_minus_laplacian(a + at, sy, sz);
             sum += r * r;
         }
         var[i] = noise_var * sum;

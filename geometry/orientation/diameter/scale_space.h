@@ -18,7 +18,7 @@ void scale_blur(float *a, float *b, const size_t n[3], double sigma);
 void scale_blur_on(float *a, float *b, const size_t n[3], int i);
 
 /* Returns -lap at p, in a volume with rows of sy and slices of sz voxels. */
-static inline float minus_laplacian(const float *p, ptrdiff_t sy, ptrdiff_t sz)
+static inline float scale_minus_laplacian(const float *p, ptrdiff_t sy, ptrdiff_t sz)
 {
     return 6.0f * p[0] - p[-1] - p[1] - p[-sy] - p[sy] - p[-sz] - p[sz];
 }

@@ -211,6 +211,25 @@ static void test_wrong_axes(void **state)
     for (int i = 0; i < 9; i++) assert_true(a.matrix[i] == (i % 4 == 0 ? 1.0 : 0.0));
 }
 
+/* With one direction at most, the share of fibers along z decides whether the axes are wrong: 0.35 of them. */
+static void test_fibers_along_z(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t n;
+        double share_z;
+        enum align_outcome outcome;
+    } is[] = {
+        {0, 0.3, ALIGN_NO_DIRECTION}, {0, 0.4, ALIGN_OTHER_AXES}, {1, 0.3, ALIGN_DONE}, {1, 0.4, ALIGN_OTHER_AXES}};
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        struct main_directions m = {.n = is[i].n, .share_z = is[i].share_z};
+        struct alignment a;
+        if (m.n == 1) m.direction[0][0] = 1.0;
+        alignment_from_directions(&m, &a);
+        assert_int_equal(a.outcome, is[i].outcome);
+    }
+}
+
 static void test_known_period(void **state)
 {
     const struct cloth *c = *state;
@@ -328,10 +347,9 @@ static void test_memory_limit(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_known_matrices),      cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
-        cmocka_unit_test(test_known_period),        cmocka_unit_test(test_align_and_crop),
-        cmocka_unit_test(test_memory_limit)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_matrices),      cmocka_unit_test(test_threads),
+                                       cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
+                                       cmocka_unit_test(test_fibers_along_z),      cmocka_unit_test(test_known_period),
+                                       cmocka_unit_test(test_align_and_crop),      cmocka_unit_test(test_memory_limit)};
     return cmocka_run_group_tests(tests, make_cloth, release_cloth);
 }

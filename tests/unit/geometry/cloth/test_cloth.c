@@ -243,6 +243,26 @@ static void test_thickness_without_hairs(void **state)
     assert_true(fabs(hairy.body_thickness_m / bare.thickness_m - 1.0) < 0.1);
 }
 
+/* Hairs leave the surface of their yarn: very short ones make a cloth of flat yarns hardly thicker. */
+static void test_roots_of_hairs(void **state)
+{
+    (void)state;
+    struct cloth_description d = small_cloth("plain");
+    struct fiber_set f;
+    struct cloth_report bare, hairy;
+    d.kind[0].n_fiber = 60;
+    set_number(&d, "yarns[0].flatness", 4.0);
+    build(&d, NULL, NULL, &f, &bare);
+    fiber_set_release(&f);
+    set_number(&d, "yarns[0].hairs_per_mm", 10.0);
+    set_number(&d, "yarns[0].hair_length_um", 50.0);
+    build(&d, NULL, NULL, &f, &hairy);
+    fiber_set_release(&f);
+    assert_true(hairy.n_fiber[0] > bare.n_fiber[0]);
+    print_message("thickness %.1f um, with short hairs %.1f um\n", 1e6 * bare.thickness_m, 1e6 * hairy.thickness_m);
+    assert_true(hairy.thickness_m < bare.thickness_m + 0.1e-3);
+}
+
 /* A melange has the asked share of the other kind, between fibers as well. */
 static void test_melange(void **state)
 {
@@ -289,6 +309,7 @@ int main(void)
         cmocka_unit_test(test_contradictions_are_named),
         cmocka_unit_test(test_too_many_fibers),
         cmocka_unit_test(test_thickness_without_hairs),
+        cmocka_unit_test(test_roots_of_hairs),
         cmocka_unit_test(test_melange),
         cmocka_unit_test(test_threads_per_cm),
     };

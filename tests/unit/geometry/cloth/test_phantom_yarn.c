@@ -180,12 +180,35 @@ static void test_wrong_yarn_files(void **state)
     assert_string_equal(err.field, "yarn");
 }
 
+/* A weft of very thin fibers in a tile of many thick warps needs more nodes than there is memory for. */
+static void test_too_many_nodes(void **state)
+{
+    struct phantom_option o;
+    struct phantom_report r;
+    struct fiber_set f;
+    struct error err = {0};
+    const char *path = scratch_path(state, "thin.txt");
+    scratch_write(path, yarn_text, sizeof yarn_text - 1);
+    phantom_option_default(&o, PHANTOM_PLAIN);
+    assert_int_equal(phantom_yarn_read(path, &o.yarn, NULL), STATUS_OK);
+    o.fiber_radius_m[0] = 1e-7;
+    o.n_yarn[0] = 2;
+    o.n_yarn[1] = 400;
+    o.yarn_true_size = true;
+    o.n_relax = 0;
+    fiber_set_init(&f);
+    assert_int_equal(phantom_generate(&o, NULL, NULL, &f, &r, &err), STATUS_INVALID);
+    assert_string_equal(err.field, "yarn");
+    assert_non_null(strstr(err.text, "over a million nodes"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plied_yarns),
         cmocka_unit_test(test_real_yarn_files),
         cmocka_unit_test(test_wrong_yarn_files),
+        cmocka_unit_test(test_too_many_nodes),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

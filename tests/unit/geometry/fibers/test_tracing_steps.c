@@ -153,9 +153,9 @@ static void test_relax(void **state)
 }
 
 /* Three fibers, two of which touch. Only two have lines, and these must end on their axes with the true radius,
- * independent of the third fiber. With a blur b, the position of a straight axis is known to sigma / sqrt(A) per
- * voxel of length with A = pi r / (2 sqrt(pi) b), because a quarter of a circle's surface determines each coordinate.
- * That is some 0.1 voxel, and the fit averages over several voxels. */
+ * independent of the third fiber. A fit that is cancelled says so and changes nothing. With a blur b, the position of a
+ * straight axis is known to sigma / sqrt(A) per voxel of length with A = pi r / (2 sqrt(pi) b), because a quarter of a
+ * circle's surface determines each coordinate. That is some 0.1 voxel, and the fit averages over several voxels. */
 static void test_axis_fit(void **state)
 {
     (void)state;
@@ -166,6 +166,8 @@ static void test_axis_fit(void **state)
     struct volume v;
     struct polyline_set coarse, lines;
     struct axis_profile profile = {.radius = 3.2, .blur = 0.8, .high = 1.0};
+    atomic_bool cancel = true;
+    const struct progress cancelled = {.cancel = &cancel};
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, 3, 0.2, 1);
     polyline_set_init(&coarse);
@@ -174,6 +176,8 @@ static void test_axis_fit(void **state)
     add_piece(&coarse, 0, 0.5f, 63.5f, 19.0f);
     assert_int_equal(polylines_resample(&coarse, &lines, NULL), STATUS_OK);
     assert_int_equal(polyline_length(&lines, 0), 64);
+    assert_int_equal(polylines_fit(&lines, &v, 7.0, 6, &profile, NULL, &cancelled, NULL), STATUS_CANCELLED);
+    assert_true(profile.radius == 3.2 && profile.blur == 0.8);
     assert_int_equal(polylines_fit(&lines, &v, 7.0, 6, &profile, NULL, NULL, NULL), STATUS_OK);
     double square = 0.0;
     for (size_t i = 0; i < lines.n_vertex; i++) {

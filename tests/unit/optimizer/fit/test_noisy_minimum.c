@@ -127,6 +127,38 @@ static void test_same_values_same_search(void **unused)
     assert_memory_equal(&a, &b, sizeof a);
 }
 
+struct place_seen {
+    size_t n;
+    double farthest;
+};
+
+/* A bowl whose points have a large stated error. It notes how far from the middle it is asked after the first points.
+ */
+static status note_place(void *context, double u, double *y, double *se, struct error *err)
+{
+    const struct function bowl = {.shape = SHAPE_BOWL};
+    struct place_seen *x = context;
+    (void)err;
+    if (x->n++ >= option.n_first) x->farthest = fmax(x->farthest, fabs(u));
+    *y = value(&bowl, u);
+    *se = 1.0;
+    return STATUS_OK;
+}
+
+/* Noise asks for points far to the sides, where the function departs from a polynomial. They stay within 0.35 of the
+ * range from the vertex, and a few steps of 0.01 that lead past points which have been evaluated. */
+static void test_sides_stay_near(void **unused)
+{
+    (void)unused;
+    struct place_seen seen = {0};
+    struct noisy_minimum m;
+    double range = option.upper - option.lower;
+    assert_int_equal(noisy_minimum_search(&option, note_place, &seen, &m, NULL), STATUS_OK);
+    assert_true(seen.n > option.n_first + 2);
+    print_message("farthest side: %.3f of the range\n", seen.farthest / range);
+    assert_true(seen.farthest > 0.33 * range && seen.farthest < 0.41 * range);
+}
+
 static void test_bad_input(void **unused)
 {
     (void)unused;
@@ -144,9 +176,13 @@ static void test_bad_input(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_without_noise),           cmocka_unit_test(test_error_is_honest),
-        cmocka_unit_test(test_flat_is_not_determined),  cmocka_unit_test(test_slope_ends_at_the_bound),
-        cmocka_unit_test(test_same_values_same_search), cmocka_unit_test(test_bad_input),
+        cmocka_unit_test(test_without_noise),
+        cmocka_unit_test(test_error_is_honest),
+        cmocka_unit_test(test_flat_is_not_determined),
+        cmocka_unit_test(test_slope_ends_at_the_bound),
+        cmocka_unit_test(test_same_values_same_search),
+        cmocka_unit_test(test_sides_stay_near),
+        cmocka_unit_test(test_bad_input),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -28,7 +28,7 @@ static void test_a_name_is_enough(void **state)
     for (const char *const *weave = cloth_weave_names; *weave != NULL; weave++) {
         char text[200];
         snprintf(text, sizeof text, CLOTH("\"weave\":\"%s\""), *weave);
-        struct job_document *doc = parse(text);
+        struct job_document *doc = job_document_of_text(text);
         assert_string_equal(doc->cloth->weave, *weave);
         assert_int_equal(doc->cloth->seed, 1);
         for (size_t i = 0; i < doc->cloth->n_number; i++) {
@@ -44,7 +44,7 @@ static void test_a_name_is_enough(void **state)
 static void test_everything_given(void **state)
 {
     (void)state;
-    struct job_document *doc = parse(CLOTH(
+    struct job_document *doc = job_document_of_text(CLOTH(
         "\"draft\":[\"1000\",\"0011\",\"0110\"],\"warp\":[0,1,1],\"weft\":[1],\"warp_per_cm\":40,\"seed\":7,\"tile_"
         "warps\":"
         "24,\"crimp\":{\"lower\":0.4,\"upper\":0.6,\"prior\":[0.5,0.1]},\"disorder\":0.02,\"yarns\":[{\"fibers\":30,"
@@ -70,31 +70,32 @@ static void test_everything_given(void **state)
 static void test_named_kinds(void **state)
 {
     (void)state;
-    struct job_document *doc =
-        parse(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{\"name\":\"blue\"}]"));
+    struct job_document *doc = job_document_of_text(
+        CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{\"name\":\"blue\"}]"));
     assert_int_equal(doc->n_group, 2);
     assert_string_equal(doc->group[0], "red");
     assert_string_equal(doc->group[1], "blue");
     job_document_free(doc);
-    doc = parse(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{},{}]"));
+    doc = job_document_of_text(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{},{}]"));
     assert_int_equal(doc->n_group, 0);
     job_document_free(doc);
-    check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{}]"), "cloth.yarns[0].name",
-                "or none");
-    check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"a\"},{\"name\":\"a\"}]"),
-                "cloth.yarns[1].name", "second time");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"a b\"}]"), "cloth.yarns[0].name", "1 to 20");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{}]"),
+                             "cloth.yarns[0].name", "or none");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"a\"},{\"name\":\"a\"}]"),
+                             "cloth.yarns[1].name", "second time");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"name\":\"a b\"}]"), "cloth.yarns[0].name",
+                             "1 to 20");
 }
 
 /* The section that results state for a described cloth is accepted, and describes the same cloth. */
 static void describes_itself(const char *text)
 {
-    struct job_document *doc = parse(text);
+    struct job_document *doc = job_document_of_text(text);
     json_t *document = json_pack("{s:s, s:o, s:{s:s}}", "sample", "s", "cloth", cloth_section_json(doc->cloth, NULL),
                                  "measurements", "file", "a.csv");
     char *again_text = json_dumps(document, JSON_REAL_PRECISION(17));
     assert_non_null(again_text);
-    struct job_document *again = parse(again_text);
+    struct job_document *again = job_document_of_text(again_text);
     assert_int_equal(again->n_group, doc->n_group);
     assert_memory_equal(again->group, doc->group, sizeof doc->group);
     for (size_t i = 0; i < doc->cloth->n_number; i++) { /* numbers that were searched are given now */
@@ -129,54 +130,65 @@ static void test_a_cloth_describes_itself(void **state)
 static void test_mistakes_are_named(void **state)
 {
     (void)state;
-    check_error(CLOTH("\"weave\":\"tweed\""), "cloth.weave", "twill31");
-    check_error(CLOTH("\"seed\":1"), "cloth.weave", "either");
-    check_error(CLOTH("\"weave\":\"plain\",\"draft\":[\"10\",\"01\"]"), "cloth.weave", "either");
-    check_error(CLOTH("\"draft\":[\"10\",\"011\"]"), "cloth.draft", "does not repeat");
-    check_error(CLOTH("\"draft\":[\"10\",\"10\"]"), "cloth.draft", "never crosses");
-    check_error(CLOTH("\"weave\":\"plain\",\"warp\":[0,1]"), "cloth.warp", "one of the 1 kinds");
-    check_error(CLOTH("\"weave\":\"twill\",\"tile_wefts\":6"), "cloth.tile_wefts", "multiple of 4");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1.5"), "cloth.crimp", "1");
-    check_error(CLOTH("\"weave\":\"felt\",\"crimp\":0.5"), "cloth.crimp", "has no number");
-    check_error(CLOTH("\"weave\":\"plain\",\"warp_per_cm\":30,\"cover_warp\":1"), "cloth.cover_warp", "has no number");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"packing\":0.95}]"), "cloth.yarns[0].packing", "0.85");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange\":0.5}]"), "cloth.yarns[0].melange", "has no number");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange_with\":0}]"), "cloth.yarns[0].melange_with",
-                "another");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"fibers\":5000}]"), "cloth.yarns[0].fibers", "1000");
-    check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{}]"), "cloth.yarns", "pile");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"lower\":0.6,\"upper\":0.4}"), "cloth.crimp", "rise");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"value\":0.9,\"upper\":0.6}"), "cloth.crimp", "starts");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5,0]}"), "cloth.crimp", "prior");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5]}"), "cloth.crimp.prior", "2 numbers");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[7,0.1]}"), "cloth.crimp", "mean of the prior");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"mean\":1}"), "cloth.crimp.mean", "unknown");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":\"NaN\""), "cloth.crimp", "but it is a text");
-    check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1e308"), "cloth.crimp", "1e+308");
-    check_error(CLOTH("\"weave\":\"plain\",\"tile_warps\":-4"), "cloth.tile_warps", "-4");
-    check_error(CLOTH("\"weave\":\"plain\",\"warp\":[]"), "cloth.warp", "1 to 64");
-    check_error(CLOTH("\"weave\":\"plain\",\"warp\":[\"red\"],\"yarns\":[{\"name\":\"red\"}]"), "cloth.warp",
-                "element 0");
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[]"), "cloth.yarns", "1 to 4");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"cloth\":{\"weave\":\"plain\"},\"measurements\":{\"file\":\"a.csv\"}}",
-                "cloth", "one of them");
+    job_document_check_error(CLOTH("\"weave\":\"tweed\""), "cloth.weave", "twill31");
+    job_document_check_error(CLOTH("\"seed\":1"), "cloth.weave", "either");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"draft\":[\"10\",\"01\"]"), "cloth.weave", "either");
+    job_document_check_error(CLOTH("\"draft\":[\"10\",\"011\"]"), "cloth.draft", "does not repeat");
+    job_document_check_error(CLOTH("\"draft\":[\"10\",\"10\"]"), "cloth.draft", "never crosses");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[0,1]"), "cloth.warp", "one of the 1 kinds");
+    job_document_check_error(CLOTH("\"weave\":\"twill\",\"tile_wefts\":6"), "cloth.tile_wefts", "multiple of 4");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1.5"), "cloth.crimp", "1");
+    job_document_check_error(CLOTH("\"weave\":\"felt\",\"crimp\":0.5"), "cloth.crimp", "has no number");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp_per_cm\":30,\"cover_warp\":1"), "cloth.cover_warp",
+                             "has no number");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"packing\":0.95}]"), "cloth.yarns[0].packing",
+                             "0.85");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange\":0.5}]"), "cloth.yarns[0].melange",
+                             "has no number");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange_with\":0}]"),
+                             "cloth.yarns[0].melange_with", "another");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"fibers\":5000}]"), "cloth.yarns[0].fibers",
+                             "1000");
+    job_document_check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{}]"), "cloth.yarns", "pile");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"lower\":0.6,\"upper\":0.4}"), "cloth.crimp",
+                             "rise");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"value\":0.9,\"upper\":0.6}"), "cloth.crimp",
+                             "starts");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5,0]}"), "cloth.crimp", "prior");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[0.5]}"), "cloth.crimp.prior",
+                             "2 numbers");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"prior\":[7,0.1]}"), "cloth.crimp",
+                             "mean of the prior");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{\"mean\":1}"), "cloth.crimp.mean", "unknown");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":\"NaN\""), "cloth.crimp", "but it is a text");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1e308"), "cloth.crimp", "1e+308");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"tile_warps\":-4"), "cloth.tile_warps", "-4");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[]"), "cloth.warp", "1 to 64");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[\"red\"],\"yarns\":[{\"name\":\"red\"}]"),
+                             "cloth.warp", "element 0");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[]"), "cloth.yarns", "1 to 4");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME
+                             ",\"cloth\":{\"weave\":\"plain\"},\"measurements\":{\"file\":\"a.csv\"}}",
+                             "cloth", "one of them");
 }
 
 /* Keys that a structure has no use for are refused, so that nobody believes they had an effect. */
 static void test_what_would_have_no_effect(void **state)
 {
     (void)state;
-    check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{},{}]"), "cloth.yarns[1]", "the kind 'cloth.yarns[1]': name");
-    check_error(CLOTH("\"weave\":\"jersey\",\"warp\":[0]"), "cloth.warp", "jersey has none");
-    check_error(CLOTH("\"weave\":\"jersey\",\"weft_per_cm\":9"), "cloth.weft_per_cm", "jersey has none");
-    check_error(CLOTH("\"weave\":\"felt\",\"tile_wefts\":4"), "cloth.tile_wefts", "felt has none");
-    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{},{}]"), "cloth.yarns",
-                "one kind of fibers, 'cloth.yarns' has 2");
-    check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{\"plies\":2}]"), "cloth.yarns[0].plies",
-                "'cloth.yarns[0].plies': fibers");
-    check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"plies\":2}]"), "cloth.yarns[1].plies", "no plies");
-    check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"melange_with\":0}]"), "cloth.yarns[1].melange_with",
-                "of one kind");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{},{}]"), "cloth.yarns[1]",
+                             "the kind 'cloth.yarns[1]': name");
+    job_document_check_error(CLOTH("\"weave\":\"jersey\",\"warp\":[0]"), "cloth.warp", "jersey has none");
+    job_document_check_error(CLOTH("\"weave\":\"jersey\",\"weft_per_cm\":9"), "cloth.weft_per_cm", "jersey has none");
+    job_document_check_error(CLOTH("\"weave\":\"felt\",\"tile_wefts\":4"), "cloth.tile_wefts", "felt has none");
+    job_document_check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{},{}]"), "cloth.yarns",
+                             "one kind of fibers, 'cloth.yarns' has 2");
+    job_document_check_error(CLOTH("\"weave\":\"felt\",\"yarns\":[{\"plies\":2}]"), "cloth.yarns[0].plies",
+                             "'cloth.yarns[0].plies': fibers");
+    job_document_check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"plies\":2}]"), "cloth.yarns[1].plies",
+                             "no plies");
+    job_document_check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"melange_with\":0}]"),
+                             "cloth.yarns[1].melange_with", "of one kind");
 }
 
 static void test_sizes_of_drafts(void **state)
@@ -185,13 +197,14 @@ static void test_sizes_of_drafts(void **state)
     char text[4000] = "{\"sample\":\"s\",\"cloth\":{\"draft\":[";
     for (int i = 0; i < 33; i++) strcat(text, i % 2 == 0 ? (i == 0 ? "\"10\"" : ",\"10\"") : ",\"01\"");
     strcat(text, "]},\"measurements\":{\"file\":\"a.csv\"}}");
-    check_error(text, "cloth.draft", "1 to 32");
-    check_error(CLOTH("\"draft\":[]"), "cloth.draft", "1 to 32");
-    check_error(CLOTH("\"draft\":[\"\",\"\"]"), "cloth.draft", "1 to 32");
-    check_error(CLOTH("\"draft\":[\"101010101010101010101010101010101\",\"010101010101010101010101010101010\"]"),
-                "cloth.draft", "1 to 32");
-    check_error(CLOTH("\"draft\":[10,\"01\"]"), "cloth.draft", "no text");
-    check_error(CLOTH("\"draft\":[\"11\",\"01\"]"), "cloth.draft", "never crosses");
+    job_document_check_error(text, "cloth.draft", "1 to 32");
+    job_document_check_error(CLOTH("\"draft\":[]"), "cloth.draft", "1 to 32");
+    job_document_check_error(CLOTH("\"draft\":[\"\",\"\"]"), "cloth.draft", "1 to 32");
+    job_document_check_error(
+        CLOTH("\"draft\":[\"101010101010101010101010101010101\",\"010101010101010101010101010101010\"]"), "cloth.draft",
+        "1 to 32");
+    job_document_check_error(CLOTH("\"draft\":[10,\"01\"]"), "cloth.draft", "no text");
+    job_document_check_error(CLOTH("\"draft\":[\"11\",\"01\"]"), "cloth.draft", "never crosses");
 }
 
 int main(void)

@@ -20,7 +20,7 @@ static void test_defaults(void **state)
 {
     (void)state;
     struct job_document *d =
-        parse("{\"sample\":\"blue \xc3\xa9toffe\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"}}");
+        job_document_of_text("{\"sample\":\"blue \xc3\xa9toffe\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"}}");
     assert_true(d->has_volume);
     assert_string_equal(d->volume_file[0], "scan.tif");
     assert_true(d->voxel_size_um[2] == 2.0);
@@ -42,7 +42,7 @@ static void test_defaults(void **state)
 static void test_everything_given(void **state)
 {
     (void)state;
-    struct job_document *d = parse(
+    struct job_document *d = job_document_of_text(
         "{\"sample\":\"s\",\"volume\":{\"files\":[\"a.tif\",\"b.tif\"],\"voxel_size_um\":[1,2,3.5],\"axes\":\"-z-x-y\","
         "\"matrix\":[1,0.1,0,0,1,0,0,0,1],"
         "\"crop_voxel\":[0,1,2,10,11,12],\"density_low\":10,\"density_high\":200,\"filter\":{\"s\":1,\"t\":2,\"h\":11,"
@@ -89,54 +89,58 @@ static void test_geometry_only(void **state)
 static void test_structure(void **state)
 {
     (void)state;
-    check_error("{", "", "not valid JSON");
-    check_error("[]", "", "must be an object");
-    check_error("{\"sample\":\"s\",\"sample\":\"t\"}", "", "duplicate");
-    check_error("{\"sampel\":\"s\"}", "sampel", "allowed here are sample, volume");
-    check_error("{\"sample\":\"\"}", "sample", "1 to");
-    check_error("{\"sample\":7}", "sample", "must be a text, but it is a number");
-    check_error("{\"sample\":\"a\\u0001b\"}", "sample", "control");
-    check_error("{\"sample\":\"s\"}", "volume", "missing");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"fibers\":{\"file\":\"a.hair\"}}", "fibers", "one of them");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"fit\":{}}", "photographs", "'fit' is given");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"correction\":{}}", "photographs", "'correction' is given");
-    check_error("{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"}}", "photographs", "missing");
-    check_error("{\"sample\":\"s\",\"geometry\":{\"job\":\"x\"}}", "photographs", "missing");
-    check_error("{\"sample\":\"s\",\"geometry\":{\"job\":\"a/b\"}}", "geometry.job", "not the id of a job");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"photographs\":[" PHOTO "]}",
-                "photographs", "one of them");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[]}", "photographs", "1 to 1024");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[" PHOTO "," PHOTO "]}", "photographs[1].file",
-                "second time");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"scan.tif\"}}", "volume.files[0]",
-                "second time");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"../a.csv\"}}", "measurements.file",
-                "A-Z a-z 0-9");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{}}", "measurements.file", "missing");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"lamp\":{\"side_cm\":true}}",
-                "lamp.side_cm", "true or false");
-    check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"black_sheet\":1}", "black_sheet",
-                "true or false");
+    job_document_check_error("{", "", "not valid JSON");
+    job_document_check_error("[]", "", "must be an object");
+    job_document_check_error("{\"sample\":\"s\",\"sample\":\"t\"}", "", "duplicate");
+    job_document_check_error("{\"sampel\":\"s\"}", "sampel", "allowed here are sample, volume");
+    job_document_check_error("{\"sample\":\"\"}", "sample", "1 to");
+    job_document_check_error("{\"sample\":7}", "sample", "must be a text, but it is a number");
+    job_document_check_error("{\"sample\":\"a\\u0001b\"}", "sample", "control");
+    job_document_check_error("{\"sample\":\"s\"}", "volume", "missing");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"fibers\":{\"file\":\"a.hair\"}}", "fibers", "one of them");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"fit\":{}}", "photographs", "'fit' is given");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"correction\":{}}", "photographs", "'correction' is given");
+    job_document_check_error("{\"sample\":\"s\",\"fibers\":{\"file\":\"a.hair\"}}", "photographs", "missing");
+    job_document_check_error("{\"sample\":\"s\",\"geometry\":{\"job\":\"x\"}}", "photographs", "missing");
+    job_document_check_error("{\"sample\":\"s\",\"geometry\":{\"job\":\"a/b\"}}", "geometry.job",
+                             "not the id of a job");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME
+                             ",\"measurements\":{\"file\":\"a.csv\"},\"photographs\":[" PHOTO "]}",
+                             "photographs", "one of them");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[]}", "photographs", "1 to 1024");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"photographs\":[" PHOTO "," PHOTO "]}",
+                             "photographs[1].file", "second time");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"scan.tif\"}}",
+                             "volume.files[0]", "second time");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"../a.csv\"}}",
+                             "measurements.file", "A-Z a-z 0-9");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{}}", "measurements.file", "missing");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME
+                             ",\"measurements\":{\"file\":\"a.csv\"},\"lamp\":{\"side_cm\":true}}",
+                             "lamp.side_cm", "true or false");
+    job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"},\"black_sheet\":1}",
+                             "black_sheet", "true or false");
 }
 
 static void test_volume(void **state)
 {
     (void)state;
-    check_error("{\"sample\":\"s\",\"volume\":{},\"photographs\":[" PHOTO "]}", "volume.files", "list of 1 to");
-    check_error("{\"sample\":\"s\",\"volume\":{\"files\":[\"a b\"]}}", "volume.files[0]", "a file name");
-    check_error(VOLUME_OF("\"voxel_size_um\":0"), "volume.voxel_size_um", "0.01 to 1000");
-    check_error(VOLUME_OF("\"voxel_size_um\":[1,2]"), "volume.voxel_size_um", "3 numbers");
-    check_error(VOLUME_OF("\"voxel_size_um\":[1,2,-1]"), "volume.voxel_size_um[2]", "-1");
-    check_error(VOLUME_OF("\"axes\":\"xxy\""), "volume.axes", "each of x, y, z once");
-    check_error(VOLUME_OF("\"matrix\":[1,0,0,0,1,0,1,0,0]"), "volume.matrix", "invertible");
-    check_error(VOLUME_OF("\"crop_voxel\":[5,0,0,5,9,9]"), "volume.crop_voxel", "empty along x");
-    check_error(VOLUME_OF("\"density_low\":5,\"density_high\":5"), "volume.density_high", "above");
-    check_error(VOLUME_OF("\"filter\":{\"eps_d\":2}"), "volume.filter.eps_d", "0 to 1");
-    check_error(VOLUME_OF("\"filter\":{\"s\":2,\"t\":1}"), "volume.filter.t", "above half of s (2)");
-    check_error(VOLUME_OF("\"filter\":{\"h\":1.5}"), "volume.filter.h", "whole number");
-    check_error(VOLUME_OF("\"filter\":{\"h\":64}"), "volume.filter.h", "3 to 63");
-    check_error(VOLUME_OF("\"filter\":{\"epsd\":1}"), "volume.filter.epsd", "unknown field");
-    check_error(VOLUME_OF("\"density_low\":1e999"), "", "not valid JSON");
+    job_document_check_error("{\"sample\":\"s\",\"volume\":{},\"photographs\":[" PHOTO "]}", "volume.files",
+                             "list of 1 to");
+    job_document_check_error("{\"sample\":\"s\",\"volume\":{\"files\":[\"a b\"]}}", "volume.files[0]", "a file name");
+    job_document_check_error(VOLUME_OF("\"voxel_size_um\":0"), "volume.voxel_size_um", "0.01 to 1000");
+    job_document_check_error(VOLUME_OF("\"voxel_size_um\":[1,2]"), "volume.voxel_size_um", "3 numbers");
+    job_document_check_error(VOLUME_OF("\"voxel_size_um\":[1,2,-1]"), "volume.voxel_size_um[2]", "-1");
+    job_document_check_error(VOLUME_OF("\"axes\":\"xxy\""), "volume.axes", "each of x, y, z once");
+    job_document_check_error(VOLUME_OF("\"matrix\":[1,0,0,0,1,0,1,0,0]"), "volume.matrix", "invertible");
+    job_document_check_error(VOLUME_OF("\"crop_voxel\":[5,0,0,5,9,9]"), "volume.crop_voxel", "empty along x");
+    job_document_check_error(VOLUME_OF("\"density_low\":5,\"density_high\":5"), "volume.density_high", "above");
+    job_document_check_error(VOLUME_OF("\"filter\":{\"eps_d\":2}"), "volume.filter.eps_d", "0 to 1");
+    job_document_check_error(VOLUME_OF("\"filter\":{\"s\":2,\"t\":1}"), "volume.filter.t", "above half of s (2)");
+    job_document_check_error(VOLUME_OF("\"filter\":{\"h\":1.5}"), "volume.filter.h", "whole number");
+    job_document_check_error(VOLUME_OF("\"filter\":{\"h\":64}"), "volume.filter.h", "3 to 63");
+    job_document_check_error(VOLUME_OF("\"filter\":{\"epsd\":1}"), "volume.filter.epsd", "unknown field");
+    job_document_check_error(VOLUME_OF("\"density_low\":1e999"), "", "not valid JSON");
 }
 
 /* A given matrix or box replaces "auto". */
@@ -144,37 +148,40 @@ static void test_alignment(void **state)
 {
     (void)state;
     struct job_document *d =
-        parse(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false"));
+        job_document_of_text(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false"));
     assert_true(d->align && d->crop && d->crop_keep == 0.3 && !d->join_seams);
     job_document_free(d);
-    d = parse(
+    d = job_document_of_text(
         VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"matrix\":[1,0,0,0,1,0,0,0,1],\"crop_voxel\":[0,0,0,9,9,9]"));
     assert_true(!d->align && !d->crop && d->join_seams && isnan(d->crop_keep));
     job_document_free(d);
-    check_error(VOLUME_OF("\"align\":\"yes\""), "volume.align", "auto");
-    check_error(VOLUME_OF("\"crop\":true"), "volume.crop", "none, auto");
-    check_error(VOLUME_OF("\"crop_keep\":0"), "volume.crop_keep", "0.1 to 1");
+    job_document_check_error(VOLUME_OF("\"align\":\"yes\""), "volume.align", "auto");
+    job_document_check_error(VOLUME_OF("\"crop\":true"), "volume.crop", "none, auto");
+    job_document_check_error(VOLUME_OF("\"crop_keep\":0"), "volume.crop_keep", "0.1 to 1");
 }
 
 static void test_photographs(void **state)
 {
     (void)state;
-    check_error(PHOTO_OF("\"camera_theta_deg\":0"), "photographs[0].light_theta_deg", "missing");
-    check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":90"), "photographs[0].light_theta_deg",
-                "below 90");
-    check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":120"), "photographs[0].light_theta_deg",
-                "black_sheet");
-    check_error(PHOTO_OF("\"camera_theta_deg\":91,\"light_theta_deg\":10"), "photographs[0].camera_theta_deg", "91");
-    check_error(PHOTO_OF("\"camera_theta_deg\":-1,\"light_theta_deg\":10"), "photographs[0].camera_theta_deg", "-1");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"test\""), "photographs[0].set",
-                "fit, held-out");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"scale\":0"), "photographs[0].scale", "1e-09");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"crop_px\":[4,0,4,5]"),
-                "photographs[0].crop_px", "empty");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"transfer\":\"gamma\""),
-                "photographs[0].transfer", "linear, srgb");
-    check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"held-out\""), "photographs",
-                "at least one");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":0"), "photographs[0].light_theta_deg", "missing");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":90"),
+                             "photographs[0].light_theta_deg", "below 90");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":0,\"light_theta_deg\":120"),
+                             "photographs[0].light_theta_deg", "black_sheet");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":91,\"light_theta_deg\":10"),
+                             "photographs[0].camera_theta_deg", "91");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":-1,\"light_theta_deg\":10"),
+                             "photographs[0].camera_theta_deg", "-1");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"test\""),
+                             "photographs[0].set", "fit, held-out");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"scale\":0"),
+                             "photographs[0].scale", "1e-09");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"crop_px\":[4,0,4,5]"),
+                             "photographs[0].crop_px", "empty");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"transfer\":\"gamma\""),
+                             "photographs[0].transfer", "linear, srgb");
+    job_document_check_error(PHOTO_OF("\"camera_theta_deg\":1,\"light_theta_deg\":10,\"set\":\"held-out\""),
+                             "photographs", "at least one");
 }
 
 static void test_file_names(void **state)
@@ -239,23 +246,26 @@ static void test_stage_weights(void **state)
 static void test_raw_volume(void **state)
 {
     (void)state;
-    struct job_document *d =
-        parse(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\",\"endian\":\"big\",\"header_bytes\":8}"));
+    struct job_document *d = job_document_of_text(
+        VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\",\"endian\":\"big\",\"header_bytes\":8}"));
     assert_true(d->raw_shape[0] == 3 && d->raw_shape[2] == 5 && d->raw_big_endian && d->raw_header_bytes == 8);
     assert_string_equal(d->raw_type, "uint16");
     job_document_free(d);
-    job_document_free(parse(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\"}")));
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\"}"), "volume.raw", "lacks 'endian'");
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5]}"), "volume.raw", "lacks 'type'");
-    check_error(VOLUME_OF("\"raw\":{\"type\":\"uint8\"}"), "volume.raw", "lacks 'shape'");
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,0,5],\"type\":\"uint8\"}"), "volume.raw.shape[1]", "allowed are 1 to");
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,5],\"type\":\"uint8\"}"), "volume.raw.shape", "3");
-    check_error(
+    job_document_free(job_document_of_text(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\"}")));
+    job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\"}"), "volume.raw",
+                             "lacks 'endian'");
+    job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5]}"), "volume.raw", "lacks 'type'");
+    job_document_check_error(VOLUME_OF("\"raw\":{\"type\":\"uint8\"}"), "volume.raw", "lacks 'shape'");
+    job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,0,5],\"type\":\"uint8\"}"), "volume.raw.shape[1]",
+                             "allowed are 1 to");
+    job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,5],\"type\":\"uint8\"}"), "volume.raw.shape", "3");
+    job_document_check_error(
         "{\"sample\":\"s\",\"volume\":{\"files\":[\"a.bin\",\"b.bin\"],\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\"}},"
         "\"photographs\":[" PHOTO "]}",
         "volume.raw", "describes one file, 'volume.files' names 2");
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint12\"}"), "volume.raw.type", "uint8");
-    check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\",\"order\":1}"), "volume.raw.order", "order");
+    job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint12\"}"), "volume.raw.type", "uint8");
+    job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\",\"order\":1}"),
+                             "volume.raw.order", "order");
 }
 
 int main(void)

@@ -158,7 +158,7 @@ static void test_shared_camera_paths(void **state)
 static void refused(void **state, const char *set_up, const char *field)
 {
     write_job(state, set_up, "");
-    check_refused_job(scratch_path(state, "job"), field);
+    refused_job_check(scratch_path(state, "job"), field);
 }
 
 static void test_refused(void **state)

@@ -180,7 +180,7 @@ static void check_input_error(void **state, const char *document, const char *fi
 {
     assert_int_equal(durable_make_folder(scratch_path(state, "inputs/input"), NULL), STATUS_OK);
     scratch_write(scratch_path(state, "inputs/job.json"), document, strlen(document));
-    check_refused_job(scratch_path(state, "inputs"), field);
+    refused_job_check(scratch_path(state, "inputs"), field);
 }
 
 static void test_inputs(void **state)

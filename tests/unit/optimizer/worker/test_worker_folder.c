@@ -1,0 +1,78 @@
+/* The inputs that a job folder's files belong to: other inputs empty the folder, but only for the worker that holds the
+ * present attempt. */
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/worker_folder.h"
+#include "tests/support/scratch_folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static void write_attempt(const char *folder, const char *text)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", folder, JOB_FILE_ATTEMPT);
+    scratch_write(path, text, strlen(text));
+}
+
+static void write_result(const struct worker_folder *f)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(f, JOB_FOLDER_RESULTS, "picture.png", path);
+    scratch_write(path, "x", 1);
+    assert_int_equal(worker_folder_mark_stage(f, "trace", NULL), STATUS_OK);
+}
+
+static bool has_result(const struct worker_folder *f)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(f, JOB_FOLDER_RESULTS, "picture.png", path);
+    return access(path, F_OK) == 0;
+}
+
+static void test_other_inputs_empty_the_folder(void **state)
+{
+    struct worker_folder f;
+    bool changed = true;
+    assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
+    write_result(&f); /* of inputs that nobody knows */
+    assert_int_equal(worker_folder_claim_inputs(&f, 1, &changed, NULL), STATUS_OK);
+    assert_false(changed || has_result(&f) || worker_folder_stage_done(&f, "trace"));
+    write_result(&f);
+    assert_int_equal(worker_folder_claim_inputs(&f, 1, &changed, NULL), STATUS_OK);
+    assert_true(!changed && has_result(&f) && worker_folder_stage_done(&f, "trace"));
+    assert_int_equal(worker_folder_claim_inputs(&f, 2, &changed, NULL), STATUS_OK);
+    assert_true(changed && !has_result(&f) && !worker_folder_stage_done(&f, "trace"));
+    worker_folder_close(&f);
+}
+
+static void test_a_worker_of_an_old_attempt_removes_nothing(void **state)
+{
+    struct worker_folder f;
+    struct error err = {0};
+    bool changed;
+    write_attempt(*state, "{\"attempt\": 1, \"token\": \"one\"}");
+    assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_claim_inputs(&f, 1, &changed, NULL), STATUS_OK);
+    write_result(&f);
+    write_attempt(*state, "{\"attempt\": 2, \"token\": \"two\"}");
+    assert_int_equal(worker_folder_claim_inputs(&f, 2, &changed, &err), STATUS_STALE);
+    assert_true(has_result(&f) && worker_folder_stage_done(&f, "trace"));
+    worker_folder_close(&f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_other_inputs_empty_the_folder, scratch_folder_setup,
+                                        scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_a_worker_of_an_old_attempt_removes_nothing, scratch_folder_setup,
+                                        scratch_folder_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
