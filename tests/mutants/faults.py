@@ -140,6 +140,8 @@ def one_more(text):
 def operator_faults(found, i):
     t = found[i]
     before = found[i - 1] if i > 0 else None
+    if t.equivalent:
+        return
     if t.kind == "operator" and t.text in SWAP:
         yield from ((("compare" if t.text[0] in "<>=!" else "logic" if t.text in ("&&", "||") else "arithmetic"), t.start, t.end, new)
                     for new in SWAP[t.text])
@@ -255,7 +257,7 @@ def faults_of(path, text, language):
     for i, t in enumerate(found[:-2]):
         if t.spoken:
             continue
-        for fault in [*(operator_faults(found, i) if not t.equivalent else []), *condition_faults(found, i, language), *statement_faults(found, i, heads, language)]:
+        for fault in [*operator_faults(found, i), *condition_faults(found, i, language), *statement_faults(found, i, heads, language)]:
             add(*fault)
         for a, b in swapped_arguments(found, i) or []:
             first, second = (text[found[x[0]].start:found[x[1]].end] for x in (a, b))
