@@ -10,7 +10,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
-static const char magic[8] = {'S', 'E', 'L', 'V', 'J', 'N', 'L', '1'};
+static const char magic[8] = {'S', 'E', 'L', 'V', 'J', 'N', 'L', '2'};
 
 enum { FILE_HEADER_BYTES = 16, RECORD_HEADER_BYTES = 8 };
 
@@ -40,7 +40,8 @@ static size_t call_bytes(const struct estimator *e)
 
 static size_t payload_bytes(const struct estimator *e)
 {
-    size_t per_estimate = (6 + 6 * e->n_param) * sizeof(double) + 2 * sizeof(uint64_t);
+    size_t per_estimate = (6 + 6 * e->n_param) * sizeof(double) + 2 * sizeof(uint64_t) + sizeof(uint32_t) +
+                          ESTIMATE_MAX_PARTNER * sizeof(struct estimate_partner);
     return call_bytes(e) + e->n_configuration * per_estimate;
 }
 
@@ -83,6 +84,8 @@ static void put_estimates(const struct estimate_journal *j, const struct estimat
         put(&to, out[i].jac_var, n_jac);
         put(&to, &out[i].n_path, sizeof out[i].n_path);
         put(&to, &out[i].n_bounce, sizeof out[i].n_bounce);
+        put(&to, &out[i].n_partner, sizeof out[i].n_partner);
+        put(&to, out[i].partner, sizeof out[i].partner);
     }
 }
 
@@ -97,6 +100,8 @@ static void get_estimates(const struct estimate_journal *j, const uint8_t *from,
         get(&from, out[i].jac_var, n_jac);
         get(&from, &out[i].n_path, sizeof out[i].n_path);
         get(&from, &out[i].n_bounce, sizeof out[i].n_bounce);
+        get(&from, &out[i].n_partner, sizeof out[i].n_partner);
+        get(&from, out[i].partner, sizeof out[i].partner);
     }
 }
 

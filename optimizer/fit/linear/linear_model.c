@@ -1,4 +1,5 @@
 #include "optimizer/fit/linear/linear_model.h"
+#include "optimizer/fit/objective/product_noise.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,7 +10,9 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
     double *block = calloc(2 * per_replica + 4 * n_row, sizeof *block);
-    if (block == NULL)
+    m->pair = malloc((n_row / 3 * ESTIMATE_MAX_PARTNER + 1) * sizeof *m->pair);
+    m->r[0] = block;
+    if (block == NULL || m->pair == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot hold a model of %zu residuals: out of memory", n_row);
     for (size_t q = 0; q < 2; q++) {
         m->r[q] = block + q * per_replica;
@@ -29,6 +32,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
 void linear_model_release(struct linear_model *m)
 {
     free(m->r[0]);
+    free(m->pair);
     *m = (struct linear_model){0};
 }
 
@@ -44,6 +48,15 @@ double linear_model_part(const struct linear_model *m, size_t i, double *se)
     return value;
 }
 
+static struct product_noise noise_of(const struct linear_model *m, size_t i)
+{
+    struct product_noise noise = {0};
+    for (size_t row = 3 * i; row < 3 * i + 3; row++)
+        product_noise_add(&noise, (const double[2]){m->r[0][row], m->r[1][row]},
+                          (const double[2]){m->r_var[0][row], m->r_var[1][row]});
+    return noise;
+}
+
 double linear_model_objective(const struct linear_model *m, double *se)
 {
     double value = 0.0, var = 0.0;
@@ -52,7 +65,11 @@ double linear_model_objective(const struct linear_model *m, double *se)
         value += linear_model_part(m, i, &sd);
         var += sd * sd;
     }
-    if (se != NULL) *se = sqrt(var);
+    for (size_t k = 0; k < m->n_pair; k++) {
+        const struct product_noise a = noise_of(m, m->pair[k].i), b = noise_of(m, m->pair[k].j);
+        var += 2.0 * product_noise_covariance(&a, &b, m->pair[k].correlation);
+    }
+    if (se != NULL) *se = sqrt(fmax(var, 0.0));
     return value;
 }
 

@@ -41,6 +41,13 @@ struct linear_history {
     struct history_step *step;
 };
 
+/* Configurations i and j < i that share their camera paths: the noise of row 3 i + c has this correlation with that of
+ * row 3 j + d. Channels count as fully correlated, as within a configuration. */
+struct linear_pair {
+    size_t i, j;
+    double correlation;
+};
+
 struct linear_model {
     size_t n_row, n_param;
     double x_ref[FIT_MAX_PARAM];
@@ -57,6 +64,8 @@ struct linear_model {
     double gain_sd; /* of ln gain of each configuration, taken out of the residuals by linear_model_pool; 0: none */
     /* number of paths per configuration and replica that the averages are equivalent to, mean over configurations */
     double n_effective;
+    struct linear_pair *pair; /* set by linear_model_pool */
+    size_t n_pair;
 };
 
 void linear_history_init(struct linear_history *h, const struct observation_set *o, const struct coordinate *k,

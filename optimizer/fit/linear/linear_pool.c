@@ -1,5 +1,6 @@
 /* Averages of a fit's estimates at one point: linear_model_pool. */
 #include "optimizer/fit/linear/linear_gain.h"
+#include "optimizer/fit/linear/linear_pairs.h"
 #include "optimizer/fit/objective/objective.h"
 
 #include <math.h>
@@ -278,6 +279,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
         m->contrast[row] = observation_is_contrast(&h->observation->item[row / 3]) ? 1.0 : 0.0;
     }
     m->n_effective /= (double)h->observation->n;
+    linear_pairs_pool(m, h);
     if (m->gain_sd > 0.0) linear_gain_absorb(m, h->observation);
 out:
     free(mean);

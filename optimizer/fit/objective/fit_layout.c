@@ -170,6 +170,8 @@ void fit_layout_estimate(const struct fit_layout *l, const double *unknown, bool
     double stray = l->i_stray != SIZE_MAX ? unknown[l->i_stray] : 0.0;
     out->n_path = from.n_path;
     out->n_bounce = from.n_bounce;
+    out->n_partner = from.n_partner;
+    memcpy(out->partner, from.partner, sizeof out->partner);
     for (size_t c = 0; c < 3; c++) {
         out->mean[c] = gain * from.mean[c] + stray;
         out->var[c] = gain * gain * from.var[c];

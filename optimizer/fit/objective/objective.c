@@ -1,4 +1,5 @@
 #include "optimizer/fit/objective/objective.h"
+#include "optimizer/fit/objective/product_noise.h"
 
 #include <math.h>
 #include <string.h>
@@ -49,6 +50,59 @@ static double square_of_channel(const struct observation *o, const struct estima
     return ra * rb;
 }
 
+/* The noise of a row's product in the channels first .. end - 1. */
+static struct product_noise noise_of(const struct observation *o, const struct estimate *a, const struct estimate *b,
+                                     int first, int end)
+{
+    struct product_noise noise = {0};
+    for (int c = first; c < end; c++) {
+        const double residual[2] = {a->mean[c] - o->mean_rgb[c], b->mean[c] - o->mean_rgb[c]};
+        product_noise_add(&noise, residual, (const double[2]){a->var[c], b->var[c]});
+    }
+    return noise;
+}
+
+/* Which rows a sum of squares has, and with which factor. */
+typedef double row_factor(const struct observation *o, int channel);
+
+static double factor_of_objective(const struct observation *o, int channel)
+{
+    (void)channel;
+    return objective_weight(o);
+}
+
+static bool scored(const struct observation *o) { return !observation_is_contrast(o) && o->weight > 0.0; }
+
+static double factor_of_relative(const struct observation *o, int channel)
+{
+    (void)channel;
+    return scored(o) ? objective_relative_weight(o) : 0.0;
+}
+
+static double factor_of_channel(const struct observation *o, int channel)
+{
+    double unit = fmax(o->mean_rgb[channel], OBJECTIVE_CHANNEL_TAU);
+    return scored(o) ? 1.0 / (unit * unit) : 0.0;
+}
+
+/* What rows that share their camera paths add to the variance of a sum over rows: of all channels, or of one. */
+static double shared_variance(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
+                              row_factor *factor, int first, int end)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < o->n; i++) {
+        for (uint32_t k = 0; k < a[i].n_partner && k < b[i].n_partner; k++) {
+            const size_t j = a[i].partner[k].configuration;
+            const struct product_noise own = noise_of(&o->item[i], &a[i], &b[i], first, end),
+                                       other = noise_of(&o->item[j], &a[j], &b[j], first, end);
+            double correlation = 0.5 * ((double)a[i].partner[k].correlation + (double)b[i].partner[k].correlation);
+            sum += 2.0 * factor(&o->item[i], first) * factor(&o->item[j], first) *
+                   product_noise_covariance(&own, &other, correlation);
+        }
+    }
+    return sum;
+}
+
 void objective_evaluate(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         struct objective_value *out)
 {
@@ -62,17 +116,19 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
         double w = objective_weight(&o->item[i]);
         value += w * product;
         var += w * w * sd * sd;
-        if (observation_is_contrast(&o->item[i]) || !(o->item[i].weight > 0.0)) continue;
+        if (!scored(&o->item[i])) continue;
         w = objective_relative_weight(&o->item[i]);
         relative += w * product;
         relative_var += w * w * sd * sd;
         n_radiance += 3.0;
     }
+    var += shared_variance(o, a, b, factor_of_objective, 0, 3);
+    relative_var += shared_variance(o, a, b, factor_of_relative, 0, 3);
     out->value = value;
-    out->se = sqrt(var);
+    out->se = sqrt(fmax(var, 0.0));
     n_radiance = fmax(n_radiance, 1.0);
     out->rel_square = relative / n_radiance;
-    out->rel_square_se = sqrt(relative_var) / n_radiance;
+    out->rel_square_se = sqrt(fmax(relative_var, 0.0)) / n_radiance;
     out->rel_rms = root_of_square(out->rel_square, out->rel_square_se, &out->rel_rms_se);
 }
 
@@ -82,12 +138,13 @@ void objective_evaluate_channels(const struct observation_set *o, const struct e
     for (int c = 0; c < 3; c++) {
         double square = 0.0, var = 0.0, n = 0.0;
         for (size_t i = 0; i < o->n; i++) {
-            double sd, unit = fmax(o->item[i].mean_rgb[c], OBJECTIVE_CHANNEL_TAU);
-            if (observation_is_contrast(&o->item[i]) || !(o->item[i].weight > 0.0)) continue;
-            square += square_of_channel(&o->item[i], &a[i], &b[i], c, &sd) / (unit * unit);
-            var += sd * sd / (unit * unit * unit * unit);
+            double sd, factor = factor_of_channel(&o->item[i], c);
+            if (!scored(&o->item[i])) continue;
+            square += factor * square_of_channel(&o->item[i], &a[i], &b[i], c, &sd);
+            var += factor * factor * sd * sd;
             n += 1.0;
         }
+        var = fmax(0.0, var + shared_variance(o, a, b, factor_of_channel, c, c + 1));
         out->rel_rms[c] = out->rel_rms_se[c] = NAN;
         if (n > 0.0) out->rel_rms[c] = root_of_square(square / n, sqrt(var) / n, &out->rel_rms_se[c]);
     }

@@ -9,7 +9,8 @@
  *
  * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of
  * one configuration share their paths; their correlation is not in an estimate, so it is taken as full: the stated
- * error is an upper estimate, too large by at most a factor sqrt(3).
+ * error is an upper estimate, too large by at most a factor sqrt(3). Configurations that share camera paths
+ * (estimate.partner) have covariances (product_noise.h).
  *
  * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left
  * out. Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product,

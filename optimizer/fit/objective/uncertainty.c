@@ -34,22 +34,33 @@ static double common_variance(const struct linear_model *m, size_t row)
     return photograph_in_common * m->photograph_var[row];
 }
 
-/* Adds the noise that the three channels of a configuration have in common, because they share their paths and the
- * exposure. */
-static void add_common_noise(const struct linear_model *m, size_t i,
-                             double (*variance)(const struct linear_model *m, size_t row), const size_t *index,
-                             size_t n, double *b)
+typedef double row_variance(const struct linear_model *m, size_t row);
+
+/* What noise of one standard deviation, the same in all channels of a configuration, adds to J'r of each replica. */
+struct common_noise {
+    double of[2][N];
+};
+
+static struct common_noise common_noise(const struct linear_model *m, size_t i, row_variance *variance,
+                                        const size_t *index, size_t n)
 {
-    double va[N] = {0}, vb[N] = {0};
+    struct common_noise v = {0};
     for (size_t row = 3 * i; row < 3 * i + 3; row++) {
         double sd = m->weight[row] * sqrt(variance(m, row));
-        for (size_t p = 0; p < n; p++) {
-            va[p] += sd * m->j[0][row * m->n_param + index[p]];
-            vb[p] += sd * m->j[1][row * m->n_param + index[p]];
-        }
+        for (int q = 0; q < 2; q++)
+            for (size_t p = 0; p < n; p++) v.of[q][p] += sd * m->j[q][row * m->n_param + index[p]];
     }
+    return v;
+}
+
+/* Adds the noise that the three channels of a configuration have in common, because they share their paths and the
+ * exposure. */
+static void add_common_noise(const struct linear_model *m, size_t i, row_variance *variance, const size_t *index,
+                             size_t n, double *b)
+{
+    const struct common_noise v = common_noise(m, i, variance, index, n);
     for (size_t p = 0; p < n; p++)
-        for (size_t q = 0; q < n; q++) b[p * n + q] += 0.5 * (va[p] * vb[q] + vb[p] * va[q]);
+        for (size_t q = 0; q < n; q++) b[p * n + q] += 0.5 * (v.of[0][p] * v.of[1][q] + v.of[1][p] * v.of[0][q]);
 }
 
 /* The part of D, the variance of the gradient, that the noise of the derivative of one row by parameter p makes. */
@@ -58,6 +69,38 @@ static double derivative_noise(const struct linear_model *m, size_t row, size_t 
     double u = m->weight[row], va = m->j_var[0][row * m->n_param + p], vb = m->j_var[1][row * m->n_param + p],
            r2 = fmax(0.0, m->r[0][row] * m->r[1][row]) + 4.0 * linear_model_row_noise(m, row);
     return u * u * r2 * 0.25 * (va + vb);
+}
+
+/* The covariance of the gradients of two configurations that the noise of their derivatives by parameter p makes. The
+ * derivatives correlate like the means. */
+static double shared_derivative_noise(const struct linear_model *m, const struct linear_pair *pair, size_t p)
+{
+    double sum = 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        const size_t i = 3 * pair->i + c, j = 3 * pair->j + c, at_i = i * m->n_param + p, at_j = j * m->n_param + p;
+        double residuals = 0.5 * (m->r[0][i] * m->r[1][j] + m->r[1][i] * m->r[0][j]) +
+                           4.0 * pair->correlation * sqrt(linear_model_row_noise(m, i) * linear_model_row_noise(m, j));
+        double variance =
+            0.25 * sqrt((m->j_var[0][at_i] + m->j_var[1][at_i]) * (m->j_var[0][at_j] + m->j_var[1][at_j]));
+        sum += m->weight[i] * m->weight[j] * residuals * pair->correlation * variance;
+    }
+    return sum;
+}
+
+/* Adds to b what configurations that share their camera paths have in common of the noise of tracing. */
+static void add_shared_noise(const struct linear_model *m, const size_t *index, size_t n, double *b)
+{
+    for (size_t k = 0; k < m->n_pair; k++) {
+        const struct common_noise v = common_noise(m, m->pair[k].i, path_variance, index, n),
+                                  w = common_noise(m, m->pair[k].j, path_variance, index, n);
+        const double half = 0.5 * m->pair[k].correlation;
+        for (size_t p = 0; p < n; p++) {
+            for (size_t q = 0; q < n; q++)
+                b[p * n + q] += half * (v.of[0][p] * w.of[1][q] + v.of[1][p] * w.of[0][q] + w.of[0][p] * v.of[1][q] +
+                                        w.of[1][p] * v.of[0][q]);
+            b[p * n + p] += 2.0 * shared_derivative_noise(m, &m->pair[k], index[p]);
+        }
+    }
 }
 
 /* B of the parameters index[0..n-1], and the mean of V. */
@@ -80,6 +123,7 @@ static void residual_matrix(const struct linear_model *m, const size_t *index, s
         add_common_noise(m, i, path_variance, index, n, b);
         add_common_noise(m, i, common_variance, index, n, b);
     }
+    add_shared_noise(m, index, n, b);
 }
 
 /* J'J of the mean J of both replicas, and the part of it that noise makes by their difference: J_A' J_B symmetrised is
@@ -194,12 +238,13 @@ static void tracing_matrices(const struct linear_model *m, const size_t *index, 
         }
     }
     for (size_t i = 0; i < m->n_row / 3; i++) add_common_noise(m, i, path_variance, index, n, b);
+    add_shared_noise(m, index, n, b);
 }
 
 double uncertainty_noise_decrease(const struct linear_model *m, const struct coordinate *k, const bool *fixed)
 {
     double h[N * N], b[N * N], inverse[N * N], sum = 0.0;
-    size_t index[N], n = 0;
+    size_t index[N] = {0}, n = 0;
     for (size_t p = 0; p < m->n_param; p++)
         if (!fixed[p]) index[n++] = p;
     tracing_matrices(m, index, n, h, b);

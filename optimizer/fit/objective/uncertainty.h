@@ -7,8 +7,9 @@
  * more than three quarters: where noise and information are alike, their difference is chance, and the errors with it.
  *   V    variance of a residual: that of the photograph, that of the misfit (the part of f per degree of freedom that
  *        no noise explains), and the Monte-Carlo variance of the pooled mean, which is fully correlated between
- *        channels, because they share their paths;
- *   D    Monte-Carlo noise of J times the residuals;
+ *        channels, because they share their paths, and correlated between configurations that share camera paths
+ *        (linear_pair);
+ *   D    Monte-Carlo noise of J times the residuals, with the correlations of V between configurations;
  *   s2   mean of V;
  *   L    s2 / (prior sd)^2, the allowed range as a weak prior, so that an undetermined parameter gets an error as
  *        large as its range instead of infinity. The model's own priors (linear_model.h) add their precision to it.

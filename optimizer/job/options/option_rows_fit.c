@@ -88,9 +88,9 @@ const struct job_option option_rows_fit[] = {
      .standard = "false",
      .meaning =
          "Whether rows that differ in the place of their lamp only are traced with the same light paths, which "
-         "takes 0.54 to 0.63 of the time for two of them. The errors of such rows then go together. The fit does "
-         "not model that, so its error bars and its stop are no longer right. A path counts once for each row. "
-         "Not together with `texture`; volumes trace separate paths all the same."},
+         "takes 0.54 to 0.63 of the time for two of them. The noise of such rows then goes together; the errors of "
+         "parameters and scores contain that. A path counts once for each row. Not together with `texture`; volumes "
+         "trace separate paths all the same."},
     {.path = "fit.fixed",
      .kind = OPTION_OWN,
      .unit = "degrees for angles",

@@ -3,6 +3,8 @@
 #include "renderer/transport/estimate/estimate_blocks.h"
 #include "renderer/transport/estimate/rotation_mean.h"
 
+#include <stdint.h>
+
 static status numeric_error(const struct estimate_request *q, const struct estimate_fault *f, struct error *err)
 {
     const struct appearance *m = q->input.model;
@@ -68,6 +70,18 @@ status estimate_run(const struct estimate_request *q, struct thread_pool *pool, 
 {
     return rotation_mean_wanted(q->configuration, q->n_configuration) ? estimate_rotations(q, pool, progress, out, err)
                                                                       : estimate_separate(q, pool, progress, out, err);
+}
+
+void estimate_move_partners(struct estimate *e, const size_t *place)
+{
+    uint32_t n = 0;
+    for (uint32_t k = 0; k < e->n_partner; k++) {
+        struct estimate_partner moved = e->partner[k];
+        if (place[moved.configuration] == SIZE_MAX) continue;
+        moved.configuration = (uint32_t)place[moved.configuration];
+        e->partner[n++] = moved;
+    }
+    e->n_partner = n;
 }
 
 size_t estimate_n_path(const struct configuration *c, size_t n_path)

@@ -17,8 +17,16 @@ struct estimate_request {
     uint32_t iteration, replica; /* rng.h; configuration i uses stream configuration = i */
     bool share_camera_paths;     /* configurations that differ in their lamp only are estimated from the same paths (as
                                     many as the one that asks for most): 1.4 to 1.9 times the paths in the same time for
-                                    two lamps, but the errors of such configurations go together, which fits do not
-                                    model. Volumes trace separate paths all the same. */
+                                    two lamps. The errors of such configurations go together (estimate.partner). Volumes
+                                    trace separate paths all the same. */
+};
+
+enum { ESTIMATE_MAX_PARTNER = 15 };
+/* An earlier configuration that was estimated from the same camera paths. correlation: covariance of the two means over
+ * the product of their standard deviations, both summed over the channels; in [-1, 1]. */
+struct estimate_partner {
+    uint32_t configuration;
+    float correlation;
 };
 
 /* rgb means in radiance units. For a configuration with contrast_cells: its contrast and the derivatives of that. For
@@ -29,6 +37,8 @@ struct estimate {
                                             n_flat = n_param of the model * number of sets */
     double jac_var[3 * SCATTERING_MAX_FLAT];
     uint64_t n_path, n_bounce;
+    uint32_t n_partner; /* of a mean over rotations that shares its paths with more rows: the first ones */
+    struct estimate_partner partner[ESTIMATE_MAX_PARTNER];
 };
 
 /* out: n_configuration estimates. STATUS_INVALID (a configuration, a parameter, fewer sets than groups, a cloth without
@@ -37,6 +47,10 @@ struct estimate {
  */
 status estimate_run(const struct estimate_request *q, struct thread_pool *pool, const struct progress *progress,
                     struct estimate *out, struct error *err);
+
+/* For estimates that are moved to other places of an array: replaces the number k of each partner by place[k], and
+ * leaves out partners whose place is SIZE_MAX. */
+void estimate_move_partners(struct estimate *e, const size_t *place);
 
 /* Paths that are traced for a configuration of which n_path (more than 0) are asked: whole blocks of
  * RADIANCE_BLOCK_PATHS, for every rotation; as many for every part of a contrast. */

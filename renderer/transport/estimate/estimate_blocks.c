@@ -4,12 +4,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK_PATHS = RADIANCE_BLOCK_PATHS, TASKS_PER_GROUP = 1024, N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT };
+enum {
+    BLOCK_PATHS = RADIANCE_BLOCK_PATHS,
+    TASKS_PER_GROUP = 1024,
+    N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT,
+    N_PAIR = ESTIMATE_MAX_PARTNER * (ESTIMATE_MAX_PARTNER + 1) / 2
+};
 
-/* Sums over the paths of one task, in path order: n_value sums and as many sums of squares. */
+/* Sums over the paths of one task, in path order: n_value sums, as many sums of squares, and for each pair of members
+ * the sum of the products of their radiances, over all channels. Pair (a, b), b < a, has number a (a - 1) / 2 + b. */
 struct task_sum {
     uint64_t n_path, n_bounce;
-    double *x, *x2;
+    double *x, *x2, *pair;
 };
 
 struct task {
@@ -30,6 +36,12 @@ size_t estimate_n_value(const struct estimate_blocks *b, size_t i_group)
     return b->groups->group[i_group].n * (3 + 3 * b->source->n_flat);
 }
 
+static size_t n_pair_of(const struct estimate_blocks *b, size_t i_group)
+{
+    size_t n = b->groups->group[i_group].n;
+    return n * (n - 1) / 2;
+}
+
 uint64_t estimate_trace(const struct estimate_blocks *b, size_t i_group, size_t n, double (*xy)[2], struct rng *rng,
                         float *value)
 {
@@ -42,6 +54,14 @@ uint64_t estimate_trace(const struct estimate_blocks *b, size_t i_group, size_t 
                                          .progress = b->progress};
     memset(value, 0, n * estimate_n_value(b, i_group) * sizeof *value);
     return b->source->tracer->trace(b->source->state, &block, value);
+}
+
+/* Adds the products of the members' radiances on one path. value: n_value of each of the n_member members. */
+static void add_pairs(const float *value, size_t n_member, size_t n_value, double *pair)
+{
+    for (size_t a = 1; a < n_member; a++)
+        for (size_t b = 0; b < a; b++, pair++)
+            for (size_t c = 0; c < 3; c++) *pair += (double)value[a * n_value + c] * (double)value[b * n_value + c];
 }
 
 static void trace_block(const struct estimate_blocks *b, uint32_t i_group, uint32_t i_block, struct task_sum *sum,
@@ -58,12 +78,15 @@ static void trace_block(const struct estimate_blocks *b, uint32_t i_group, uint3
     }
     sum->n_bounce += estimate_trace(b, i_group, BLOCK_PATHS, xy, rng, value);
     sum->n_path += BLOCK_PATHS;
-    for (size_t i = 0; i < BLOCK_PATHS; i++)
+    const size_t n_member = b->groups->group[i_group].n;
+    for (size_t i = 0; i < BLOCK_PATHS; i++) {
         for (size_t k = 0; k < n_value; k++) {
             double v = (double)value[i * n_value + k];
             sum->x[k] += v;
             sum->x2[k] += v * v;
         }
+        add_pairs(value + i * n_value, n_member, n_value / n_member, sum->pair);
+    }
 }
 
 static void run_task(void *context, size_t i_task, size_t i_thread)
@@ -114,7 +137,7 @@ static uint64_t blocks_of(const struct run *r, size_t i_group, uint64_t *per_tas
     return n_block;
 }
 
-static void fill_tasks(struct run *r, size_t n_value)
+static void fill_tasks(struct run *r, size_t n_value, size_t n_pair)
 {
     size_t n = 0;
     for (size_t i = 0; i < r->b->groups->n; i++) {
@@ -122,8 +145,9 @@ static void fill_tasks(struct run *r, size_t n_value)
         for (uint64_t b = 0; b < n_block; b += per_task, n++) {
             uint64_t here = n_block - b < per_task ? n_block - b : per_task;
             r->task[n] = (struct task){(uint32_t)i, (uint32_t)b, (uint32_t)here};
-            r->sum[n].x = r->sum_storage + 2 * n_value * n;
+            r->sum[n].x = r->sum_storage + (2 * n_value + n_pair) * n;
             r->sum[n].x2 = r->sum[n].x + n_value;
+            r->sum[n].pair = r->sum[n].x2 + n_value;
         }
     }
 }
@@ -132,7 +156,7 @@ static void fill_tasks(struct run *r, size_t n_value)
 static status make_tasks(struct run *r, struct error *err)
 {
     const struct path_groups *groups = r->b->groups;
-    size_t n = 0, n_value = 0;
+    size_t n = 0, n_value = 0, n_pair = 0;
     for (size_t i = 0; i < groups->n; i++) {
         const struct path_group *g = &groups->group[i];
         uint64_t per_task, n_block;
@@ -141,14 +165,15 @@ static status make_tasks(struct run *r, struct error *err)
         n_block = blocks_of(r, i, &per_task);
         n += (size_t)((n_block + per_task - 1) / per_task);
         if (estimate_n_value(r->b, i) > n_value) n_value = estimate_n_value(r->b, i);
+        if (n_pair_of(r->b, i) > n_pair) n_pair = n_pair_of(r->b, i);
     }
     r->n_task = n;
     r->task = malloc((n + 1) * sizeof *r->task);
     r->sum = calloc(n + 1, sizeof *r->sum);
-    r->sum_storage = calloc(n + 1, (2 * n_value + 1) * sizeof *r->sum_storage);
+    r->sum_storage = calloc(n + 1, (2 * n_value + n_pair + 1) * sizeof *r->sum_storage);
     if (r->task == NULL || r->sum == NULL || r->sum_storage == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu tasks", n);
-    fill_tasks(r, n_value);
+    fill_tasks(r, n_value, n_pair);
     return STATUS_OK;
 }
 
@@ -180,6 +205,22 @@ static bool member_estimate(const struct task_sum *sum, size_t n_jac, struct est
     return true;
 }
 
+/* Adds the correlation of members a and b, b < a, whose estimates are ready. */
+static void add_partner(const struct path_group *g, const size_t *member, size_t a, size_t b, double pair,
+                        struct estimate *out)
+{
+    struct estimate *e = &out[member[g->first + a]];
+    const struct estimate *f = &out[member[g->first + b]];
+    double n = (double)e->n_path, covariance = pair / n, scale = 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        covariance -= e->mean[c] * f->mean[c];
+        scale += sqrt(e->var[c] * f->var[c]);
+    }
+    double correlation = scale > 0.0 ? covariance / (n - 1.0) / scale : 0.0;
+    e->partner[e->n_partner++] = (struct estimate_partner){.configuration = (uint32_t)member[g->first + b],
+                                                           .correlation = (float)fmin(fmax(correlation, -1.0), 1.0)};
+}
+
 static status group_estimates(const struct run *r, size_t i_group, const struct task_sum *total, struct estimate *out,
                               struct estimate_fault *fault, struct error *err)
 {
@@ -195,8 +236,10 @@ static status group_estimates(const struct run *r, size_t i_group, const struct 
     }
     for (size_t k = 0; k < g->n; k++) {
         size_t i = groups->member[g->first + k], at = k * (3 + n_jac);
-        const struct task_sum own = {total->n_path, total->n_bounce, total->x + at, total->x2 + at};
+        const struct task_sum own = {total->n_path, total->n_bounce, total->x + at, total->x2 + at, NULL};
         if (!member_estimate(&own, n_jac, &out[i], &bad_value)) return not_finite(i, bad_value, fault, err);
+        for (size_t b = 0; b < k && total->n_path > 0; b++)
+            add_partner(g, groups->member, k, b, total->pair[k * (k - 1) / 2 + b], out);
     }
     return STATUS_OK;
 }
@@ -207,14 +250,15 @@ static status reduce(const struct run *r, struct estimate *out, struct estimate_
     status st = STATUS_OK;
     memset(out, 0, r->b->n_configuration * sizeof *out);
     for (size_t i = 0; i < r->b->groups->n && st == STATUS_OK; i++) {
-        double x[N_VALUE] = {0}, x2[N_VALUE] = {0};
-        struct task_sum total = {0, 0, x, x2};
+        double x[N_VALUE] = {0}, x2[N_VALUE] = {0}, pair[N_PAIR] = {0};
+        struct task_sum total = {0, 0, x, x2, pair};
         for (; i_task < r->n_task && r->task[i_task].i_group == i; i_task++) {
             const struct task_sum *s = &r->sum[i_task];
             for (size_t k = 0; k < estimate_n_value(r->b, i); k++) {
                 total.x[k] += s->x[k];
                 total.x2[k] += s->x2[k];
             }
+            for (size_t k = 0; k < n_pair_of(r->b, i); k++) total.pair[k] += s->pair[k];
             total.n_path += s->n_path;
             total.n_bounce += s->n_bounce;
         }

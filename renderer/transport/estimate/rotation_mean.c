@@ -26,8 +26,9 @@ status rotation_mean_init(struct rotation_mean *m, const struct configuration *c
     m->turned = calloc(m->n_turned + 1, sizeof *m->turned);
     m->n_path = calloc(m->n_turned + 1, sizeof *m->n_path);
     m->first = calloc(n + 1, sizeof *m->first);
+    m->row = calloc(m->n_turned + 1, sizeof *m->row);
     m->estimate = calloc(m->n_turned + 1, sizeof *m->estimate);
-    if (m->turned == NULL || m->n_path == NULL || m->first == NULL || m->estimate == NULL)
+    if (m->turned == NULL || m->n_path == NULL || m->first == NULL || m->row == NULL || m->estimate == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: out of memory");
     for (size_t i = 0, t = 0; i < n; i++) {
         size_t n_rotation = rotations(&c[i]);
@@ -36,6 +37,7 @@ status rotation_mean_init(struct rotation_mean *m, const struct configuration *c
             m->turned[t].n_rotation = 0;
             m->turned[t].cloth_rotation_rad += 2 * M_PI * (double)k / (double)n_rotation;
             m->n_path[t] = (n_path[i] + n_rotation - 1) / n_rotation;
+            m->row[t] = i;
         }
         m->first[i + 1] = t;
     }
@@ -57,12 +59,44 @@ static void add(struct estimate *sum, const struct estimate *e, double share)
     sum->n_bounce += e->n_bounce;
 }
 
+static double common_scale(const struct estimate *a, const struct estimate *b)
+{
+    double sum = 0.0;
+    for (size_t c = 0; c < 3; c++) sum += sqrt(a->var[c] * b->var[c]);
+    return sum;
+}
+
+/* Finds the entry of a partner, or adds one. NULL when there is no room. */
+static struct estimate_partner *entry_of(struct estimate *e, size_t configuration)
+{
+    uint32_t k = 0;
+    while (k < e->n_partner && e->partner[k].configuration != configuration) k++;
+    if (k == ESTIMATE_MAX_PARTNER) return NULL;
+    if (k == e->n_partner) e->partner[e->n_partner++] = (struct estimate_partner){(uint32_t)configuration, 0.0f};
+    return &e->partner[k];
+}
+
+/* Adds the correlations that mean i has through rotation t, which shared its paths with rotations of other rows. */
+static void add_partners(const struct rotation_mean *m, size_t i, size_t t, struct estimate *out)
+{
+    const struct estimate *e = &m->estimate[t];
+    for (uint32_t k = 0; k < e->n_partner; k++) {
+        const size_t turned = e->partner[k].configuration, row = m->row[turned];
+        const double n = (double)(m->first[i + 1] - m->first[i]), n_row = (double)(m->first[row + 1] - m->first[row]);
+        const double scale = common_scale(&out[i], &out[row]) * n * n_row;
+        struct estimate_partner *to = entry_of(&out[i], row);
+        if (to == NULL || !(scale > 0.0)) continue;
+        to->correlation += (float)(e->partner[k].correlation * common_scale(e, &m->estimate[turned]) / scale);
+    }
+}
+
 void rotation_mean_take(const struct rotation_mean *m, struct estimate *out)
 {
     memset(out, 0, m->n * sizeof *out);
     for (size_t i = 0; i < m->n; i++) {
         double share = 1.0 / (double)(m->first[i + 1] - m->first[i]);
         for (size_t t = m->first[i]; t < m->first[i + 1]; t++) add(&out[i], &m->estimate[t], share);
+        for (size_t t = m->first[i]; t < m->first[i + 1]; t++) add_partners(m, i, t, out);
     }
 }
 
@@ -71,5 +105,6 @@ void rotation_mean_release(struct rotation_mean *m)
     free(m->turned);
     free(m->n_path);
     free(m->first);
+    free(m->row);
     free(m->estimate);
 }

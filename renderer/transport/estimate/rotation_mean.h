@@ -12,6 +12,7 @@ struct rotation_mean {
     struct configuration *turned; /* in the order asked for; n_rotation 0 */
     size_t *n_path;               /* of turned */
     size_t *first;                /* n + 1 entries: the rotations of i are first[i] .. first[i + 1] - 1 */
+    size_t *row;                  /* of turned: the configuration asked for */
     struct estimate *estimate;    /* of turned; filled in by the caller */
 };
 

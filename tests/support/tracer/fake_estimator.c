@@ -118,13 +118,21 @@ static double exponential_sum(struct rng *r, uint64_t n)
     return sum;
 }
 
+static size_t paths_of(const struct fake_cloth *f, const struct estimator_call *call, size_t i)
+{
+    size_t other = i ^ 1;
+    if (!f->share_paths || other >= f->n_configuration || call->n_path[i] > call->n_path[other]) return call->n_path[i];
+    return call->n_path[other];
+}
+
 static void sample_configuration(const struct fake_cloth *f, const struct estimator_call *call, size_t i,
                                  struct estimate *e)
 {
-    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)call->n_path[i], factor = 0.0, var = 0.0,
+    const size_t n_path = paths_of(f, call, i), first = f->share_paths ? i & ~(size_t)1 : i;
+    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)n_path, factor = 0.0, var = 0.0,
                                           score[FAKE_N_PARAM] = {0}, score_var = 0.0, width[FAKE_N_PARAM] = {0}, z[2];
     struct rng_key key = {
-        .seed = f->seed, .iteration = call->iteration, .replica = call->replica, .configuration = (uint32_t)i};
+        .seed = f->seed, .iteration = call->iteration, .replica = call->replica, .configuration = (uint32_t)first};
     struct rng r;
     rng_start(&r, &key, 0, 0);
     fake_radiance(&f->configuration[i], call->param, rgb, jac);
@@ -159,8 +167,11 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
             e->jac_var[c * FAKE_N_PARAM + p] = part * part * score_var * (own * own + per_unit * per_unit * 4.0 / 6.0);
         }
     }
-    e->n_path = call->n_path[i];
+    e->n_path = n_path;
     e->n_bounce = 10 * e->n_path;
+    if (first == i) return;
+    e->n_partner = 1;
+    e->partner[0] = (struct estimate_partner){(uint32_t)first, 1.0f};
 }
 
 static status run(void *context, const struct estimator_call *call, const struct progress *progress,

@@ -10,6 +10,7 @@
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -186,6 +187,49 @@ static void shared_paths_agree_with_separate_ones(void **state)
     assert_memory_equal(&again[0].jac, &separate[0].jac, sizeof again[0].jac);
 }
 
+/* The stated correlation of means that share camera paths is that of repeated estimates; also of means over rotations,
+ * and estimates that are moved to other places keep it. */
+static void shared_paths_state_their_correlation(void **state)
+{
+    (void)state;
+    enum { N = 3, REPEAT = 400 };
+    const size_t n_path[N] = {256, 256, 256};
+    for (uint32_t n_rotation = 1; n_rotation <= 2; n_rotation++) {
+        struct configuration c[N] = {configuration[1], configuration[4], configuration[1]};
+        struct estimate e[N];
+        struct estimate_request q = request(n_path, N);
+        double sum[2] = {0}, square[2] = {0}, product = 0.0, stated = 0.0;
+        c[2].light_theta_rad += 0.2;
+        c[0].n_rotation = c[2].n_rotation = n_rotation;
+        q.configuration = c;
+        q.share_camera_paths = true;
+        q.input.want_derivative = false;
+        for (int k = 0; k < REPEAT; k++) {
+            q.iteration = (uint32_t)k;
+            run(&q, 2, e);
+            assert_true(e[0].n_partner == 0 && e[1].n_partner == 0 && e[2].n_partner == 1);
+            assert_int_equal(e[2].partner[0].configuration, 0);
+            double x = e[0].mean[0] + e[0].mean[1] + e[0].mean[2], y = e[2].mean[0] + e[2].mean[1] + e[2].mean[2];
+            sum[0] += x / REPEAT;
+            sum[1] += y / REPEAT;
+            square[0] += x * x / REPEAT;
+            square[1] += y * y / REPEAT;
+            product += x * y / REPEAT;
+            stated += (double)e[2].partner[0].correlation / REPEAT;
+        }
+        double found =
+            (product - sum[0] * sum[1]) / sqrt((square[0] - sum[0] * sum[0]) * (square[1] - sum[1] * sum[1]));
+        double se = (1.0 - found * found) / sqrt(REPEAT);
+        if (!(stated > 0.2 && stated < 0.98 && fabs(found - stated) < 4.0 * se + 0.05))
+            fail_msg("%u rotations: stated %g, found %g +- %g", n_rotation, stated, found, se);
+        estimate_move_partners(&e[2], (const size_t[N]){7, SIZE_MAX, SIZE_MAX});
+        assert_true(e[2].n_partner == 1 && e[2].partner[0].configuration == 7);
+        e[2].partner[0].configuration = 1;
+        estimate_move_partners(&e[2], (const size_t[N]){7, SIZE_MAX, SIZE_MAX});
+        assert_int_equal(e[2].n_partner, 0);
+    }
+}
+
 /* Without a lamp nothing is shared: the estimate for an environment alone agrees with that by separate paths. */
 static void shared_paths_without_a_lamp(void **state)
 {
@@ -347,6 +391,7 @@ int main(void)
         cmocka_unit_test(same_bits_for_any_threads),
         cmocka_unit_test(variances_agree_with_repetitions),
         cmocka_unit_test(shared_paths_agree_with_separate_ones),
+        cmocka_unit_test(shared_paths_state_their_correlation),
         cmocka_unit_test(shared_paths_without_a_lamp),
         cmocka_unit_test(agrees_without_avx512),
         cmocka_unit_test(cancels_within_100_ms),

@@ -6,6 +6,7 @@
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 
 /* Paths of a row and replica when a fit is scored: a share of those of the fit, between two bounds. */
@@ -55,20 +56,23 @@ static status score(const struct pipeline_context *c, enum job_set set, const st
 {
     struct observation_set part;
     struct estimate *shown[2] = {malloc(c->observation.n * sizeof **shown), malloc(c->observation.n * sizeof **shown)};
-    size_t n = 0;
+    size_t n = 0, *place = malloc(c->observation.n * sizeof *place);
     observation_set_init(&part);
-    status s = shown[0] != NULL && shown[1] != NULL
+    status s = shown[0] != NULL && shown[1] != NULL && place != NULL
                    ? observation_set_select(&c->observation, set, &part, err)
                    : error_set(err, STATUS_NO_MEMORY, "cannot compare fits: out of memory");
     observation_set_weigh(&part);
     for (size_t i = 0; i < c->observation.n && s == STATUS_OK; i++) {
+        place[i] = SIZE_MAX;
         if (c->observation.item[i].set != set || !(c->observation.item[i].weight > 0.0)) continue;
         for (int q = 0; q < 2; q++) nuisance_show(&r->nuisance, &replica[q][i], &shown[q][n]);
-        n++;
+        place[i] = n++;
     }
+    for (size_t i = 0; i < 2 * n && s == STATUS_OK; i++) estimate_move_partners(&shown[i % 2][i / 2], place);
     *value = (struct objective_value){.rel_rms = NAN, .rel_rms_se = NAN};
     if (s == STATUS_OK && n > 0) objective_evaluate(&part, shown[0], shown[1], value);
     observation_set_release(&part);
+    free(place);
     free(shown[0]);
     free(shown[1]);
     return s;

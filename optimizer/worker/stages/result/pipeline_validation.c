@@ -7,6 +7,7 @@
 #include "optimizer/worker/work_file.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 
 enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
@@ -67,21 +68,26 @@ static status evaluate_set(const struct pipeline_context *c, const struct pipeli
                            struct error *err)
 {
     struct observation_set part;
-    size_t n = c->observation.n, n_part = 0;
+    size_t n = c->observation.n, n_part = 0, *place = malloc(n * sizeof *place);
     struct estimate *a = malloc(2 * n * sizeof *a), *b = a != NULL ? a + n : NULL;
     observation_set_init(&part);
     *value = (struct objective_value){NAN, NAN, NAN, NAN, NAN, NAN};
-    status s = a != NULL ? observation_set_select(&c->observation, set, &part, err)
-                         : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
+    status s = a != NULL && place != NULL ? observation_set_select(&c->observation, set, &part, err)
+                                          : error_set(err, STATUS_NO_MEMORY, "cannot validate: out of memory");
     observation_set_weigh(&part); /* as the fit does */
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        place[i] = SIZE_MAX;
         if (c->observation.item[i].set != set || !(c->observation.item[i].weight > 0.0)) continue;
         show_row(c, m, i, 0, own_gains, &a[n_part]);
-        show_row(c, m, i, 1, own_gains, &b[n_part++]);
+        show_row(c, m, i, 1, own_gains, &b[n_part]);
+        place[i] = n_part++;
     }
+    for (size_t i = 0; i < 2 * n_part && s == STATUS_OK; i++)
+        estimate_move_partners(i < n_part ? &a[i] : &b[i - n_part], place);
     if (s == STATUS_OK && part.n > 0) objective_evaluate(&part, a, b, value);
     if (s == STATUS_OK && channels != NULL) objective_evaluate_channels(&part, a, b, channels);
     observation_set_release(&part);
+    free(place);
     free(a);
     return s;
 }
@@ -187,7 +193,7 @@ static status store_validations(struct pipeline_context *c, struct error *err)
     estimate_sections(c, section);
     status s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "validation.2", section, 4 * c->n_model, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "validation.3", section, 4 * c->n_model, err) : s;
 }
 
 status stage_validation_load(struct pipeline_context *c, struct error *err)
@@ -198,7 +204,7 @@ status stage_validation_load(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
     if (s != STATUS_OK) return s;
     estimate_sections(c, section);
-    s = work_file_read(path, "validation.2", section, 4 * c->n_model, err);
+    s = work_file_read(path, "validation.3", section, 4 * c->n_model, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = score_validation(c, &c->model[i], err);
     if (s == STATUS_OK) pipeline_warn_choice(c);
     return s;

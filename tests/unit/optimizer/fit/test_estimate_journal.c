@@ -26,6 +26,7 @@ static void resume_after(void **state, const struct descent_method *m, size_t n_
     descent_fixture_init(&x, 4, 1500000);
     x.problem.max_iteration = 6;
     x.cloth.fail_after = n_call;
+    x.cloth.share_paths = true; /* estimates then have partners */
     assert_int_equal(estimate_journal_open(path, 7, &x.estimator, NULL, NULL, &j, NULL), STATUS_OK);
     struct estimator through = estimate_journal_estimator(j);
     x.problem.estimator = &through;
@@ -57,6 +58,7 @@ static void test_resume(void **state)
         struct fit_result want;
         descent_fixture_init(&x, 4, 1500000);
         x.problem.max_iteration = 6;
+        x.cloth.share_paths = true;
         descent_fixture_run(&x, *m, &want);
         observation_set_release(&x.observation);
         for (size_t n_call = 1; n_call <= 10; n_call += 3) {

@@ -28,6 +28,7 @@ static void test_pool(void **state)
     size_t n_path[FAKE_N_FIT];
     fake_cloth_init(&f, 3, FAKE_N_FIT);
     f.noise = 0.0;
+    f.share_paths = true;
     struct estimator e = fake_estimator(&f);
     fake_param_set(mid_range, truth);
     observation_set_init(&o);
@@ -52,6 +53,9 @@ static void test_pool(void **state)
     }
     for (size_t p = 0; p < FAKE_N_PARAM; p++) x[p] = coordinate_from_param(&k[p], truth[p]);
     assert_int_equal(linear_model_pool(&m, &h, x, NULL), STATUS_OK);
+    assert_int_equal(m.n_pair, FAKE_N_FIT / 2);
+    for (size_t i = 0; i < m.n_pair; i++)
+        assert_true(m.pair[i].i == 2 * i + 1 && m.pair[i].j == 2 * i && m.pair[i].correlation == 1.0);
     assert_true(m.n_effective > 1.5 * 4096 && m.n_effective <= 3.0 * 4096.5);
     for (size_t row = 0; row < m.n_row; row++) {
         assert_true(fabs(m.r[0][row]) < 2e-3);

@@ -104,6 +104,8 @@ static void compare(void **state, const char *set_up, const char *fit, const str
         assert_true(want[i].mean[1] > 0.0);
         assert_memory_equal(of_job[i].mean, want[i].mean, sizeof want[i].mean);
         assert_memory_equal(of_job[i].jac, want[i].jac, 3 * model->n_param * sizeof *want[i].jac);
+        assert_int_equal(of_job[i].n_partner, share && i == 1 ? 1 : 0);
+        assert_memory_equal(of_job[i].partner, want[i].partner, sizeof want[i].partner);
     }
     pipeline_trace_close(&trace);
     pipeline_context_release(&c);
