@@ -129,8 +129,8 @@ static void sample_configuration(const struct fake_cloth *f, const struct estima
                                  struct estimate *e)
 {
     const size_t n_path = paths_of(f, call, i), first = f->share_paths ? i & ~(size_t)1 : i;
-    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)n_path, factor = 0.0, var = 0.0,
-                                          score[FAKE_N_PARAM] = {0}, score_var = 0.0, width[FAKE_N_PARAM] = {0}, z[2];
+    double rgb[3], jac[3 * FAKE_N_PARAM], n = (double)n_path, factor = 0.0, var = 0.0, score[FAKE_N_PARAM] = {0},
+                                          score_var = 0.0, width[FAKE_N_PARAM] = {0}, z[2];
     struct rng_key key = {
         .seed = f->seed, .iteration = call->iteration, .replica = call->replica, .configuration = (uint32_t)first};
     struct rng r;

@@ -17,7 +17,8 @@ extern const struct param_info fake_param[FAKE_N_PARAM];
 struct fake_cloth {
     uint64_t seed;
     double noise; /* 1: noise as described above; 0: exact means */
-    bool share_paths; /* configurations 2 i and 2 i + 1 have the same noise, with the paths of the one that asks for more */
+    /* configurations 2 i and 2 i + 1 have the same noise, with the paths of the one that asks for more */
+    bool share_paths;
     size_t n_configuration;
     struct configuration configuration[FAKE_N_FIT + FAKE_N_HELD_OUT];
     size_t n_call;     /* estimates made so far */
