@@ -89,7 +89,7 @@ function clothNumbers(result) {
   return el("div", {}, el("h3", {}, "Numbers of the cloth"),
     el("p", { class: "hint" }, "Fitted together with the parameters, whose standard errors contain those of these numbers."),
     table("cloth-numbers", ["Number", "#Value ± standard error", "Unit", "#Range", ""], list.map((n) => el("tr", {}, el("td", { class: "mono" }, n.name), number(withError(n.value, n.standard_error)), el("td", {}, n.unit),
-      number(`${n.lower} to ${n.upper}`), el("td", {}, n.determined ? "" : tag("these measurements do not tell it"), n.at_bound ? tag(`at its ${n.at_bound} bound`) : "")))));
+      number(`${n.lower} to ${n.upper}`), el("td", {}, n.determined ? "" : tag("these measurements do not determine it"), n.at_bound ? tag(`at its ${n.at_bound} bound`) : "")))));
 }
 
 // Returns the content of the card, or null if there is nothing to show.

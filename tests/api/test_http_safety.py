@@ -145,8 +145,11 @@ def test_a_thousand_idle_clients(daemon_maker):
     print(f"a request beside 1000 idle connections: {(time.monotonic() - start) * 100:.1f} ms")
     connections = float(re.search(r"^selvedge_http_connections (\S+)", d.get("/metrics").text, re.M).group(1))
     assert connections >= 1000
-    for s in idle:
+    # not all at once: a thread of libmicrohttpd 0.9.75 that finds a multiple of 128 events waits for one more before it handles them
+    for i, s in enumerate(idle):
         s.close()
+        if i % 20 == 0:
+            time.sleep(0.01)
     wait_until(lambda: float(re.search(r"^selvedge_http_connections (\S+)", d.get("/metrics").text, re.M).group(1)) < 50, what="closing")
 
 

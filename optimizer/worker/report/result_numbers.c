@@ -84,7 +84,7 @@ void result_numbers_print(const struct pipeline_context *c, const struct pipelin
         const char *bound = at_bound(c, m, k);
         fprintf(out, "%s %-28s %10.4g +- %-8.2g %s%s%s%s\n", k == 0 ? "cloth   " : "        ", c->number.info[k].name,
                 m->cloth.number[k], r->uncertainty.se_param[p], c->number.item[k].unit,
-                r->uncertainty.determined[p] ? "" : " these measurements do not tell it",
+                r->uncertainty.determined[p] ? "" : " these measurements do not determine it",
                 bound != NULL ? " at its bound: " : "", bound != NULL ? bound : "");
     }
     print_uncorrected(m, out);

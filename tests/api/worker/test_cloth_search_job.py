@@ -88,12 +88,12 @@ def test_numbers_come_back(tmp_path, sample):
     flatness, hairs = numbers["yarns[0].flatness"], numbers["yarns[0].hair_length_um"]
     assert flatness["determined"] and abs(flatness["value"] - 2.6) < 0.8 and flatness["standard_error"] < 0.6, flatness
     assert not hairs["determined"] and 100 <= hairs["value"] <= 1000 and hairs["unit"] == "um", hairs
-    assert "these measurements do not tell" in json.dumps(result["warnings"]) and "hair_length_um" in json.dumps(result["warnings"])
+    assert "these measurements do not determine" in json.dumps(result["warnings"]) and "hair_length_um" in json.dumps(result["warnings"])
     assert len(flatness["correlation_parameters"]) == len(result["parameters"])
     shown = {n["name"]: n for n in result["geometry"]["cloth"]["numbers"]}
     assert abs(shown["yarns[0].flatness"]["value"] - flatness["value"]) < 1e-9
     summary = (job / "results" / "summary.txt").read_text()
-    assert "yarns[0].flatness" in summary and "these measurements do not tell it" in summary
+    assert "yarns[0].flatness" in summary and "these measurements do not determine it" in summary
     assert sum(s["best"] for s in result["cloth_screening"]) == 1
 
 

@@ -150,7 +150,8 @@ static void warn_numbers(struct pipeline_context *c, const struct pipeline_model
                            "which was taken: allow more paths",
                            m->appearance.id);
     if (used > 0)
-        worker_status_warn(c->status, "these measurements do not tell, in the fit of %s: %s", m->appearance.id, names);
+        worker_status_warn(c->status, "these measurements do not determine, in the fit of %s: %s", m->appearance.id,
+                           names);
 }
 
 static void warn_parameters(struct pipeline_context *c, const struct pipeline_model *m)

@@ -191,6 +191,7 @@ static void test_too_many_nodes(void **state)
     scratch_write(path, yarn_text, sizeof yarn_text - 1);
     phantom_option_default(&o, PHANTOM_PLAIN);
     assert_int_equal(phantom_yarn_read(path, &o.yarn, NULL), STATUS_OK);
+    o.yarn.n_fiber = 1;
     o.fiber_radius_m[0] = 1e-7;
     o.n_yarn[0] = 2;
     o.n_yarn[1] = 400;

@@ -221,7 +221,7 @@ static void test_recovery_and_errors(void **state)
     free(r);
 }
 
-/* What the measurements do not tell stays at its prior. */
+/* What the measurements do not determine stays at its prior. */
 static void test_prior_of_an_undetermined_number(void **state)
 {
     (void)state;
