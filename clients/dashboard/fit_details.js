@@ -92,9 +92,23 @@ function clothNumbers(result) {
       number(`${n.lower} to ${n.upper}`), el("td", {}, n.determined ? "" : tag("these measurements do not determine it"), n.at_bound ? tag(`at its ${n.at_bound} bound`) : "")))));
 }
 
+// What the photographs ask to change about the fibers of a scan or a file, and what that gains.
+function corrections(result) {
+  const without = result.without_corrections;
+  if (!without) return null;
+  const asked = without.asked_for;
+  const scored = isNumber(without.heldout_gain), gains = scored && without.heldout_gain >= 2 * without.heldout_gain_se;
+  const verdict = !scored ? null : gains ? tag("lower the held-out error", "good") : tag("not worth keeping", "warn");
+  const errors = (fit, heldout) => `${percent(fit, 2)} over the fitted rows${isNumber(heldout) ? `, ${percent(heldout, 2)} over the held-out rows` : ""}`;
+  return el("div", { id: "corrections" }, el("h3", {}, "Corrections of the fibers ", verdict),
+    el("p", { class: "hint" }, asked.length ? `The photographs ask for ${asked.join(", ")}. ` : "The photographs ask for none of these corrections. ",
+      `Relative RMS error without them: ${errors(without.fit_rel_rms, without.heldout_rel_rms)}; with them: ${errors(result.fit_rel_rms, result.heldout_rel_rms)}.`,
+      scored ? ` They ${without.heldout_gain < 0 ? "raise" : "lower"} the held-out error by ${percent(Math.abs(without.heldout_gain), 2)} ± ${percent(without.heldout_gain_se, 2)}.` : ""));
+}
+
 // Returns the content of the card, or null if there is nothing to show.
 export function fitDetails(job) {
   if (!job.result) return null;
-  const parts = [skill, clothNumbers, certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
+  const parts = [skill, clothNumbers, corrections, certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
   return parts.length ? el("div", { id: "fit-details" }, parts) : null;
 }

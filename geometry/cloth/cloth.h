@@ -28,8 +28,8 @@ struct cloth_report {
     double thickness_m;                       /* from the lowest to the highest fiber surface, hairs included */
     double body_thickness_m;                  /* the same without hairs: what a thickness gauge finds, not pressed */
     double cover;                             /* share of the tile's area under at least one fiber, along z */
-    double volume_fraction;                   /* volume of the fibers over tile area x thickness */
-    double overlap_mean;                      /* depth of interpenetration over the diameter, mean over all points */
+    double volume_fraction; /* volume of the fibers, hairs included, over tile area x thickness without hairs */
+    double overlap_mean;    /* depth of interpenetration over the diameter, mean over all points */
     double overlap_max;
     double strain_p95;              /* of bent fibers: radius over radius of curvature; 95 % of the points stay below */
     size_t n_fiber[CLOTH_MAX_KIND]; /* fibers of each kind in the tile, as pieces between faces */

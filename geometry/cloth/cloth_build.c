@@ -45,7 +45,7 @@ static void report_fibers(const struct fiber_set *f, struct cloth_report *r)
         r->length_m[f->group[i]] += length_m;
     }
     r->thickness_m = high - low;
-    r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * r->thickness_m);
+    r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * r->body_thickness_m);
 }
 
 /* Height from the lowest to the highest surface of fibers that are no hairs. */

@@ -320,7 +320,8 @@ static status write_description(const struct cloth *c, struct error *err)
         st = phantom_described_as(&c->phantom, &c->report, &c->fibers, &nearest, err);
     if (st != STATUS_OK) return st;
     json_t *json = cloth_section_json(d, NULL);
-    char *text = json_dumps(json, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(9));
+    /* all digits, as in result.json: the same cloth to the last bit */
+    char *text = json_dumps(json, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));
     json_decref(json);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     st = durable_replace(path, text, strlen(text), err);

@@ -125,6 +125,32 @@ def test_parameters_of_two_groups(real, browser, tmp_path):
     assert complaints(browser) == []
 
 
+def test_corrections(real, browser, tmp_path):
+    """What the photographs ask to change about the fibers, and what that gains, as in result.json."""
+    url, _ = real
+    (tmp_path / "cloth.hair").write_bytes(small_cloth.hair())
+    (tmp_path / "rows.csv").write_text(small_cloth.TABLE)
+    (tmp_path / "job.json").write_text(json.dumps({
+        "sample": "corrected", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
+        "correction": {"radius": {"lower": 0.8, "upper": 1.2}},
+        "fit": {"model": "two_lobe.v1", "path_budget": 100000, "render_px": 8, "render_samples": 1}}))
+    job = selvedge.Server(url).submit(str(tmp_path / "job.json"))
+    job.wait()
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#corrections')")
+    text = browser.find_element(By.ID, "corrections").text
+    result = job.state()["result"]
+    without = result["without_corrections"]
+    keeps = without["heldout_gain"] >= 2 * without["heldout_gain_se"]
+    assert ("LOWER THE HELD-OUT ERROR" if keeps else "NOT WORTH KEEPING") in text.upper()
+    assert ("ask for radius" if without["asked_for"] else "ask for none of these corrections") in text
+    assert f"{100 * without['heldout_rel_rms']:.2f} % over the held-out rows; with them: {100 * result['fit_rel_rms']:.2f} %" in text
+    assert f"{100 * abs(without['heldout_gain']):.2f} % ± {100 * without['heldout_gain_se']:.2f} %" in text
+    assert browser.find_element(By.CSS_SELECTOR, "#cloth-numbers tbody tr").text.startswith("radius")
+    keep(browser, "corrections")
+    assert complaints(browser) == []
+
+
 def test_failed_job_and_hostile_name(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "failing <img src=x onerror=alert(1)>")

@@ -1,4 +1,5 @@
 #include "optimizer/worker/report/result_numbers.h"
+#include "base/catalogue/correction_numbers.h"
 #include "optimizer/worker/report/json_number.h"
 
 #include <math.h>
@@ -50,11 +51,34 @@ static json_t *screening_json(const struct pipeline_context *c, const struct clo
     return list;
 }
 
-static json_t *uncorrected_json(const struct pipeline_model *m)
+/* Whether the photographs ask for correction k: it is determined, and two standard errors or more from the value that
+ * leaves the fibers as they are. */
+static bool asked_for(const struct pipeline_context *c, const struct pipeline_model *m, size_t k)
+{
+    const struct uncertainty *u = &m->cloth.joint.uncertainty;
+    const size_t p = u->n_param - c->number.n + k;
+    const double off = m->cloth.number[k] - correction_number_table[c->number.item[k].index].standard;
+    return !m->cloth.took_screened && u->determined[p] && fabs(off) >= 2.0 * u->se_param[p];
+}
+
+/* Decrease of the held-out error by the corrections, and its standard error by tracing. NaN without held-out rows. */
+static double heldout_gain(const struct pipeline_model *m, double *se)
 {
     const struct pipeline_uncorrected *u = &m->scan_error.uncorrected;
-    return json_pack("{s:o, s:o, s:o}", "fit_rel_rms", json_number(u->fit_rel_rms), "heldout_rel_rms",
-                     json_number(u->heldout_rel_rms), "heldout_rel_rms_se", json_number(u->heldout_rel_rms_se));
+    *se = hypot(u->heldout_rel_rms_se, m->validation.held_out.rel_rms_se);
+    return u->heldout_rel_rms - m->validation.held_out.rel_rms;
+}
+
+static json_t *uncorrected_json(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    const struct pipeline_uncorrected *u = &m->scan_error.uncorrected;
+    json_t *asked = json_array();
+    double se, gain = heldout_gain(m, &se);
+    for (size_t k = 0; k < c->number.n; k++)
+        if (asked_for(c, m, k)) json_array_append_new(asked, json_string(c->number.info[k].name));
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "fit_rel_rms", json_number(u->fit_rel_rms), "heldout_rel_rms",
+                     json_number(u->heldout_rel_rms), "heldout_rel_rms_se", json_number(u->heldout_rel_rms_se),
+                     "heldout_gain", json_number(gain), "heldout_gain_se", json_number(se), "asked_for", asked);
 }
 
 void result_numbers_put(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m)
@@ -63,14 +87,24 @@ void result_numbers_put(json_t *json, const struct pipeline_context *c, const st
     json_t *list = json_array();
     for (size_t k = 0; k < c->number.n; k++) json_array_append_new(list, number_json(c, m, k));
     json_object_set_new(json, "cloth_numbers", list);
-    if (m->scan_error.uncorrected.measured) json_object_set_new(json, "without_corrections", uncorrected_json(m));
+    if (m->scan_error.uncorrected.measured) json_object_set_new(json, "without_corrections", uncorrected_json(c, m));
     json_object_set_new(json, "cloth_screening", screening_json(c, &m->cloth));
 }
 
-static void print_uncorrected(const struct pipeline_model *m, FILE *out)
+/* What the photographs say about the corrections, and what these gain. */
+static void print_uncorrected(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
     const struct pipeline_uncorrected *u = &m->scan_error.uncorrected;
+    double se, gain = heldout_gain(m, &se);
+    size_t n_asked = 0;
     if (!u->measured) return;
+    for (size_t k = 0; k < c->number.n; k++)
+        if (asked_for(c, m, k))
+            fprintf(out, "%s%s", n_asked++ == 0 ? "         the photographs ask for " : ", ", c->number.info[k].name);
+    fputs(n_asked > 0 ? "\n" : "         the photographs ask for none of these corrections\n", out);
+    if (isfinite(gain))
+        fprintf(out, "         the corrections %s the held-out error by %.4f +- %.4f%s\n",
+                gain < 0.0 ? "raise" : "lower", fabs(gain), se, gain < 2.0 * se ? ": not worth keeping" : "");
     fprintf(out, "         without these corrections: relative RMS error %.4f fitted", u->fit_rel_rms);
     if (isfinite(u->heldout_rel_rms)) fprintf(out, ", %.4f held out", u->heldout_rel_rms);
     fputs("\n", out);
@@ -87,6 +121,6 @@ void result_numbers_print(const struct pipeline_context *c, const struct pipelin
                 r->uncertainty.determined[p] ? "" : " these measurements do not determine it",
                 bound != NULL ? " at its bound: " : "", bound != NULL ? bound : "");
     }
-    print_uncorrected(m, out);
+    print_uncorrected(c, m, out);
     if (c->number.n > 0) fprintf(out, "         the errors of the parameters contain those of these numbers\n\n");
 }

@@ -1,5 +1,5 @@
-"""Jobs that correct the fibers of a file or a scan: a wrong radius is found and what its correction gains is stated,
-given corrections are applied, and documents that cannot be are refused."""
+"""Jobs that correct the fibers of a file or a scan: a wrong radius and a wrong height are found, what corrections gain is
+stated, given corrections are applied, and documents that cannot be are refused."""
 import json
 import os
 import shutil
@@ -12,12 +12,12 @@ from small_cloth import TABLE, hair
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 TRUTH = {"C_R": [0.06, 0.05, 0.08], "C_TT": [0.7, 0.5, 0.3], "beta_R": 6, "beta_TT": 20, "gamma_TT": 20}
 OUTPUT = {"render_px": 8, "render_samples": 1}
-THIN = 0.85
+THIN, HIGH = 0.85, 1 / 0.75
 
 
 @pytest.fixture(scope="module")
 def sample(tmp_path_factory):
-    """Photographs of a cloth, and its fibers with radii that are too small."""
+    """Photographs of a cloth, and its fibers with radii that are too small, or too high."""
     folder = tmp_path_factory.mktemp("sample")
     phantom = program("selvedge-phantom")
     subprocess.run([phantom, "cloth", "--weave", "twill", "--fibers-per-yarn", "7", "--cover", "0.7", "--out", str(folder)],
@@ -27,7 +27,9 @@ def sample(tmp_path_factory):
     subprocess.run([phantom, "photograph", "--fibers", str(folder / "truth.hair"), "--out", str(folder), "--px", "8",
                     "--paths", "20000", *given, "--quiet"], check=True)
     rows = [line.split() for line in (folder / "truth.txt").read_text().splitlines()]
-    (folder / "thin.txt").write_text("\n".join(" ".join([*r[:3], f"{THIN * float(r[3]):.9g}"]) if r else "" for r in rows) + "\n")
+    for name, factor in (("thin.txt", (1, THIN)), ("high.txt", (HIGH, 1))):
+        changed = [[*r[:2], *(f"{k * float(v):.9g}" for k, v in zip(factor, r[2:]))] if r else [] for r in rows]
+        (folder / name).write_text("\n".join(map(" ".join, changed)) + "\n")
     return folder
 
 
@@ -48,26 +50,44 @@ def small(tmp_path):
     return run
 
 
-@pytest.mark.slow
-def test_a_wrong_radius_is_corrected(tmp_path, sample):
+def corrected(job, sample, fibers, correction, path_budget=1200000):
+    """Result and summary of a job that corrects the fibers of a file, with all parameters known but C_TT."""
     known = {k: v for k, v in TRUTH.items() if k != "C_TT"}
-    job = tmp_path / "job"
     (job / "input").mkdir(parents=True)
     photographs = json.loads((sample / "photographs.json").read_text())
-    for name in ["thin.txt"] + [p["file"] for p in photographs]:
+    for name in [fibers] + [p["file"] for p in photographs]:
         shutil.copy(sample / name, job / "input")
     tile = json.loads((sample / "phantom.json").read_text())["result"]["tile_mm"]
-    fit = {"model": "two_lobe.v1", "path_budget": 1200000, "fixed": known, **OUTPUT}
-    assert run_job(job, {"sample": "thin", "fibers": {"file": "thin.txt", "tile_mm": tile}, "photographs": photographs,
-                         "correction": {"radius": {"lower": 0.8, "upper": 1.4}}, "fit": fit}) == 0
+    fit = {"model": "two_lobe.v1", "path_budget": path_budget, "fixed": known, **OUTPUT}
+    assert run_job(job, {"sample": fibers, "fibers": {"file": fibers, "tile_mm": tile}, "photographs": photographs,
+                         "correction": correction, "fit": fit}) == 0
     result = json.loads((job / "results" / "result.json").read_text())
-    (radius,) = result["cloth_numbers"]
-    print(radius["value"], radius["standard_error"], result["heldout_rel_rms"], result["without_corrections"])
-    assert radius["name"] == "radius" and radius["determined"]
-    assert abs(radius["value"] - 1 / THIN) < max(0.03, 3 * radius["standard_error"])
-    assert result["heldout_rel_rms"] < 0.5 * result["without_corrections"]["heldout_rel_rms"]
-    assert abs(result["geometry"]["mean_radius_um"] - 7 * THIN * radius["value"]) < 0.02
-    assert "without these corrections" in (job / "results" / "summary.txt").read_text()
+    print(result["cloth_numbers"], result["heldout_rel_rms"], result["without_corrections"])
+    return result, (job / "results" / "summary.txt").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fibers, name, true", [("thin.txt", "radius", 1 / THIN), ("high.txt", "compression", 1 / HIGH)])
+def test_wrong_fibers_are_corrected(tmp_path, sample, fibers, name, true):
+    result, summary = corrected(tmp_path / "job", sample, fibers, {name: {"lower": 0.7, "upper": 1.4}})
+    (number,) = result["cloth_numbers"]
+    without = result["without_corrections"]
+    assert number["name"] == name and number["determined"] and without["asked_for"] == [name]
+    assert abs(number["value"] - true) < max(0.03, 3 * number["standard_error"])
+    assert result["heldout_rel_rms"] < 0.5 * without["heldout_rel_rms"]
+    assert abs(without["heldout_gain"] - (without["heldout_rel_rms"] - result["heldout_rel_rms"])) < 1e-12
+    assert without["heldout_gain"] > 2 * without["heldout_gain_se"] > 0
+    assert abs(result["geometry"]["mean_radius_um"] - 7 * (THIN * number["value"] if name == "radius" else 1)) < 0.02
+    assert "without these corrections" in summary and f"the photographs ask for {name}\n" in summary
+    assert "lower the held-out error" in summary and "not worth keeping" not in summary
+
+
+@pytest.mark.slow
+def test_hairs_that_the_cloth_has_not_are_not_asked_for(tmp_path, sample):
+    result, summary = corrected(tmp_path / "job", sample, "truth.txt", {"hairs_per_mm2": {"lower": 0, "upper": 60}}, 600000)
+    (hairs,) = result["cloth_numbers"]
+    assert hairs["value"] < max(10, 2 * hairs["standard_error"])
+    assert result["without_corrections"]["asked_for"] == [] and "the photographs ask for none" in summary
 
 
 def test_given_corrections_are_applied(tmp_path, small):

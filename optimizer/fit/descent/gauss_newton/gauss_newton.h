@@ -27,7 +27,9 @@ struct gauss_newton {
     bool pulls;            /* whether there is a pull */
     bool at_misfit;        /* the pull ended because the fit had arrived at misfit */
     /* Of gauss_newton_judge_progress: the accepted point with the lowest objective since the pull ended, f with priors
-     * there, and the iterations since f last fell by more than its noise and a small share. */
+     * there (which noise may make negative), and the iterations since f last fell by more than its noise and a small
+     * share. */
+    bool judged; /* whether there has been such a point */
     double lowest_x[N], lowest_f;
     size_t n_stalled;
     size_t n_free; /* free parameters */

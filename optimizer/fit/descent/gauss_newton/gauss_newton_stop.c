@@ -103,9 +103,10 @@ bool gauss_newton_in_noise_trap(const struct gauss_newton *g)
 
 void gauss_newton_judge_progress(struct gauss_newton *g, double f, double se)
 {
-    const bool first = g->lowest_f <= 0.0, lower = first || f < g->lowest_f;
+    const bool first = !g->judged, lower = first || f < g->lowest_f;
     const bool progress = first || f < g->lowest_f - fmax(progress_share * g->lowest_f, se);
     g->n_stalled = progress ? 0 : g->n_stalled + 1;
+    g->judged = true;
     if (!lower) return;
     g->lowest_f = f;
     memcpy(g->lowest_x, g->model.x_ref, sizeof g->lowest_x);

@@ -241,6 +241,8 @@ static void test_thickness_without_hairs(void **state)
     assert_true(fabs(bare.thickness_m - bare.body_thickness_m) < 1e-9);
     assert_true(hairy.thickness_m > 1.3 * bare.thickness_m);
     assert_true(fabs(hairy.body_thickness_m / bare.thickness_m - 1.0) < 0.1);
+    assert_true(hairy.volume_fraction > 0.9 * bare.volume_fraction &&
+                hairy.volume_fraction < 2.0 * bare.volume_fraction);
 }
 
 /* Hairs leave the surface of their yarn: very short ones make a cloth of flat yarns hardly thicker. */
