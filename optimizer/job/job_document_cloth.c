@@ -90,6 +90,28 @@ static status read_number(const struct json_field *f, struct cloth_number *n, st
     return json_field_required_number(f, n->info->name, n->info->lower, n->info->upper, &n->value, err);
 }
 
+/* Which cloths have a number of the catalogue. */
+static const char *who_has(const struct cloth_number_info *i)
+{
+    if (strncmp(i->name, "cover_", 6) == 0) return "weaves without 'warp_per_cm' and 'weft_per_cm' have it";
+    switch (i->structures) {
+    case CLOTH_HAS_MELANGE:
+        return "it needs 'melange_with', the other kind of yarn";
+    case CLOTH_HAS_PLIES:
+        return "it needs 'plies' of 2 or more";
+    case CLOTH_HAS_WEAVE:
+        return "weaves and velvets have it";
+    case CLOTH_HAS_LOOPS:
+        return "knits have it";
+    case CLOTH_HAS_PILE:
+        return "velvets have it, those of a yarn for their last kind";
+    case CLOTH_HAS_FELT:
+        return "felts have it";
+    default:
+        return "cloths of yarns have it, not felts and piles";
+    }
+}
+
 /* Refuses numbers of the catalogue that this cloth, or this kind of yarn, does not have. */
 static status check_surplus(const struct json_field *f, int kind, const struct cloth_description *d, struct error *err)
 {
@@ -98,9 +120,7 @@ static status check_surplus(const struct json_field *f, int kind, const struct c
         if (!isnan(cloth_number_value(d, NULL, kind, i->name))) continue;
         char path[JSON_PATH_BYTES];
         json_field_path(f, i->name, path);
-        return error_set_field(err, STATUS_INVALID, path,
-                               "this cloth has no number '%s': its structure, its plies or other keys do not allow it",
-                               path);
+        return error_set_field(err, STATUS_INVALID, path, "this cloth has no number '%s': %s", path, who_has(i));
     }
     return STATUS_OK;
 }

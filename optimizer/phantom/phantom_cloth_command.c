@@ -308,7 +308,7 @@ static json_t *describe(const struct cloth *c)
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
 }
 
-/* cloth.json: what a job takes as its section "cloth" for the same cloth, or for the nearest that can be described. */
+/* cloth.json: what a job takes as its section "cloth" for the same cloth (numbers with all digits), or for the nearest. */
 static status write_description(const struct cloth *c, struct error *err)
 {
     char path[4096];
@@ -320,7 +320,6 @@ static status write_description(const struct cloth *c, struct error *err)
         st = phantom_described_as(&c->phantom, &c->report, &c->fibers, &nearest, err);
     if (st != STATUS_OK) return st;
     json_t *json = cloth_section_json(d, NULL);
-    /* all digits, as in result.json: the same cloth to the last bit */
     char *text = json_dumps(json, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));
     json_decref(json);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);

@@ -1,5 +1,7 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
+#include "base/option_id.h"
+#include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/cloth/quality.h"
 #include "optimizer/worker/report/result_json.h"
@@ -8,6 +10,20 @@
 #include "optimizer/worker/stages/result/pipeline_advice.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "optimizer/worker/stages/result/pipeline_skill.h"
+
+/* Depth by which fibers run into each other, over their diameter and as a mean over all points, above which a described
+ * cloth has more fiber than fits. Default numbers make 0 to 0.07; a packing of 0.85 makes 0.14. */
+static const double most_overlap = 0.1;
+
+static void warn_of_overlap(const struct pipeline_context *c)
+{
+    if (c->doc->cloth == NULL || !(c->cloth.overlap_mean > most_overlap)) return;
+    worker_status_warn(
+        c->status,
+        "'%s' asks for more fiber than fits: its fibers run into each other by %.0f %% of their diameter "
+        "on average; lower packing or cover, or raise compression",
+        job_option_key(OPTION_CLOTH), 100.0 * c->cloth.overlap_mean);
+}
 
 /* Of a job that ends with the geometry. */
 static status report_geometry(struct pipeline_context *c, struct error *err)
@@ -26,6 +42,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_use(c, pipeline_best_model(c), err);
+    if (s == STATUS_OK) warn_of_overlap(c);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);

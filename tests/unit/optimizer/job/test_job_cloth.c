@@ -138,13 +138,13 @@ static void test_mistakes_are_named(void **state)
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[0,1]"), "cloth.warp", "one of the 1 kinds");
     job_document_check_error(CLOTH("\"weave\":\"twill\",\"tile_wefts\":6"), "cloth.tile_wefts", "multiple of 4");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1.5"), "cloth.crimp", "1");
-    job_document_check_error(CLOTH("\"weave\":\"felt\",\"crimp\":0.5"), "cloth.crimp", "has no number");
+    job_document_check_error(CLOTH("\"weave\":\"felt\",\"crimp\":0.5"), "cloth.crimp", "weaves and velvets have it");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp_per_cm\":30,\"cover_warp\":1"), "cloth.cover_warp",
-                             "has no number");
+                             "weaves without 'warp_per_cm'");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"packing\":0.95}]"), "cloth.yarns[0].packing",
                              "0.85");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange\":0.5}]"), "cloth.yarns[0].melange",
-                             "has no number");
+                             "'melange_with'");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange_with\":0}]"),
                              "cloth.yarns[0].melange_with", "another");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"fibers\":5000}]"), "cloth.yarns[0].fibers",
