@@ -1,5 +1,6 @@
 """Jobs whose cloth is described with a photograph of its texture: the draft comes from it, or is compared with it."""
 import os
+import random
 
 import pytest
 from daemon_under_test import problem, program
@@ -65,6 +66,31 @@ def test_a_contradiction_is_named(real):
     assert state["result"]["geometry"]["cloth"]["weave"] == "plain"
     warning = next(text for text in state["warnings"] if "weave.png" in text)
     assert "'twill 2/1'" in warning and "the job says 'plain'" in warning
+
+
+def noisy(draft):
+    """A weave under so much noise that its draft is found, but not certain."""
+    grey, rng = weave(draft), random.Random(1)
+    return png(192, lambda x, y: min(255, max(0, 0.4 * grey(x, y) + 80 + rng.uniform(-140, 140))))
+
+
+def test_an_uncertain_draft_is_taken_with_a_warning(real):
+    state = finish(real, {"tile_warps": 3, "tile_wefts": 3}, noisy(TWILL))
+    confidence = state["result"]["geometry"]["texture"]["confidence"]["draft"]
+    assert 0.2 < confidence < 0.7
+    warning = next(text for text in state["warnings"] if "weave.png" in text)
+    assert "not certain of it" in warning and f"(confidence {confidence:.2f})" in warning
+
+
+def test_an_uncertain_contradiction(real):
+    state = finish(real, {"weave": "plain", "tile_warps": 2, "tile_wefts": 2}, noisy(TWILL))
+    warning = next(text for text in state["warnings"] if "weave.png" in text)
+    assert "the job says 'plain'" in warning and "the photograph is not certain" in warning
+
+
+def test_a_certain_draft_is_taken_without_a_warning(real):
+    state = finish(real, {"tile_warps": 3, "tile_wefts": 3}, png(192, weave(TWILL)))
+    assert not any("weave.png" in text for text in state["warnings"])
 
 
 def test_a_photograph_without_texture(real):

@@ -37,6 +37,17 @@ def test_from_description_to_results(real):
     assert "fibers.hair" in files and "quality.html" in files
 
 
+def test_more_fiber_than_fits(real):
+    """Yarns whose fibers cannot lie beside each other are rendered, with a warning that says so."""
+    for packing, warned in ((0.85, True), (0.5, False)):
+        job = start(real, {"weave": "plain", "tile_warps": 2, "tile_wefts": 2, "yarns": [{"fibers": 40, "packing": packing}]})
+        state = real.wait_state(job, "succeeded", timeout_s=120)
+        overlap = state["result"]["geometry"]["cloth"]["made"]["overlap_mean"]
+        said = [text for text in state["warnings"] if "more fiber than fits" in text]
+        assert (overlap > 0.1) == warned and len(said) == warned, (overlap, said)
+        assert not warned or f"by {100 * overlap:.0f} % of their diameter" in said[0]
+
+
 def test_a_result_describes_its_cloth_to_another_job(real):
     """With kinds of yarn that have names, and with a number that is searched in the first job."""
     first = start(real, {"draft": ["10", "01"], "tile_warps": 2, "tile_wefts": 4, "weft": [1], "warp_per_cm": 50,
