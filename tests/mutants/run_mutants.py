@@ -265,12 +265,14 @@ def build_for(test):
     return make(*([test.program] if test.program else (f"build/bin/{p}" for p in PROGRAMS))).returncode == 0
 
 
-def passes_without(test, target, original):
-    """Whether a test that failed with a fault passes without it: it may fail for other reasons on a busy machine."""
+def caught_by(test, failed_after_s, limit_s, target, original):
+    """Whether a test that failed, or had no end within its limit, has caught the fault: it passes without the fault, and in far
+    less time. On a busy machine it may fail for other reasons."""
     mutated = target.read_text()
     target.write_text(original)
     try:
-        return build_for(test) and test.run(max(SLOW_S, SLOW_FACTOR * test.seconds))[0]
+        passed, seconds = test.run(SLOW_FACTOR * limit_s) if build_for(test) else (False, 0.0)
+        return passed and (failed_after_s < limit_s or failed_after_s > 0.5 * SLOW_FACTOR * seconds)
     finally:
         target.write_text(mutated)
 
@@ -283,8 +285,9 @@ def try_tests(fault, selection, original, limit_s):
             return "unfinished", "", time.monotonic() - start
         if not build_for(t):
             return "invalid", t.name, 0.0
-        passed, _ = t.run(max(SLOW_S, SLOW_FACTOR * t.seconds))
-        if not passed and passes_without(t, TREE / fault.path, original):
+        test_limit_s = max(SLOW_S, SLOW_FACTOR * t.seconds)
+        passed, seconds = t.run(test_limit_s)
+        if not passed and caught_by(t, seconds, test_limit_s, TREE / fault.path, original):
             return "caught", t.name, time.monotonic() - start
     return "survived", "", time.monotonic() - start
 
