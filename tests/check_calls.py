@@ -31,15 +31,16 @@ def objects_of(build):
 
 def calls_of(objects):
     """Source -> {source that it needs: the symbols}."""
-    home, wanted = {}, {}
-    for source, path in sorted(objects.items()):
-        wanted[source] = set()
-        for line in subprocess.run(["nm", path], check=True, capture_output=True, text=True).stdout.splitlines():
-            *_, kind, symbol = line.split()
-            if kind == "U":
-                wanted[source].add(symbol)
-            elif kind in "TDBR":
-                home[symbol] = source
+    home, wanted = {}, {source: set() for source in objects}
+    source_of = {path: source for source, path in objects.items()}
+    listed = subprocess.run(["nm", "-A", *sorted(source_of)], check=True, capture_output=True, text=True).stdout
+    for line in listed.splitlines():
+        path, _, symbols = line.partition(".o:")
+        *_, kind, symbol = symbols.split()
+        if kind == "U":
+            wanted[source_of[path + ".o"]].add(symbol)
+        elif kind in "TDBR":
+            home[symbol] = source_of[path + ".o"]
     needs = {source: collections.defaultdict(list) for source in objects}
     for source, symbols in wanted.items():
         for symbol in sorted(symbols):
