@@ -74,6 +74,8 @@ struct reconstruct_report {
     double radius_se_m[3]; /* standard error; NaN where the radius was given */
     /* Radius of the profile that was fitted to the axes: a second measurement, by the edges instead of the mass. */
     double profile_radius_m;
+    double radius_spread;      /* standard deviation of the radii of single fibers over their mean, without errors */
+    double single_radius_se_m; /* typical standard error of the radius of one fiber by the scan's noise */
     /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
     double axis_position_se_m, axis_direction_se_rad;
     bool radius_per_axis;          /* each class has a radius of its own */

@@ -10,7 +10,6 @@
 #include "geometry/fibers/lines/linking.h"
 #include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/shape/radius.h"
-#include "geometry/fibers/shape/relax.h"
 #include "geometry/fibers/shape/smoothing.h"
 #include "geometry/fibers/slices/centers.h"
 
@@ -21,7 +20,8 @@
 enum {
     MIN_PIECE = 4,  /* least number of centers in a chain before joining */
     N_REPAIR = 2,   /* rounds of growing, joining and cutting */
-    N_FIT = 4,      /* rounds of fitting axes to the scan */
+    N_CENTER = 2,   /* rounds of fitting pieces of lines to the scan */
+    N_FIT = 4,      /* rounds of fitting whole lines */
     MAX_GROWTH = 64 /* voxels by which an end may grow */
 };
 
@@ -38,8 +38,9 @@ struct fiber_job {
     struct thread_pool *pool;
     struct reconstruct_report *report;
     struct progress inner;
-    struct progress_part part; /* progress that inner reports to */
-    double diameter;           /* voxels */
+    struct progress_part part;   /* progress that inner reports to */
+    double diameter;             /* voxels */
+    struct axis_profile profile; /* of the lines so far */
 };
 
 static void enter_part(struct fiber_job *job, double from, double to)
@@ -172,10 +173,15 @@ static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool 
     return s;
 }
 
-static status relax(struct fiber_job *job, struct polyline_set *lines, int n_round, struct error *err)
+static struct axis_profile start_profile(const struct fiber_job *job)
 {
-    return polylines_relax(lines, job->v, (float)(0.6 * job->diameter), n_round, job->o->smooth_alpha, job->pool,
-                           &job->inner, err);
+    return (struct axis_profile){.radius = 0.5 * job->diameter, .radius_spread = 0.3, .blur = 0.8, .high = 1.0};
+}
+
+/* Moves lines that are still in pieces towards their axes, and finds their radii. */
+static status center(struct fiber_job *job, struct polyline_set *lines, struct error *err)
+{
+    return polylines_fit(lines, job->v, job->diameter, N_CENTER, &job->profile, job->pool, &job->inner, err);
 }
 
 static bool is_inside(const struct fiber_job *job, const float x[3])
@@ -206,7 +212,8 @@ static status keep_inside(const struct fiber_job *job, const struct polyline_set
 /* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, with errors for the report. */
 static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool last, struct error *err)
 {
-    struct axis_profile profile = {.radius = 0.5 * job->diameter, .blur = 0.8, .high = 1.0, .measured_curvature = last};
+    struct axis_profile profile = start_profile(job);
+    profile.measured_curvature = last;
     const double voxel_m = job->v->voxel_size_m[0];
     struct polyline_set even, inside;
     polyline_set_init(&even);
@@ -218,6 +225,8 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool l
         job->report->axis_position_se_m = profile.position_se * voxel_m;
         job->report->axis_direction_se_rad = profile.direction_se_rad;
         job->report->profile_radius_m = profile.radius * voxel_m;
+        job->report->radius_spread = profile.radius_spread;
+        job->report->single_radius_se_m = profile.radius_se * profile.radius * voxel_m;
         polyline_set_release(lines);
         *lines = inside;
         polyline_set_init(&inside);
@@ -270,9 +279,9 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     enter_part(job, 0.6, 0.65);
     if (s == STATUS_OK) s = repair_lines(job, &part[0], false, &part[1], &counts, err);
     for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
-        s = relax(job, &part[1], 2, err);
+        s = center(job, &part[1], err);
         if (s == STATUS_OK) s = repair_lines(job, &part[1], true, &part[2], &counts, err);
-        if (s == STATUS_OK) s = relax(job, &part[2], 2, err);
+        if (s == STATUS_OK) s = center(job, &part[2], err);
         if (s == STATUS_OK) s = repair_lines(job, &part[2], false, &part[1], &counts, err);
     }
     if (s == STATUS_OK) s = repair_lines(job, &part[1], true, &part[0], &counts, err);
@@ -280,7 +289,7 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         classify(&part[0]); /* from classes of subvolumes to axis classes */
         s = smooth_and_drop(job, &part[0], lines, err);
     }
-    if (s == STATUS_OK) s = relax(job, lines, 2, err);
+    if (s == STATUS_OK) s = center(job, lines, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
     if (s == STATUS_OK)
@@ -302,13 +311,42 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     return s;
 }
 
-static status find_radius(struct fiber_job *job, const struct polyline_set *lines, struct error *err)
+/* Root of the mean square of the radii from the profile, by length, of the lines of a class; class 3: of all. The mass
+ * that the radius of a class follows from is proportional to this square. */
+static double rms_radius_voxel(const struct polyline_set *lines, int class)
+{
+    double square = 0.0, length = 0.0;
+    for (size_t l = 0; l < lines->n_line; l++) {
+        if (class < 3 && lines->axis[l] != class) continue;
+        double n = (double)polyline_length(lines, l);
+        square += n * (double)lines->radius[l] * (double)lines->radius[l];
+        length += n;
+    }
+    return length > 0.0 ? sqrt(square / length) : 1.0;
+}
+
+/* Gives every line the radius of its fiber in voxels: that of its profile, scaled so that all fibers of a class together
+ * have the mass measured; or the one radius that the job asks for. */
+static void set_radii(const struct fiber_job *job, bool given, struct polyline_set *lines)
+{
+    double scale[3], voxel_m = job->v->voxel_size_m[0];
+    bool single = !given && job->o->radius_rule == RADIUS_AUTO;
+    for (int a = 0; a < 3; a++)
+        scale[a] = job->o->radius_m[a] / voxel_m / rms_radius_voxel(lines, job->report->radius_per_axis ? a : 3);
+    for (size_t l = 0; l < lines->n_line; l++) {
+        uint8_t a = lines->axis[l];
+        lines->radius[l] = (float)(single ? scale[a] * (double)lines->radius[l] : job->o->radius_m[a] / voxel_m);
+    }
+}
+
+static status find_radius(struct fiber_job *job, struct polyline_set *lines, struct error *err)
 {
     /* the last one is the sum of the others */
     struct distance_histogram *part = malloc((RADIUS_PARTS + 1) * sizeof *part), *all;
     struct reconstruct_report *report = job->report;
     struct radius_measure m;
     double voxel_m = job->v->voxel_size_m[0];
+    const bool is_given = !isnan(job->o->radius_m[0]);
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
     enter_part(job, 0.65, 1.0);
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
@@ -326,6 +364,7 @@ static status find_radius(struct fiber_job *job, const struct polyline_set *line
             report->radius_score[a] = radius_score(all, m.per_axis ? 1u << a : 7u, job->o->radius_m[a] / voxel_m);
         }
     }
+    if (s == STATUS_OK) set_radii(job, is_given, lines);
     free(part);
     return s;
 }
@@ -341,7 +380,7 @@ static status to_fiber_set(const struct fiber_job *job, const struct polyline_se
         for (size_t a = 0; a < 3; a++) f->position_m[3 * i + a] = (float)((double)lines->vertex[i][a] * voxel_m);
     for (size_t l = 0; l < lines->n_line; l++) {
         f->axis_class[l] = lines->axis[l];
-        f->radius_m[l] = (float)job->o->radius_m[lines->axis[l]];
+        f->radius_m[l] = (float)((double)lines->radius[l] * voxel_m);
     }
     f->tile_size_m[0] = (double)job->v->n[0] * voxel_m;
     f->tile_size_m[1] = (double)job->v->n[1] * voxel_m;
@@ -358,6 +397,7 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
     struct fiber_job job = {.v = v, .d = d, .o = o, .pool = pool, .report = report, .part = {.outer = progress}};
     job.inner = progress_of_part(&job.part);
     job.diameter = report->fiber_diameter_voxel;
+    job.profile = start_profile(&job);
     struct polyline_set lines;
     polyline_set_init(&lines);
     fiber_set_init(f);

@@ -14,7 +14,7 @@ struct live_grid {
     size_t n[3];
     uint32_t *head; /* per cell: number of its first entry + 1 */
     struct live_entry {
-        float x[3];
+        float x[3], radius2; /* radius2: square of the radius of its fiber */
         uint32_t line, next;
         bool is_end; /* within a few vertices of an end of its line */
     } * entry;
@@ -37,7 +37,7 @@ static size_t cell_of(const struct live_grid *g, const float x[3])
     return (c[2] * g->n[1] + c[1]) * g->n[0] + c[0];
 }
 
-static bool grid_add(struct live_grid *g, const float x[3], uint32_t line, bool is_end)
+static bool grid_add(struct live_grid *g, const float x[3], float radius, uint32_t line, bool is_end)
 {
     if (g->n_entry == g->capacity) {
         size_t n = g->capacity == 0 ? 4096 : 2 * g->capacity;
@@ -49,6 +49,7 @@ static bool grid_add(struct live_grid *g, const float x[3], uint32_t line, bool 
     struct live_entry *e = &g->entry[g->n_entry];
     size_t c = cell_of(g, x);
     memcpy(e->x, x, sizeof e->x);
+    e->radius2 = radius * radius;
     e->line = line;
     e->is_end = is_end;
     e->next = g->head[c];
@@ -58,7 +59,7 @@ static bool grid_add(struct live_grid *g, const float x[3], uint32_t line, bool 
 
 /* Vertices of other lines near a point. */
 struct near_vertices {
-    float at[MAX_NEAR][3]; /* some of them, n */
+    float at[MAX_NEAR][3], radius2[MAX_NEAR]; /* some of them, n */
     size_t n;
     uint32_t nearest; /* index of its entry; UINT32_MAX: there is none */
     float least2;     /* squared distance of the nearest; infinite without one */
@@ -90,12 +91,16 @@ static void find_near(const struct live_grid *g, const float x[3], uint32_t line
                         near->least2 = d2;
                         near->nearest = i - 1;
                     }
-                    if (near->n < MAX_NEAR) memcpy(near->at[near->n++], e->x, sizeof *near->at);
+                    if (near->n == MAX_NEAR) continue;
+                    near->radius2[near->n] = e->radius2;
+                    memcpy(near->at[near->n++], e->x, sizeof *near->at);
                 }
 }
 
 /* Finds the material in the disk of radius r and thickness 1.5 around x, perpendicular to t, that is nearer to x
- * than to the neighbours: its mean perpendicular offset, and the mean density within half of r of x. Near a face
+ * than to the neighbours: its mean perpendicular offset, and the mean density within half of r of x. The squared radius
+ * of a fiber is taken off its squared distances, so that the border between touching fibers of different thickness is
+ * where they touch. Near a face
  * only voxels whose mirror image through x lies in the volume count, or the walk would turn along the face. */
 static bool disk_centroid(const struct walk *w, const float x[3], const float t[3], float r,
                           const struct near_vertices *near, float offset[3], float *core)
@@ -128,7 +133,7 @@ static bool disk_centroid(const struct walk *w, const float x[3], const float t[
                         float e = p[a] + x[a] - near->at[k][a];
                         e2 += e * e;
                     }
-                    mine = e2 > across2;
+                    mine = e2 - near->radius2[k] > across2 - r * r;
                 }
                 float density = w->v->density[volume_index(n, (size_t)i[0], (size_t)i[1], (size_t)i[2])];
                 if (across2 <= 0.25f * r * r) {
@@ -146,6 +151,11 @@ static bool disk_centroid(const struct walk *w, const float x[3], const float t[
     return true;
 }
 
+static float fiber_radius(const struct walk *w, const struct polyline_set *lines, size_t l)
+{
+    return lines->radius[l] > 0.0f ? lines->radius[l] : 0.5f * w->o->diameter_voxel;
+}
+
 static float normalise(float t[3])
 {
     float norm = sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
@@ -153,12 +163,11 @@ static float normalise(float t[3])
     return norm;
 }
 
-/* Walks from position x with unit tangent t and writes at most max_step positions. A walk that reaches the middle of
- * another line did not follow a fiber of its own, so all of it is discarded. */
-static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], float (*path)[3])
+/* Walks from position x with unit tangent t along a fiber of radius r and writes at most max_step positions. A walk that
+ * reaches the middle of another line did not follow a fiber of its own, so all of it is discarded. */
+static int walk_on(const struct walk *w, uint32_t line, float r, float x[3], float t[3], float (*path)[3])
 {
     struct near_vertices near;
-    float r = 0.5f * w->o->diameter_voxel, stop2 = 0.25f * w->o->diameter_voxel * w->o->diameter_voxel;
     int n = 0;
     while (n < w->o->max_step && n < MAX_WALK) {
         float y[3], offset[3], core;
@@ -169,7 +178,7 @@ static int walk_on(const struct walk *w, uint32_t line, float x[3], float t[3], 
         }
         if (outside) break;
         find_near(&w->grid, y, line, r + w->o->diameter_voxel, &near);
-        if (near.least2 < stop2) return w->grid.entry[near.nearest].is_end ? n : 0;
+        if (near.least2 < r * r) return w->grid.entry[near.nearest].is_end ? n : 0;
         if (!disk_centroid(w, y, t, r, &near, offset, &core) || core < w->o->eps_d) break;
         float u[3], cosine = 0.0f, length;
         for (int a = 0; a < 3; a++) {
@@ -203,19 +212,19 @@ static void end_tangent(const struct polyline_set *p, size_t line, bool last, fl
 static status grow_line(struct walk *w, const struct polyline_set *lines, size_t l, struct polyline_set *result,
                         size_t *n_grown, struct error *err)
 {
-    float path[2][MAX_WALK][3], x[3], t[3];
+    float path[2][MAX_WALK][3], x[3], t[3], radius = fiber_radius(w, lines, l);
     int n[2];
     status s = STATUS_OK;
     scratch_keep_within(w->v->space);
     for (int e = 0; e < 2; e++) {
         end_tangent(lines, l, e == 1, x, t);
-        n[e] = walk_on(w, (uint32_t)l, x, t, path[e]);
+        n[e] = walk_on(w, (uint32_t)l, radius, x, t, path[e]);
         for (int i = 0; i < n[e]; i++)
-            if (!grid_add(&w->grid, path[e][i], (uint32_t)l, i + NEAR_END >= n[e])) s = STATUS_NO_MEMORY;
+            if (!grid_add(&w->grid, path[e][i], radius, (uint32_t)l, i + NEAR_END >= n[e])) s = STATUS_NO_MEMORY;
         *n_grown += (size_t)n[e];
     }
     if (s != STATUS_OK) return error_set(err, s, "cannot grow fibers: out of memory");
-    s = polyline_begin(result, lines->axis[l], err);
+    s = polyline_begin_like(result, lines, l, err);
     for (int i = n[0] - 1; i >= 0 && s == STATUS_OK; i--) s = polyline_add(result, path[0][i], err);
     for (size_t i = lines->first[l]; i < lines->first[l + 1] && s == STATUS_OK; i++)
         s = polyline_add(result, lines->vertex[i], err);
@@ -234,7 +243,7 @@ status polylines_grow(const struct polyline_set *lines, const struct volume *v, 
     bool failed = w.grid.head == NULL;
     for (size_t l = 0; l < lines->n_line && !failed; l++)
         for (size_t i = lines->first[l]; i < lines->first[l + 1] && !failed; i++)
-            failed = !grid_add(&w.grid, lines->vertex[i], (uint32_t)l,
+            failed = !grid_add(&w.grid, lines->vertex[i], fiber_radius(&w, lines, l), (uint32_t)l,
                                i < lines->first[l] + NEAR_END || i + NEAR_END >= lines->first[l + 1]);
     if (failed) s = error_set(err, STATUS_NO_MEMORY, "cannot grow fibers: out of memory");
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) s = grow_line(&w, lines, l, result, n_grown, err);

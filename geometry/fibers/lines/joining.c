@@ -12,6 +12,8 @@ enum { MAX_TRIM = 6, TRIM_STEP = 3 };
  * diameter or more. */
 static const float FACE_STEPS = 1.5f;                              /* voxels along the fiber to a face */
 static const double MAX_RMS = 0.13, MAX_BEND = 1.2, MAX_GAP = 1.5; /* diameters, per diameter, diameters */
+/* Logarithm of the ratio of two radii that makes a join as unlikely as a curve of the largest bend. */
+static const double UNLIKE = 0.3;
 
 struct join {
     double cost;
@@ -27,7 +29,8 @@ struct join_list {
 struct join_job {
     const struct polyline_set *lines;
     const struct volume *v;
-    double diameter, eps_d;
+    double diameter, eps_d; /* typical diameter */
+    float largest_radius;
     struct vertex_grid grid; /* of all vertices */
 };
 
@@ -46,11 +49,17 @@ static double density_at(const struct volume *v, const double x[3])
     return sum / 7.0;
 }
 
-/* Returns whether a third line passes within half a diameter of x. */
+/* Radius of the fiber of line l. */
+static float radius_of(const struct join_job *job, size_t l)
+{
+    return job->lines->radius[l] > 0.0f ? job->lines->radius[l] : (float)(0.5 * job->diameter);
+}
+
+/* Returns whether x lies inside of a third line. */
 static bool is_claimed(const struct join_job *job, const float x[3], uint32_t a, uint32_t b)
 {
     const struct vertex_grid *g = &job->grid;
-    float near = (float)(0.5 * job->diameter);
+    float near = job->largest_radius;
     size_t from[3], to[3], c[3];
     vertex_grid_range(g, x, near, from, to);
     for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
@@ -62,7 +71,8 @@ static bool is_claimed(const struct join_job *job, const float x[3], uint32_t a,
                     if (g->line_of[g->vertex[k]] == a / 2 || g->line_of[g->vertex[k]] == b / 2) continue;
                     float d2 = 0.0f;
                     for (int e = 0; e < 3; e++) d2 += (x[e] - y[e]) * (x[e] - y[e]);
-                    if (d2 < near * near) return true;
+                    float inside = radius_of(job, g->line_of[g->vertex[k]]);
+                    if (d2 < inside * inside) return true;
                 }
             }
     return false;
@@ -120,16 +130,18 @@ static struct join best_join(const struct join_job *job, uint32_t a, uint32_t b)
 {
     struct join best = {.cost = INFINITY, .a = a, .b = b};
     if (!may_face(job, a, b)) return best;
+    const double ra = (double)radius_of(job, a / 2), rb = (double)radius_of(job, b / 2), diameter = ra + rb;
+    const double unlike = log(ra / rb) / UNLIKE;
     size_t longest[2] = {polyline_length(job->lines, a / 2) / 4, polyline_length(job->lines, b / 2) / 4};
     uint8_t trim[2];
     for (trim[0] = 0; trim[0] <= MAX_TRIM && trim[0] <= longest[0]; trim[0] = (uint8_t)(trim[0] + TRIM_STEP))
         for (trim[1] = 0; trim[1] <= MAX_TRIM && trim[1] <= longest[1]; trim[1] = (uint8_t)(trim[1] + TRIM_STEP)) {
             struct join_curve j;
             if (!join_curve_fit(job->lines, a, b, trim, &j)) continue;
-            double rms = j.rms / job->diameter, bend = j.bend * job->diameter, gap = j.gap / job->diameter;
+            double rms = j.rms / diameter, bend = j.bend * diameter, gap = j.gap / diameter;
             if (rms > MAX_RMS || bend > MAX_BEND || gap > MAX_GAP + 0.15 * (trim[0] + trim[1])) continue;
             double cost = (rms / MAX_RMS) * (rms / MAX_RMS) + 0.5 * (bend / MAX_BEND) * (bend / MAX_BEND) + 0.3 * gap +
-                          0.04 * (trim[0] + trim[1]);
+                          0.04 * (trim[0] + trim[1]) + 0.5 * unlike * unlike;
             if (cost >= best.cost || !is_way_free(job, &j, a, b)) continue;
             best.cost = cost;
             memcpy(best.trim, trim, sizeof trim);
@@ -276,12 +288,17 @@ static status emit_joined(const struct polyline_set *lines, const uint32_t *part
     status s = STATUS_OK;
     for (uint32_t e = 0; e < 2 * lines->n_line && s == STATUS_OK; e++) {
         if (partner[e] != UINT32_MAX || done[e / 2]) continue;
-        s = polyline_begin(out, lines->axis[e / 2], err);
+        double sum = 0.0, weight = 0.0;
+        s = polyline_begin_like(out, lines, e / 2, err);
         for (uint32_t at = e; at != UINT32_MAX && s == STATUS_OK; at = partner[at ^ 1u]) {
+            double length = lines->radius[at / 2] > 0.0f ? (double)polyline_length(lines, at / 2) : 0.0;
+            sum += length * (double)lines->radius[at / 2];
+            weight += length;
             if (at != e) s = fill_gap(lines, partner[at], at, trim, out, err);
             if (s == STATUS_OK) s = append_line(lines, at, trim, out, err);
             done[at / 2] = true;
         }
+        if (s == STATUS_OK && weight > 0.0) out->radius[out->n_line - 1] = (float)(sum / weight);
     }
     return s;
 }
@@ -304,6 +321,8 @@ status polylines_join(const struct polyline_set *lines, const struct volume *v, 
         partner[2 * l] = partner[2 * l + 1] = UINT32_MAX;
         parent[l] = (uint32_t)l;
     }
+    job.largest_radius = (float)(0.5 * diameter_voxel);
+    for (size_t l = 0; l < n; l++) job.largest_radius = fmaxf(job.largest_radius, lines->radius[l]);
     s = vertex_grid_init(&job.grid, lines, v->n, (float)fmax(3.0, diameter_voxel), err);
     if (s == STATUS_OK) s = find_joins(&job, &joins, err);
     if (s != STATUS_OK) goto out;

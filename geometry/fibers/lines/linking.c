@@ -67,6 +67,13 @@ static void match(struct edge_list *edges, uint32_t *next, uint32_t *previous)
     }
 }
 
+static float mean_radius(const struct center_list *list, const uint32_t *next, uint32_t first)
+{
+    double sum = 0.0, n = 0.0;
+    for (uint32_t c = first; c != NONE; c = next[c], n += 1.0) sum += (double)list->center[c].radius;
+    return (float)(sum / n);
+}
+
 static status emit_chains(const struct center_list *list, const struct slice_frame *frame, size_t min_vertex,
                           const uint32_t *next, const uint32_t *previous, struct polyline_set *lines, size_t *n_chain,
                           struct error *err)
@@ -80,6 +87,7 @@ static status emit_chains(const struct center_list *list, const struct slice_fra
             *n_chain += length > 1;
             if (length < min_vertex) continue;
             s = polyline_begin(lines, (uint8_t)frame->index, err);
+            if (s == STATUS_OK) lines->radius[lines->n_line - 1] = mean_radius(list, next, (uint32_t)i);
             for (uint32_t c = (uint32_t)i; c != NONE && s == STATUS_OK; c = next[c], slice++) {
                 float x[3];
                 slice_frame_point(frame, list->center[c].u, list->center[c].v, (float)slice + 0.5f, x);

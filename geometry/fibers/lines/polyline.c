@@ -12,6 +12,7 @@ void polyline_set_release(struct polyline_set *p)
     free(p->first);
     free(p->vertex);
     free(p->axis);
+    free(p->radius);
     *p = (struct polyline_set){0};
 }
 
@@ -28,13 +29,23 @@ status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err)
         if (first != NULL) p->first = first;
         uint8_t *axes = realloc(p->axis, n);
         if (axes != NULL) p->axis = axes;
-        if (first == NULL || axes == NULL) return no_memory(err);
+        float *radius = realloc(p->radius, n * sizeof *radius);
+        if (radius != NULL) p->radius = radius;
+        if (first == NULL || axes == NULL || radius == NULL) return no_memory(err);
         p->line_capacity = n;
     }
     p->axis[p->n_line] = axis;
+    p->radius[p->n_line] = 0.0f;
     p->first[p->n_line] = p->first[p->n_line + 1] = p->n_vertex;
     p->n_line++;
     return STATUS_OK;
+}
+
+status polyline_begin_like(struct polyline_set *p, const struct polyline_set *from, size_t line, struct error *err)
+{
+    status s = polyline_begin(p, from->axis[line], err);
+    if (s == STATUS_OK) p->radius[p->n_line - 1] = from->radius[line];
+    return s;
 }
 
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
@@ -55,7 +66,7 @@ status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
                          struct error *err)
 {
-    status s = polyline_begin(p, from->axis[line], err);
+    status s = polyline_begin_like(p, from, line, err);
     for (; i < end && s == STATUS_OK; i++) s = polyline_add(p, from->vertex[i], err);
     return s;
 }

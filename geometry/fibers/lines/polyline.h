@@ -12,13 +12,15 @@ struct polyline_set {
     size_t *first; /* n_line + 1 entries */
     float (*vertex)[3];
     uint8_t *axis; /* per line: index of the subvolume (slice frame) it was found in; later its axis class */
+    float *radius; /* per line: radius of the fiber, voxels; 0 while it is not known */
 };
 
 void polyline_set_init(struct polyline_set *p);
 void polyline_set_release(struct polyline_set *p);
-/* polyline_begin starts a line, and polyline_add adds a vertex to it. STATUS_NO_MEMORY; STATUS_TOO_LARGE at 2^32
- * vertices. */
+/* polyline_begin starts a line of unknown radius, polyline_begin_like one with the axis and radius of another line, and
+ * polyline_add adds a vertex to the last line. STATUS_NO_MEMORY; STATUS_TOO_LARGE at 2^32 vertices. */
 status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err);
+status polyline_begin_like(struct polyline_set *p, const struct polyline_set *from, size_t line, struct error *err);
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
 /* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line. */
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,

@@ -82,6 +82,7 @@ status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *
             memcpy(g->b, lines->vertex[i + 1], sizeof g->b);
             g->line = (uint32_t)l;
             g->axis = lines->axis[l];
+            g->radius = lines->radius[l];
             g->is_first = i == lines->first[l];
             g->is_last = i + 2 == lines->first[l + 1];
         }
@@ -102,6 +103,7 @@ status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_s
             }
             g->line = (uint32_t)l;
             g->axis = f->axis_class[l];
+            g->radius = (float)((double)f->radius_m[l] / voxel_size_m[0]);
             g->is_first = i == f->first_vertex[l];
             g->is_last = i + 2 == f->first_vertex[l + 1];
         }

@@ -7,16 +7,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK, N_TABLE = 512 };
+enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK };
 static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
 /* Bounds of the measured standard deviation of a fiber's curvature, per diameter. */
 static const double CURVATURE_LEAST = 0.05, CURVATURE_MOST = 0.35;
-static const double TAIL = 2.5; /* distance beyond the radius up to which a fiber is modelled, in units of the blur */
 
 /* Sums over one brick: for the vertices of its segments, and for the profile. */
 struct brick_sum {
-    struct axis_pull *pull;                           /* two for each segment of the brick */
-    double normal[4][4], gradient[4], square, weight; /* square, weight: of the residuals */
+    struct axis_pull *pull; /* two for each segment of the brick */
+    struct shared_sum shared;
     bool failed;
 };
 
@@ -24,33 +23,14 @@ struct fit_job {
     const struct volume *v;
     const struct segment_bricks *bricks;
     struct axis_profile profile;
-    float reach, table_scale;
-    float share[N_TABLE + 2], slope[N_TABLE + 2]; /* g and dg/dd by distance */
+    struct axis_table table;
+    float tail, inverse_blur; /* voxels beyond the radius up to which a fiber is modelled */
     struct brick_scratch {
         float model[N_CELL], own2[N_CELL], by_radius[N_CELL], by_blur[N_CELL];
         uint32_t own[N_CELL], touched[N_CELL];
     } * scratch;           /* one per thread */
     struct brick_sum *sum; /* one per brick */
 };
-
-static void make_table(struct fit_job *job)
-{
-    double r = job->profile.radius, b = job->profile.blur, end = r + TAIL * b;
-    job->reach = (float)end;
-    job->table_scale = (float)(N_TABLE / end);
-    for (int i = 0; i < N_TABLE + 2; i++) {
-        double z = (i * end / N_TABLE - r) / b;
-        job->share[i] = (float)(0.5 * erfc(z * M_SQRT1_2));
-        job->slope[i] = (float)(-exp(-0.5 * z * z) / (b * sqrt(2.0 * M_PI)));
-    }
-}
-
-static float look_up(const float table[N_TABLE + 2], float at)
-{
-    int i = (int)at;
-    float f = at - (float)i;
-    return i >= N_TABLE ? 0.0f : (1.0f - f) * table[i] + f * table[i + 1];
-}
 
 /* Finds the point of the segment nearest to p (relative to a): *t is its position along the segment in [0, 1].
  * Returns false if p lies beyond an end of the line. */
@@ -98,10 +78,10 @@ static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const si
 {
     const struct segment *g = &job->bricks->segment[segment];
     size_t lo[3], hi[3];
-    float u[3], length2 = 0.0f;
+    float u[3], length2 = 0.0f, reach = g->radius + job->tail;
     for (int a = 0; a < 3; a++) {
-        float l = ceilf(fminf(g->a[a], g->b[a]) - job->reach - 0.5f),
-              h = floorf(fmaxf(g->a[a], g->b[a]) + job->reach - 0.5f) + 1.0f;
+        float l = ceilf(fminf(g->a[a], g->b[a]) - reach - 0.5f),
+              h = floorf(fmaxf(g->a[a], g->b[a]) + reach - 0.5f) + 1.0f;
         float first = (float)from[a], end = (float)(from[a] + n[a]);
         if (h <= first || l >= end) return n_touched;
         lo[a] = l <= first ? 0 : (size_t)(l - first);
@@ -119,7 +99,7 @@ static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const si
             for (size_t i = lo[0] + i0; i < lo[0] + i1; i++, p[0] += 1.0f) {
                 float t, offset[3], d2;
                 size_t at = (k * BRICK + j) * BRICK + i;
-                if (!foot_of(g, p, &t, offset, &d2) || d2 >= job->reach * job->reach || d2 >= s->own2[at]) continue;
+                if (!foot_of(g, p, &t, offset, &d2) || d2 >= reach * reach || d2 >= s->own2[at]) continue;
                 if (s->own[at] == UINT32_MAX) s->touched[n_touched++] = (uint32_t)at;
                 s->own2[at] = d2;
                 s->own[at] = segment;
@@ -128,14 +108,16 @@ static size_t stamp(const struct fit_job *job, struct brick_scratch *s, const si
     return n_touched;
 }
 
-static void add_to_model(const struct fit_job *job, struct brick_scratch *s, size_t n_touched)
+static void add_to_model(const struct fit_job *job, struct brick_scratch *s, float radius, size_t n_touched)
 {
     for (size_t i = 0; i < n_touched; i++) {
-        uint32_t at = s->touched[i];
-        float d = sqrtf(s->own2[at]), slope = look_up(job->slope, d * job->table_scale);
-        s->model[at] += look_up(job->share, d * job->table_scale);
-        s->by_radius[at] -= slope;
-        s->by_blur[at] -= slope * (d - (float)job->profile.radius) / (float)job->profile.blur;
+        uint32_t cell = s->touched[i];
+        float depth = (sqrtf(s->own2[cell]) - radius) * job->inverse_blur;
+        float at = axis_table_place(&job->table, depth);
+        s->model[cell] += axis_table_look_up(job->table.share, at);
+        float slope = axis_table_look_up(job->table.slope, at) * job->inverse_blur;
+        s->by_radius[cell] -= slope;
+        s->by_blur[cell] -= slope * depth;
     }
 }
 
@@ -152,6 +134,19 @@ static float residual(const struct fit_job *job, const struct brick_scratch *s, 
     return e;
 }
 
+/* Adds a voxel to the normal equation of its line's radius. by: derivative of the model by the radius. */
+static void add_radius(const struct brick_scratch *s, uint32_t at, float amplitude, float by, float e, float weight,
+                       struct axis_pull *q)
+{
+    float share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
+    q->radius_normal += weight * by * by;
+    q->radius_gradient += weight * e * by;
+    q->radius_cross[0] += weight * by * amplitude * s->by_radius[at];
+    q->radius_cross[1] += weight * by * amplitude * s->by_blur[at];
+    q->radius_cross[2] += weight * by * (1.0f - share);
+    q->radius_cross[3] += weight * by * share;
+}
+
 static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const size_t from[3], size_t n_touched,
                       uint32_t first_segment, const uint32_t *slot, struct brick_sum *sum)
 {
@@ -164,10 +159,13 @@ static void add_pulls(const struct fit_job *job, struct brick_scratch *s, const 
                       (float)(from[2] + at / (BRICK * BRICK)) + 0.5f - g->a[2]};
         float t, offset[3], d2, weight;
         if (!foot_of(g, p, &t, offset, &d2) || !(d2 > 1e-6f)) continue;
-        float d = sqrtf(d2), e = residual(job, s, from, at, &weight),
-              slope = -amplitude * look_up(job->slope, d * job->table_scale);
+        float d = sqrtf(d2), e = residual(job, s, from, at, &weight);
+        float place = axis_table_place(&job->table, (d - g->radius) * job->inverse_blur);
+        float slope = -amplitude * job->inverse_blur * axis_table_look_up(job->table.slope, place);
+        struct axis_pull *pull = &sum->pull[2 * slot[s->own[at] - first_segment]];
+        add_radius(s, at, amplitude, slope, e, weight, pull);
         for (int end = 0; end < 2; end++) {
-            struct axis_pull *q = &sum->pull[2 * slot[s->own[at] - first_segment] + (uint32_t)end];
+            struct axis_pull *q = pull + end;
             float w = weight * (end == 0 ? 1.0f - t : t) * slope / d;
             for (int a = 0, c = 0; a < 3; a++) {
                 q->gradient[a] += w * e * offset[a];
@@ -193,7 +191,7 @@ static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t
             for (size_t i = e; i < end; i++) slot[b->index[i] - lowest] = (uint32_t)(i - b->first[i_brick]);
             add_pulls(job, s, from, n_touched, lowest, slot, sum);
         } else {
-            add_to_model(job, s, n_touched);
+            add_to_model(job, s, b->segment[lowest].radius, n_touched);
         }
         for (size_t i = 0; i < n_touched; i++) {
             s->own2[s->touched[i]] = INFINITY;
@@ -202,9 +200,9 @@ static void each_line(const struct fit_job *job, struct brick_scratch *s, size_t
     }
 }
 
-/* Adds to the normal equations of the profile: radius, blur, low, high. */
-static void add_profile(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3],
-                        const size_t n[3], struct brick_sum *sum)
+/* Adds to the normal equations of what fibers share: a change of all radii, blur, low, high. */
+static void add_shared(const struct fit_job *job, const struct brick_scratch *s, const size_t from[3],
+                       const size_t n[3], struct shared_sum *sum)
 {
     double amplitude = job->profile.high - job->profile.low;
     for (size_t k = 0; k < n[2]; k++)
@@ -253,37 +251,32 @@ static void fit_brick(void *context, size_t i_brick, size_t i_thread)
         segment_brick_box(b, i_brick, from, n);
         each_line(job, s, i_brick, from, n, NULL, sum);
         each_line(job, s, i_brick, from, n, slot, sum);
-        add_profile(job, s, from, n, sum);
+        add_shared(job, s, from, n, &sum->shared);
     }
     free(slot);
 }
 
-/* Variance of the residuals: noise, and structure that the model cannot describe. */
-static double residual_variance(const struct fit_job *job, size_t n_brick)
+/* Adds the bricks in order, so that sums do not depend on the number of threads. */
+static void add_bricks(const struct fit_job *job, const uint32_t *first_vertex_of, struct axis_pull *total,
+                       struct shared_sum *shared, struct radius_sum *line)
 {
-    double square = 0.0, weight = 0.0;
-    for (size_t b = 0; b < n_brick; b++) {
-        square += job->sum[b].square;
-        weight += job->sum[b].weight;
-    }
-    return weight > 0.0 ? square / weight : 1.0;
-}
-
-/* Makes one step for the profile, limited to plausible values. */
-static void step_profile(const struct fit_job *job, size_t n_brick, double diameter, struct axis_profile *p)
-{
-    double m[16] = {0.0}, x[4] = {0.0};
-    for (size_t b = 0; b < n_brick; b++)
-        for (int a = 0; a < 4; a++) {
-            x[a] += job->sum[b].gradient[a];
-            for (int c = 0; c < 4; c++) m[4 * a + c] += job->sum[b].normal[a][c];
+    for (size_t b = 0; b < segment_n_brick(job->bricks); b++) {
+        const struct brick_sum *sum = &job->sum[b];
+        for (size_t e = 0; e < 2 * (job->bricks->first[b + 1] - job->bricks->first[b]); e++) {
+            const struct axis_pull *q = &sum->pull[e];
+            struct radius_sum *r = &line[job->bricks->segment[q->segment].line];
+            axis_pull_add(&total[first_vertex_of[q->segment] + e % 2], q);
+            r->normal += (double)q->radius_normal;
+            r->gradient += (double)q->radius_gradient;
+            for (int a = 0; a < 4; a++) r->cross[a] += (double)q->radius_cross[a];
         }
-    if (!small_factor(m, 4, 0.0)) return;
-    small_solve(m, 4, x, 1);
-    p->radius = fmin(0.75 * diameter, fmax(0.3 * diameter, p->radius + fmin(0.3, fmax(-0.3, x[0]))));
-    p->blur = fmin(2.5, fmax(0.4, p->blur + fmin(0.2, fmax(-0.2, x[1]))));
-    p->low = fmin(0.4, fmax(-0.2, p->low + x[2]));
-    p->high = fmin(1.5, fmax(0.5, p->high + x[3]));
+        shared->square += sum->shared.square;
+        shared->weight += sum->shared.weight;
+        for (int a = 0; a < 4; a++) {
+            shared->gradient[a] += sum->shared.gradient[a];
+            for (int c = 0; c < 4; c++) shared->normal[a][c] += sum->shared.normal[a][c];
+        }
+    }
 }
 
 /* Standard deviation of one component of the lines' curvature, per voxel. It is measured over chords of a diameter,
@@ -316,13 +309,67 @@ static void state_error(const struct axis_pull *total, size_t n_vertex, double v
     p->direction_se_rad = p->position_se / length;
 }
 
-static status one_round(struct fit_job *job, struct polyline_set *lines, const uint32_t *first_vertex_of,
-                        struct axis_pull *total, double diameter, struct thread_pool *pool,
-                        const struct progress *progress, struct error *err)
+/* What a fit keeps from round to round. */
+struct fit_work {
+    uint32_t *first_vertex_of; /* per segment */
+    struct axis_pull *total;   /* per vertex */
+    struct radius_sum *radius; /* per line */
+    double *length;
+};
+
+static void release_work(struct fit_work *w)
+{
+    free(w->first_vertex_of);
+    free(w->total);
+    free(w->radius);
+    free(w->length);
+}
+
+static bool init_work(struct fit_work *w, const struct polyline_set *lines)
+{
+    size_t n_segment = 0;
+    *w = (struct fit_work){.first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *w->first_vertex_of),
+                           .total = malloc((lines->n_vertex + 1) * sizeof *w->total),
+                           .radius = malloc((lines->n_line + 1) * sizeof *w->radius),
+                           .length = malloc((lines->n_line + 1) * sizeof *w->length)};
+    if (w->first_vertex_of == NULL || w->total == NULL || w->radius == NULL || w->length == NULL) return false;
+    for (size_t l = 0; l < lines->n_line; l++) {
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
+            w->first_vertex_of[n_segment++] = (uint32_t)i;
+        w->length[l] = (double)polyline_length(lines, l);
+    }
+    return true;
+}
+
+/* Steps all vertices, radii and the profile from the sums of all bricks. */
+static status make_step(struct fit_job *job, struct polyline_set *lines, struct fit_work *w, double diameter,
+                        struct thread_pool *pool, struct error *err)
+{
+    struct shared_sum shared = {0};
+    memset(w->total, 0, lines->n_vertex * sizeof *w->total);
+    memset(w->radius, 0, lines->n_line * sizeof *w->radius);
+    add_bricks(job, w->first_vertex_of, w->total, &shared, w->radius);
+    axis_profile_step(&job->profile, &shared, w->radius, w->length, lines->n_line, diameter, lines->radius);
+    double sd = job->profile.measured_curvature ? measure_curvature(lines, diameter) : CURVATURE_MOST / diameter;
+    double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0, stiffness = variance / (sd * sd);
+    state_error(w->total, lines->n_vertex, variance, stiffness, &job->profile);
+    return axis_solve_lines(lines, w->total, stiffness, pool, err);
+}
+
+static float largest_radius(const struct polyline_set *lines)
+{
+    float most = 0.0f;
+    for (size_t l = 0; l < lines->n_line; l++) most = fmaxf(most, lines->radius[l]);
+    return most;
+}
+
+static status one_round(struct fit_job *job, struct polyline_set *lines, struct fit_work *w, double diameter,
+                        struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
     struct segment_bricks bricks = {0};
-    make_table(job);
-    status s = segment_bricks_init(&bricks, lines, job->v->n, BRICK, job->reach + 1.0f, err);
+    job->tail = (float)(AXIS_TAIL * job->profile.blur);
+    job->inverse_blur = (float)(1.0 / job->profile.blur);
+    status s = segment_bricks_init(&bricks, lines, job->v->n, BRICK, largest_radius(lines) + job->tail + 1.0f, err);
     if (s != STATUS_OK) return s;
     size_t n_brick = segment_n_brick(&bricks);
     job->bricks = &bricks;
@@ -334,17 +381,7 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, const u
         for (size_t b = 0; b < n_brick && s == STATUS_OK; b++)
             if (job->sum[b].failed) s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     }
-    if (s == STATUS_OK) {
-        memset(total, 0, lines->n_vertex * sizeof *total);
-        for (size_t b = 0; b < n_brick; b++) /* in order, so that sums do not depend on the number of threads */
-            for (size_t e = 0; e < 2 * (bricks.first[b + 1] - bricks.first[b]); e++)
-                axis_pull_add(&total[first_vertex_of[job->sum[b].pull[e].segment] + e % 2], &job->sum[b].pull[e]);
-        step_profile(job, n_brick, diameter, &job->profile);
-        double sd = job->profile.measured_curvature ? measure_curvature(lines, diameter) : CURVATURE_MOST / diameter;
-        double variance = residual_variance(job, n_brick), stiffness = variance / (sd * sd);
-        state_error(total, lines->n_vertex, variance, stiffness, &job->profile);
-        s = axis_solve_lines(lines, total, stiffness, pool, err);
-    }
+    if (s == STATUS_OK) s = make_step(job, lines, w, diameter, pool, err);
     for (size_t b = 0; job->sum != NULL && b < n_brick; b++) free(job->sum[b].pull);
     free(job->sum);
     job->sum = NULL;
@@ -358,26 +395,24 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
                      struct error *err)
 {
     struct fit_job *job = calloc(1, sizeof *job);
-    uint32_t *first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *first_vertex_of);
-    struct axis_pull *total = malloc((lines->n_vertex + 1) * sizeof *total);
-    size_t n_segment = 0;
+    struct fit_work work = {0};
     status s = STATUS_OK;
     if (job != NULL) job->scratch = malloc(thread_pool_n_thread(pool) * sizeof *job->scratch);
-    if (job == NULL || job->scratch == NULL || first_vertex_of == NULL || total == NULL) {
+    if (job == NULL || job->scratch == NULL || !init_work(&work, lines)) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
         goto out;
     }
     job->v = v;
     job->profile = *profile;
+    axis_table_init(&job->table);
     for (size_t l = 0; l < lines->n_line; l++)
-        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++) first_vertex_of[n_segment++] = (uint32_t)i;
+        if (!(lines->radius[l] > 0.0f)) lines->radius[l] = (float)(0.5 * diameter_voxel);
     for (int round = 0; round < n_round && s == STATUS_OK; round++)
-        s = one_round(job, lines, first_vertex_of, total, diameter_voxel, pool, progress, err);
+        s = one_round(job, lines, &work, diameter_voxel, pool, progress, err);
     if (s == STATUS_OK) *profile = job->profile;
 out:
+    release_work(&work);
     if (job != NULL) free(job->scratch);
     free(job);
-    free(first_vertex_of);
-    free(total);
     return s;
 }

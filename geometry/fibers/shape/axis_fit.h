@@ -1,13 +1,13 @@
 /* Fits fiber axes to the scan: finds the polylines whose rendering is nearest to the measured densities.
  *
  * Model: M(x) = low + (high - low) sum over lines of g(distance of x from the line), where g(d) = erfc((d - r) /
- * (sqrt 2 b)) / 2 is the profile of a fiber of radius r blurred by b. Fibers do not interpenetrate, so their blurred
- * densities add up. Therefore a line is not drawn towards its neighbours, as it would be towards the centroid of the
- * material around it. Each round is one Gauss-Newton step of
+ * (sqrt 2 b)) / 2 is the profile of a fiber of radius r, blurred by b; every line has its own r. Fibers do not
+ * interpenetrate, so their blurred densities add up. Therefore a line is not drawn towards its neighbours, as it would be
+ * towards the centroid of the material around it. Each round is one Gauss-Newton step of
  *     sum over voxels of w (V - M)^2 + sum over lines of stiffness |p_{i-1} - 2 p_i + p_{i+1}|^2
- * for all vertices, and one for r, b, low and high together. The weight w (Geman and McClure 1985) ignores fibers
- * that no line represents. The stiffness is the variance of the residuals over that of the fibers' curvature, so
- * noisy scans give smoother fibers.
+ * for all vertices, one for b, low, high and all radii together, and one for each radius. The weight w (Geman and
+ * McClure 1985) ignores fibers that no line represents. The stiffness is the variance of the residuals over that of the
+ * fibers' curvature, so noisy scans give smoother fibers.
  *
  * The errors of the axes follow from the same sum. With data of information n a vertex, residuals of variance s and
  * stiffness L, the posterior spectrum of the position is s / (n + L k^4). Its integral, and that of k^2 times it, are
@@ -19,22 +19,11 @@
 
 #include "base/thread_pool.h"
 #include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/shape/axis_profile.h"
 #include "geometry/volume/volume.h"
 
-#include <stdbool.h>
-
-struct axis_profile {
-    double radius, blur; /* voxels */
-    double low, high;    /* densities of void and fiber */
-    /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
-     * about to break, which holds back no line that still has to find its fiber. */
-    bool measured_curvature;
-    /* Written by the fit: standard error of one component of the axes' position (voxels) and of their direction. */
-    double position_se, direction_se_rad;
-};
-
-/* Moves `lines`, which have about one vertex per voxel (polylines_resample). *profile is the start, and is refined.
- * STATUS_CANCELLED, STATUS_NO_MEMORY. */
+/* Moves `lines`, which have about one vertex per voxel (polylines_resample), and refines their radii; lines of unknown
+ * radius start at half of diameter_voxel. *profile is the start, and is refined. STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round,
                      struct axis_profile *profile, struct thread_pool *pool, const struct progress *progress,
                      struct error *err);

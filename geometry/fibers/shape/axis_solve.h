@@ -10,6 +10,8 @@ struct axis_pull {
     uint32_t segment;  /* segment that the terms belong to, in a sum over a brick */
     float normal[6];   /* xx, yx yy, zx zy zz */
     float gradient[3]; /* normal times the step to the minimum */
+    /* Normal equation of the radius of the line, and its terms with the shared ones (axis_profile.h). */
+    float radius_normal, radius_gradient, radius_cross[4];
 };
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);

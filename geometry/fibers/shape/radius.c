@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING, MAX_BRICK = 1500 };
+enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING, MAX_BRICK = 500 };
 
 struct radius_job {
     const struct volume *v;

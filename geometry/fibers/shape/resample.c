@@ -17,7 +17,7 @@ status polylines_resample(const struct polyline_set *lines, struct polyline_set 
         size_t end = lines->first[l + 1] - 1, i = lines->first[l];
         for (size_t k = i; k < end; k++) length += distance(lines->vertex[k], lines->vertex[k + 1]);
         int n = (int)fmaxf(1.0f, rintf(length));
-        s = polyline_begin(out, lines->axis[l], err);
+        s = polyline_begin_like(out, lines, l, err);
         for (int k = 0; k <= n && s == STATUS_OK; k++) {
             float want = length * (float)k / (float)n, step, x[3];
             while (i + 1 < end && passed + distance(lines->vertex[i], lines->vertex[i + 1]) < want) {

@@ -33,36 +33,40 @@ static float perpendicular2(const struct center *c, size_t u, size_t v)
     return du * du + dv * dv - along * along / (1.0f + c->slope_u * c->slope_u + c->slope_v * c->slope_v);
 }
 
-static void claim_pixels(const struct refine_slice *s, const struct center *center, size_t n, float r)
+static float window(const struct center *c) { return WINDOW_RADII * c->radius; }
+
+static void claim_pixels(const struct refine_slice *s, const struct center *center, size_t n)
 {
     struct box b;
     /* clear only the pixels that centers can reach, because no others are read later */
     for (size_t i = 0; i < n; i++) {
-        if (!pixel_box(&center[i], r, s->width, s->height, &b)) continue;
+        if (!pixel_box(&center[i], window(&center[i]), s->width, s->height, &b)) continue;
         for (size_t v = b.v0; v <= b.v1; v++)
-            for (size_t u = b.u0; u <= b.u1; u++) s->distance[v * s->width + u] = r * r;
+            for (size_t u = b.u0; u <= b.u1; u++) s->distance[v * s->width + u] = INFINITY;
     }
     for (size_t i = 0; i < n; i++) {
-        if (!pixel_box(&center[i], r, s->width, s->height, &b)) continue;
+        const struct center *c = &center[i];
+        float radius2 = c->radius * c->radius, edge2 = window(c) * window(c);
+        if (!pixel_box(c, window(c), s->width, s->height, &b)) continue;
         for (size_t v = b.v0; v <= b.v1; v++)
             for (size_t u = b.u0; u <= b.u1; u++) {
-                float d2 = perpendicular2(&center[i], u, v);
-                if (d2 >= s->distance[v * s->width + u]) continue;
-                s->distance[v * s->width + u] = d2;
+                float d2 = perpendicular2(c, u, v);
+                if (d2 >= edge2 || d2 - radius2 >= s->distance[v * s->width + u]) continue;
+                s->distance[v * s->width + u] = d2 - radius2;
                 s->owner[v * s->width + u] = (float)i;
             }
     }
 }
 
-static void move_to_centroid(const struct refine_slice *s, struct center *c, float index, float r)
+static void move_to_centroid(const struct refine_slice *s, struct center *c, float index)
 {
     struct box b;
     float sum = 0.0f, su = 0.0f, sv = 0.0f;
-    if (!pixel_box(c, r, s->width, s->height, &b)) return;
+    if (!pixel_box(c, window(c), s->width, s->height, &b)) return;
     for (size_t v = b.v0; v <= b.v1; v++)
         for (size_t u = b.u0; u <= b.u1; u++) {
             size_t at = v * s->width + u;
-            if (s->distance[at] >= r * r || s->owner[at] != index) continue;
+            if (!(s->distance[at] < INFINITY) || s->owner[at] != index) continue;
             float w = s->image[at] - FLOOR;
             float mirror_u = 2.0f * c->u - (float)u - 0.5f, mirror_v = 2.0f * c->v - (float)v - 0.5f;
             if (mirror_u < 0.0f || mirror_v < 0.0f || mirror_u > (float)s->width || mirror_v > (float)s->height)
@@ -77,11 +81,10 @@ static void move_to_centroid(const struct refine_slice *s, struct center *c, flo
     c->v += fminf(1.0f, fmaxf(-1.0f, sv / sum));
 }
 
-void centers_refine(const struct refine_slice *slice, double diameter_voxel, struct center *center, size_t n)
+void centers_refine(const struct refine_slice *slice, struct center *center, size_t n)
 {
-    float r = WINDOW_RADII * 0.5f * (float)diameter_voxel;
     for (int round = 0; round < N_ROUND; round++) {
-        claim_pixels(slice, center, n, r);
-        for (size_t i = 0; i < n; i++) move_to_centroid(slice, &center[i], (float)i, r);
+        claim_pixels(slice, center, n);
+        for (size_t i = 0; i < n; i++) move_to_centroid(slice, &center[i], (float)i);
     }
 }

@@ -9,14 +9,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_SCALE = 4 };
-static const double scale_factor[N_SCALE] = {0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
+enum { N_SCALE = 5 };
+static const double scale_factor[N_SCALE] = {0.58, 0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
 
 /* An isolated disk has response 0.74; a disk inside a dense bundle, whose neighbours fill the surround of the
  * filter, about 0.25. */
 static const float MIN_STRENGTH = 0.12f;
-/* Least distance of two centers as a share of the diameter. */
+/* Least distance of two centers as a share of the mean of their diameters. */
 static const float MIN_SPACING = 0.55f;
+/* Radius of a fiber in a bundle over the scale of its strongest response (sqrt 2 for an isolated disk), and its bounds
+ * as shares of half the typical diameter. */
+static const double RADIUS_OVER_SIGMA = 1.7, LEAST_RADIUS = 0.55, MOST_RADIUS = 1.5;
 
 struct slice_result {
     struct center *center;
@@ -145,6 +148,18 @@ static bool push(struct slice_result *r, const struct center *c)
     return true;
 }
 
+/* Radius of the fiber from the responses of the scales beside that of a peak: a parabola in log sigma. */
+static float radius_at(const struct detect_job *job, const float *peak, size_t n_pixel, int s)
+{
+    double shift = 0.0, half = 0.5 * job->diameter;
+    if (s > 0 && s + 1 < N_SCALE) {
+        double l = (double)peak[-(ptrdiff_t)n_pixel], c = (double)peak[0], r = (double)peak[n_pixel];
+        if (l - 2.0 * c + r < 0.0) shift = fmin(0.5, fmax(-0.5, 0.5 * (l - r) / (l - 2.0 * c + r)));
+    }
+    double r = RADIUS_OVER_SIGMA * job->sigma[s] * pow(scale_factor[1] / scale_factor[0], shift);
+    return (float)fmin(MOST_RADIUS * half, fmax(LEAST_RADIUS * half, r));
+}
+
 static bool collect_peaks(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
     size_t n_pixel = w->width * w->height;
@@ -161,7 +176,7 @@ static bool collect_peaks(const struct detect_job *job, const struct view *w, st
                 refine_position(w, map, u, v, offset);
                 struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
                                    .v = w->origin[1] + (float)v + 0.5f + offset[1],
-                                   .sigma = (float)job->sigma[s],
+                                   .radius = radius_at(job, map + at, n_pixel, s),
                                    .strength = map[at]};
                 if (find_slope(job, w->i_slice, &c) && !push(r, &c)) return false;
             }
@@ -183,13 +198,12 @@ static int lower_v_first(const void *a, const void *b)
     return (x->u > y->u) - (x->u < y->u);
 }
 
-/* Keeps the strongest of peaks nearer to each other than min_distance. Kept peaks are sorted into cells of that
- * edge. */
+/* Keeps the strongest of peaks nearer to each other than their radii allow. Kept peaks are sorted into cells of edge
+ * min_distance, the largest of these limits. */
 static bool thin_out(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
     size_t kept = 0, n_cell[2] = {(size_t)((float)w->width / job->min_distance) + 3,
                                   (size_t)((float)w->height / job->min_distance) + 3};
-    float limit = job->min_distance * job->min_distance;
     if (r->n == 0) return true;
     uint32_t *head = calloc(n_cell[0] * n_cell[1], sizeof *head), *next = malloc(r->n * sizeof *next);
     if (head == NULL || next == NULL) {
@@ -207,7 +221,8 @@ static bool thin_out(const struct detect_job *job, const struct view *w, struct 
             for (size_t x = cu - 1; x <= cu + 1 && x < n_cell[0]; x++)
                 for (uint32_t at = head[y * n_cell[0] + x]; at != 0 && !near; at = next[at - 1]) {
                     float du = c->u - r->center[at - 1].u, dv = c->v - r->center[at - 1].v;
-                    near = du * du + dv * dv < limit;
+                    float limit = MIN_SPACING * (c->radius + r->center[at - 1].radius);
+                    near = du * du + dv * dv < limit * limit;
                 }
         if (near) continue;
         size_t cell = (cv < n_cell[1] ? cv : n_cell[1] - 1) * n_cell[0] + (cu < n_cell[0] ? cu : n_cell[0] - 1);
@@ -260,7 +275,7 @@ static void detect_slice(void *context, size_t i_task, size_t i_thread)
         r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
     move_centers(r, -w.origin[0], -w.origin[1]);
     const struct refine_slice slice = {w.image, w.width, w.height, w.response, w.response + n_pixel};
-    centers_refine(&slice, job->diameter, r->center, r->n);
+    centers_refine(&slice, r->center, r->n);
     move_centers(r, w.origin[0], w.origin[1]);
     if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
@@ -307,7 +322,7 @@ static status detect_slabs(struct detect_job *job, const struct slice_source *so
 /* The margin covers the reach of the filters, the moves of centers, and their window stretched by the slope. */
 static size_t picture_margin(double largest_sigma, double diameter)
 {
-    return (size_t)ceil(4.0 * largest_sigma + diameter) + 8;
+    return (size_t)ceil(4.0 * largest_sigma + MOST_RADIUS * diameter) + 8;
 }
 
 status centers_detect(const struct center_search *search, struct thread_pool *pool, const struct progress *progress,
@@ -327,7 +342,7 @@ status centers_detect(const struct center_search *search, struct thread_pool *po
     n_slab = n_slab < n_thread ? n_thread : n_slab > n_slice ? n_slice : n_slab;
     for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
     job.diameter = diameter_voxel;
-    job.min_distance = MIN_SPACING * (float)diameter_voxel;
+    job.min_distance = MIN_SPACING * (float)(MOST_RADIUS * diameter_voxel);
     job.margin = picture_margin(job.sigma[N_SCALE - 1], diameter_voxel);
     for (int a = 0; a < 3; a++) { /* pictures are void beyond this; diagonals need 3/2 of the margin */
         size_t reach = job.margin * 3 / 2;

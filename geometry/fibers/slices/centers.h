@@ -17,7 +17,7 @@
 struct center {
     float u, v;             /* in pixels of the frame; the centre of pixel i is at i + 1/2 */
     float slope_u, slope_v; /* du, dv per slice, from the direction volume */
-    float sigma;            /* scale of the strongest response, voxels; sigma * sqrt 2 estimates the radius */
+    float radius;           /* of the fiber, from the scale of the strongest response, voxels */
     float strength;         /* scale-normalised response; 0.74 for an isolated disk of density 1 */
 };
 

@@ -253,9 +253,9 @@ const struct job_option option_rows_cloth[] = {
     {.path = "volume.radius_per_axis",
      .kind = OPTION_BOOL_OR_LEFT_OUT,
      INTO(radius_per_axis),
-     .left_out = "from the measured radii",
-     .meaning = "`true`: one radius for weft, warp and pile each. `false`: one for all. Left out: one each when two "
-                "differ by more than three standard errors and by more than 5 %."},
+     .left_out = "one for each fiber",
+     .meaning = "`true`: one radius for weft, warp and pile each. `false`: one for all. Left out: each fiber has the "
+                "radius measured on it."},
 
     {.path = "geometry",
      .kind = OPTION_SECTION,

@@ -65,6 +65,33 @@ static void hits_are_where_they_should_be(void **state)
     scene_free(s);
 }
 
+/* Every fiber has its own radius: a ray straight down meets it so far above its axis, and beside a thin fiber passes. */
+static void fibers_have_their_own_radius(void **state)
+{
+    (void)state;
+    static const double y_z[2][2] = {{0.1e-3, 0}, {0.3e-3, 0}};
+    const float radius_mm[2] = {0.012f, 0.03f};
+    struct fiber_set f;
+    struct scene *s = NULL;
+    hand_straight(&f, 2, y_z, 0.5e-3, 20e-6);
+    for (int i = 0; i < 2; i++) f.radius_m[i] = 1e-3f * radius_mm[i];
+    assert_int_equal(scene_new(&f, &(struct scene_option){false}, &s, NULL), STATUS_OK);
+    float top[2];
+    for (int i = 0; i < 2; i++) {
+        struct scene_hit h;
+        struct scene_ray r = ray_to(0.2, 0.1 + 0.2 * i, 0.05, 0, 0, -1),
+                         beside = ray_to(0.2, 0.12 + 0.2 * i, 0.05, 0, 0, -1);
+        assert_true(scene_trace(s, &r, &h));
+        assert_int_equal(scene_fiber_of(s, h.i_segment), i);
+        assert_true(fabsf(h.radius_mm - radius_mm[i]) < 1e-7f);
+        top[i] = h.position_mm[2];
+        assert_int_equal(scene_occluded(s, &beside), i == 1);
+    }
+    assert_true(fabsf(top[1] - top[0] - (radius_mm[1] - radius_mm[0])) < 1e-5f);
+    scene_free(s);
+    fiber_set_release(&f);
+}
+
 static void back_faces_do_not_exist(void **state)
 {
     (void)state;
@@ -334,11 +361,17 @@ static void lamp_is_calibrated(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hits_are_where_they_should_be),    cmocka_unit_test(back_faces_do_not_exist),
-        cmocka_unit_test(rays_leave_across_the_width),      cmocka_unit_test(cloth_is_periodic),
-        cmocka_unit_test(bad_fibers_are_refused),           cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
-        cmocka_unit_test(too_thin_fibers_are_refused),      cmocka_unit_test(segments_of_enormous_length_are_refused),
-        cmocka_unit_test(camera_looks_at_the_orbit_centre), cmocka_unit_test(lamp_is_calibrated),
+        cmocka_unit_test(hits_are_where_they_should_be),
+        cmocka_unit_test(fibers_have_their_own_radius),
+        cmocka_unit_test(back_faces_do_not_exist),
+        cmocka_unit_test(rays_leave_across_the_width),
+        cmocka_unit_test(cloth_is_periodic),
+        cmocka_unit_test(bad_fibers_are_refused),
+        cmocka_unit_test(thin_fibers_are_as_wide_as_thick_ones),
+        cmocka_unit_test(too_thin_fibers_are_refused),
+        cmocka_unit_test(segments_of_enormous_length_are_refused),
+        cmocka_unit_test(camera_looks_at_the_orbit_centre),
+        cmocka_unit_test(lamp_is_calibrated),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

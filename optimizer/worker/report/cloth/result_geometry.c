@@ -141,6 +141,8 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "radius_um", json_number_list(g->radius_m, 3, um));
     json_object_set_new(json, "radius_se_um", json_number_list(g->radius_se_m, 3, um));
     json_object_set_new(json, "radius_profile_um", json_number(g->profile_radius_m * um));
+    json_object_set_new(json, "radius_spread", json_number(g->radius_spread));
+    json_object_set_new(json, "radius_error_um", json_number(g->single_radius_se_m * um));
     json_object_set_new(json, "axis_position_error_um", json_number(g->axis_position_se_m * um));
     json_object_set_new(json, "axis_direction_error_deg", json_number(g->axis_direction_se_rad / RAD_PER_DEG));
     json_object_set_new(json, "radius_per_axis", json_boolean(g->radius_per_axis));

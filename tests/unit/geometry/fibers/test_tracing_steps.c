@@ -6,7 +6,6 @@
 #include "geometry/fibers/lines/linking.h"
 #include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/shape/radius.h"
-#include "geometry/fibers/shape/relax.h"
 #include "geometry/fibers/shape/smoothing.h"
 #include "geometry/volume/volume_align.h"
 #include "tests/support/scan/scan_files.h"
@@ -125,33 +124,6 @@ static void test_duplicates_and_joins(void **state)
     volume_release(&v);
 }
 
-/* Two touching fibers: lines that start one voxel away from the axes end on them, and are not pulled together. */
-static void test_relax(void **state)
-{
-    (void)state;
-    const size_t n[3] = {64, 32, 32};
-    const struct test_cylinder c[2] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 3.5},
-                                       {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
-    struct volume v;
-    struct polyline_set lines;
-    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
-    test_fill_cylinders(&v, c, 2, 0.2, 1);
-    polyline_set_init(&lines);
-    add_piece(&lines, 0, 0.5f, 63.5f, 13.3f);
-    add_piece(&lines, 0, 0.5f, 63.5f, 18.9f);
-    assert_int_equal(polylines_relax(&lines, &v, 4.2f, 6, 0.1, NULL, NULL, NULL), STATUS_OK);
-    double square = 0.0;
-    for (size_t i = 0; i < lines.n_vertex; i++) {
-        double dy = (double)lines.vertex[i][1] - (i < lines.first[1] ? 12.5 : 19.5),
-               dz = (double)lines.vertex[i][2] - 16.0;
-        square += dy * dy + dz * dz;
-    }
-    print_message("rms distance from the axes %.3f voxels\n", sqrt(square / (double)lines.n_vertex));
-    assert_true(sqrt(square / (double)lines.n_vertex) < 0.15);
-    polyline_set_release(&lines);
-    volume_release(&v);
-}
-
 /* Three fibers, two of which touch. Only two have lines, and these must end on their axes with the true radius,
  * independent of the third fiber. A fit that is cancelled says so and changes nothing. With a blur b, the position of a
  * straight axis is known to sigma / sqrt(A) per voxel of length with A = pi r / (2 sqrt(pi) b), because a quarter of a
@@ -190,6 +162,36 @@ static void test_axis_fit(void **state)
     assert_true(sqrt(square / (double)lines.n_vertex) < 0.1);
     assert_true(fabs(profile.radius - 3.5) < 0.03 * 3.5);
     polyline_set_release(&coarse);
+    polyline_set_release(&lines);
+    volume_release(&v);
+}
+
+/* Two touching fibers of different thickness: each line finds its own axis and radius, although both start with the
+ * typical radius, half of the diameter given. */
+static void test_single_radii(void **state)
+{
+    (void)state;
+    const size_t n[3] = {64, 40, 32};
+    const struct test_cylinder c[2] = {{{0.0, 12.5, 16.0}, {1.0, 0.0, 0.0}, 2.6},
+                                       {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 4.4}};
+    struct volume v;
+    struct polyline_set lines;
+    struct axis_profile profile = {.radius = 3.5, .radius_spread = 0.3, .blur = 0.8, .high = 1.0};
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, c, 2, 0.2, 1);
+    polyline_set_init(&lines);
+    add_piece(&lines, 0, 0.5f, 63.5f, 13.2f);
+    add_piece(&lines, 0, 0.5f, 63.5f, 19.0f);
+    assert_int_equal(polylines_fit(&lines, &v, 7.0, 8, &profile, NULL, NULL, NULL), STATUS_OK);
+    for (size_t l = 0; l < 2; l++) {
+        double mean = 0.0;
+        for (size_t i = lines.first[l]; i < lines.first[l + 1]; i++)
+            mean += ((double)lines.vertex[i][1] - c[l].point[1]) / (double)polyline_length(&lines, l);
+        print_message("radius %.3f of %.1f, offset %.3f voxels\n", (double)lines.radius[l], c[l].radius, mean);
+        assert_true(fabs((double)lines.radius[l] / c[l].radius - 1.0) < 0.03);
+        assert_true(fabs(mean) < 0.1);
+    }
+    assert_true(fabs(profile.radius_spread - 0.9 / 3.5) < 0.03 && profile.radius_se < 0.02);
     polyline_set_release(&lines);
     volume_release(&v);
 }
@@ -381,7 +383,7 @@ int main(void)
         cmocka_unit_test(test_smoothing),
         cmocka_unit_test(test_linking_leaning_neighbours),
         cmocka_unit_test(test_duplicates_and_joins),
-        cmocka_unit_test(test_relax),
+        cmocka_unit_test(test_single_radii),
         cmocka_unit_test(test_axis_fit),
         cmocka_unit_test(test_axis_errors),
         cmocka_unit_test(test_radius),

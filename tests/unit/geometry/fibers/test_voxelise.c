@@ -73,6 +73,29 @@ static void test_volume_is_kept(void **unused)
     fiber_set_release(&f);
 }
 
+/* Every fiber has its own radius in the density: the share of material on one of two radii is that of its disc. */
+static void test_fibers_of_unequal_radius(void **unused)
+{
+    (void)unused;
+    const double tile = 300 * um, length = tile * sqrt(1.0 + 0.37 * 0.37 + 0.04), radius[2] = {6 * um, 14 * um};
+    struct fiber_set f;
+    struct direction_volume v;
+    for (int thick = 0; thick < 2; thick++) {
+        slanted(&f, 2, tile, 10 * um);
+        f.radius_m[thick] = (float)radius[1];
+        f.radius_m[1 - thick] = (float)radius[0];
+        f.position_m[3 * 3 + 2] = f.position_m[3 * 4 + 2] = f.position_m[3 * 5 + 2] = (float)(150 * um);
+        voxelise(&f, 4 * um, 1, &v);
+        double low = 0.0;
+        for (size_t i = 0; i < volume_n_voxel(v.n); i++)
+            if ((double)(i / (v.n[0] * v.n[1])) < 0.5 * (double)v.n[2]) low += v.density[i] / 255.0 * pow(4 * um, 3);
+        double want = M_PI * radius[thick == 0] * radius[thick == 0] * length;
+        assert_true(fabs(low / want - 1.0) < 0.03);
+        direction_volume_release(&v);
+        fiber_set_release(&f);
+    }
+}
+
 static void test_directions_are_tangents(void **unused)
 {
     (void)unused;
@@ -180,7 +203,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_volume_is_kept), cmocka_unit_test(test_directions_are_tangents),
         cmocka_unit_test(test_periodic),       cmocka_unit_test(test_threads_do_not_matter),
-        cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_limits),         cmocka_unit_test(test_fibers_of_unequal_radius),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

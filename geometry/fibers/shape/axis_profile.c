@@ -1,0 +1,79 @@
+#include "geometry/fibers/shape/axis_profile.h"
+#include "base/small_matrix.h"
+
+#include <math.h>
+
+/* Bounds of the radius of a fiber, per typical diameter, and of a step, voxels. */
+static const double RADIUS_LEAST = 0.2, RADIUS_MOST = 1.0, RADIUS_STEP = 0.3;
+/* Lower bound of the spread of the radii, relative. */
+static const double SPREAD_LEAST = 0.01;
+
+void axis_table_init(struct axis_table *t)
+{
+    t->scale = (float)(AXIS_N_TABLE / (AXIS_CORE + AXIS_TAIL));
+    for (int i = 0; i < AXIS_N_TABLE + 2; i++) {
+        double z = i * (AXIS_CORE + AXIS_TAIL) / AXIS_N_TABLE - AXIS_CORE;
+        t->share[i] = (float)(0.5 * erfc(z * M_SQRT1_2));
+        t->slope[i] = (float)(-exp(-0.5 * z * z) / sqrt(2.0 * M_PI));
+    }
+}
+
+/* Mean radius of the lines by length, their spread without the part of their errors, and the mean of these. */
+static void measure_spread(struct axis_profile *p, const struct radius_sum *line, const double *length, size_t n_line,
+                           double variance, const float *radius)
+{
+    double sum = 0.0, square = 0.0, error = 0.0, total = 0.0;
+    for (size_t l = 0; l < n_line; l++) {
+        if (!(line[l].normal > 0.0)) continue;
+        double r = (double)radius[l];
+        total += length[l];
+        sum += length[l] * r;
+        square += length[l] * r * r;
+        error += length[l] * variance / line[l].normal;
+    }
+    if (!(total > 0.0)) return;
+    p->radius = sum / total;
+    double var = square / total - p->radius * p->radius;
+    p->radius_se = sqrt(error / total) / p->radius;
+    p->radius_spread = sqrt(fmax(0.0, var - error / total)) / p->radius;
+}
+
+/* Solves for the shared step; zero if the data do not determine it. */
+static void solve_shared(const struct shared_sum *shared, double x[4])
+{
+    double m[16];
+    for (int a = 0; a < 4; a++) {
+        x[a] = shared->gradient[a];
+        for (int b = 0; b < 4; b++) m[4 * a + b] = shared->normal[a][b];
+    }
+    if (small_factor(m, 4, 0.0))
+        small_solve(m, 4, x, 1);
+    else
+        for (int a = 0; a < 4; a++) x[a] = 0.0;
+}
+
+static double within(double least, double value, double most) { return fmin(most, fmax(least, value)); }
+
+void axis_profile_step(struct axis_profile *p, const struct shared_sum *shared, const struct radius_sum *line,
+                       const double *length, size_t n_line, double diameter, float *radius)
+{
+    double x[4], variance = shared->weight > 0.0 ? shared->square / shared->weight : 1.0;
+    double spread = fmax(p->radius_spread, SPREAD_LEAST) * p->radius, hold = variance / (spread * spread);
+    solve_shared(shared, x);
+    const double low = within(-0.2, p->low + x[2], 0.4), high = within(0.5, p->high + x[3], 1.5),
+                 blur = within(0.4, p->blur + within(-0.2, x[1], 0.2), 2.5);
+    x[0] = within(-RADIUS_STEP, x[0], RADIUS_STEP);
+    x[1] = blur - p->blur;
+    x[2] = low - p->low;
+    x[3] = high - p->high;
+    for (size_t l = 0; l < n_line; l++) {
+        double step = line[l].gradient + hold * (p->radius - (double)radius[l]), normal = line[l].normal + hold;
+        for (int a = 0; a < 4; a++) step -= line[l].cross[a] * x[a];
+        double r = (double)radius[l] + x[0] + within(-RADIUS_STEP, step / normal, RADIUS_STEP);
+        radius[l] = (float)within(RADIUS_LEAST * diameter, r, RADIUS_MOST * diameter);
+    }
+    p->blur = blur;
+    p->low = low;
+    p->high = high;
+    measure_spread(p, line, length, n_line, variance, radius);
+}

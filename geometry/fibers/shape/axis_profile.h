@@ -1,0 +1,69 @@
+/* The profile of the fibers in the fit of axes (axis_fit.h): what all fibers share, and the radius of each. */
+#ifndef SELVEDGE_GEOMETRY_AXIS_PROFILE_H
+#define SELVEDGE_GEOMETRY_AXIS_PROFILE_H
+
+#include "base/status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct axis_profile {
+    double blur;      /* voxels */
+    double low, high; /* densities of void and fiber */
+    /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
+     * about to break, which holds back no line that still has to find its fiber. */
+    bool measured_curvature;
+    /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
+     * their errors (relative), root mean square of the errors (relative). */
+    double radius, radius_spread, radius_se;
+    /* Written by the fit: standard error of one component of the axes' position (voxels) and of their direction. */
+    double position_se, direction_se_rad;
+};
+
+enum { AXIS_N_TABLE = 512 };
+
+/* Share of a blurred fiber in a voxel and its derivative, by the distance from the surface in units of the blur. */
+struct axis_table {
+    float scale, slope_scale; /* entries per unit; 1 / blur */
+    float share[AXIS_N_TABLE + 2], slope[AXIS_N_TABLE + 2];
+};
+
+/* A fiber is modelled up to AXIS_TAIL times the blur beyond its surface. */
+#define AXIS_TAIL 2.5
+#define AXIS_CORE 3.5 /* depth below the surface at which a fiber is solid */
+
+void axis_table_init(struct axis_table *t);
+
+/* Position in the table of a place `depth` beyond the surface, in units of the blur. */
+static inline float axis_table_place(const struct axis_table *t, float depth)
+{
+    float at = (depth + (float)AXIS_CORE) * t->scale;
+    return at < 0.0f ? 0.0f : at;
+}
+
+static inline float axis_table_look_up(const float table[AXIS_N_TABLE + 2], float at)
+{
+    int i = (int)at;
+    float f = at - (float)i;
+    return i >= AXIS_N_TABLE ? 0.0f : (1.0f - f) * table[i] + f * table[i + 1];
+}
+
+/* Normal equations of what all fibers share: a change of all radii, blur, low, high. */
+struct shared_sum {
+    double normal[4][4], gradient[4];
+    double square, weight; /* of the residuals */
+};
+
+/* Normal equation of the radius of one line, and the terms that it has in common with the shared ones. */
+struct radius_sum {
+    double normal, gradient, cross[4];
+};
+
+/* Makes one Gauss-Newton step for what all fibers share, and then one for the radius of each line with what is left of
+ * the residuals, limited to plausible values. (All at once overshoots: lines that touch share voxels, which the
+ * equations of single lines do not know.) Radii are held towards their mean by their own spread (empirical Bayes), so
+ * fibers of one size keep one size. length: of the lines. diameter: typical, voxels. */
+void axis_profile_step(struct axis_profile *p, const struct shared_sum *shared, const struct radius_sum *line,
+                       const double *length, size_t n_line, double diameter, float *radius);
+
+#endif
