@@ -311,34 +311,6 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     return s;
 }
 
-/* Root of the mean square of the radii from the profile, by length, of the lines of a class; class 3: of all. The mass
- * that the radius of a class follows from is proportional to this square. */
-static double rms_radius_voxel(const struct polyline_set *lines, int class)
-{
-    double square = 0.0, length = 0.0;
-    for (size_t l = 0; l < lines->n_line; l++) {
-        if (class < 3 && lines->axis[l] != class) continue;
-        double n = (double)polyline_length(lines, l);
-        square += n * (double)lines->radius[l] * (double)lines->radius[l];
-        length += n;
-    }
-    return length > 0.0 ? sqrt(square / length) : 1.0;
-}
-
-/* Gives every line the radius of its fiber in voxels: that of its profile, scaled so that all fibers of a class together
- * have the mass measured; or the one radius that the job asks for. */
-static void set_radii(const struct fiber_job *job, bool given, struct polyline_set *lines)
-{
-    double scale[3], voxel_m = job->v->voxel_size_m[0];
-    bool single = !given && job->o->radius_rule == RADIUS_AUTO;
-    for (int a = 0; a < 3; a++)
-        scale[a] = job->o->radius_m[a] / voxel_m / rms_radius_voxel(lines, job->report->radius_per_axis ? a : 3);
-    for (size_t l = 0; l < lines->n_line; l++) {
-        uint8_t a = lines->axis[l];
-        lines->radius[l] = (float)(single ? scale[a] * (double)lines->radius[l] : job->o->radius_m[a] / voxel_m);
-    }
-}
-
 static status find_radius(struct fiber_job *job, struct polyline_set *lines, struct error *err)
 {
     /* the last one is the sum of the others */
@@ -364,7 +336,8 @@ static status find_radius(struct fiber_job *job, struct polyline_set *lines, str
             report->radius_score[a] = radius_score(all, m.per_axis ? 1u << a : 7u, job->o->radius_m[a] / voxel_m);
         }
     }
-    if (s == STATUS_OK) set_radii(job, is_given, lines);
+    for (int a = 0; a < 3; a++) m.radius_voxel[a] = job->o->radius_m[a] / voxel_m;
+    if (s == STATUS_OK) polylines_set_radii(lines, &m, !is_given && job->o->radius_rule == RADIUS_AUTO);
     free(part);
     return s;
 }

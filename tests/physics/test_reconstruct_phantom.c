@@ -68,7 +68,8 @@ static void test_velvet(void **state)
     meet_the_goals(&c);
 }
 
-/* Fibers of unequal radius: each has its own radius in the result, and the axes are as good as those of equal fibers. */
+/* Fibers of unequal radius: each has its own radius in the result, and the axes are as good as those of equal
+ * fibers. */
 static void test_unequal_radii(void **state)
 {
     (void)state;

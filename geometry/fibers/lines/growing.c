@@ -163,8 +163,8 @@ static float normalise(float t[3])
     return norm;
 }
 
-/* Walks from position x with unit tangent t along a fiber of radius r and writes at most max_step positions. A walk that
- * reaches the middle of another line did not follow a fiber of its own, so all of it is discarded. */
+/* Walks from position x with unit tangent t along a fiber of radius r and writes at most max_step positions. A walk
+ * that reaches the middle of another line did not follow a fiber of its own, so all of it is discarded. */
 static int walk_on(const struct walk *w, uint32_t line, float r, float x[3], float t[3], float (*path)[3])
 {
     struct near_vertices near;

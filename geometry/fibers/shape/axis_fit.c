@@ -9,9 +9,6 @@
 
 enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK };
 static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
-/* Bounds of the measured standard deviation of a fiber's curvature, per diameter. */
-static const double CURVATURE_LEAST = 0.05, CURVATURE_MOST = 0.35;
-
 /* Sums over one brick: for the vertices of its segments, and for the profile. */
 struct brick_sum {
     struct axis_pull *pull; /* two for each segment of the brick */
@@ -279,23 +276,6 @@ static void add_bricks(const struct fit_job *job, const uint32_t *first_vertex_o
     }
 }
 
-/* Standard deviation of one component of the lines' curvature, per voxel. It is measured over chords of a diameter,
- * where the noise of single vertices has little weight. */
-static double measure_curvature(const struct polyline_set *lines, double diameter)
-{
-    size_t h = diameter > 4.0 ? (size_t)(0.5 * diameter) : 2;
-    double square = 0.0, n = 0.0;
-    for (size_t l = 0; l < lines->n_line; l++)
-        for (size_t i = lines->first[l] + h; i + h < lines->first[l + 1]; i++, n += 2.0)
-            for (int a = 0; a < 3; a++) {
-                double bend = (double)lines->vertex[i - h][a] - 2.0 * (double)lines->vertex[i][a] +
-                              (double)lines->vertex[i + h][a];
-                square += bend * bend;
-            }
-    double sd = n > 0.0 ? sqrt(square / n) / (double)(h * h) : INFINITY;
-    return fmin(fmax(sd, CURVATURE_LEAST / diameter), CURVATURE_MOST / diameter);
-}
-
 /* States the errors of the axes that the step has made (axis_fit.h). */
 static void state_error(const struct axis_pull *total, size_t n_vertex, double variance, double stiffness,
                         struct axis_profile *p)
@@ -350,7 +330,7 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
     memset(w->radius, 0, lines->n_line * sizeof *w->radius);
     add_bricks(job, w->first_vertex_of, w->total, &shared, w->radius);
     axis_profile_step(&job->profile, &shared, w->radius, w->length, lines->n_line, diameter, lines->radius);
-    double sd = job->profile.measured_curvature ? measure_curvature(lines, diameter) : CURVATURE_MOST / diameter;
+    double sd = job->profile.measured_curvature ? axis_curvature_sd(lines, diameter) : AXIS_CURVATURE_MOST / diameter;
     double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0, stiffness = variance / (sd * sd);
     state_error(w->total, lines->n_vertex, variance, stiffness, &job->profile);
     return axis_solve_lines(lines, w->total, stiffness, pool, err);

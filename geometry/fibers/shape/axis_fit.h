@@ -2,8 +2,8 @@
  *
  * Model: M(x) = low + (high - low) sum over lines of g(distance of x from the line), where g(d) = erfc((d - r) /
  * (sqrt 2 b)) / 2 is the profile of a fiber of radius r, blurred by b; every line has its own r. Fibers do not
- * interpenetrate, so their blurred densities add up. Therefore a line is not drawn towards its neighbours, as it would be
- * towards the centroid of the material around it. Each round is one Gauss-Newton step of
+ * interpenetrate, so their blurred densities add up. Therefore a line is not drawn towards its neighbours, as it would
+ * be towards the centroid of the material around it. Each round is one Gauss-Newton step of
  *     sum over voxels of w (V - M)^2 + sum over lines of stiffness |p_{i-1} - 2 p_i + p_{i+1}|^2
  * for all vertices, one for b, low, high and all radii together, and one for each radius. The weight w (Geman and
  * McClure 1985) ignores fibers that no line represents. The stiffness is the variance of the residuals over that of the

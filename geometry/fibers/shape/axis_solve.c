@@ -5,6 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Lower bound of the measured standard deviation of a fiber's curvature, per diameter. */
+static const double CURVATURE_LEAST = 0.05;
+
 enum { BAND = 7 }; /* the diagonal and six below it: second differences of three coordinates */
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
@@ -75,4 +78,19 @@ status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull
         if (job.failed[l]) s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     free(job.failed);
     return s;
+}
+
+double axis_curvature_sd(const struct polyline_set *lines, double diameter)
+{
+    size_t h = diameter > 4.0 ? (size_t)(0.5 * diameter) : 2;
+    double square = 0.0, n = 0.0;
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l] + h; i + h < lines->first[l + 1]; i++, n += 2.0)
+            for (int a = 0; a < 3; a++) {
+                double bend = (double)lines->vertex[i - h][a] - 2.0 * (double)lines->vertex[i][a] +
+                              (double)lines->vertex[i + h][a];
+                square += bend * bend;
+            }
+    double sd = n > 0.0 ? sqrt(square / n) / (double)(h * h) : INFINITY;
+    return fmin(fmax(sd, CURVATURE_LEAST / diameter), AXIS_CURVATURE_MOST / diameter);
 }

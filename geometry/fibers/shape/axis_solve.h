@@ -16,6 +16,12 @@ struct axis_pull {
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
 
+/* Standard deviation of one component of the lines' curvature, per voxel, at most AXIS_CURVATURE_MOST per diameter:
+ * that of fibers about to break. It is measured over chords of a diameter, where the noise of single vertices has
+ * little weight. */
+#define AXIS_CURVATURE_MOST 0.35
+double axis_curvature_sd(const struct polyline_set *lines, double diameter);
+
 /* Moves the vertices of every line to the minimum of its data terms plus stiffness |second difference|^2, by at most
  * one voxel. STATUS_NO_MEMORY. */
 status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness,

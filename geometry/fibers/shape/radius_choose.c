@@ -55,3 +55,27 @@ status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum ra
     free(scratch);
     return STATUS_OK;
 }
+
+/* Root of the mean square of the radii, by length, of the lines of a class; class 3: of all. The mass that the radius
+ * of a class follows from is proportional to this square. */
+static double rms_radius(const struct polyline_set *lines, int class)
+{
+    double square = 0.0, length = 0.0;
+    for (size_t l = 0; l < lines->n_line; l++) {
+        if (class < 3 && lines->axis[l] != class) continue;
+        double n = (double)polyline_length(lines, l);
+        square += n * (double)lines->radius[l] * (double)lines->radius[l];
+        length += n;
+    }
+    return length > 0.0 ? sqrt(square / length) : 1.0;
+}
+
+void polylines_set_radii(struct polyline_set *lines, const struct radius_measure *m, bool single)
+{
+    double scale[3];
+    for (int a = 0; a < 3; a++) scale[a] = m->radius_voxel[a] / rms_radius(lines, m->per_axis ? a : 3);
+    for (size_t l = 0; l < lines->n_line; l++) {
+        uint8_t a = lines->axis[l];
+        lines->radius[l] = (float)(single ? scale[a] * (double)lines->radius[l] : m->radius_voxel[a]);
+    }
+}

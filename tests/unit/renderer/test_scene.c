@@ -65,7 +65,8 @@ static void hits_are_where_they_should_be(void **state)
     scene_free(s);
 }
 
-/* Every fiber has its own radius: a ray straight down meets it so far above its axis, and beside a thin fiber passes. */
+/* Every fiber has its own radius: a ray straight down meets it so far above its axis, and passes beside the thin
+ * one. */
 static void fibers_have_their_own_radius(void **state)
 {
     (void)state;
