@@ -157,6 +157,17 @@ static status run_screening(struct search *s, struct error *err)
 }
 
 /* The fit of all unknowns, from the best cloth. */
+/* Paths of the joint fit's own cloths: differences take paths, too. */
+static uint64_t joint_budget(const struct search *s)
+{
+    const struct cloth_search *q = s->search;
+    size_t n_free = 0;
+    for (size_t k = 0; k < n_number(q); k++) n_free += !q->cloth->fixed[k];
+    double spared =
+        ((double)q->screen_expected - (double)s->result->n_path) / cloth_estimator_cost(q->cloth->moves, n_free);
+    return (uint64_t)fmax((double)q->problem->path_budget + spared, (double)q->least_joint_budget);
+}
+
 static status run_joint(struct search *s, struct error *err)
 {
     const struct cloth_search *q = s->search;
@@ -167,6 +178,7 @@ static status run_joint(struct search *s, struct error *err)
     struct fit_option option = *q->option;
     option.n_extra_start = 0;
     snprintf(s->kind, sizeof s->kind, "numbers of the cloth");
+    if (q->n_screen > 1) problem.path_budget = joint_budget(s);
     problem.first_path = problem.path_budget / (JOINT_STEPS * 2 * problem.observation->n);
     problem.parameter = s->parameter;
     problem.progress = &progress;

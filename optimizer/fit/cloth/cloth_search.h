@@ -34,8 +34,11 @@ struct cloth_search {
     struct cloth_estimator *cloth;
     /* Cloths of the screening, more than extra starts; 0 or 1: the joint fit begins at the start values. */
     size_t n_screen;
-    uint64_t screen_budget;           /* paths of each of them */
-    uint64_t final_budget;            /* paths of the final fit */
+    uint64_t screen_budget; /* most paths of each of them */
+    /* Paths that the budget of `problem` leaves for the whole screening. What the screening takes more or less is the
+     * joint fit's, which has least_joint_budget all the same. */
+    uint64_t screen_expected, least_joint_budget;
+    uint64_t final_budget;            /* paths of the final fit; where a second one is needed, it takes as many */
     double screen_share, final_share; /* of the progress, together below 1 */
 };
 

@@ -113,12 +113,22 @@ static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[
     }
 }
 
-/* The error of fitted rows that were left out in turn; null when there are too few rows. */
-static json_t *cross_validation_json(const struct cross_validation *v)
+/* The error of fitted rows that were left out in turn; null when there are too few rows. Where numbers of the cloth are
+ * fitted, they are the same in all folds; the same error with new numbers in each fold is that of the joint fit. */
+static json_t *cross_validation_json(const struct pipeline_context *c, const struct pipeline_model *m)
 {
+    const struct cross_validation *v = &m->fit.cross_validation, *joint = &m->cloth.joint.cross_validation;
     if (v->n_fold == 0) return json_null();
-    return json_pack("{s:o, s:o, s:I, s:I}", "rel_rms", json_number(v->rel_rms), "rel_rms_se",
-                     json_number(v->rel_rms_se), "n_fold", (json_int_t)v->n_fold, "n_row", (json_int_t)v->n_row);
+    json_t *json =
+        json_pack("{s:o, s:o, s:I, s:I}", "rel_rms", json_number(v->rel_rms), "rel_rms_se", json_number(v->rel_rms_se),
+                  "n_fold", (json_int_t)v->n_fold, "n_row", (json_int_t)v->n_row);
+    if (c->number.n == 0) return json;
+    json_object_set_new(json, "cloth_numbers_held", json_true());
+    json_object_set_new(json, "with_cloth_numbers",
+                        joint->n_fold == 0 ? json_null()
+                                           : json_pack("{s:o, s:o}", "rel_rms", json_number(joint->rel_rms),
+                                                       "rel_rms_se", json_number(joint->rel_rms_se)));
+    return json;
 }
 
 /* Adds the results of a fit and of its validation. */
@@ -145,7 +155,7 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
                         json_number_list(m->validation.held_out_channels.rel_rms, 3, 1.0));
     json_object_set_new(json, "heldout_channel_rel_rms_se",
                         json_number_list(m->validation.held_out_channels.rel_rms_se, 3, 1.0));
-    json_object_set_new(json, "cross_validation", cross_validation_json(&m->fit.cross_validation));
+    json_object_set_new(json, "cross_validation", cross_validation_json(c, m));
     json_object_set_new(json, "misfit_rel_rms", json_number(sqrt(m->fit.uncertainty.misfit_var)));
     json_object_set_new(json, "validation_worst_rel_se", json_number(m->validation.worst_rel_se));
     result_fit_options(c, m, json);

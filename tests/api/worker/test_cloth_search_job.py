@@ -90,6 +90,8 @@ def test_numbers_come_back(tmp_path, sample):
     assert not hairs["determined"] and 100 <= hairs["value"] <= 1000 and hairs["unit"] == "um", hairs
     assert "these measurements do not determine" in json.dumps(result["warnings"]) and "hair_length_um" in json.dumps(result["warnings"])
     assert len(flatness["correlation_parameters"]) == len(result["parameters"])
+    folds = result["cross_validation"]
+    assert folds["cloth_numbers_held"] and folds["with_cloth_numbers"]["rel_rms"] >= 0 and folds["with_cloth_numbers"]["rel_rms_se"] > 0
     shown = {n["name"]: n for n in result["geometry"]["cloth"]["numbers"]}
     assert abs(shown["yarns[0].flatness"]["value"] - flatness["value"]) < 1e-9
     summary = (job / "results" / "summary.txt").read_text()

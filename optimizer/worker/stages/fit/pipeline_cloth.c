@@ -252,9 +252,11 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     q->n_screen = n_screen >= 2.0 ? (size_t)n_screen : 0;
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
     q->final_budget = (uint64_t)fmax(final_share * whole, LEAST_FITS * least);
-    double left = (1.0 - final_share) * whole - (double)q->n_screen * per_cloth;
-    problem->path_budget =
-        (uint64_t)fmax(left / cloth_estimator_cost(q->cloth->moves, n_free_number(c)), LEAST_FITS * least);
+    const double cost = cloth_estimator_cost(q->cloth->moves, n_free_number(c)), least_joint = LEAST_FITS * least;
+    double both = fmax((1.0 - final_share) * whole, least_joint * cost); /* of screening and joint fit */
+    q->screen_expected = (uint64_t)fmin((double)q->n_screen * per_cloth, both - least_joint * cost);
+    q->least_joint_budget = (uint64_t)least_joint;
+    problem->path_budget = (uint64_t)((both - (double)q->screen_expected) / cost);
     q->screen_share = 0.25;
     q->final_share = 0.35;
 }

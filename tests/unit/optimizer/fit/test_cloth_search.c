@@ -249,6 +249,7 @@ static void test_extra_starts(void **state)
     fake_numbers_init(&x, mid_cloth, 11, 0.0, 0.0, 0.0);
     x.problem.max_iteration = 1; /* the joint fit stays where it begins */
     x.search.n_screen = 4;
+    x.search.screen_expected = 4 * x.search.screen_budget;
     x.option.n_extra_start = 2;
     memcpy(x.option.extra_start[0], x.truth, sizeof x.truth);
     x.option.extra_start[0][FAKE_N_PARAM] = 9.0;
@@ -303,6 +304,30 @@ static void test_marginal(void **state)
     free(r);
 }
 
+/* What the screening takes more than expected is missing in the joint fit, which has its least budget all the same. */
+static void test_screening_within_the_budget(void **state)
+{
+    (void)state;
+    struct fake_numbers x;
+    struct cloth_search_result *r = malloc(sizeof *r);
+    for (int least = 0; least < 2; least++) {
+        uint64_t screened = 0;
+        fake_numbers_init(&x, mid_cloth, 13, 1.0, 0.01, 0.0);
+        const double cost = cloth_estimator_cost(x.numbers.moves, FAKE_N_NUMBER);
+        x.search.n_screen = 3;
+        x.search.screen_budget = 300000;
+        x.search.screen_expected = 0;
+        x.search.least_joint_budget = least ? x.problem.path_budget : 0;
+        fake_numbers_run(&x, r);
+        for (size_t i = 0; i < r->n_screen; i++) screened += r->screened[i].n_path;
+        double whole = (double)x.problem.path_budget, joint = (double)r->joint.n_path;
+        assert_true((double)screened > 0.1 * whole);
+        assert_true(least ? joint > 0.9 * whole : joint < 1.05 * (whole - (double)screened / cost));
+        fake_numbers_release(&x);
+    }
+    free(r);
+}
+
 /* ---- interruption ---- */
 
 static void test_resume(void **state)
@@ -312,6 +337,7 @@ static void test_resume(void **state)
     const char *path = scratch_path(state, "cloth.journal");
     fake_numbers_init(&x, mid_cloth, 13, 1.0, 0.01, 0.0);
     x.search.n_screen = 2;
+    x.search.screen_expected = 2 * x.search.screen_budget;
     x.problem.max_iteration = 3;
     fake_numbers_run(&x, want);
     size_t n_call = x.cloth.n_call;
@@ -346,6 +372,7 @@ int main(void)
         cmocka_unit_test(test_prior_of_an_undetermined_number),
         cmocka_unit_test(test_extra_starts),
         cmocka_unit_test(test_marginal),
+        cmocka_unit_test(test_screening_within_the_budget),
         cmocka_unit_test_setup_teardown(test_resume, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
