@@ -308,7 +308,7 @@ static json_t *describe(const struct cloth *c)
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
 }
 
-/* cloth.json: what a job takes as its section "cloth" for the same cloth (numbers with all digits), or for the nearest. */
+/* cloth.json: the section "cloth" of a job for the same cloth (numbers with all digits), or for the nearest. */
 static status write_description(const struct cloth *c, struct error *err)
 {
     char path[4096];
