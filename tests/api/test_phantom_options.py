@@ -48,9 +48,11 @@ def test_weave_and_yarn_in_both_spellings(tmp_path):
 def test_a_described_cloth_and_its_description(tmp_path):
     """The description that a phantom writes is one that it takes, and it makes the same cloth again."""
     given = tmp_path / "given.json"
-    given.write_text(json.dumps({"draft": ["10", "01"], "crimp": 0.6, "tile_warps": 2, "tile_wefts": 4, "yarns": [{"fibers": 9, "twist_per_m": 700}]}))
+    given.write_text(json.dumps({"draft": ["10", "01"], "crimp": 0.6, "disorder": 1 / 30, "tile_warps": 2, "tile_wefts": 4,
+                                 "yarns": [{"fibers": 9, "twist_per_m": 700}]}))
     made = cloth(tmp_path / "a", "--description", str(given))
     assert made["cloth"]["crimp"] == 0.6 and made["cloth"]["yarns"][0]["twist_per_m"] == 700 and made["result"]["volume_fraction"] > 0.1
+    assert json.loads((tmp_path / "a" / "cloth.json").read_text())["disorder"] == 1 / 30  # with all digits
     again = cloth(tmp_path / "b", f"--description={tmp_path}/a/cloth.json")
     assert again["result"] == made["result"] and (tmp_path / "a" / "truth.hair").read_bytes() == (tmp_path / "b" / "truth.hair").read_bytes()
 

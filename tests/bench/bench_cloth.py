@@ -104,6 +104,7 @@ def bench_table(arguments, table):
     brdf = best["skill"]["plain_brdf"]["heldout_rel_rms"]
     figure(f"cloth.real.{sample}.fit_rel_rms", best["fit_rel_rms"], "1")
     figure(f"cloth.real.{sample}.heldout_rel_rms", best["heldout_rel_rms"], "1")
+    figure(f"cloth.real.{sample}.heldout_worst_channel_rel_rms", max(best["heldout_channel_rel_rms"]), "1")
     figure(f"cloth.real.{sample}.brdf_heldout_rel_rms", brdf, "1")
     figure(f"cloth.real.{sample}.wall_s", round(wall_s, 1), "s")
     return best["heldout_rel_rms"], brdf
