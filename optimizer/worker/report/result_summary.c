@@ -85,14 +85,15 @@ static void print_channels(const char *label, const struct objective_channels *v
     fprintf(out, " %%\n");
 }
 
-static void print_errors(const struct pipeline_model *m, FILE *out)
+static void print_errors(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out)
 {
     const struct validation *v = &m->validation;
     char text[80];
     percent(&v->fit, text, sizeof text);
     fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
     percent_left_out(m, text, sizeof text);
-    fprintf(out, "fitted rows left out in turn               %s (cross-validation)\n", text);
+    fprintf(out, "fitted rows left out in turn               %s (cross-validation%s)\n", text,
+            c->number.n > 0 ? ", numbers of the cloth held" : "");
     percent(&v->held_out, text, sizeof text);
     if (isfinite(v->held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
     print_channels("red, green, blue apart, fitted rows", &v->fit_channels, out);
@@ -165,7 +166,7 @@ static void print_summary(struct pipeline_context *c, FILE *out)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m, 1e6 * c->radius.se_m,
                 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
                 c->radius.curve.at_bound ? " (at the edge of its range)" : "");
-    print_errors(m, out);
+    print_errors(c, m, out);
     print_skill(c, out);
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
             m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
