@@ -35,6 +35,7 @@ def test_a_fault_is_possible(before, after):
     ("int f(void)\n{\n    snprintf(a + n, sizeof a - n, \"x\");\n    b = 2;\n}\n", "sizeof a - n"),
     ("int f(void)\n{\n    struct error err = {0};\n    b = 2;\n}\n", "{0}"),
     ("int f(void)\n{\n    char text[40];\n    b = 2;\n}\n", "[40]"),
+    ("int f(void)\n{\n    a = malloc(8 * n);\n    b = 2;\n}\n", "8"),
     ("int f(void)\n{\n    log_info(log, \"%d\", 2 + a);\n    b = 2;\n}\n", "2 + a"),
 ])
 def test_a_place_without_an_effect_is_left_alone(text, kept):

@@ -1,7 +1,7 @@
 """Small faults in source text: every place of a file where one of the operators below applies.
 
 Works on tokens, not on a syntax tree: what does not compile is sorted out by the compiler. Left alone are comments, strings,
-preprocessor lines, array sizes in declarations, everything inside a call that logs, words a message or asserts, and answers to a
+preprocessor lines, sizes of arrays and of memory, everything inside a call that logs, words a message or asserts, and answers to a
 lack of memory, which no test provokes; and three kinds of places where every fault is equivalent (equivalent_places below).
 """
 import dataclasses
@@ -88,8 +88,11 @@ def statement_start(found, i):
 
 
 def mark_sizes(found):
-    """Sizes of arrays in declarations: one more element changes nothing."""
+    """Sizes of arrays in declarations, and of memory that is asked for: one more element changes nothing."""
     for i, t in enumerate(found):
+        if t.text in ("malloc", "calloc", "realloc", "aligned_alloc") and i + 1 < len(found) and found[i + 1].text == "(":
+            for k in range(i + 1, closing(found, i + 1) + 1):
+                found[k].in_size = True
         if t.text == "[" and found[statement_start(found, i)].kind == "word" and TYPES.match(found[statement_start(found, i)].text):
             for k in range(i, closing(found, i) + 1):
                 found[k].in_size = True

@@ -11,7 +11,13 @@ static double now_s;
 
 #include <cmocka.h>
 
-enum { CUT_OFF = -1, RUNNING = 200, SUCCEEDED = 201 };
+enum { CUT_OFF = -1, RUNNING = 200, SUCCEEDED = 1, DRAFT, CANCELLED, FAILED, N_ANSWER };
+
+static const char *const body_of[N_ANSWER] = {
+    [SUCCEEDED] = "{\"state\":\"succeeded\"}",
+    [DRAFT] = "{\"state\":\"draft\"}",
+    [CANCELLED] = "{\"state\":\"cancelled\"}",
+    [FAILED] = "{\"state\":\"failed\",\"error\":{\"text\":\"too dark\",\"field\":\"lamp\"}}"};
 
 /* The answers of the server, one for each call; the last one repeats. */
 static const int *script;
@@ -23,13 +29,13 @@ status http_call(struct http *http, const char *method, const char *path, const 
     (void)http, (void)method, (void)path, (void)header, (void)body, (void)n_body;
     int now = script[i_script];
     if (i_script + 1 < n_script) i_script++;
-    *reply = (struct http_reply){.code = now == SUCCEEDED ? 200 : now};
+    *reply = (struct http_reply){.code = now > 0 && now < N_ANSWER ? 200 : now};
     if (now == CUT_OFF) {
         reply->cut_off = true;
         return error_set(err, STATUS_IO, "cut off");
     }
     if (reply->code == 200) {
-        reply->body = strdup(now == RUNNING ? "{\"state\":\"running\"}" : "{\"state\":\"succeeded\"}");
+        reply->body = strdup(now == RUNNING ? "{\"state\":\"running\"}" : body_of[now]);
         reply->n_body = strlen(reply->body);
     }
     return STATUS_OK;
@@ -130,12 +136,38 @@ static void test_other_answers_end_it(void **state)
     }
 }
 
+/* How a watch ends by the state of the job. */
+static void test_states(void **state)
+{
+    (void)state;
+    static const struct {
+        int answer;
+        status result;
+        const char *error, *note;
+    } is[] = {{SUCCEEDED, STATUS_OK, "", "results: selvedge results j"},
+              {CANCELLED, STATUS_OK, "", "`selvedge retry j` continues"},
+              {DRAFT, STATUS_CONFLICT, "job j has not been started; start it with: selvedge submit --resume j", ""},
+              {FAILED, STATUS_CONFLICT, "job j failed: too dark", ""}};
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        const int answer[] = {RUNNING, is[i].answer};
+        struct error err = {0};
+        char *said = NULL;
+        assert_int_equal(watch(answer, 2, &said, &err), is[i].result);
+        assert_string_equal(err.text, is[i].error);
+        assert_string_equal(err.field, is[i].answer == FAILED ? "lamp" : "");
+        assert_non_null(strstr(said, is[i].note));
+        assert_true(now_s - 1000 < 5);
+        free(said);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_a_server_that_comes_back),
         cmocka_unit_test(test_a_server_that_stays_away),
         cmocka_unit_test(test_other_answers_end_it),
+        cmocka_unit_test(test_states),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

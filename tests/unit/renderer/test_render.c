@@ -111,6 +111,30 @@ static void agrees_with_estimate(void **state)
     scene_free(scene);
 }
 
+/* The variance of a pixel is that of its mean: pictures of two seeds differ as much as theirs say. */
+static void variance_is_that_of_the_mean(void **state)
+{
+    (void)state;
+    struct scene *scene = small_cloth(true);
+    struct render_request q = request(scene, &configuration[0]);
+    struct image one, two;
+    double square = 0, var = 0;
+    q.n_sample = 40;
+    render(&q, 2, &one);
+    q.seed++;
+    render(&q, 2, &two);
+    for (size_t i = 0; i < one.width * one.height; i++)
+        for (size_t k = i * one.n_channel; k < i * one.n_channel + 3; k++) {
+            square += pow((double)one.pixel[k] - (double)two.pixel[k], 2);
+            var += (double)one.pixel[k + 3] + (double)two.pixel[k + 3];
+        }
+    print_message("squared differences over variances: %.3f\n", square / var);
+    assert_true(fabs(square / var - 1) < 0.15);
+    image_release(&one);
+    image_release(&two);
+    scene_free(scene);
+}
+
 /* With a lamp below, the black sheet stops all light. Without it light passes through the cloth and between its
  * fibers. */
 static void back_light(void **state)
@@ -159,6 +183,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layers_and_threads),
         cmocka_unit_test(agrees_with_estimate),
+        cmocka_unit_test(variance_is_that_of_the_mean),
         cmocka_unit_test(back_light),
         cmocka_unit_test(bad_requests),
     };

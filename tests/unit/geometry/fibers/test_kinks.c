@@ -52,6 +52,27 @@ static void test_kink_is_cut(void **state)
     polyline_set_release(&out);
 }
 
+/* A corner in the middle of a line: what is cut off lies evenly on both sides of it. */
+static void test_cut_is_even(void **state)
+{
+    (void)state;
+    struct polyline_set lines, out;
+    size_t n_cut;
+    polyline_set_init(&lines);
+    polyline_set_init(&out);
+    assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
+    for (int i = -50; i <= 50; i++) {
+        const float x[3] = {i < 0 ? (float)i : 0.0f, i > 0 ? (float)i : 0.0f, 0.0f};
+        assert_int_equal(polyline_add(&lines, x, NULL), STATUS_OK);
+    }
+    assert_int_equal(polylines_cut_kinks(&lines, DIAMETER, 2.1, 10, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, 2);
+    assert_int_equal(polyline_length(&out, 0), polyline_length(&out, 1));
+    assert_int_equal(n_cut % 2, 1);
+    polyline_set_release(&lines);
+    polyline_set_release(&out);
+}
+
 static void test_crimp_is_kept(void **state)
 {
     (void)state;
@@ -105,6 +126,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_kink_is_cut),
+        cmocka_unit_test(test_cut_is_even),
         cmocka_unit_test(test_crimp_is_kept),
         cmocka_unit_test(test_stray_end_is_trimmed),
     };

@@ -357,6 +357,22 @@ static void test_weighted_objective(void **state)
     linear_model_release(&m);
 }
 
+/* Priors add precision (x - mean)^2, in units of the rows' variance, and its derivatives. */
+static void test_penalty_of_priors(void **state)
+{
+    (void)state;
+    const struct gaussian_prior prior[2] = {{.mean = 1.0, .precision = 4.0}, {.mean = -2.0, .precision = 0.5}};
+    double x[2] = {1.5, 1.0}, g[2], h[4];
+    struct linear_model m = {.n_param = 2, .row_var = 0.1, .prior = prior, .x_ref = {1.5, 1.0}};
+    assert_true(fabs(linear_model_penalty(&m, x) - 0.1 * (4.0 * 0.25 + 0.5 * 9.0)) < 1e-12);
+    linear_model_gradient(&m, g);
+    assert_true(fabs(g[0] - 0.1 * 8.0 * 0.5) < 1e-12 && fabs(g[1] - 0.1 * 1.0 * 3.0) < 1e-12);
+    linear_model_hessian(&m, false, h);
+    assert_true(fabs(h[0] - 0.8) < 1e-12 && h[1] == 0.0 && h[2] == 0.0 && fabs(h[3] - 0.1) < 1e-12);
+    m.prior = NULL;
+    assert_true(linear_model_penalty(&m, x) == 0.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -370,6 +386,7 @@ int main(void)
         cmocka_unit_test(test_bound_of_a_wide_range),
         cmocka_unit_test(test_contrasts_have_a_misfit_of_their_own),
         cmocka_unit_test(test_weighted_objective),
+        cmocka_unit_test(test_penalty_of_priors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
