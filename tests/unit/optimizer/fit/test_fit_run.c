@@ -194,6 +194,43 @@ static void test_extra_starts(void **state)
     assert_int_equal(fit_run(descent_find(method_gauss_newton.id), &x.problem, &x.option, &r, NULL), STATUS_INVALID);
     fit_fixture_release(&x);
 }
+/* Where the first step of each start was. */
+struct first_steps {
+    bool seen[FIT_MAX_START];
+    double param[FIT_MAX_START][FAKE_N_PARAM];
+};
+
+static status note_first(void *context, const struct fit_step *step, struct error *err)
+{
+    struct first_steps *first = context;
+    unsigned k = 0;
+    (void)err;
+    assert_int_equal(sscanf(step->phase, "start %u of 3", &k), 1);
+    assert_true(k >= 1 && k <= 3);
+    if (!first->seen[k - 1]) memcpy(first->param[k - 1], step->param, sizeof first->param[k - 1]);
+    first->seen[k - 1] = true;
+    return STATUS_OK;
+}
+
+/* Each start begins where the result says. */
+static void test_starts_begin_apart(void **state)
+{
+    (void)state;
+    struct fit_fixture x;
+    struct fit_result r;
+    struct first_steps first = {0};
+    fit_fixture_init(&x, fit_fixture_mid_range, 11, false, 0.005);
+    x.problem.path_budget = 1000000;
+    x.problem.report = note_first;
+    x.problem.report_context = &first;
+    x.option.n_start = 3;
+    assert_int_equal(fit_run(descent_find(method_gauss_newton.id), &x.problem, &x.option, &r, NULL), STATUS_OK);
+    for (size_t k = 0; k < 3; k++)
+        for (size_t p = 0; p < FAKE_N_PARAM; p++)
+            assert_true(first.seen[k] && fabs(first.param[k][p] / r.start[k].from[p] - 1.0) < 1e-9);
+    fit_fixture_release(&x);
+}
+
 /* Starts lie inside the bounds, differ, and the best is kept; all are listed. */
 static void test_starts(void **state)
 {
@@ -320,6 +357,7 @@ int main(void)
         cmocka_unit_test(test_priors),
         cmocka_unit_test(test_priors_of_tied_channels),
         cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_starts_begin_apart),
         cmocka_unit_test(test_extra_starts),
         cmocka_unit_test(test_resume),
         cmocka_unit_test(test_too_many_unknowns),

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -66,6 +67,24 @@ static void test_a_worker_of_an_old_attempt_removes_nothing(void **state)
     worker_folder_close(&f);
 }
 
+/* That there is no mark is no error; a mark that cannot be removed is one. */
+static void test_marks_are_removed(void **state)
+{
+    struct worker_folder f;
+    struct error err = {0};
+    char path[WORKER_PATH_BYTES];
+    assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_mark_stage(&f, "trace", NULL), STATUS_OK);
+    assert_int_equal(worker_folder_unmark_stage(&f, "trace", NULL), STATUS_OK);
+    assert_false(worker_folder_stage_done(&f, "trace"));
+    assert_int_equal(worker_folder_unmark_stage(&f, "trace", NULL), STATUS_OK);
+    worker_folder_path(&f, JOB_FOLDER_WORK, "trace.done", path);
+    assert_int_equal(mkdir(path, 0700), 0);
+    assert_int_not_equal(worker_folder_unmark_stage(&f, "trace", &err), STATUS_OK);
+    assert_non_null(strstr(err.text, "trace.done"));
+    worker_folder_close(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -73,6 +92,7 @@ int main(void)
                                         scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_a_worker_of_an_old_attempt_removes_nothing, scratch_folder_setup,
                                         scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_marks_are_removed, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
