@@ -73,6 +73,19 @@ static void test_a_bundle_and_its_blur(void **state)
     fiber_set_release(&f);
 }
 
+/* Fibers farther apart than 1.6 sums of their radii are no neighbours, so nothing lies beside them. */
+static void test_neighbours(void **state)
+{
+    (void)state;
+    static const double spacing[] = {10.0, 13.0};
+    for (int k = 0; k < 2; k++) {
+        struct fiber_set f = bundle(2, spacing[k], 3.5);
+        struct scan_grade g = grade_of(&f, &f, 0.7, 0.0, NULL);
+        assert_true(k == 0 ? g.beside_share > 0.95 : g.beside_share == 0.0);
+        fiber_set_release(&f);
+    }
+}
+
 /* What a tracer makes of a tow whose fibers it cannot see: an even grid in a block of material. */
 static void test_invented_fibers(void **state)
 {
@@ -151,6 +164,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_bundle_and_its_blur),
+        cmocka_unit_test(test_neighbours),
         cmocka_unit_test(test_invented_fibers),
         cmocka_unit_test(test_pressed_fibers),
         cmocka_unit_test(test_hollow_and_single_fibers),
