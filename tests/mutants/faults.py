@@ -20,6 +20,8 @@ SPOKEN = re.compile(r"^(log_\w+|error_set\w*|error_prefix|fprintf|printf|assert\
 # what is dropped here leaks or stays locked, which no test of a result can see
 RELEASES = re.compile(r"^(free|close|fclose|\w*_(release|free|close|unlock|lock|destroy|init|finalize)|log_\w+|assert\w*|print|progress_report)$")
 DESCRIPTOR = re.compile(r"^(\w*_)?fd$")
+# calls that do not depend on the order of their first two arguments; of the comparisons, only whether they are 0 is asked for
+SYMMETRIC = re.compile(r"^(f(min|max)f?|hypotf?|memcmp|strn?(case)?cmp)$")
 TYPES = re.compile(r"^(char|int|float|double|bool|status|size_t|ssize_t|off_t|u?int\d+_t|unsigned|signed|long|short|struct|enum|union|"
                    r"const|static|extern|inline|void|typedef|let|var|def|class|import|from|restrict|_Atomic|atomic_\w+)$")
 CONTROL = {"if", "for", "while", "switch", "return", "sizeof", "else", "do", "case", "goto", "break", "continue", "default", "elif",
@@ -172,7 +174,7 @@ def condition_faults(found, i, language):
 def swapped_arguments(found, i):
     if found[i].kind != "word" or found[i].text in CONTROL or TYPES.match(found[i].text) or found[i + 1].text != "(":
         return
-    if SPOKEN.match(found[i].text):
+    if SPOKEN.match(found[i].text) or SYMMETRIC.match(found[i].text):
         return
     if i > 0 and (found[i - 1].kind == "word" and found[i - 1].text not in CONTROL or found[i - 1].text == "*" and found[i - 1].end == found[i].start):
         return  # a declaration

@@ -211,6 +211,25 @@ static void test_wrong_axes(void **state)
     for (int i = 0; i < 9; i++) assert_true(a.matrix[i] == (i % 4 == 0 ? 1.0 : 0.0));
 }
 
+/* Weft and warp that are neither orthogonal nor in the plane. */
+static void test_sheared_and_tilted(void **state)
+{
+    (void)state;
+    const struct main_directions m = {
+        .n = 2, .direction = {{1.0, 0.0, 0.0}, {0.3, 0.94, 0.16}}, .repeat_m = {1e-4, 1e-4}};
+    const double normal[3] = {0.0, -0.16, 0.94};
+    double length = hypot(0.16, 0.94);
+    struct alignment a;
+    alignment_from_directions(&m, &a);
+    assert_int_equal(a.outcome, ALIGN_DONE);
+    for (int i = 0; i < 3; i++) { /* the normal of the cloth becomes z, and thickness stays what it is */
+        double z = 0.0;
+        for (int k = 0; k < 3; k++) z += a.matrix[3 * i + k] * normal[k] / length;
+        assert_true(fabs(z - (i == 2 ? 1.0 : 0.0)) < 1e-9);
+    }
+    assert_true(fabs(a.tilt_deg - atan2(0.16, 0.94) / deg) < 1e-6);
+}
+
 /* With one direction at most, the share of fibers along z decides whether the axes are wrong: 0.35 of them. */
 static void test_fibers_along_z(void **state)
 {
@@ -347,9 +366,11 @@ static void test_memory_limit(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_matrices),      cmocka_unit_test(test_threads),
-                                       cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
-                                       cmocka_unit_test(test_fibers_along_z),      cmocka_unit_test(test_known_period),
-                                       cmocka_unit_test(test_align_and_crop),      cmocka_unit_test(test_memory_limit)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_known_matrices),      cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_one_system_and_none), cmocka_unit_test(test_wrong_axes),
+        cmocka_unit_test(test_fibers_along_z),      cmocka_unit_test(test_sheared_and_tilted),
+        cmocka_unit_test(test_known_period),        cmocka_unit_test(test_align_and_crop),
+        cmocka_unit_test(test_memory_limit)};
     return cmocka_run_group_tests(tests, make_cloth, release_cloth);
 }

@@ -91,11 +91,28 @@ static void test_fixed_ones_are_left_out(void **state)
     assert_true(fabs(u.cov[3] - (at_fixed_x[1][1] + given)) < 1e-12);
 }
 
+/* No error is larger than that of a parameter of which only the range is known, which is not determined then. */
+static void test_limit(void **state)
+{
+    (void)state;
+    static const struct param_info info[2] = {
+        {"x", "x", PARAM_SHAPE, PARAM_UNIT_NONE, -1, 0.0, 1.0, 0.5, PARAM_LINEAR, ""},
+        {"y", "y", PARAM_SHAPE, PARAM_UNIT_NONE, -1, 0.0, 1.0, 0.5, PARAM_LINEAR, ""}};
+    static const struct fit_parameter parameter[2] = {{0.0, 1.0, 0.5, false}, {0.0, 1.0, 0.5, false}};
+    struct uncertainty u = {.n_param = 2, .cov = {0.0001, 0.0, 0.0, 1.0}, .se_param = {0.01, 1.0}};
+    u.determined[0] = false;
+    u.determined[1] = true;
+    carried_error_limit(info, parameter, &u);
+    assert_true(u.determined[0] && !u.determined[1]);
+    assert_true(u.se_param[0] == 0.01 && fabs(u.se_param[1] - 1.0 / sqrt(12.0)) < 1e-12);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_joint_and_given_variance),
         cmocka_unit_test(test_fixed_ones_are_left_out),
+        cmocka_unit_test(test_limit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -272,6 +272,10 @@ static void test_too_dark_and_too_bright(void **state)
     assert_int_equal(s.n, 2);
     assert_non_null(strstr(s.text[0], "'row-2' is brighter than any cloth: its radiance is 1e+06"));
     assert_non_null(strstr(s.text[1], "'row-3' is brighter"));
+    check_rows(usual, (const double[5]){300, 300, 300, 200, 200}, one, &s);
+    assert_int_equal(s.n, 4);
+    assert_non_null(strstr(s.text[2], "'row-2' is brighter"));
+    assert_string_equal(s.text[3], "2 more rows are brighter than any cloth");
 }
 
 /* Number of warnings for two rows that contradict each other. */
