@@ -1,6 +1,7 @@
 /* The inputs that a job folder's files belong to: other inputs empty the folder, but only for the worker that holds the
  * present attempt. */
 #include "optimizer/job/job_folder.h"
+#include "optimizer/worker/document_fingerprint.h"
 #include "optimizer/worker/worker_folder.h"
 #include "tests/support/scratch_folder.h"
 
@@ -11,6 +12,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cmocka.h>
 
@@ -85,6 +87,16 @@ static void test_marks_are_removed(void **state)
     worker_folder_close(&f);
 }
 
+/* The fingerprint is that of the document and of the program that works on it. */
+static void test_fingerprint(void **state)
+{
+    (void)state;
+    uint64_t a = document_fingerprint("{\"a\": 1}", 8);
+    assert_true(a == document_fingerprint("{\"a\": 1}", 8));
+    assert_true(a != document_fingerprint("{\"a\": 2}", 8));
+    assert_true(a != crc32_z(0, (const void *)"{\"a\": 1}", 8));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -92,6 +104,7 @@ int main(void)
                                         scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_a_worker_of_an_old_attempt_removes_nothing, scratch_folder_setup,
                                         scratch_folder_teardown),
+        cmocka_unit_test(test_fingerprint),
         cmocka_unit_test_setup_teardown(test_marks_are_removed, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
