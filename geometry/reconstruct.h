@@ -32,6 +32,7 @@ struct reconstruct_option {
     bool crop;                        /* choose the box that tiles best (tile_crop.h); a given box has precedence */
     double crop_keep;                 /* least share of each edge that is kept, 0.5 by default */
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
+    bool hollow_fibers;               /* lumens are filled when the volume is read (lumen_fill.h) */
     double fiber_diameter_voxel;      /* typical diameter, from which scales and reaches follow */
     double s, t;                      /* filter widths, per square voxel (thesis Table 5.2) */
     size_t h;                         /* edge of the filter's cube, voxels */
@@ -60,6 +61,7 @@ struct reconstruct_report {
     double density_low, density_high; /* scanner values */
     double separability;              /* of void and material in the histogram, 0..1 (density_map.h) */
     double noise_sd;                  /* of the mapped density in voxels without material */
+    double lumen_share;               /* filled lumens over material; 0 if the fibers are solid */
     double fiber_diameter_voxel;      /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
      * there is none, or the diameter was given. */
@@ -75,7 +77,7 @@ struct reconstruct_report {
     /* Radius of the profile that was fitted to the axes: a second measurement, by the edges instead of the mass. */
     double profile_radius_m;
     double radius_spread;      /* standard deviation of the radii of single fibers over their mean, without errors */
-    double single_radius_se_m; /* typical standard error of the radius of one fiber by the scan's noise */
+    double single_radius_se_m; /* typical standard error of the radius of one fiber */
     /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
     double axis_position_se_m, axis_direction_se_rad;
     bool radius_per_axis;          /* each class has a radius of its own */

@@ -311,6 +311,17 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
     return s;
 }
 
+/* Mean radius of the lines by length, voxels. */
+static double mean_radius(const struct polyline_set *lines)
+{
+    double sum = 0.0, length = 0.0;
+    for (size_t l = 0; l < lines->n_line; l++) {
+        sum += (double)polyline_length(lines, l) * (double)lines->radius[l];
+        length += (double)polyline_length(lines, l);
+    }
+    return length > 0.0 ? sum / length : 0.0;
+}
+
 static status find_radius(struct fiber_job *job, struct polyline_set *lines, struct error *err)
 {
     /* the last one is the sum of the others */
@@ -338,6 +349,9 @@ static status find_radius(struct fiber_job *job, struct polyline_set *lines, str
     }
     for (int a = 0; a < 3; a++) m.radius_voxel[a] = job->o->radius_m[a] / voxel_m;
     if (s == STATUS_OK) polylines_set_radii(lines, &m, !is_given && job->o->radius_rule == RADIUS_AUTO);
+    /* edges and mass disagree by the errors of both models, which every fiber shares */
+    report->single_radius_se_m =
+        hypot(report->single_radius_se_m, mean_radius(lines) * voxel_m - report->profile_radius_m);
     free(part);
     return s;
 }

@@ -2,6 +2,7 @@
 #include "base/option_id.h"
 #include "geometry/reconstruct.h"
 
+#include "geometry/orientation/lumen_fill.h"
 #include "geometry/orientation/repeat_direction.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/volume_align.h"
@@ -239,6 +240,9 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->density_high = o->density_high;
     report->separability = m.separability;
     report->noise_sd = density_noise_sd(v);
+    report->lumen_share = 0.0;
+    if (o->hollow_fibers) s = lumens_fill(v, report->noise_sd, &report->lumen_share, err);
+    if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;
 }

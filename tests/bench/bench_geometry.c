@@ -150,6 +150,7 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
     scan.beam_hardening = k->beam_hardening;
     scan.phase_fringes = k->phase_fringes;
     reconstruct_option_default(&r.option);
+    r.option.hollow_fibers = k->section.lumen > 0.0;
     status st = phantom_reconstruct_scan(&o, &scan, &r, err);
     if (st == STATUS_OK && s->pictures != NULL) st = write_pictures(s->pictures, name, &r.v, &r.found, err);
     const struct compare_report *c = &r.compare;

@@ -96,6 +96,9 @@ static void test_unequal_radii(void **state)
     assert_true(c->direction_mean_deg <= 2.5 && c->direction_p95_deg <= 6.0);
     assert_true(c->radius_rms_percent <= 4.0);
     assert_true(fabs(r.report.radius_spread - 0.2) < 0.05 && r.report.single_radius_se_m > 0.0);
+    double stated = 100.0 * r.report.single_radius_se_m / r.report.profile_radius_m;
+    print_message("error of the radius of a fiber: stated %.2f %%, found %.2f %%\n", stated, c->radius_rms_percent);
+    assert_true(stated > 0.33 * c->radius_rms_percent && stated < 3.0 * c->radius_rms_percent);
     phantom_reconstruction_release(&r);
 }
 

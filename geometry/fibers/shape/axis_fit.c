@@ -9,6 +9,8 @@
 
 enum { BRICK = 32, N_CELL = BRICK * BRICK * BRICK };
 static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
+static const double PIECE_DIAMETERS = 2.0; /* length of the pieces that show the error of a radius */
+
 /* Sums over one brick: for the vertices of its segments, and for the profile. */
 struct brick_sum {
     struct axis_pull *pull; /* two for each segment of the brick */
@@ -277,13 +279,8 @@ static void add_bricks(const struct fit_job *job, const uint32_t *first_vertex_o
 }
 
 /* States the errors of the axes that the step has made (axis_fit.h). */
-static void state_error(const struct axis_pull *total, size_t n_vertex, double variance, double stiffness,
-                        struct axis_profile *p)
+static void state_error(double information, double variance, double stiffness, struct axis_profile *p)
 {
-    double information = 0.0; /* of the data, a component and vertex: half the trace, none lies along the fiber */
-    for (size_t i = 0; i < n_vertex; i++)
-        information += 0.5 * (double)(total[i].normal[0] + total[i].normal[2] + total[i].normal[5]);
-    information = fmax(information / fmax((double)n_vertex, 1.0), 1e-12);
     double length = pow(stiffness / information, 0.25);
     p->position_se = sqrt(variance / (2.0 * M_SQRT2 * information * length));
     p->direction_se_rad = p->position_se / length;
@@ -329,10 +326,14 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
     memset(w->total, 0, lines->n_vertex * sizeof *w->total);
     memset(w->radius, 0, lines->n_line * sizeof *w->radius);
     add_bricks(job, w->first_vertex_of, w->total, &shared, w->radius);
+    for (size_t l = 0; l < lines->n_line; l++)
+        w->radius[l].scatter =
+            axis_scatter(&w->total[lines->first[l]].radius_gradient, sizeof *w->total / sizeof(float),
+                         polyline_length(lines, l), (size_t)fmax(2.0, PIECE_DIAMETERS * diameter));
     axis_profile_step(&job->profile, &shared, w->radius, w->length, lines->n_line, diameter, lines->radius);
     double sd = job->profile.measured_curvature ? axis_curvature_sd(lines, diameter) : AXIS_CURVATURE_MOST / diameter;
     double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0, stiffness = variance / (sd * sd);
-    state_error(w->total, lines->n_vertex, variance, stiffness, &job->profile);
+    state_error(axis_information(w->total, lines->n_vertex), variance, stiffness, &job->profile);
     return axis_solve_lines(lines, w->total, stiffness, pool, err);
 }
 

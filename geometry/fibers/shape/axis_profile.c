@@ -18,24 +18,43 @@ void axis_table_init(struct axis_table *t)
     }
 }
 
-/* Mean radius of the lines by length, their spread without the part of their errors, and the mean of these. */
-static void measure_spread(struct axis_profile *p, const struct radius_sum *line, const double *length, size_t n_line,
-                           double variance, const float *radius)
+double axis_scatter(const float *value, size_t stride, size_t n, size_t piece)
 {
-    double sum = 0.0, square = 0.0, error = 0.0, total = 0.0;
+    double sum = 0.0, square = 0.0;
+    size_t n_piece = n / piece, used = n_piece * piece;
+    if (n_piece < 2) return INFINITY;
+    for (size_t p = 0; p < n_piece; p++) {
+        double part = 0.0;
+        for (size_t i = p * piece; i < (p + 1) * piece; i++) part += (double)value[i * stride];
+        sum += part;
+        square += part * part;
+    }
+    double count = (double)n_piece, of_piece = fmax(0.0, square - sum * sum / count) / (count - 1.0);
+    return of_piece * count * (double)n / (double)used;
+}
+
+/* Mean radius of the lines by length, their spread without the part of white noise, and their errors. The errors of
+ * lines too short to show their scatter count as the mean of the others. hold: towards the mean radius. */
+static void measure_spread(struct axis_profile *p, const struct radius_sum *line, const double *length, size_t n_line,
+                           double variance, double hold, const float *radius)
+{
+    double sum = 0.0, square = 0.0, white = 0.0, total = 0.0, error = 0.0, measured = 0.0;
     for (size_t l = 0; l < n_line; l++) {
         if (!(line[l].normal > 0.0)) continue;
-        double r = (double)radius[l];
+        double r = (double)radius[l], normal = line[l].normal + hold;
         total += length[l];
         sum += length[l] * r;
         square += length[l] * r * r;
-        error += length[l] * variance / line[l].normal;
+        white += length[l] * variance / line[l].normal;
+        if (!isfinite(line[l].scatter)) continue;
+        error += length[l] * line[l].scatter / (normal * normal);
+        measured += length[l];
     }
     if (!(total > 0.0)) return;
     p->radius = sum / total;
     double var = square / total - p->radius * p->radius;
-    p->radius_se = sqrt(error / total) / p->radius;
-    p->radius_spread = sqrt(fmax(0.0, var - error / total)) / p->radius;
+    p->radius_se = sqrt(measured > 0.0 ? error / measured : white / total) / p->radius;
+    p->radius_spread = sqrt(fmax(0.0, var - white / total)) / p->radius;
 }
 
 /* Solves for the shared step; zero if the data do not determine it. */
@@ -75,5 +94,5 @@ void axis_profile_step(struct axis_profile *p, const struct shared_sum *shared, 
     p->blur = blur;
     p->low = low;
     p->high = high;
-    measure_spread(p, line, length, n_line, variance, radius);
+    measure_spread(p, line, length, n_line, variance, hold, radius);
 }

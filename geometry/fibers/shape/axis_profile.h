@@ -14,7 +14,7 @@ struct axis_profile {
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
-     * their errors (relative), root mean square of the errors (relative). */
+     * errors by white noise (relative), root mean square of the errors of single fibers (relative). */
     double radius, radius_spread, radius_se;
     /* Written by the fit: standard error of one component of the axes' position (voxels) and of their direction. */
     double position_se, direction_se_rad;
@@ -57,7 +57,13 @@ struct shared_sum {
 /* Normal equation of the radius of one line, and the terms that it has in common with the shared ones. */
 struct radius_sum {
     double normal, gradient, cross[4];
+    double scatter; /* variance of the gradient, from the scatter of pieces of the line */
 };
+
+/* Variance of the sum of n values about their mean, from that between pieces of `piece` values. Within a piece they may
+ * be correlated in any way, as are the gradients of a radius: by the noise of the scan, by a radius that varies along
+ * the fiber, and by neighbours that are not modelled. stride: of the values, in floats. Infinite below two pieces. */
+double axis_scatter(const float *value, size_t stride, size_t n, size_t piece);
 
 /* Makes one Gauss-Newton step for what all fibers share, and then one for the radius of each line with what is left of
  * the residuals, limited to plausible values. (All at once overshoots: lines that touch share voxels, which the

@@ -14,6 +14,15 @@ void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
 {
     for (int i = 0; i < 6; i++) to->normal[i] += from->normal[i];
     for (int i = 0; i < 3; i++) to->gradient[i] += from->gradient[i];
+    to->radius_gradient += from->radius_gradient;
+}
+
+double axis_information(const struct axis_pull *total, size_t n_vertex)
+{
+    double sum = 0.0; /* half the trace, because none lies along the fiber */
+    for (size_t i = 0; i < n_vertex; i++)
+        sum += 0.5 * (double)(total[i].normal[0] + total[i].normal[2] + total[i].normal[5]);
+    return fmax(sum / fmax((double)n_vertex, 1.0), 1e-12);
 }
 
 struct solve_job {

@@ -14,7 +14,10 @@ struct axis_pull {
     float radius_normal, radius_gradient, radius_cross[4];
 };
 
+/* Adds the terms of a position, and the gradient of the radius. */
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
+/* Mean information of the data on one component of the position of a vertex. */
+double axis_information(const struct axis_pull *total, size_t n_vertex);
 
 /* Standard deviation of one component of the lines' curvature, per voxel, at most AXIS_CURVATURE_MOST per diameter:
  * that of fibers about to break. It is measured over chords of a diameter, where the noise of single vertices has

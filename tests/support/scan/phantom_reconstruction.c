@@ -2,6 +2,7 @@
 
 #include "base/clock.h"
 #include "base/rng.h"
+#include "geometry/orientation/lumen_fill.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/volume_align.h"
 
@@ -25,6 +26,9 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     struct density_modes m;
     status s = density_modes_find(&r->v, &m, err);
     if (s == STATUS_OK) s = density_map_apply(&r->v, m.low, m.high, pool, err);
+    if (s == STATUS_OK) r->report.noise_sd = density_noise_sd(&r->v);
+    if (s == STATUS_OK && r->option.hollow_fibers)
+        s = lumens_fill(&r->v, r->report.noise_sd, &r->report.lumen_share, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &r->option, pool, NULL, &d, &r->report, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &r->option, pool, NULL, &r->found, &r->report, err);
     if (s == STATUS_OK) s = reconstruct_transfer(&r->found, &d, pool, NULL, &r->report, err);

@@ -31,6 +31,7 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
     o->density_low = doc->density_low;
     o->density_high = doc->density_high;
     o->fiber_diameter_voxel = doc->fiber_diameter_voxel;
+    o->hollow_fibers = doc->hollow_fibers;
     if (!isnan(doc->filter_s)) o->s = doc->filter_s;
     if (!isnan(doc->filter_t)) o->t = doc->filter_t;
     if (doc->filter_h > 0) o->h = doc->filter_h;

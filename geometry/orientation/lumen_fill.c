@@ -1,0 +1,181 @@
+#include "geometry/orientation/lumen_fill.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    UNIT = 250, /* of the blurred density as a byte */
+    BLOCK = 12, /* edge of the blocks that show the outside: wider than a lumen */
+    MAX_SWEEP = 64,
+    MARK = 255
+};
+/* Depth of the basin of a lumen, and in units of the noise that the blur leaves. */
+static const double LEAST_DEPTH = 0.1, NOISE_DEPTH = 3.0, BLUR_OF_NOISE = 0.23; /* of white noise: (3/8)^(3/2) */
+static const double VOID_DENSITY = 0.3, BLOCK_RANGE = 0.05;
+
+/* A volume: its blurred density, and the height of the ways to the outside, later the depth of basins. */
+struct lumen_box {
+    const struct volume *v;
+    size_t n[3];
+    uint8_t *density, *height;
+};
+
+static size_t clamped(size_t at, int step, size_t n)
+{
+    return step < 0 && at == 0 ? 0 : step > 0 && at + 1 >= n ? n - 1 : at + (size_t)(ptrdiff_t)step;
+}
+
+/* Writes the density of a row, blurred by 1/4 1/2 1/4 along each axis. sum: scratch of a row and two voxels more. */
+static void blur_row(const struct lumen_box *b, size_t j, size_t k, float *sum, uint8_t *out)
+{
+    static const float weight[3] = {0.25f, 0.5f, 0.25f};
+    const size_t *n = b->n;
+    memset(sum, 0, (b->n[0] + 2) * sizeof *sum);
+    for (int dz = -1; dz <= 1; dz++)
+        for (int dy = -1; dy <= 1; dy++) {
+            const float *row = b->v->density + volume_index(n, 0, clamped(j, dy, n[1]), clamped(k, dz, n[2]));
+            const float w = weight[dy + 1] * weight[dz + 1];
+            for (size_t i = 0; i < b->n[0]; i++) sum[i + 1] += w * row[i];
+        }
+    sum[0] = sum[1];
+    sum[b->n[0] + 1] = sum[b->n[0]];
+    for (size_t i = 0; i < b->n[0]; i++)
+        out[i] = (uint8_t)((float)UNIT * (0.25f * (sum[i] + sum[i + 2]) + 0.5f * sum[i + 1]) + 0.5f);
+}
+
+static bool blur_box(const struct lumen_box *b)
+{
+    float *sum = malloc((b->n[0] + 2) * sizeof *sum);
+    for (size_t k = 0; k < b->n[2] && sum != NULL; k++) {
+        for (size_t j = 0; j < b->n[1]; j++) blur_row(b, j, k, sum, b->density + volume_index(b->n, 0, j, k));
+        scratch_keep_within(b->v->space);
+    }
+    free(sum);
+    return sum != NULL;
+}
+
+/* Mean density of block c, in units of a byte. */
+static double block_mean(const struct lumen_box *b, const size_t c[3], size_t end[3])
+{
+    double sum = 0.0;
+    for (int a = 0; a < 3; a++) end[a] = BLOCK * (c[a] + 1) < b->n[a] ? BLOCK * (c[a] + 1) : b->n[a];
+    for (size_t k = BLOCK * c[2]; k < end[2]; k++)
+        for (size_t j = BLOCK * c[1]; j < end[1]; j++)
+            for (size_t i = BLOCK * c[0]; i < end[0]; i++) sum += b->density[volume_index(b->n, i, j, k)];
+    return sum / (double)((end[0] - BLOCK * c[0]) * (end[1] - BLOCK * c[1]) * (end[2] - BLOCK * c[2]));
+}
+
+/* Sets the height of void in the emptiest blocks, which is outside, to its density, and all other to MARK. */
+static void mark_outside(const struct lumen_box *b)
+{
+    size_t n_block[3], c[3], end[3];
+    double least = INFINITY;
+    for (int a = 0; a < 3; a++) n_block[a] = b->n[a] / BLOCK > 0 ? b->n[a] / BLOCK : 1;
+    memset(b->height, MARK, volume_n_voxel(b->n));
+    for (int pass = 0; pass < 2; pass++)
+        for (c[2] = 0; c[2] < n_block[2]; c[2]++)
+            for (c[1] = 0; c[1] < n_block[1]; c[1]++)
+                for (c[0] = 0; c[0] < n_block[0]; c[0]++) {
+                    double mean = block_mean(b, c, end);
+                    if (pass == 0) least = fmin(least, mean);
+                    if (pass == 0 || mean > least + BLOCK_RANGE * UNIT) continue;
+                    for (size_t k = BLOCK * c[2]; k < end[2]; k++)
+                        for (size_t j = BLOCK * c[1]; j < end[1]; j++)
+                            for (size_t i = BLOCK * c[0]; i < end[0]; i++) {
+                                size_t at = volume_index(b->n, i, j, k);
+                                if (b->density[at] < VOID_DENSITY * UNIT) b->height[at] = b->density[at];
+                            }
+                }
+}
+
+/* New height of voxel `at` of a box, from its neighbours; marked: spreads marks within basins instead. */
+static uint8_t relaxed(const struct lumen_box *b, const size_t x[3], size_t at, bool marked)
+{
+    const size_t step[3] = {1, b->n[0], b->n[0] * b->n[1]};
+    uint8_t best = b->height[at], most = 0;
+    for (int a = 0; a < 3; a++) {
+        uint8_t before = x[a] > 0 ? b->height[at - step[a]] : best;
+        uint8_t after = x[a] + 1 < b->n[a] ? b->height[at + step[a]] : best;
+        uint8_t low = before < after ? before : after, high = before > after ? before : after;
+        if (!marked && low < best) best = low;
+        if (high > most) most = high;
+    }
+    if (marked) return most == MARK ? MARK : best;
+    return best > b->density[at] ? best : b->density[at];
+}
+
+/* Passes over the box forwards and backwards in turn until nothing changes. */
+static void sweep(const struct lumen_box *b, bool marked)
+{
+    bool changed = true;
+    for (int pass = 0; changed && pass < MAX_SWEEP; pass++) {
+        changed = false;
+        for (size_t k = 0; k < b->n[2]; k++) {
+            for (size_t j = 0; j < b->n[1]; j++)
+                for (size_t i = 0; i < b->n[0]; i++) {
+                    const bool back = pass % 2 == 1;
+                    const size_t x[3] = {back ? b->n[0] - 1 - i : i, back ? b->n[1] - 1 - j : j,
+                                         back ? b->n[2] - 1 - k : k};
+                    size_t at = volume_index(b->n, x[0], x[1], x[2]);
+                    const uint8_t old = b->height[at];
+                    if (marked ? old == 0 || old == MARK : old == b->density[at]) continue;
+                    b->height[at] = relaxed(b, x, at, marked);
+                    changed = changed || b->height[at] != old;
+                }
+            scratch_keep_within(b->v->space);
+        }
+    }
+}
+
+/* Marks the basins with a place deeper than `depth` and returns their share of the material. */
+static double mark_basins(const struct lumen_box *b, double depth)
+{
+    size_t n = volume_n_voxel(b->n), n_material = 0, n_basin = 0;
+    mark_outside(b);
+    sweep(b, false);
+    for (size_t i = 0; i < n; i++) {
+        int deep = b->height[i] - b->density[i]; /* MARK was not reached: a place that sweeps leave out */
+        n_material += 2 * b->density[i] > UNIT;
+        b->height[i] = b->height[i] == MARK ? 0 : (double)deep > depth * UNIT ? MARK : (uint8_t)(deep > 0 ? deep : 0);
+    }
+    sweep(b, true);
+    for (size_t i = 0; i < n; i++)
+        if (b->height[i] == MARK) n_basin++;
+    return n_material > 0 ? (double)n_basin / (double)n_material : 0.0;
+}
+
+static status box_share(struct lumen_box *b, double depth, double *share, struct error *err)
+{
+    void *array[2] = {NULL, NULL};
+    const size_t n = volume_n_voxel(b->n);
+    status s = scratch_new(b->v->space, n, "the lumens of fibers", &array[0], err);
+    if (s == STATUS_OK) s = scratch_new(b->v->space, n, "the lumens of fibers", &array[1], err);
+    b->density = array[0];
+    b->height = array[1];
+    if (s == STATUS_OK && !blur_box(b)) s = error_set(err, STATUS_NO_MEMORY, "cannot look for lumens: out of memory");
+    if (s == STATUS_OK) *share = mark_basins(b, depth);
+    return s;
+}
+
+static void release_box(struct lumen_box *b)
+{
+    scratch_release(b->v->space, b->density);
+    scratch_release(b->v->space, b->height);
+    b->density = b->height = NULL;
+}
+
+status lumens_fill(struct volume *v, double noise_sd, double *filled_share, struct error *err)
+{
+    struct lumen_box all = {.v = v, .n = {v->n[0], v->n[1], v->n[2]}};
+    double depth = fmax(LEAST_DEPTH, isfinite(noise_sd) ? NOISE_DEPTH * BLUR_OF_NOISE * noise_sd : 0.0);
+    *filled_share = 0.0;
+    status s = box_share(&all, depth, filled_share, err);
+    for (size_t i = 0; s == STATUS_OK && i < volume_n_voxel(v->n); i++) {
+        if (all.height[i] == MARK) v->density[i] = 1.0f;
+        if (i % (v->n[0] * v->n[1]) == 0) scratch_keep_within(v->space);
+    }
+    release_box(&all);
+    return s;
+}
