@@ -97,6 +97,16 @@ static json_t *grade_json(const struct scan_grade *g)
                      json_count(g->n_dropped));
 }
 
+static void set_radii(json_t *json, const struct reconstruct_report *g)
+{
+    const double um = 1e6;
+    json_object_set_new(json, "radius_um", json_number_list(g->radius_m, 3, um));
+    json_object_set_new(json, "radius_se_um", json_number_list(g->radius_se_m, 3, um));
+    json_object_set_new(json, "radius_profile_um", json_number(g->profile_radius_m * um));
+    json_object_set_new(json, "radius_spread", json_number(g->radius_spread));
+    json_object_set_new(json, "radius_error_um", json_number(g->single_radius_se_m * um));
+}
+
 json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -139,11 +149,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "n_short_dropped", json_count_list(g->n_short_dropped, 3));
     json_object_set_new(json, "n_gap_bridged", json_count(g->n_gap_bridged));
     json_object_set_new(json, "n_joined", json_count(g->n_joined));
-    json_object_set_new(json, "radius_um", json_number_list(g->radius_m, 3, um));
-    json_object_set_new(json, "radius_se_um", json_number_list(g->radius_se_m, 3, um));
-    json_object_set_new(json, "radius_profile_um", json_number(g->profile_radius_m * um));
-    json_object_set_new(json, "radius_spread", json_number(g->radius_spread));
-    json_object_set_new(json, "radius_error_um", json_number(g->single_radius_se_m * um));
+    set_radii(json, g);
     json_object_set_new(json, "axis_position_error_um", json_number(g->axis_position_se_m * um));
     json_object_set_new(json, "axis_direction_error_deg", json_number(g->axis_direction_se_rad / RAD_PER_DEG));
     json_object_set_new(json, "radius_per_axis", json_boolean(g->radius_per_axis));

@@ -1,7 +1,8 @@
-/* The overlap score of the fiber radius (fabric thesis 5.6.5) on a histogram written by hand:
+/* The scatter of sums, and the overlap score of the fiber radius (fabric thesis 5.6.5) on a histogram written by hand:
  *     score(r) = |C(r) and V| - |C(r) xor V|, and a ring belongs to the best C(r) while more than a third of its points
  *     are in V, because a point of V inside of C(r) counts twice (it joins the intersection and leaves the
  *     difference). */
+#include "geometry/fibers/shape/axis_profile.h"
 #include "geometry/fibers/shape/radius.h"
 
 #include <math.h>
@@ -53,8 +54,22 @@ static void test_score(void **state)
     free(h);
 }
 
+/* Sums of correlated values scatter as the pieces show, and not as independent values would. */
+static void test_scatter_of_correlated_values(void **state)
+{
+    (void)state;
+    enum { N = 4000, RUN = 10 };
+    static float value[N];
+    for (int i = 0; i < N; i++) value[i] = (i / RUN) % 2 == 0 ? 1.0f : -1.0f; /* runs of ten: variance 400 x 10^2 */
+    assert_true(fabs(axis_scatter(value, 1, N, RUN) / (400.0 * 100.0) - 1.0) < 0.01);
+    assert_true(fabs(axis_scatter(value, 1, N, 1) / N - 1.0) < 0.01); /* as if they were independent */
+    assert_true(fabs(axis_scatter(value, 2, N / 2, RUN / 2) / (400.0 * 25.0) - 1.0) < 0.01);
+    assert_true(isinf(axis_scatter(value, 1, RUN, RUN)));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_best_score), cmocka_unit_test(test_score)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_scatter_of_correlated_values),
+                                       cmocka_unit_test(test_best_score), cmocka_unit_test(test_score)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -196,19 +196,6 @@ static void test_single_radii(void **state)
     volume_release(&v);
 }
 
-/* Sums of correlated values scatter as the pieces show, and not as independent values would. */
-static void test_scatter_of_correlated_values(void **state)
-{
-    (void)state;
-    enum { N = 4000, RUN = 10 };
-    static float value[N];
-    for (int i = 0; i < N; i++) value[i] = (i / RUN) % 2 == 0 ? 1.0f : -1.0f; /* runs of ten: variance 400 x 10^2 */
-    assert_true(fabs(axis_scatter(value, 1, N, RUN) / (400.0 * 100.0) - 1.0) < 0.01);
-    assert_true(fabs(axis_scatter(value, 1, N, 1) / N - 1.0) < 0.01); /* as if they were independent */
-    assert_true(fabs(axis_scatter(value, 2, N / 2, RUN / 2) / (400.0 * 25.0) - 1.0) < 0.01);
-    assert_true(isinf(axis_scatter(value, 1, RUN, RUN)));
-}
-
 /* RMS of one component of the deviation of lines along x from their axis, and of the slope of their segments. */
 static void deviation(const struct polyline_set *lines, double y, double z, double *position, double *slope)
 {
@@ -397,7 +384,6 @@ int main(void)
         cmocka_unit_test(test_linking_leaning_neighbours),
         cmocka_unit_test(test_duplicates_and_joins),
         cmocka_unit_test(test_single_radii),
-        cmocka_unit_test(test_scatter_of_correlated_values),
         cmocka_unit_test(test_axis_fit),
         cmocka_unit_test(test_axis_errors),
         cmocka_unit_test(test_radius),
