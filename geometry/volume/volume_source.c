@@ -79,7 +79,6 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
         free(v);
         return s;
     }
-    v->info.reader_id = found->id;
     *source = v;
     return STATUS_OK;
 }

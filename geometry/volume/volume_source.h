@@ -24,7 +24,6 @@ struct volume_raw_declaration {
 struct volume_source_info {
     size_t n[3];            /* columns, rows, slices */
     double voxel_size_m[3]; /* NaN where the file does not state it */
-    const char *reader_id;  /* "tiff.v1" */
     const char *sample;     /* "uint8", "uint16", "int16", "float32" */
 };
 

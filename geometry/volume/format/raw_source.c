@@ -47,10 +47,8 @@ status raw_source_open(const char *const *path, size_t n_path, const struct volu
         voxel_stream_close(stream);
         return s;
     }
-    *info = (struct volume_source_info){.n = {d->n[0], d->n[1], d->n[2]},
-                                        .voxel_size_m = {NAN, NAN, NAN},
-                                        .reader_id = "raw.v1",
-                                        .sample = sample_name(layout.sample)};
+    *info = (struct volume_source_info){
+        .n = {d->n[0], d->n[1], d->n[2]}, .voxel_size_m = {NAN, NAN, NAN}, .sample = sample_name(layout.sample)};
     *handle = stream;
     return STATUS_OK;
 }

@@ -117,6 +117,16 @@ static void test_stray_end_is_trimmed(void **state)
     assert_true(n_cut >= 8 && n_cut <= 12);
     assert_int_equal(out.n_vertex, 50 - n_cut);
     assert_true(out.vertex[0][0] == (float)n_cut + 5.5f); /* from the start, nothing from the end */
+    polyline_set_release(&out);
+    polyline_set_init(
+        &out); /* the cut of everything that disagrees leaves the same piece, unless pieces are to be longer */
+    assert_int_equal(polylines_cut_disagreeing(&lines, &d, M_PI / 6.0, 10, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, 1);
+    assert_true(n_cut >= 8 && n_cut <= 12 && out.n_vertex == 50 - n_cut);
+    polyline_set_release(&out);
+    polyline_set_init(&out);
+    assert_int_equal(polylines_cut_disagreeing(&lines, &d, M_PI / 6.0, 43, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(out.n_line, 0);
     polyline_set_release(&lines);
     polyline_set_release(&out);
     direction_volume_release(&d);

@@ -28,6 +28,9 @@ static float ramp(size_t x, size_t y, size_t c)
 {
     return (float)(c + 1) * (1.0f + 0.001f * (float)x + 0.002f * (float)y);
 }
+static float red_only(size_t x, size_t y, size_t c) { return (c == 0 ? 0.25f : 0.0f) + 0.0f * (float)(x + y); }
+static float green_only(size_t x, size_t y, size_t c) { return (c == 1 ? 0.25f : 0.0f) + 0.0f * (float)(x + y); }
+static float blue_only(size_t x, size_t y, size_t c) { return (c == 2 ? 0.25f : 0.0f) + 0.0f * (float)(x + y); }
 static float black(size_t x, size_t y, size_t c) { return 0.0f * (float)(x + y + c); }
 static float with_nan(size_t x, size_t y, size_t c) { return x == 3 && y == 5 && c == 1 ? NAN : 1.0f; }
 static float negative(size_t x, size_t y, size_t c) { return c == 2 ? -0.1f : 0.0f * (float)(x + y) + 1.0f; }
@@ -98,6 +101,20 @@ static void test_refused(void **state)
     struct error err = {0};
     assert_int_equal(photograph_measure(scratch_path(state, "black.exr"), &beyond, &m, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "(17, 4)"));
+}
+
+/* A photograph with light in one channel only is not black. */
+static void test_one_channel(void **state)
+{
+    static float (*const picture[3])(size_t, size_t, size_t) = {red_only, green_only, blue_only};
+    for (size_t c = 0; c < 3; c++) {
+        const struct job_photograph whole = {.scale = 1.0};
+        struct photograph_mean m;
+        struct error err = {0};
+        write_exr(scratch_path(state, "one.exr"), 16, picture[c]);
+        if (photograph_measure(scratch_path(state, "one.exr"), &whole, &m, &err) != STATUS_OK) fail_msg("%s", err.text);
+        for (size_t k = 0; k < 3; k++) assert_true(fabs(m.mean_rgb[k] - (k == c ? 0.25 : 0.0)) < 1e-6);
+    }
 }
 
 static void test_not_uniform(void **state)
@@ -195,13 +212,10 @@ static void test_small_files_of_huge_pictures(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_mean),
-        cmocka_unit_test(test_error_of_texture),
-        cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_not_uniform),
-        cmocka_unit_test(test_png),
-        cmocka_unit_test(test_truncated_png),
-        cmocka_unit_test(test_small_files_of_huge_pictures),
+        cmocka_unit_test(test_mean),          cmocka_unit_test(test_error_of_texture),
+        cmocka_unit_test(test_refused),       cmocka_unit_test(test_one_channel),
+        cmocka_unit_test(test_not_uniform),   cmocka_unit_test(test_png),
+        cmocka_unit_test(test_truncated_png), cmocka_unit_test(test_small_files_of_huge_pictures),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
