@@ -277,11 +277,12 @@ static void whole_cloth_balanced(void **state)
     struct scene *scene = small_cloth(false);
     struct configuration c[16];
     orbit_configurations_16(c);
-    /* textile.v3 has three more parameters: the shares w and s, and the flatness f */
-    const double set[3][12] = {
-        {0.05, 0.05, 0.05, 0.999, 0.998, 0.997, 8 * RAD_PER_DEG, 25 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0.3, 0.9, 0.3},
-        {0.3, 0.3, 0.3, 0.999, 0.998, 0.997, 2 * RAD_PER_DEG, 12 * RAD_PER_DEG, 30 * RAD_PER_DEG, 0.1, 0.5, 0.98},
-        {0.001, 0.001, 0.001, 0.999, 0.998, 0.997, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG, 0.8, 0.1,
+    /* textile.v3 has four more parameters: the shares w and s, the flatness f, and the side h */
+    const double set[3][13] = {
+        {0.05, 0.05, 0.05, 0.999, 0.998, 0.997, 8 * RAD_PER_DEG, 25 * RAD_PER_DEG, 20 * RAD_PER_DEG, 0.3, 0.9, 0.3,
+         0.9},
+        {0.3, 0.3, 0.3, 0.999, 0.998, 0.997, 2 * RAD_PER_DEG, 12 * RAD_PER_DEG, 30 * RAD_PER_DEG, 0.1, 0.5, 0.98, 0.5},
+        {0.001, 0.001, 0.001, 0.999, 0.998, 0.997, 10 * RAD_PER_DEG, 45 * RAD_PER_DEG, 45 * RAD_PER_DEG, 0.8, 0.1, 0.1,
          0.1}};
     for (int i = 0; i < 6; i++) check_whole_cloth(scene, "two_lobe_balanced.v1", set[i % 3], &c[i]);
     for (int i = 6; i < 9; i++) check_whole_cloth(scene, "textile.v3", set[i % 3], &c[i]);

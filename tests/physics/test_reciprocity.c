@@ -56,7 +56,7 @@ static struct configuration far_away(const double lamp_deg[2], const double came
 static void asymmetry(const struct scattering_model *m, double *worst_se, double *worst)
 {
     static const double param[] = {0.1, 0.1, 0.1, 0.6, 0.6, 0.6, 10 * RAD_PER_DEG, 30 * RAD_PER_DEG, 40 * RAD_PER_DEG,
-                                   0.5, 0.5, 0.4};
+                                   0.5, 0.5, 0.4, 0.7};
     struct scene *scene = packed_fibers();
     struct thread_pool *pool = NULL;
     struct appearance model;

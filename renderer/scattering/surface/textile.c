@@ -2,7 +2,7 @@
  *
  * Sampling of wi: one of four terms, by its energy at th_o and the weights of the channels. R with the azimuth of a
  * smooth cylinder; R with a uniform azimuth, which also serves Schlick's rise, whose azimuth has no peak; TT; D, with
- * density cos th_i / pi^2.
+ * density cos th_i (1 - (2 h - 1) cos ph) / pi^2.
  */
 #include "renderer/scattering/surface/textile.h"
 
@@ -29,6 +29,7 @@ static status prepare(const double *param, struct scattering_state **state, stru
     t->w = (float)param[TEXTILE_P_W];
     t->s = (float)param[TEXTILE_P_S];
     t->f = (float)param[TEXTILE_P_F];
+    t->forward = 2 * (float)param[TEXTILE_P_H] - 1;
     textile_section(t);
     st = textile_balance(t, param, err);
     if (st != STATUS_OK) {
@@ -62,7 +63,7 @@ static struct side side_of(const struct textile_state *t, const struct fiber_dir
     x -= (float)i;
     float v2 = f2 + (1 - f2) * cos2;
     struct side y = {.v = sqrtf(v2), .d_ln_v = t->f * (1 - cos2) / v2, .t = two_lobe_mix(a->t, b->t, x)};
-    for (int k = 0; k < TEXTILE_N_SLOPE; k++) y.d_ln_t[k] = two_lobe_mix(a->d_ln_t[k], b->d_ln_t[k], x);
+    for (int k = 0; k < TEXTILE_N_SLOPE; k++) y.d_ln_t[k] = two_lobe_mix(a->d_t[k], b->d_t[k], x) / y.t;
     return y;
 }
 
@@ -71,6 +72,7 @@ struct terms {
     float r, azimuth, rise;           /* R = r azimuth (C_R + (1 - C_R) rise) */
     float tt_whole, tt, d;            /* TT = tt = tt_whole (1 - K) */
     float d_tt[TEXTILE_N_SLOPE], d_d; /* d ln TT by way of t, and d ln D by f */
+    float d_h;                        /* d ln D by h */
     float cos_half_azimuth;           /* cos(ph / 2) */
     float cos_d;                      /* cos((th_i - th_o) / 2) */
     float d_scale[2];                 /* d ln of the scales of R and TT by their own widths */
@@ -93,7 +95,9 @@ static struct terms terms_of(const struct textile_state *t, const struct fiber_d
     for (int k = 0; k < TEXTILE_N_SLOPE; k++) m.d_tt[k] = in.d_ln_t[k] + out.d_ln_t[k];
     m.tt = m.tt_whole * (1 - textile_polynomial(t->share, m.cos_d));
     m.d = entry_at(t, di->theta_rad).q * entry_at(t, dout->theta_rad).q * t->inv_z;
-    m.d *= in.v * out.v * t->inv_mean_v;
+    const float cos_azimuth = l->one_minus_cos - 1, around = 1 - t->forward * cos_azimuth;
+    m.d *= in.v * out.v * t->inv_mean_v * around;
+    m.d_h = -2 * cos_azimuth / around;
     m.d_d = in.d_ln_v + out.d_ln_v - t->d_ln_mean_v;
     for (int k = 0; k < 2; k++) m.d_scale[k] = score_i[k] + score_o[k];
     return m;
@@ -149,6 +153,7 @@ static void eval_terms(const struct textile_state *t, const struct fiber_directi
         h[TWO_LOBE_P_GAMMA_TT] = body * y.tt[3];
         h[TEXTILE_P_W] = body * (m.d + m.tt * m.d_tt[TEXTILE_BY_W]);
         h[TEXTILE_P_F] = body * m.tt * m.d_tt[TEXTILE_BY_F] + diffuse * m.d * m.d_d;
+        h[TEXTILE_P_H] = diffuse * m.d * m.d_h;
         h[TEXTILE_P_S] = part_r[c] * inv * y.r[1] + body * y.tt[1] + diffuse * y.d[1];
     }
 }
@@ -183,7 +188,8 @@ static float pdf_terms(const struct textile_state *t, const struct fiber_directi
     for (int k = 0; k < 2; k++) density[k] = l->g[k] * 2 / (e.near[k] + e.far[k]);
     float azimuth = p[SMOOTH_R] * 0.25f * sqrtf(0.5f * l->one_minus_cos) + p[UNIFORM_R] * (float)(0.5 / M_PI);
     float lobes = density[TWO_LOBE_R] * azimuth + p[LOBE_TT] * density[TWO_LOBE_TT] * l->von_mises;
-    return lobes / cos_i + p[DIFFUSE] * cos_i * (float)(M_1_PI * M_1_PI);
+    float around = 1 - t->forward * (l->one_minus_cos - 1);
+    return lobes / cos_i + p[DIFFUSE] * cos_i * around * (float)(M_1_PI * M_1_PI);
 }
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
@@ -218,13 +224,20 @@ static enum term pick(const float p[N_TERM], float *u)
     return (enum term)k;
 }
 
-/* cos^2 th d th: the sine of th is distributed as one coordinate of a point in the unit disk. */
-static void sample_diffuse(float u, const float v[2], float wi[3])
+/* cos^2 th d th: the sine of th is distributed as one coordinate of a point in the unit disk. The other one, over its
+ * largest value cos th, is uniform whatever the first. It decides whether the azimuth, uniform at first, is turned
+ * round: of two opposite azimuths, whose densities sum to 1 / pi, either is taken by its own share. */
+static void sample_diffuse(const struct textile_state *t, const struct fiber_direction *dout, float u, const float v[2],
+                           float wi[3])
 {
-    float z = sqrtf(u) * cosf((float)(2 * M_PI) * v[0]), cos_theta = sqrtf(fmaxf(0, (1 - z) * (1 + z)));
+    float r = sqrtf(u), z = r * cosf((float)(2 * M_PI) * v[0]), other = r * sinf((float)(2 * M_PI) * v[0]);
+    float cos_theta = sqrtf(fmaxf(0, (1 - z) * (1 + z)));
+    float x = cosf((float)(2 * M_PI) * v[1]), y = sinf((float)(2 * M_PI) * v[1]);
+    float cos_azimuth = x * dout->azimuth[0] + y * dout->azimuth[1];
+    float side = other < -cos_theta * t->forward * cos_azimuth ? cos_theta : -cos_theta;
     wi[0] = z;
-    wi[1] = cos_theta * cosf((float)(2 * M_PI) * v[1]);
-    wi[2] = cos_theta * sinf((float)(2 * M_PI) * v[1]);
+    wi[1] = side * x;
+    wi[2] = side * y;
 }
 
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
@@ -237,7 +250,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     choose(t, &e, dout.azimuth[0], weight_rgb, p);
     enum term k = pick(p, &rest);
     if (k == DIFFUSE) {
-        sample_diffuse(rest, u + 1, wi);
+        sample_diffuse(t, &dout, rest, u + 1, wi);
         return;
     }
     float theta = two_lobe_sample_theta(s, &e, k == LOBE_TT ? TWO_LOBE_TT : TWO_LOBE_R, dout.theta_rad, u[1]);

@@ -9,14 +9,16 @@
  *     R  = a(th_i) a(th_o) g(th_o; -th_i, beta_R) N(ph) (C_R + (1 - C_R) k)
  *     v(ph) = sqrt(f^2 + (1 - f^2) cos^2 ph)             width of the section seen from ph over its largest width
  *     TT = b(th_i) b(th_o) g(th_o; -th_i, beta_TT) (1 - K(d)) t(ph_i) t(ph_o) f(ph_o; ph_i + pi, gamma_TT)
- *     D  = q(th_i) q(th_o) / Z v(ph_i) v(ph_o) / (mean of v),  q = 1 - rho
+ *     D  = q(th_i) q(th_o) / Z v(ph_i) v(ph_o) / (mean of v) (1 - (2 h - 1) cos ph),  q = 1 - rho
  *     S  = R + C_TT (1 - C_R) (TT + w D)
  *
  * ph = 0 and ph = pi are the normals of the flat section, an ellipse of height over width f; for a flat fiber in a
  * cloth they lie as near to the cloth's normal as the fiber's direction lets them (fiber_frame.h). The tube that stands
  * for the fiber in the scene is as wide as the ellipse: of the light from ph, the share w v(ph) meets it and is
  * scattered inside, and the rest goes on in TT. t solves t(ph) (f * t)(ph) = 1 - w v(ph) (textile_section.c), so both
- * take all light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w).
+ * take all light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w). v has the period pi, so that the
+ * mean of v cos ph is 0, and h takes light from one side of the fiber to the other without loss: h = 1/2 scatters alike
+ * to all sides, and less than that more towards where the light came from.
  *
  * Light enters the fiber at a random place of its width (scattering_model.across_width).
  *
@@ -34,7 +36,8 @@ enum {
     TEXTILE_N_PARAM = surface_textile_n_param,
     TEXTILE_P_W = TWO_LOBE_N_PARAM, /* the parameters of two_lobe.v1 come first */
     TEXTILE_P_S,
-    TEXTILE_P_F
+    TEXTILE_P_F,
+    TEXTILE_P_H
 };
 enum { TEXTILE_DEGREE = 5, TEXTILE_N_SECTION = 64 };
 enum textile_section_slope { TEXTILE_BY_GAMMA, TEXTILE_BY_W, TEXTILE_BY_F, TEXTILE_N_SLOPE };
@@ -45,13 +48,13 @@ struct textile_entry { /* by |th| */
     float cross_s;     /* d ln b / d s */
 };
 
-struct textile_section_entry { /* by |cos ph| */
-    float t, d_ln_t[TEXTILE_N_SLOPE];
+struct textile_section_entry {     /* by |cos ph| */
+    float t, d_t[TEXTILE_N_SLOPE]; /* not of ln t: the slope of t as it is interpolated */
 };
 
 struct textile_state {
     struct scattering_state lobes; /* scales, sampling tables and TT's azimuth; cross: d ln b / d beta_R */
-    float w, s, f;
+    float w, s, f, forward;        /* forward: 2 h - 1 */
     float share[TEXTILE_DEGREE + 1],
         d_share[TEXTILE_DEGREE + 1]; /* coefficients of K and of dK / ds in powers of 1 - cos d */
     float inv_z;

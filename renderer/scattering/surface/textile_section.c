@@ -103,7 +103,7 @@ static struct textile_section_entry entry_for(const struct section *s, double co
     for (int k = 0; k < TEXTILE_N_SLOPE; k++) {
         double td[N];
         for (int j = 0; j < N; j++) td[j] = s->t[j] * s->d[k][j];
-        e.d_ln_t[k] = (float)(by[k] - sum_of(row, td) / around);
+        e.d_t[k] = e.t * (float)(by[k] - sum_of(row, td) / around);
     }
     return e;
 }

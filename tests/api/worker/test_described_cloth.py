@@ -32,7 +32,7 @@ def test_from_description_to_results(real):
     assert made["tile_yarns"] == [4, 4] and all(yarn["n_fiber"] > 30 for yarn in made["yarns"])
     # the default model, all of whose parameters are free
     assert state["result"]["model"] == "textile.v3"
-    assert [p["name"] for p in state["result"]["parameters"]][-5:] == ["beta_R", "beta_TT", "gamma_TT", "w", "s"]
+    assert [p["name"] for p in state["result"]["parameters"]][-7:] == ["beta_R", "beta_TT", "gamma_TT", "w", "s", "f", "h"]
     files = [f["path"] for f in real.get(f"/v1/jobs/{job}/results").json()["files"]]
     assert "fibers.hair" in files and "quality.html" in files
 

@@ -28,7 +28,7 @@ static void textile_rise_in_closed_form(void **unused)
     enum { N_THETA = 4000, N_PHI = 200 };
     for (int k = 0; k < 2; k++) {
         double s = k == 0 ? 0.02 : 0.98, want = 0, got = 0, c_r = 0.001;
-        const double param[12] = {c_r, c_r, c_r, 0.001, 0.001, 0.001, 1 * RAD_PER_DEG, 0.3, 0.4, 0.3, s, 0.5};
+        const double param[13] = {c_r, c_r, c_r, 0.001, 0.001, 0.001, 1 * RAD_PER_DEG, 0.3, 0.4, 0.3, s, 0.5, 0.7};
         struct scattering_state *state = prepare(m, param);
         for (int j = 0; j < N_PHI; j++) {
             double phi = 2 * M_PI * (j + 0.5) / N_PHI - M_PI, c = cos(phi / 2);
@@ -72,8 +72,8 @@ static void flat_section_in_closed_form(void **unused)
     double mean_v[2] = {0, 0}, back[2][2];
     static const double f[2] = {0.3, 0.98};
     for (int n = 0; n < 2; n++) {
-        const double param[12] = {0.001, 0.001, 0.001, 0.999, 0.999, 0.999, 5 * RAD_PER_DEG, 0.2, 10 * RAD_PER_DEG,
-                                  0.8,   0.5,   f[n]};
+        const double param[13] = {0.001, 0.001, 0.001, 0.999, 0.999, 0.999, 5 * RAD_PER_DEG, 0.2, 10 * RAD_PER_DEG,
+                                  0.8,   0.5,   f[n],  0.9};
         struct scattering_state *state = prepare(m, param);
         for (int i = 0; i < 1000; i++)
             mean_v[n] += sqrt(f[n] * f[n] + (1 - f[n] * f[n]) * pow(cos((i + 0.5) / 1000 * M_PI_2), 2)) / 1000;
@@ -96,11 +96,35 @@ static void flat_section_in_closed_form(void **unused)
     assert_true(fabs(back[0][0] / back[1][0] / (mean_v[1] / mean_v[0]) - 1) < 1e-4);
 }
 
+/* D alone, off R's cone and away from TT: towards the light and beside it, at azimuths where a flat section looks the
+ * same. */
+static void side_in_closed_form(void **unused)
+{
+    (void)unused;
+    const struct scattering_model *m = scattering_find("textile.v3");
+    static const double azimuth[2] = {0, M_PI_2}, h[3] = {0.02, 0.5, 0.9};
+    for (int n = 0; n < 3; n++) {
+        const double param[13] = {0.001, 0.001,           0.001, 0.9, 0.9, 0.9, 2 * RAD_PER_DEG,
+                                  0.2,   5 * RAD_PER_DEG, 0.9,   0.5, 0.3, h[n]};
+        struct scattering_state *state = prepare(m, param);
+        const float wi[3] = {0.5f, sqrtf(0.375f), sqrtf(0.375f)};
+        float rgb[2][3];
+        for (int k = 0; k < 2; k++) {
+            double phi = M_PI_4 + azimuth[k], c = sqrt(1 - 0.04);
+            const float wo[3] = {0.2f, (float)(c * cos(phi)), (float)(c * sin(phi))};
+            m->eval(state, wi, wo, rgb[k], NULL);
+        }
+        m->release(state);
+        assert_true(fabs((double)(rgb[0][0] / rgb[1][0]) - (1 - (2 * h[n] - 1))) < 1e-4);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(textile_rise_in_closed_form),
         cmocka_unit_test(flat_section_in_closed_form),
+        cmocka_unit_test(side_in_closed_form),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -68,7 +68,7 @@ static void test_names_of_groups(void **state)
         "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\",\"groups\":[\"a\",\"b\",\"c\",\"d\",\"e\",\"f\","
         "\"g\",\"h\"]},"
         "\"photographs\":[" PHOTO "],\"fit\":{}}",
-        "fit.model", "96");
+        "fit.model", "104");
 }
 
 /* Names with that of a group concern its set, names without it concern all sets. */
