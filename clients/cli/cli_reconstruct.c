@@ -6,12 +6,13 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 static bool ends_with(const char *text, const char *end)
 {
     size_t n = strlen(text), m = strlen(end);
-    return n >= m && strcmp(text + n - m, end) == 0;
+    return n >= m && strcasecmp(text + n - m, end) == 0;
 }
 
 static const char *name_of(const char *path)
@@ -49,8 +50,18 @@ static status list_slices(const char *folder, json_t *files, struct error *err)
     return n > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "the folder '%s' has no TIFF files", folder);
 }
 
-/* Adds the data file that a header names: the rest of the line that begins with `key`. */
-static status add_data_file(const char *path, const char *key, char separator, json_t *files, struct error *err)
+/* Whether the line up to the separator is the key of a data file, in either spelling and case. */
+static bool names_data_file(const char *line, size_t n)
+{
+    static const char *const key[] = {"ElementDataFile", "data file", "datafile"};
+    while (n > 0 && (line[n - 1] == ' ' || line[n - 1] == '\t')) n--;
+    for (size_t i = 0; i < sizeof key / sizeof *key; i++)
+        if (strlen(key[i]) == n && strncasecmp(line, key[i], n) == 0) return true;
+    return false;
+}
+
+/* Adds the data file that a header names behind `separator`. LOCAL: the data is in the header's own file. */
+static status add_data_file(const char *path, char separator, json_t *files, struct error *err)
 {
     char line[1024];
     FILE *f = fopen(path, "re");
@@ -58,11 +69,11 @@ static status add_data_file(const char *path, const char *key, char separator, j
     if (f == NULL) return error_set_errno(err, "cannot read the scan '%s'", path);
     while (!found && fgets(line, sizeof line, f) != NULL) {
         char *value = strchr(line, separator);
-        if (strncmp(line, key, strlen(key)) != 0 || value == NULL) continue;
+        if (value == NULL || !names_data_file(line, (size_t)(value - line))) continue;
         value += 1 + strspn(value + 1, " \t");
         value[strcspn(value, "\r\n")] = '\0';
         found = value[0] != '\0';
-        if (found) json_array_append_new(files, json_string(value));
+        if (found && strcasecmp(value, "LOCAL") != 0) json_array_append_new(files, json_string(value));
     }
     fclose(f);
     return found ? STATUS_OK : error_set(err, STATUS_FORMAT, "the scan '%s' does not name its data file", path);
@@ -79,8 +90,8 @@ static status list_scan(const char *scan, json_t *files, char *folder, size_t n_
     }
     cli_folder_of(scan, folder, n_bytes);
     json_array_append_new(files, json_string(name_of(scan)));
-    if (ends_with(scan, ".mhd")) return add_data_file(scan, "ElementDataFile", '=', files, err);
-    return ends_with(scan, ".nhdr") ? add_data_file(scan, "data file", ':', files, err) : STATUS_OK;
+    if (ends_with(scan, ".mhd")) return add_data_file(scan, '=', files, err);
+    return ends_with(scan, ".nhdr") ? add_data_file(scan, ':', files, err) : STATUS_OK;
 }
 
 /* "2" or "2,2,3": one edge for all axes, or three. */

@@ -73,6 +73,23 @@ def test_command_line(real, scan, tmp_path):
     assert (tmp_path / "out" / "fibers.hair").stat().st_size > 1000
 
 
+@pytest.mark.parametrize("name,header,sent", [
+    ("a.mhd", "NDims = 3\nElementDataFile = b.raw\n", ["a.mhd", "b.raw"]), ("A.MHD", "elementdatafile=LOCAL\n", ["A.MHD"]),
+    ("a.nhdr", "NRRD0004\ndatafile: b.raw\n", ["a.nhdr", "b.raw"]), ("a.nhdr", "NRRD0004\nData File: b.raw\n", ["a.nhdr", "b.raw"]),
+    ("slices/1.TIF", "II*", ["1.TIF"]),
+])
+def test_files_of_a_scan(real, tmp_path, name, header, sent):
+    """The worker refuses these scans, but the client finds their files."""
+    scan = tmp_path / name
+    scan.parent.mkdir(exist_ok=True)
+    scan.write_text(header)
+    (tmp_path / "b.raw").write_bytes(b"0")
+    done = reconstruct(real, scan.parent if name.startswith("slices") else scan, "--voxel-um", "2", "--id-file", tmp_path / "id")
+    assert done.returncode != 0
+    job = real.get(f"/v1/jobs/{(tmp_path / 'id').read_text().strip()}").json()
+    assert sorted(f["name"] for f in job["files"]) == sorted(sent), done.stderr
+
+
 @pytest.mark.parametrize("words,text", [
     (["nothing.tif"], "cannot read the scan 'nothing.tif'"), ([".", "--voxel-um", "2"], "has no TIFF files"),
     (["scan.tif", "--voxel-um", "2,3"], "--voxel-um"), (["scan.tif", "--voxel-um", "2,,3"], "--voxel-um"), (["scan.tif", "--voxel-um", "-2"], "--voxel-um"),
