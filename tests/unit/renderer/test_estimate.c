@@ -1,9 +1,8 @@
 /* estimate_run: the same bits for any number of threads, right variances, cancellation, bad requests. */
 #include "base/clock.h"
-#include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
-#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
@@ -16,78 +15,46 @@
 
 #include <cmocka.h>
 
-static struct scene *scene;
-static double start[SCATTERING_MAX_PARAM];
-static struct appearance model;
-static struct configuration configuration[16];
+static struct estimate_fixture fixture;
 
 static int set_up(void **state)
 {
     (void)state;
-    struct fiber_set f;
-    const struct scattering_model *m = scattering_find("two_lobe.v1");
-    for (size_t p = 0; p < m->n_param; p++) start[p] = m->param[p].start;
-    orbit_configurations_16(configuration);
-    hand_weave_small(&f);
-    status st = scene_new(&f, &(struct scene_option){true}, &scene, NULL);
-    fiber_set_release(&f);
-    return st != STATUS_OK;
+    return estimate_fixture_init(&fixture);
 }
 
 static int tear_down(void **state)
 {
     (void)state;
-    scene_free(scene);
+    estimate_fixture_release(&fixture);
     return 0;
-}
-
-static struct estimate_request request(const size_t *n_path, size_t n_configuration)
-{
-    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
-                                 .configuration = configuration,
-                                 .n_configuration = n_configuration,
-                                 .n_path = n_path,
-                                 .seed = 17,
-                                 .iteration = 3,
-                                 .replica = 1};
-    q.input.want_derivative = true;
-    return q;
-}
-
-static void run(const struct estimate_request *q, size_t n_thread, struct estimate *e)
-{
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    if (estimate_run(q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
-    thread_pool_free(pool);
 }
 
 static void same_bits_for_any_threads(void **state)
 {
     (void)state;
     const size_t n_path[4] = {1000, 256, 0, 2500};
-    struct estimate_request q = request(n_path, 4);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 4);
     struct estimate one[4], more[4];
-    run(&q, 1, one);
+    estimate_fixture_run(&q, 1, one);
     assert_int_equal(one[0].n_path, 1024);
     assert_int_equal(one[2].n_path, 0);
     assert_true(one[2].mean[0] == 0 && one[0].mean[0] > 0 && one[0].n_bounce > 1024);
     for (size_t t = 2; t <= 3; t++) {
-        run(&q, t, more);
+        estimate_fixture_run(&q, t, more);
         assert_memory_equal(one, more, sizeof one);
     }
     /* a configuration does not depend on the others of a request; other keys give other numbers */
     const size_t only_last[4] = {0, 0, 0, 2500};
-    struct estimate_request alone = request(only_last, 4);
-    run(&alone, 2, more);
+    struct estimate_request alone = estimate_fixture_request(&fixture, only_last, 4);
+    estimate_fixture_run(&alone, 2, more);
     assert_memory_equal(&one[3], &more[3], sizeof one[3]);
     alone.replica = 2;
-    run(&alone, 2, more);
+    estimate_fixture_run(&alone, 2, more);
     assert_true(more[3].mean[0] != one[3].mean[0]);
     /* without derivatives the same radiance */
     q.input.want_derivative = false;
-    run(&q, 1, more);
+    estimate_fixture_run(&q, 1, more);
     for (int c = 0; c < 3; c++)
         assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
 }
@@ -102,9 +69,9 @@ static void variances_agree_with_repetitions(void **state)
     double var = 0, jac_var = 0;
     for (uint32_t i = 0; i < N; i++) {
         struct estimate e;
-        struct estimate_request q = request(n_path, 1);
+        struct estimate_request q = estimate_fixture_request(&fixture, n_path, 1);
         q.iteration = i;
-        run(&q, 1, &e);
+        estimate_fixture_run(&q, 1, &e);
         sample_mean_add(&mean, e.mean[0]);
         sample_mean_add(&jac, e.jac[3]); /* C_TT.r on r */
         var += e.var[0] / N;
@@ -124,7 +91,7 @@ static void agrees_without_avx512(void **state)
     struct error err = {0};
     struct scene *plain = NULL;
     struct estimate with[2], without[2];
-    struct estimate_request q = request(n_path, 2);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 2);
     hand_weave_small(&f);
     if (scene_new(&f, &(struct scene_option){.black_sheet = true, .no_avx512 = true}, &plain, &err) != STATUS_OK)
         fail_msg("%s", err.text);
@@ -168,7 +135,7 @@ static void cancels_within_100_ms(void **state)
     (void)state;
     const double white[9] = {0.001, 0.001, 0.001, 0.999, 0.999, 0.999, 0.1, 0.4, 0.4};
     const size_t n_path[1] = {200000000};
-    struct estimate_request q = request(n_path, 1);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 1);
     struct thread_pool *pool = NULL;
     struct error err = {0};
     double late_s[5];
@@ -197,19 +164,19 @@ static void bad_requests(void **state)
     const size_t n_path[1] = {256};
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = request(n_path, 1);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 1);
     double param[SCATTERING_MAX_PARAM];
-    memcpy(param, start, sizeof param);
+    memcpy(param, fixture.start, sizeof param);
     param[6] = NAN;
     q.input.param = param;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
     assert_string_equal(err.field, "beta_R");
-    q = request(n_path, 1);
-    struct configuration c = configuration[0];
+    q = estimate_fixture_request(&fixture, n_path, 1);
+    struct configuration c = fixture.configuration[0];
     c.camera_theta_rad = M_PI_2;
     q.configuration = &c;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
-    q = request(n_path, 1);
+    q = estimate_fixture_request(&fixture, n_path, 1);
     q.iteration = 70000;
     assert_int_equal(estimate_run(&q, NULL, NULL, &e, &err), STATUS_INVALID);
 }
@@ -233,8 +200,8 @@ static void nan_is_named(void **state)
     const double param[3] = {0.5, 0.5, 0.5};
     struct estimate e[2];
     struct error err = {0};
-    struct estimate_request q = request(n_path, 2);
-    q.input = trace_input_surface(scene, &broken, param, &model);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 2);
+    q.input = trace_input_surface(fixture.scene, &broken, param, &fixture.model);
     q.input.want_derivative = true;
     assert_int_equal(estimate_run(&q, NULL, NULL, e, &err), STATUS_NUMERIC);
     assert_non_null(strstr(err.text, "broken.v1"));
@@ -264,8 +231,8 @@ static void samples_without_density(void **state)
     const double param[3] = {0.5, 0.5, 0.5};
     struct estimate e;
     struct error err = {0};
-    struct estimate_request q = request(n_path, 1);
-    q.input = trace_input_surface(scene, &rounding, param, &model);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 1);
+    q.input = trace_input_surface(fixture.scene, &rounding, param, &fixture.model);
     q.input.want_derivative = true;
     if (estimate_run(&q, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_true(e.mean[0] > 0 && isfinite(e.jac[0]));

@@ -1,9 +1,6 @@
 /* Configurations that differ in their lamp and share their camera paths: the same means as apart, and the correlation
  * of their noise. */
-#include "renderer/transport/estimate/estimate.h"
-#include "tests/support/cloth/hand_weave.h"
-#include "tests/support/tracer/orbit_configurations.h"
-#include "tests/support/tracer/trace_input.h"
+#include "tests/support/tracer/estimate_fixture.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -12,51 +9,19 @@
 
 #include <cmocka.h>
 
-static struct scene *scene;
-static double start[SCATTERING_MAX_PARAM];
-static struct appearance model;
-static struct configuration configuration[16];
+static struct estimate_fixture fixture;
 
 static int set_up(void **state)
 {
     (void)state;
-    struct fiber_set f;
-    const struct scattering_model *m = scattering_find("two_lobe.v1");
-    for (size_t p = 0; p < m->n_param; p++) start[p] = m->param[p].start;
-    orbit_configurations_16(configuration);
-    hand_weave_small(&f);
-    status st = scene_new(&f, &(struct scene_option){true}, &scene, NULL);
-    fiber_set_release(&f);
-    return st != STATUS_OK;
+    return estimate_fixture_init(&fixture);
 }
 
 static int tear_down(void **state)
 {
     (void)state;
-    scene_free(scene);
+    estimate_fixture_release(&fixture);
     return 0;
-}
-
-static struct estimate_request request(const size_t *n_path, size_t n_configuration)
-{
-    struct estimate_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
-                                 .configuration = configuration,
-                                 .n_configuration = n_configuration,
-                                 .n_path = n_path,
-                                 .seed = 17,
-                                 .iteration = 3,
-                                 .replica = 1};
-    q.input.want_derivative = true;
-    return q;
-}
-
-static void run(const struct estimate_request *q, size_t n_thread, struct estimate *e)
-{
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    if (estimate_run(q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
-    thread_pool_free(pool);
 }
 
 /* Shared paths: the same means and derivatives as separate ones within their errors, the same bits for any threads. */
@@ -67,18 +32,18 @@ static void shared_paths_agree_with_separate_ones(void **state)
     const size_t n_path[N] = {16384, 8192, 0, 4096, 16384};
     struct configuration c[N];
     struct estimate separate[N], shared[N], again[N];
-    struct estimate_request q = request(n_path, N);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, N);
     for (int i = 0; i < N; i++) {
-        c[i] = configuration[i == 3 ? 4 : 0]; /* one of them with the cloth turned: alone in its group */
+        c[i] = fixture.configuration[i == 3 ? 4 : 0]; /* one of them with the cloth turned: alone in its group */
         c[i].light_theta_rad = 0.2 + 0.25 * i;
         c[i].light_phi_rad = 2.0 + 0.7 * i;
     }
     c[4].environment_rgb[1] = 0.1; /* differs in more than its lamp: alone, too */
     q.configuration = c;
-    run(&q, 2, separate);
+    estimate_fixture_run(&q, 2, separate);
     q.share_camera_paths = true;
-    run(&q, 2, shared);
-    run(&q, 1, again);
+    estimate_fixture_run(&q, 2, shared);
+    estimate_fixture_run(&q, 1, again);
     assert_memory_equal(shared, again, sizeof shared);
     assert_int_equal(shared[2].n_path, 0);
     assert_int_equal(shared[1].n_path, 16384); /* as many as configuration 0 asks for */
@@ -97,9 +62,9 @@ static void shared_paths_agree_with_separate_ones(void **state)
         }
     /* a group of one has the paths of its own estimate when it is first: same key, same numbers */
     q.n_configuration = 1;
-    run(&q, 1, again);
+    estimate_fixture_run(&q, 1, again);
     q.share_camera_paths = false;
-    run(&q, 1, separate);
+    estimate_fixture_run(&q, 1, separate);
     assert_memory_equal(&again[0].mean, &separate[0].mean, sizeof again[0].mean);
     assert_memory_equal(&again[0].jac, &separate[0].jac, sizeof again[0].jac);
 }
@@ -112,9 +77,9 @@ static void shared_paths_state_their_correlation(void **state)
     enum { N = 3, REPEAT = 400 };
     const size_t n_path[N] = {256, 256, 256};
     for (uint32_t n_rotation = 1; n_rotation <= 2; n_rotation++) {
-        struct configuration c[N] = {configuration[1], configuration[4], configuration[1]};
+        struct configuration c[N] = {fixture.configuration[1], fixture.configuration[4], fixture.configuration[1]};
         struct estimate e[N];
-        struct estimate_request q = request(n_path, N);
+        struct estimate_request q = estimate_fixture_request(&fixture, n_path, N);
         double sum[2] = {0}, square[2] = {0}, product = 0.0, stated = 0.0;
         c[2].light_theta_rad += 0.2;
         c[0].n_rotation = c[2].n_rotation = n_rotation;
@@ -123,7 +88,7 @@ static void shared_paths_state_their_correlation(void **state)
         q.input.want_derivative = false;
         for (int k = 0; k < REPEAT; k++) {
             q.iteration = (uint32_t)k;
-            run(&q, 2, e);
+            estimate_fixture_run(&q, 2, e);
             assert_true(e[0].n_partner == 0 && e[1].n_partner == 0 && e[2].n_partner == 1);
             assert_int_equal(e[2].partner[0].configuration, 0);
             double x = e[0].mean[0] + e[0].mean[1] + e[0].mean[2], y = e[2].mean[0] + e[2].mean[1] + e[2].mean[2];
@@ -152,17 +117,17 @@ static void shared_paths_without_a_lamp(void **state)
 {
     (void)state;
     const size_t n_path[2] = {4096, 4096};
-    struct configuration c[2] = {configuration[0], configuration[0]};
+    struct configuration c[2] = {fixture.configuration[0], fixture.configuration[0]};
     struct estimate separate[2], shared[2];
-    struct estimate_request q = request(n_path, 2);
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 2);
     for (int i = 0; i < 2; i++) {
         c[i].light = LIGHT_NO_LAMP;
         c[i].environment_rgb[0] = c[i].environment_rgb[1] = c[i].environment_rgb[2] = 0.5 + i;
     }
     q.configuration = c;
-    run(&q, 2, separate);
+    estimate_fixture_run(&q, 2, separate);
     q.share_camera_paths = true;
-    run(&q, 2, shared);
+    estimate_fixture_run(&q, 2, shared);
     assert_memory_equal(shared[0].mean, separate[0].mean,
                         sizeof shared[0].mean); /* first in the order: same key, same numbers */
     for (int k = 0; k < 3; k++) {
