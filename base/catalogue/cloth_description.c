@@ -102,17 +102,15 @@ static unsigned has(const struct cloth_description *d, int kind)
     static const unsigned of_structure[CLOTH_N_STRUCTURE] = {CLOTH_HAS_WEAVE, CLOTH_HAS_LOOPS,
                                                              CLOTH_HAS_WEAVE | CLOTH_HAS_PILE, CLOTH_HAS_FELT};
     unsigned mask = of_structure[d->structure];
+    if (kind < 0 && (mask & CLOTH_HAS_WEAVE) != 0) {
+        if (!(d->threads_per_cm[CLOTH_WARP] > 0.0)) mask |= CLOTH_HAS_WARP_COVER;
+        if (!(d->threads_per_cm[CLOTH_WEFT] > 0.0)) mask |= CLOTH_HAS_WEFT_COVER;
+    }
     if (kind < 0) return mask;
     if (d->structure == CLOTH_VELVET) mask = kind == d->pile_kind ? CLOTH_HAS_PILE : CLOTH_HAS_WEAVE;
     if (d->kind[kind].n_ply > 1) mask |= CLOTH_HAS_PLIES;
     if (d->kind[kind].melange_with >= 0) mask |= CLOTH_HAS_MELANGE;
     return mask;
-}
-
-static bool replaced(const struct cloth_description *d, const struct cloth_number_info *info)
-{
-    return (d->threads_per_cm[CLOTH_WARP] > 0.0 && strcmp(info->name, "cover_warp") == 0) ||
-           (d->threads_per_cm[CLOTH_WEFT] > 0.0 && strcmp(info->name, "cover_weft") == 0);
 }
 
 static void list_number(struct cloth_description *d, const struct cloth_description *before,
@@ -138,7 +136,7 @@ void cloth_description_number(struct cloth_description *d)
     const struct cloth_description before = *d;
     d->n_number = 0;
     for (const struct cloth_number_info *i = cloth_number_table; i->name != NULL; i++)
-        if (!i->of_yarn && (i->structures & has(d, -1)) != 0 && !replaced(d, i)) list_number(d, &before, i, -1);
+        if (!i->of_yarn && (i->structures & has(d, -1)) != 0) list_number(d, &before, i, -1);
     for (int k = 0; k < (int)d->n_kind; k++)
         for (const struct cloth_number_info *i = cloth_number_table; i->name != NULL; i++)
             if (i->of_yarn && (i->structures & has(d, k)) != 0) list_number(d, &before, i, k);

@@ -32,12 +32,14 @@ enum cloth_direction { CLOTH_WEFT, CLOTH_WARP }; /* weft runs along x, warp alon
 
 /* Which cloths have a number. */
 enum cloth_has {
-    CLOTH_HAS_WEAVE = 1,   /* woven cloths and the ground of a velvet */
-    CLOTH_HAS_LOOPS = 2,   /* knits */
-    CLOTH_HAS_PILE = 4,    /* velvets */
-    CLOTH_HAS_FELT = 8,    /* felts */
-    CLOTH_HAS_PLIES = 16,  /* yarns of at least two plies */
-    CLOTH_HAS_MELANGE = 32 /* yarns with mixed fibers */
+    CLOTH_HAS_WEAVE = 1,       /* woven cloths and the ground of a velvet */
+    CLOTH_HAS_LOOPS = 2,       /* knits */
+    CLOTH_HAS_PILE = 4,        /* velvets */
+    CLOTH_HAS_FELT = 8,        /* felts */
+    CLOTH_HAS_PLIES = 16,      /* yarns of at least two plies */
+    CLOTH_HAS_MELANGE = 32,    /* yarns with mixed fibers */
+    CLOTH_HAS_WARP_COVER = 64, /* weaves and velvets whose warps per cm are not given */
+    CLOTH_HAS_WEFT_COVER = 128 /* weaves and velvets whose wefts per cm are not given */
 };
 #define CLOTH_HAS_YARN (CLOTH_HAS_WEAVE | CLOTH_HAS_LOOPS)
 #define CLOTH_HAS_ANY (CLOTH_HAS_YARN | CLOTH_HAS_PILE | CLOTH_HAS_FELT)

@@ -26,19 +26,20 @@ enum {
 static const struct cli_command {
     const char *name, *operand, *what, *more;
     int option;
+    const char *needs; /* what the operand is, for the message when it is missing; NULL: a job id */
 } command_table[CLI_N_COMMAND] = {
     [CLI_SUBMIT] =
         {"submit", "JOB.json", "send a job document and its files, and start the job",
          "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
          "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
          "continues a submit that was interrupted. Prints the job's id on standard output.\n",
-         OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE},
+         OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE, "a job document"},
     [CLI_RECONSTRUCT] =
         {"reconstruct", "SCAN", "trace the fibers of a scan, without photographs, and download the results",
          "SCAN is a file (TIFF, .mhd, .mha, .nrrd, .nhdr, .vol) or a folder of TIFF slices. The job ends with the\n"
          "geometry; a later job goes on from it (\"geometry\": {\"job\": ID} in its document). The results go to the\n"
          "folder of --out (default: selvedge-ID).\n",
-         OPT_VOXEL | OPT_AXES | OPT_ALIGN | OPT_OUT | OPT_ID_FILE},
+         OPT_VOXEL | OPT_AXES | OPT_ALIGN | OPT_OUT | OPT_ID_FILE, "a scan"},
     [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
     [CLI_WATCH] =
         {"watch", "ID", "follow a job until it ends",
@@ -247,10 +248,7 @@ static status check(const struct cli_args *a, int given, struct error *err)
     bool may_lack = a->command == CLI_SUBMIT && a->resume_id != NULL;
     if (c->operand != NULL && a->operand == NULL && !may_lack)
         return error_set(err, STATUS_INVALID, "'selvedge %s' needs %s: selvedge %s %s", c->name,
-                         a->command == CLI_SUBMIT        ? "a job document"
-                         : a->command == CLI_RECONSTRUCT ? "a scan"
-                                                         : "a job id (`selvedge list` shows them)",
-                         c->name, c->operand);
+                         c->needs != NULL ? c->needs : "a job id (`selvedge list` shows them)", c->name, c->operand);
     if (c->operand == NULL && a->operand != NULL)
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
     if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0)

@@ -100,13 +100,15 @@ static status read_voxel(const char *text, json_t **voxel, struct error *err)
     double um[3];
     char *end = NULL;
     int n = 0;
-    for (const char *at = text; n < 3; at = end + 1) {
+    bool valid = true;
+    const char *at = text;
+    do {
         um[n] = strtod(at, &end);
-        if (end == at || !(um[n] > 0.0) || !isfinite(um[n])) break;
+        valid = end != at && um[n] > 0.0 && isfinite(um[n]);
+        at = end + 1;
         n++;
-        if (*end != ',') break;
-    }
-    if ((n != 1 && n != 3) || *end != '\0')
+    } while (valid && n < 3 && *end == ',');
+    if (!valid || n == 2 || *end != '\0')
         return error_set(err, STATUS_INVALID, "option '--voxel-um' takes one length or three, such as 2 or 2,2,3: '%s'",
                          text);
     *voxel = n == 1 ? json_real(um[0]) : json_pack("[f, f, f]", um[0], um[1], um[2]);

@@ -93,8 +93,11 @@ static status read_number(const struct json_field *f, struct cloth_number *n, st
 /* Which cloths have a number of the catalogue. */
 static const char *who_has(const struct cloth_number_info *i)
 {
-    if (strncmp(i->name, "cover_", 6) == 0) return "weaves without 'warp_per_cm' and 'weft_per_cm' have it";
     switch (i->structures) {
+    case CLOTH_HAS_WARP_COVER:
+        return "weaves and velvets without 'warp_per_cm' have it";
+    case CLOTH_HAS_WEFT_COVER:
+        return "weaves and velvets without 'weft_per_cm' have it";
     case CLOTH_HAS_MELANGE:
         return "it needs 'melange_with', the other kind of yarn";
     case CLOTH_HAS_PLIES:

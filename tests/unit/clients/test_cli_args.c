@@ -75,6 +75,7 @@ static void test_errors(void **state)
     expect_error(PARSE("sumbit", "a"), "did you mean 'submit'");
     expect_error(PARSE("frobnicate"), "--help");
     expect_error(PARSE("submit"), "needs a job document");
+    expect_error(PARSE("reconstruct"), "needs a scan");
     expect_error(PARSE("watch"), "needs a job id");
     expect_error(PARSE("watch", "a", "b"), "'b' follows 'a'");
     expect_error(PARSE("list", "a"), "takes no 'a'");

@@ -140,7 +140,7 @@ static void test_mistakes_are_named(void **state)
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1.5"), "cloth.crimp", "1");
     job_document_check_error(CLOTH("\"weave\":\"felt\",\"crimp\":0.5"), "cloth.crimp", "weaves and velvets have it");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp_per_cm\":30,\"cover_warp\":1"), "cloth.cover_warp",
-                             "weaves without 'warp_per_cm'");
+                             "weaves and velvets without 'warp_per_cm'");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"packing\":0.95}]"), "cloth.yarns[0].packing",
                              "0.85");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"melange\":0.5}]"), "cloth.yarns[0].melange",
