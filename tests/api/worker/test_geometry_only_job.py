@@ -92,8 +92,7 @@ def test_files_of_a_scan(real, tmp_path, name, header, sent):
 
 @pytest.mark.parametrize("words,text", [
     (["nothing.tif"], "cannot read the scan 'nothing.tif'"), ([".", "--voxel-um", "2"], "has no TIFF files"),
-    (["scan.tif", "--voxel-um", "2,3"], "--voxel-um"), (["scan.tif", "--voxel-um", "2,,3"], "--voxel-um"), (["scan.tif", "--voxel-um", "2,"], "--voxel-um"), (["scan.tif", "--voxel-um", "-2"], "--voxel-um"),
-    (["lost.mhd"], "does not name its data file"),
+    (["lost.mhd"], "does not name its data file"), *((["scan.tif", "--voxel-um", um], "--voxel-um") for um in ("2,3", "2,,3", "2,", "-2")),
 ])
 def test_command_line_errors(real, tmp_path, monkeypatch, words, text):
     monkeypatch.chdir(tmp_path)
