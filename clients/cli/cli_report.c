@@ -215,6 +215,17 @@ static void print_geometry(const json_t *g, FILE *out)
                 100.0 * member_number(grade, "safe_share"));
 }
 
+static void report_verdict(const json_t *verdict, FILE *out)
+{
+    size_t i;
+    const json_t *reservation;
+    if (!json_is_object(verdict)) return;
+    print_text("verdict", member_text(verdict, "words"), out);
+    print_text("", member_text(verdict, "text"), out);
+    json_array_foreach(json_object_get(verdict, "reservations"), i, reservation)
+        print_text("  -", member_text(reservation, "text"), out);
+}
+
 void report_result(const json_t *job, FILE *out)
 {
     static const struct {
@@ -223,6 +234,7 @@ void report_result(const json_t *job, FILE *out)
     size_t i;
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
     const json_t *models = json_object_get(result, "models");
+    report_verdict(json_object_get(job, "verdict"), out);
     if (json_is_array(models) && json_array_size(models) == 0) { /* of geometry only */
         print_geometry(json_object_get(result, "geometry"), out);
         return;
@@ -245,14 +257,22 @@ void report_result(const json_t *job, FILE *out)
     if (json_is_false(converged)) fprintf(out, "The fit has NOT converged; see the log.\n");
 }
 
+/* The verdict in a column of the list. */
+static const char *verdict_word(const json_t *job)
+{
+    const char *code = member_text(json_object_get(job, "verdict"), "code");
+    return strcmp(code, "does_not_describe_this_cloth") == 0 ? "does not describe" : code;
+}
+
 void report_summary(const json_t *job, FILE *out)
 {
     struct job_view view;
-    char id[64], sample[80], eta[CLI_SHORT_TEXT];
+    char id[64], sample[80], eta[CLI_SHORT_TEXT], verdict[32];
     report_view(job, &view);
     text_clean(member_text(job, "id"), id, sizeof id);
     text_clean(member_text(job, "sample"), sample, sizeof sample);
     text_duration(view.eta_s, eta);
-    fprintf(out, "%-36s  %-10s %4.0f %% %8s  %s\n", id, view.state, isnan(view.fraction) ? 0.0 : 100.0 * view.fraction,
-            eta, sample);
+    text_clean(verdict_word(job), verdict, sizeof verdict);
+    fprintf(out, "%-36s  %-10s %-17s %4.0f %% %8s  %s\n", id, view.state, verdict,
+            isnan(view.fraction) ? 0.0 : 100.0 * view.fraction, eta, sample);
 }

@@ -1,5 +1,5 @@
 // Comparison of measured and rendered photographs: pictures side by side, and a scatter plot of the means.
-import { colour, el, percent, svg } from "./page_parts.js";
+import { colour, el, percentWithError, svg } from "./page_parts.js";
 
 const RGB = ["var(--red)", "var(--green)", "var(--blue)"];
 const degrees = (x) => (typeof x === "number" ? `${Number(x.toFixed(1))}°` : "–");
@@ -26,7 +26,7 @@ export function gallery(list, pngExposure) {
       el("div", { class: "row" }, el("span", {}, "light"), el("span", {}, `θ ${degrees(c.angles.light_theta_deg)}  φ ${degrees(c.angles.light_phi_deg)}`)),
       el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(c.angles.camera_theta_deg)}  φ ${degrees(c.angles.camera_phi_deg)}`)),
       el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, c.angles.all_rotations ? "mean over all" : degrees(c.angles.cloth_rotation_deg))),
-      el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percent(c.error))))));
+      el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percentWithError(c.error, c.errorSe, 1))))));
   return [
     el("p", { class: "hint" }, "Left: measured; right: rendered with the fitted parameters. Photographs in dashed frames were held out of the fit. Plain squares show mean colours. All pictures have the same exposure."),
     el("div", { class: "gallery" }, cards),

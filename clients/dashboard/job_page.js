@@ -4,7 +4,7 @@ import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
-import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, when, withError } from "./page_parts.js";
+import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, verdictTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
@@ -36,8 +36,9 @@ function factsOf(job) {
   if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", duration(job.eta_s)));
   if (job.state === "running" && /^(fitting|fiber radius)/.test(job.message)) facts.push(fact("now", job.message));
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
-  const of = job.result ?? job; // after the end: of the best model, computed with fresh paths
-  if (isNumber(of.objective)) facts.push(fact("objective", withError(of.objective, of.objective_se)));
+  const { result } = job; // after the end there is one objective: that of the best model, computed with fresh paths
+  if (isNumber(result?.objective)) facts.push(fact("objective, fresh paths", withError(result.objective, result.objective_se)));
+  else if (isNumber(job.objective)) facts.push(fact("objective of this step", withError(job.objective, job.objective_se)));
   const { fit, fitSe, leftOut, leftOutSe, held, heldSe } = residuals(job);
   if (isNumber(fit)) facts.push(fact("relative RMS error, fitted", percentWithError(fit, fitSe)));
   if (isNumber(leftOut)) facts.push(fact("left out in turn", percentWithError(leftOut, leftOutSe)));
@@ -50,6 +51,13 @@ function factsOf(job) {
   if (job.peak_rss_bytes > 0) facts.push(fact("memory", size(job.peak_rss_bytes)));
   facts.push(fact("created", when(job.created_unix_s)));
   return facts;
+}
+
+// The verdict on the result: words, the sentence and the reservations.
+function verdictOf(verdict) {
+  if (!verdict) return null;
+  return el("div", { id: "verdict" }, el("p", {}, el("b", {}, "Verdict "), verdictTag(verdict), ` ${verdict.text}`),
+    verdict.reservations.length ? el("ul", {}, verdict.reservations.map((r) => el("li", { title: r.code }, r.text))) : null);
 }
 
 function notesOf(job) {
@@ -91,11 +99,11 @@ function downloads(job, list) {
 }
 
 export function jobPage(page, id) {
-  const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), notes = el("div");
+  const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
   const fitCard = el("div"), curveCard = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
   const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode);
   const logLink = el("a", { href: `/v1/jobs/${id}/log`, target: "_blank" }, "whole log");
-  page.append(el("section", { class: "card", id: "state" }, head, stages, facts, notes),
+  page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
     el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard)), results,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines; ", logLink)), logNode));
   let about = null, generation = null, closeFibers = null, gone = false;
@@ -151,6 +159,7 @@ export function jobPage(page, id) {
     refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
     refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
+    refill(verdict, job.verdict, () => [verdictOf(job.verdict)]);
     refill(notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
     await charts.update(job);
     await log.update(id);

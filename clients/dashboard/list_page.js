@@ -1,5 +1,5 @@
 // The list of all jobs, newest first, with a drop area for new ones.
-import { duration, el, refill, stateTag, when } from "./page_parts.js";
+import { duration, el, refill, stateTag, verdictTag, when } from "./page_parts.js";
 import { getJson, poll } from "./server_link.js";
 import { submitPanel } from "./submit_panel.js";
 
@@ -10,6 +10,7 @@ function row(job) {
   return el("tr", { class: "link", onclick: () => { location.hash = job.id; } },
     el("td", {}, el("a", { href: `#${job.id}` }, job.sample || "(no name)")),
     el("td", {}, stateTag(job.state)),
+    el("td", { class: "verdict" }, verdictTag(job.verdict)),
     el("td", {}, busy ? el("progress", { max: 1, value: job.fraction, title: `${Math.round(100 * job.fraction)} %` }) : null),
     el("td", {}, job.state === "running" ? job.stage ?? "" : job.state === "failed" ? job.error?.text ?? "" : ""),
     el("td", { class: "number" }, busy ? duration(job.eta_s) : ""),
@@ -24,7 +25,7 @@ export function listPage(page) {
   page.append(
     el("section", { class: "card" }, el("h2", {}, "Jobs"),
       el("table", { id: "jobs" },
-        el("thead", {}, el("tr", {}, el("th", {}, "Sample"), el("th", {}, "State"), el("th", { width: "170" }, "Progress"), el("th", {}, ""),
+        el("thead", {}, el("tr", {}, el("th", {}, "Sample"), el("th", {}, "State"), el("th", {}, "Verdict"), el("th", { width: "170" }, "Progress"), el("th", {}, ""),
           el("th", { class: "number" }, "Time left"), el("th", { class: "number" }, "Created"))), body),
       empty, more),
     submitPanel());

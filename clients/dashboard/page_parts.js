@@ -57,6 +57,10 @@ export const percentWithError = (x, se, digits = 2) => (isNumber(x) && isNumber(
 export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
 export const stateTag = (state) => el("span", { class: `state ${state}` }, state);
 
+// The verdict on a result as a coloured tag; null before there is one. The sentence is its title.
+const VERDICT_CLASS = { good: "good", usable: "warn", does_not_describe_this_cloth: "bad" };
+export const verdictTag = (verdict) => (verdict ? el("span", { class: `tag ${VERDICT_CLASS[verdict.code] ?? ""}`, title: verdict.text }, verdict.words) : null);
+
 // Converts linear radiance to an sRGB byte colour.
 export function colour(rgb, exposure) {
   const byte = (x) => {

@@ -69,14 +69,11 @@ export function radiusSearch(job) {
   return { value: r.radius_um, se: r.standard_error_um, start: r.start_um, flags, curve };
 }
 
-// Returns all configurations: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error}]
+// Returns all configurations: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error, errorSe}], error: the relative error of the row
 export function configurations(job, urls) {
   return (job.result?.rows ?? []).map((c) => {
-    const measured = c.measured, rendered = c.rendered;
-    const mean = (v) => (v[0] + v[1] + v[2]) / 3;
-    const error = measured && rendered ? Math.hypot(...measured.map((m, i) => rendered[i] - m)) / Math.sqrt(3) / Math.max(mean(measured), 1e-9) : null;
     return {
-      name: c.name, held: c.set === "held-out", angles: c, measured, rendered, error,
+      name: c.name, held: c.set === "held-out", angles: c, measured: c.measured, rendered: c.rendered, error: c.rel_error ?? null, errorSe: c.rel_error_se,
       measuredPicture: urls.get(c.photograph_png) ?? null, renderedPicture: urls.get(c.rendering_png) ?? null,
     };
   });

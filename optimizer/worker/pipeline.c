@@ -92,6 +92,7 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
     for (size_t i = 0; i < n_stage; i++) total += is_skipped(c, i) ? 0.0 : info[i].weight;
     for (size_t i = 0; i < n_stage; i++) {
         if (is_skipped(c, i)) continue;
+        if (stage_code[i].run == stage_fit) c->n_input_warning = worker_status_n_warning(c->status);
         worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage, done / total, info[i].weight / total);
         status s = do_stage(c, i, &earlier_ran, err);
         if (s == STATUS_OK && progress_cancelled(&c->progress)) s = error_set(err, STATUS_CANCELLED, "cancelled");

@@ -20,6 +20,7 @@
 #include "optimizer/fit/objective/next_photograph.h"
 #include "optimizer/fit/objective/noisy_minimum.h"
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/fit/verdict/verdict.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/worker_folder.h"
@@ -135,6 +136,8 @@ struct pipeline_context {
     struct pipeline_numbers number;
     struct pipeline_radius radius; /* when the job has the radius fitted */
     struct pipeline_skill skill;   /* filled in before the report */
+    size_t n_input_warning;        /* warnings of reading the job and of its geometry */
+    struct verdict verdict;        /* of the best model; filled in before the report */
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;

@@ -31,6 +31,7 @@ struct worker_status {
     bool has_objective;
     size_t step;
     double objective, objective_se;
+    json_t *verdict;          /* NULL: not reached */
     size_t n_warning, n_more; /* n_more: warnings that are in the log only */
     char warning[MAX_WARNING][WARNING_BYTES];
 };
@@ -75,6 +76,8 @@ static char *status_text(const struct worker_status *st, const char *state, cons
                   st->has_objective ? json_number(st->objective_se) : json_null(), "step",
                   st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
                   error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
+    if (json != NULL)
+        json_object_set_new(json, "verdict", st->verdict != NULL ? json_incref(st->verdict) : json_null());
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(12)) : NULL;
     json_decref(json);
     return text;
@@ -172,6 +175,7 @@ void worker_status_free(struct worker_status *st)
     if (st == NULL) return;
     stop_thread(st);
     pthread_mutex_destroy(&st->mutex);
+    json_decref(st->verdict);
     free(st);
 }
 
@@ -211,6 +215,14 @@ void worker_status_message(struct worker_status *st, const char *text)
 {
     pthread_mutex_lock(&st->mutex);
     keep(st->message, sizeof st->message, text);
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_verdict(struct worker_status *st, json_t *verdict)
+{
+    pthread_mutex_lock(&st->mutex);
+    json_decref(st->verdict);
+    st->verdict = verdict;
     pthread_mutex_unlock(&st->mutex);
 }
 

@@ -6,6 +6,7 @@
 #include "base/log.h"
 #include "optimizer/worker/worker_folder.h"
 
+#include <jansson.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -31,6 +32,8 @@ void worker_status_fraction(struct worker_status *st, double stage_fraction);
 /* Estimates the remaining time from here on, because what is done so far was done by an earlier attempt. */
 void worker_status_restart_eta(struct worker_status *st);
 void worker_status_message(struct worker_status *st, const char *text);
+/* Takes over the verdict on the result (verdict_json.h); null until it is reached. */
+void worker_status_verdict(struct worker_status *st, json_t *verdict);
 void worker_status_objective(struct worker_status *st, size_t step, double objective, double se);
 /* Formats a warning as printf does, keeps it in the list and writes it to the log; a warning that the list has
  * already is not added again. From the 50th on they are in the log only, and the list's last entry counts them. */

@@ -54,6 +54,7 @@ static void put_progress(json_t *out, const struct job_row *row, const json_t *s
     put(out, "objective_se", st, "objective_se", JSON_REAL, json_null());
     put(out, "step", st, "step", JSON_INTEGER, json_null());
     put(out, "warnings", st, "warnings", JSON_ARRAY, json_array());
+    put(out, "verdict", row->state == JOB_SUCCEEDED ? st : NULL, "verdict", JSON_OBJECT, json_null());
     json_int_t peak = json_integer_value(json_object_get(st, "peak_rss_bytes"));
     json_object_set_new(out, "peak_rss_bytes", json_integer(peak > row->peak_rss_bytes ? peak : row->peak_rss_bytes));
 }

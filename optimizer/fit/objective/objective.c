@@ -132,6 +132,17 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
     out->rel_rms = root_of_square(out->rel_square, out->rel_square_se, &out->rel_rms_se);
 }
 
+double objective_row_error(const struct observation *o, const struct estimate *a, const struct estimate *b, double *se)
+{
+    double product = 0.0, sd = 0.0, channel_sd;
+    for (int c = 0; c < 3; c++) {
+        product += square_of_channel(o, a, b, c, &channel_sd);
+        sd += channel_sd;
+    }
+    const double w = objective_relative_weight(o) / 3.0;
+    return root_of_square(w * product, w * sd, se);
+}
+
 void objective_evaluate_channels(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                                  struct objective_channels *out)
 {

@@ -59,6 +59,9 @@ void objective_evaluate(const struct observation_set *o, const struct estimate *
 /* The same for the channels apart. Contrasts and rows of weight 0 are left out. */
 void objective_evaluate_channels(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                                  struct objective_channels *out);
+/* The relative error of one row, sqrt(max(0, sum_c (A-M)(B-M) / 3)) / max(a, tau), and its standard error: the mean
+ * square of the rows' errors is the square of their relative RMS error above. */
+double objective_row_error(const struct observation *o, const struct estimate *a, const struct estimate *b, double *se);
 /* gradient[n_param], by internal units. */
 void objective_gradient(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                         size_t n_param, double *gradient);

@@ -5,6 +5,7 @@
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
+#include "optimizer/worker/report/verdict_json.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 
 #include <jansson.h>
@@ -113,6 +114,21 @@ static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[
     }
 }
 
+double result_row_error(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *se)
+{
+    struct estimate a, b;
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
+    nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
+    return objective_row_error(&c->observation.item[i], &a, &b, se);
+}
+
+static void put_row_error(json_t *row, const struct pipeline_context *c, const struct pipeline_model *m, size_t i)
+{
+    double se, error = result_row_error(c, m, i, &se);
+    json_object_set_new(row, "rel_error", json_number(error));
+    json_object_set_new(row, "rel_error_se", json_number(se));
+}
+
 /* The error of fitted rows that were left out in turn; null when there are too few rows. Where numbers of the cloth are
  * fitted, they are the same in all folds; the same error with new numbers in each fold is that of the joint fit. */
 static json_t *cross_validation_json(const struct pipeline_context *c, const struct pipeline_model *m)
@@ -180,6 +196,7 @@ static json_t *model_json(const struct pipeline_context *c, size_t i_model)
         rendered_mean(m, i, mean, se);
         json_t *row = json_pack("{s:o, s:o}", "rendered", json_number_list(mean, 3, 1.0), "rendered_se",
                                 json_number_list(se, 3, 1.0));
+        put_row_error(row, c, m, i);
         result_row_options(c, m, i, row);
         json_array_append_new(rows, row);
     }
@@ -208,6 +225,7 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
     json_object_set_new(row, "measured_se", json_number_list(o->se_rgb, 3, 1.0));
     json_object_set_new(row, "rendered", json_number_list(rendered, 3, 1.0));
     json_object_set_new(row, "rendered_se", json_number_list(se, 3, 1.0));
+    put_row_error(row, c, m, i);
     json_object_set_new(row, "rendering_png", json_string(png));
     json_object_set_new(row, "rendering_exr", json_string(exr));
     json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
@@ -264,6 +282,7 @@ static json_t *skill_json(const struct pipeline_context *c)
 /* Adds what every job has, also one of geometry only. */
 static void put_job(json_t *json, struct pipeline_context *c)
 {
+    json_object_set_new(json, "verdict", verdict_json(&c->verdict));
     json_object_set_new(json, "geometry", result_geometry_json(c));
     json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
     json_object_set_new(json, "stages", stages_json(c));

@@ -5,6 +5,7 @@
  *   "format", "sample", "method", "seed"            version of this format, and what the job document says
  *   "model", "chosen_by"                            id of the best model, to which all keys but "models" refer, and
  *                                                   the measure by which it was chosen
+ *   "verdict"                                       whether the result can be used (verdict.h)
  *   "converged", "reason", "reason_code"            why the fit ended (stop_reason.h)
  *   "parameters"                                    value, standard error (with photograph noise, Monte-Carlo noise and
  *                                                   misfit), bounds, ties and prior of each parameter, in file units
@@ -42,6 +43,10 @@ typedef char picture_name[JOB_MAX_NAME_BYTES + 8];
 status result_picture_names(const struct observation_set *o, picture_name **name, struct error *err);
 /* Exposure of all PNG pictures. It brings the 90th percentile of the brightest measured channels to 0.8. */
 double result_png_exposure(const struct observation_set *o);
+
+/* Relative error of row i by model m (objective_row_error), and its standard error: the one error of a row that
+ * results, summary, report and dashboard show. */
+double result_row_error(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *se);
 
 /* The same of a job that ends with the geometry: without parameters, rows and models. */
 status result_geometry_json_write(struct pipeline_context *c, struct error *err);

@@ -40,20 +40,17 @@ static void print_rows(const struct pipeline_context *c, const struct pipeline_m
     for (size_t i = 0; i < c->observation.n; i++) {
         const struct observation *o = &c->observation.item[i];
         const struct configuration *k = &o->configuration;
-        double r[3], error = 0.0;
+        double r[3], se;
         char turn[16];
         struct estimate a, b;
         nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
         nuisance_show(&m->fit.nuisance, &m->validation.replica[1][i], &b);
-        for (int q = 0; q < 3; q++) {
-            r[q] = 0.5 * (a.mean[q] + b.mean[q]);
-            error += (r[q] - o->mean_rgb[q]) * (r[q] - o->mean_rgb[q]) / 3.0;
-        }
+        for (int q = 0; q < 3; q++) r[q] = 0.5 * (a.mean[q] + b.mean[q]);
         snprintf(turn, sizeof turn, "%.1f", k->cloth_rotation_rad * deg);
         fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6s   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
                 o->name, o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg,
                 k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->n_rotation > 1 ? "all" : turn, o->mean_rgb[0],
-                o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], 100.0 * sqrt(error * objective_relative_weight(o)));
+                o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], 100.0 * result_row_error(c, m, i, &se));
     }
 }
 
@@ -145,6 +142,14 @@ static void print_cloth(const struct pipeline_context *c, FILE *out)
     fprintf(out, "         quality.html shows how good the geometry is\n\n");
 }
 
+static void print_verdict(const struct verdict *v, FILE *out)
+{
+    if (v->code == VERDICT_NONE) return;
+    fprintf(out, "verdict  %s\n         %s\n", verdict_code_words(v->code), v->text);
+    for (size_t i = 0; i < v->n_reservation; i++) fprintf(out, "         - %s\n", v->reservation[i].text);
+    fputc('\n', out);
+}
+
 static void print_warnings(struct pipeline_context *c, FILE *out)
 {
     char text[600];
@@ -156,6 +161,7 @@ static void print_summary(struct pipeline_context *c, FILE *out)
 {
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
     fprintf(out, "%s\n\n", c->doc->sample);
+    print_verdict(&c->verdict, out);
     if (c->n_model > 1) print_comparison(c, out);
     fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
     fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
@@ -179,7 +185,9 @@ static void print_summary(struct pipeline_context *c, FILE *out)
 /* Of a job that ends with the geometry. */
 static void print_geometry(struct pipeline_context *c, FILE *out)
 {
-    fprintf(out, "%s\n\ngeometry only: the job has no photographs\n", c->doc->sample);
+    fprintf(out, "%s\n\n", c->doc->sample);
+    print_verdict(&c->verdict, out);
+    fprintf(out, "geometry only: the job has no photographs\n");
     print_cloth(c, out);
     print_warnings(c, out);
 }

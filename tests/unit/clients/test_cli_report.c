@@ -115,6 +115,18 @@ static void test_models(void **state)
     check("{'result': {'models': [{'id': 'a.v1', 'fit_rel_rms': 0.02}]}}", "");
 }
 
+static void test_verdict(void **state)
+{
+    (void)state;
+    check("{'verdict': {'code': 'usable', 'words': 'usable with reservations', 'text': 'A sentence.',"
+          "'reservations': [{'code': 'a', 'text': 'First.'}, {'code': 'b', 'text': 'Second.'}]}}",
+          "verdict      usable with reservations\n"
+          "             A sentence.\n"
+          "  -          First.\n"
+          "  -          Second.\n");
+    check("{'verdict': null}", "");
+}
+
 static void test_geometry_only(void **state)
 {
     (void)state;
@@ -128,8 +140,8 @@ static void test_geometry_only(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_parameters), cmocka_unit_test(test_sets),          cmocka_unit_test(test_residuals),
-        cmocka_unit_test(test_models),     cmocka_unit_test(test_geometry_only),
+        cmocka_unit_test(test_parameters), cmocka_unit_test(test_sets),    cmocka_unit_test(test_residuals),
+        cmocka_unit_test(test_models),     cmocka_unit_test(test_verdict), cmocka_unit_test(test_geometry_only),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include "optimizer/worker/stages/result/pipeline_advice.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "optimizer/worker/stages/result/pipeline_skill.h"
+#include "optimizer/worker/stages/result/pipeline_verdict.h"
 
 /* Depth by which fibers run into each other, over their diameter and as a mean over all points, above which a described
  * cloth has more fiber than fits. Default numbers make 0 to 0.07; a packing of 0.85 makes 0.14. */
@@ -29,6 +30,7 @@ static void warn_of_overlap(const struct pipeline_context *c)
 static status report_geometry(struct pipeline_context *c, struct error *err)
 {
     reconstruct_warn_fibers(&c->geometry, &c->fiber, &(struct warning_sink){pipeline_warn, c});
+    pipeline_reach_verdict(c);
     status s = result_geometry_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);
@@ -43,6 +45,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_use(c, pipeline_best_model(c), err);
     if (s == STATUS_OK) warn_of_overlap(c);
+    if (s == STATUS_OK) pipeline_reach_verdict(c);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);

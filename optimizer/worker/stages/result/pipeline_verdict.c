@@ -1,0 +1,107 @@
+#include "optimizer/worker/stages/result/pipeline_verdict.h"
+#include "optimizer/worker/report/verdict_json.h"
+#include "optimizer/worker/stages/result/pipeline_advice.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { NAMES_BYTES = 200 };
+
+/* Appends a name to a list "a, b"; what does not fit is cut. */
+static void append_name(char list[NAMES_BYTES], const char *name)
+{
+    size_t used = strlen(list);
+    snprintf(list + used, NAMES_BYTES - used, "%s%s", used > 0 ? ", " : "", name);
+}
+
+/* Names of the parameters and numbers of the cloth that the rows do not determine, and of those at a bound. */
+static void list_parameters(const struct pipeline_context *c, const struct pipeline_model *m,
+                            char not_determined[NAMES_BYTES], char at_bound[NAMES_BYTES])
+{
+    const struct uncertainty *u = &m->fit.uncertainty, *joint = &m->cloth.joint.uncertainty;
+    not_determined[0] = at_bound[0] = '\0';
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
+        if (m->parameter[p].fixed) continue;
+        if (!u->determined[p]) append_name(not_determined, m->sets.info.param[p].name);
+        if (u->at_bound[p]) append_name(at_bound, m->sets.info.param[p].name);
+    }
+    for (size_t k = 0; k < c->number.n; k++) {
+        const size_t p = joint->n_param - c->number.n + k;
+        if (!joint->determined[p]) append_name(not_determined, c->number.info[k].name);
+        if (joint->at_bound[p]) append_name(at_bound, c->number.info[k].name);
+    }
+}
+
+/* The error that judges the fit: over held-out rows; without any, over fitted rows left out in turn; where these are
+ * too few, over the fitted rows. If the job gives every photograph a gain, each row has its own. */
+static void judge_rows(const struct pipeline_model *m, struct verdict_facts *f)
+{
+    const struct validation *v = &m->validation;
+    const bool gains = m->option->gain == JOB_GAIN_PER_PHOTOGRAPH;
+    const struct objective_value *held_out = gains ? &v->held_out_with_gains : &v->held_out,
+                                 *fitted = gains ? &v->fit_with_gains : &v->fit;
+    f->rows = VERDICT_FITTED;
+    f->error = fitted->rel_rms;
+    f->error_se = fitted->rel_rms_se;
+    if (isfinite(held_out->rel_rms)) {
+        f->rows = VERDICT_HELD_OUT;
+        f->error = held_out->rel_rms;
+        f->error_se = held_out->rel_rms_se;
+    } else if (m->fit.cross_validation.n_fold > 0) {
+        f->rows = VERDICT_LEFT_OUT;
+        f->error = m->fit.cross_validation.rel_rms;
+        f->error_se = m->fit.cross_validation.rel_rms_se;
+    }
+}
+
+static bool has_other_solution(const struct pipeline_model *m)
+{
+    bool elsewhere = false;
+    for (size_t k = 0; k < m->fit.n_start; k++) elsewhere = elsewhere || m->fit.start[k].elsewhere;
+    return elsewhere;
+}
+
+static void add_fit(const struct pipeline_context *c, const struct pipeline_model *m, struct verdict_facts *f)
+{
+    judge_rows(m, f);
+    const enum job_set set = f->rows == VERDICT_HELD_OUT ? JOB_SET_HELD_OUT : JOB_SET_FIT;
+    f->has_fit = true;
+    f->allowed = verdict_allowed_error(&c->observation, set);
+    f->one_color_error = verdict_one_color_error(&c->observation, set);
+    f->plain_brdf_error = !c->skill.measured            ? NAN
+                          : f->rows == VERDICT_HELD_OUT ? c->skill.heldout_rel_rms
+                                                        : c->skill.fit_rel_rms;
+    f->converged = m->fit.converged;
+    f->derivatives_right = pipeline_certificate_passed(m);
+    f->several_solutions = has_other_solution(m);
+}
+
+static enum verdict_scan scan_of(const struct pipeline_context *c)
+{
+    static const enum verdict_scan of[] = {[GRADE_NONE] = VERDICT_NO_SCAN,
+                                           [GRADE_RESOLVED] = VERDICT_SCAN_RESOLVED,
+                                           [GRADE_PARTLY] = VERDICT_SCAN_PARTLY,
+                                           [GRADE_UNRESOLVED] = VERDICT_SCAN_UNRESOLVED};
+    return c->doc->has_volume ? of[c->geometry.grade.verdict] : VERDICT_NO_SCAN;
+}
+
+void pipeline_reach_verdict(struct pipeline_context *c)
+{
+    char not_determined[NAMES_BYTES] = "", at_bound[NAMES_BYTES] = "";
+    struct verdict_facts facts = {.scan = scan_of(c),
+                                  .scan_safe_share = c->geometry.grade.safe_share,
+                                  .n_input_warning = c->n_input_warning,
+                                  .not_determined = not_determined,
+                                  .at_bound = at_bound};
+    if (!job_document_geometry_only(c->doc)) {
+        const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
+        list_parameters(c, best, not_determined, at_bound);
+        add_fit(c, best, &facts);
+    } else
+        facts.n_input_warning = worker_status_n_warning(c->status);
+    verdict_reach(&facts, &c->verdict);
+    log_info(c->log, "verdict: %s. %s", verdict_code_words(c->verdict.code), c->verdict.text);
+    worker_status_verdict(c->status, verdict_json(&c->verdict));
+}

@@ -1,0 +1,11 @@
+/* The verdict on the job's result (optimizer/fit/verdict/verdict.h) from what the stages have found. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_VERDICT_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_VERDICT_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Fills in c->verdict, of the best model or, without a fit, of the geometry, and puts it into the status, from which
+ * the daemon's list of jobs has it. In the stage "report", after the certificate and the skill. */
+void pipeline_reach_verdict(struct pipeline_context *c);
+
+#endif

@@ -1,0 +1,154 @@
+/* Verdicts: which facts lead to which code and reservations, and what measurements allow. */
+#include "optimizer/fit/verdict/verdict.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* A fit without any reservation. */
+static struct verdict_facts flawless(void)
+{
+    return (struct verdict_facts){.has_fit = true,
+                                  .rows = VERDICT_HELD_OUT,
+                                  .error = 0.03,
+                                  .error_se = 0.002,
+                                  .allowed = 0.02,
+                                  .one_color_error = 0.5,
+                                  .plain_brdf_error = 0.05,
+                                  .converged = true,
+                                  .derivatives_right = true,
+                                  .not_determined = "",
+                                  .at_bound = "",
+                                  .scan = VERDICT_SCAN_RESOLVED,
+                                  .scan_safe_share = 1.0};
+}
+
+/* The verdict has this code and exactly these reservations, given as "a b". */
+static void expect(struct verdict_facts f, enum verdict_code code, const char *reservations)
+{
+    struct verdict v;
+    char got[600] = "";
+    verdict_reach(&f, &v);
+    for (size_t i = 0; i < v.n_reservation; i++) {
+        if (i > 0) strcat(got, " ");
+        strcat(got, v.reservation[i].code);
+        assert_true(strlen(v.reservation[i].text) > 20 &&
+                    v.reservation[i].text[strlen(v.reservation[i].text) - 1] == '.');
+    }
+    assert_string_equal(got, reservations);
+    assert_int_equal(v.code, code);
+    assert_true(strlen(v.text) > 10);
+}
+
+static void test_a_fit_without_reservations_is_good(void **state)
+{
+    (void)state;
+    expect(flawless(), VERDICT_GOOD, "");
+    struct verdict_facts f = flawless();
+    f.error = 0.06 + 2.0 * f.error_se - 1e-9; /* noise of the rendering condemns nothing */
+    f.plain_brdf_error = NAN;
+    expect(f, VERDICT_GOOD, "");
+}
+
+static void test_errors_are_judged_by_the_noise(void **state)
+{
+    (void)state;
+    struct verdict_facts f = flawless();
+    f.plain_brdf_error = f.one_color_error = NAN;
+    f.error = 0.07;
+    expect(f, VERDICT_USABLE, "error_beyond_noise");
+    f.error = 0.21;
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "error_beyond_noise");
+    f.allowed = 0.08; /* the same error with noisier photographs */
+    expect(f, VERDICT_GOOD, "");
+    f.error = NAN;
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "error_beyond_noise");
+    f.error = 4.7;
+    f.error_se = NAN;
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "error_beyond_noise");
+}
+
+static void test_errors_are_compared_with_simpler_descriptions(void **state)
+{
+    (void)state;
+    struct verdict_facts f = flawless();
+    f.plain_brdf_error = 0.02; /* worse, but both within the noise */
+    expect(f, VERDICT_USABLE, "worse_than_plain_brdf");
+    f.error = 0.08;
+    f.plain_brdf_error = 0.07;
+    expect(f, VERDICT_USABLE, "error_beyond_noise worse_than_plain_brdf");
+    f.plain_brdf_error = 0.03;
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "error_beyond_noise worse_than_plain_brdf");
+    f.plain_brdf_error = NAN;
+    f.one_color_error = 0.07;
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "error_beyond_noise worse_than_one_color");
+}
+
+static void test_each_reservation(void **state)
+{
+    (void)state;
+    struct verdict_facts f = flawless();
+    f.converged = f.derivatives_right = false;
+    f.several_solutions = true;
+    f.not_determined = "beta_R, w";
+    f.at_bound = "C_R.r";
+    f.rows = VERDICT_FITTED;
+    f.scan = VERDICT_SCAN_PARTLY;
+    f.n_input_warning = 2;
+    expect(f, VERDICT_USABLE,
+           "no_held_out_rows not_converged derivatives_wrong several_solutions parameters_not_determined "
+           "parameters_at_bound scan_partly_resolved input_warnings");
+    f = flawless();
+    f.scan = VERDICT_SCAN_UNRESOLVED; /* the fit is judged by its rows, the scan is a reservation */
+    expect(f, VERDICT_USABLE, "scan_not_resolved");
+}
+
+static void test_geometry_alone(void **state)
+{
+    (void)state;
+    struct verdict_facts f = {.scan = VERDICT_SCAN_RESOLVED, .scan_safe_share = 0.9};
+    struct verdict v;
+    expect(f, VERDICT_GOOD, "");
+    f.scan = VERDICT_SCAN_PARTLY;
+    expect(f, VERDICT_USABLE, "scan_partly_resolved");
+    f.scan = VERDICT_SCAN_UNRESOLVED;
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "scan_not_resolved");
+    f.scan = VERDICT_NO_SCAN;
+    expect(f, VERDICT_NONE, "");
+    verdict_reach(&f, &v);
+    assert_true(isnan(v.error) && isnan(v.allowed));
+}
+
+static void test_what_measurements_allow(void **state)
+{
+    (void)state;
+    struct observation item[3] = {
+        {.set = JOB_SET_FIT, .weight = 1.0, .mean_rgb = {0.1, 0.1, 0.1}, .se_rgb = {0.01, 0.01, 0.01}},
+        {.set = JOB_SET_FIT, .weight = 0.0, .mean_rgb = {0.1, 0.1, 0.1}, .se_rgb = {1.0, 1.0, 1.0}},
+        {.set = JOB_SET_HELD_OUT, .weight = 1.0, .mean_rgb = {0.2, 0.2, 0.2}}};
+    const struct observation_set o = {.n = 3, .item = item};
+    assert_true(fabs(verdict_allowed_error(&o, JOB_SET_FIT) - hypot(0.1, VERDICT_LEAST_ERROR)) < 1e-12);
+    assert_true(fabs(verdict_allowed_error(&o, JOB_SET_HELD_OUT) - VERDICT_LEAST_ERROR) < 1e-12);
+    assert_true(fabs(verdict_one_color_error(&o, JOB_SET_HELD_OUT) - 0.5) < 1e-12); /* 0.1 in place of 0.2 */
+    assert_true(verdict_one_color_error(&o, JOB_SET_FIT) < 1e-12);
+    item[2].weight = 0.0;
+    assert_true(isnan(verdict_allowed_error(&o, JOB_SET_HELD_OUT)));
+    assert_true(isnan(verdict_one_color_error(&o, JOB_SET_HELD_OUT)));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_fit_without_reservations_is_good),
+        cmocka_unit_test(test_errors_are_judged_by_the_noise),
+        cmocka_unit_test(test_errors_are_compared_with_simpler_descriptions),
+        cmocka_unit_test(test_each_reservation),
+        cmocka_unit_test(test_geometry_alone),
+        cmocka_unit_test(test_what_measurements_allow),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
