@@ -14,7 +14,7 @@ ifeq ($(ARCH),x86_64)
 MACHINE ?= -march=x86-64-v3
 endif
 
-PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt zlib libzstd libarchive libpng libcurl
+PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt zlib libzstd libarchive libpng libjpeg libraw_r libcurl
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ') -isystem /usr/include/opencv4
 # fields left out of an initialiser are zero, and zero is made to mean the usual thing
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-missing-field-initializers
@@ -52,7 +52,7 @@ PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-w
 LINK_BASE := -lz -lm -pthread
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
-LINK_OPTIMIZER := -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
+LINK_OPTIMIZER := -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
 .PHONY: all generate deps help check test nightly demo clean

@@ -54,7 +54,7 @@ $(FUZZ_BINS): $(BUILD)/%: $(BUILD)/obj/%.c.o $(BUILD)/obj/tests/fuzz/fuzz_input.
 	@mkdir -p $(@D)
 	@echo "  LINK $@"
 	@$(CC) $(LDFLAGS) -fsanitize=fuzzer -o $@ $^ $(LINK_OPTIMIZER)
-$(BUILD)/tests/fuzz/make_fuzz_seeds: $(BUILD)/obj/tests/fuzz/make_fuzz_seeds.c.o $(FUZZ_LIBS)
+$(BUILD)/tests/fuzz/make_fuzz_seeds: $(BUILD)/obj/tests/fuzz/make_fuzz_seeds.c.o $(BUILD)/obj/tests/support/camera_files.c.o $(FUZZ_LIBS)
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
 fuzz-programs: $(FUZZ_BINS) $(BUILD)/tests/fuzz/make_fuzz_seeds

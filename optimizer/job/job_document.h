@@ -34,6 +34,8 @@ struct job_model {
 };
 
 enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
+/* How integer samples of a picture stand for light. */
+enum job_transfer { JOB_TRANSFER_UNDECLARED, JOB_TRANSFER_LINEAR, JOB_TRANSFER_SRGB };
 
 struct job_photograph {
     char file[JOB_MAX_NAME_BYTES];
@@ -41,7 +43,8 @@ struct job_photograph {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
     double scale, weight;
     size_t crop_px[4]; /* all 0: whole picture */
-    bool srgb;
+    enum job_transfer transfer;
+    double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
 };
 
 /* A configuration of which a photograph might be taken. */

@@ -24,7 +24,7 @@
 
 enum { NAMED_PHOTOGRAPHS = 3 };
 
-/* A series of photographs is often uneven alike: the first few are named in the job's status, all in its log. */
+/* A series of photographs often has the same fault: the first few are named in the job's status, all in its log. */
 struct uneven_photographs {
     struct pipeline_context *pipeline;
     size_t n;
@@ -33,7 +33,7 @@ struct uneven_photographs {
 static void warn_photograph(void *context, const char *option, const char *text)
 {
     struct uneven_photographs *uneven = context;
-    if (++uneven->n <= NAMED_PHOTOGRAPHS)
+    if (option[0] != '\0' || ++uneven->n <= NAMED_PHOTOGRAPHS)
         pipeline_warn(uneven->pipeline, option, text);
     else
         log_warning(uneven->pipeline->log, "%s", text);
@@ -48,7 +48,7 @@ static status load_observations(struct pipeline_context *c, struct error *err)
         observation_set_load(c->doc, path, &(struct warning_sink){warn_photograph, &uneven}, &c->observation, err);
     if (s != STATUS_OK) return s;
     if (uneven.n > NAMED_PHOTOGRAPHS)
-        worker_status_warn(c->status, "%zu more photographs are not uniform: the job's log names them",
+        worker_status_warn(c->status, "%zu more warnings about photographs are in the job's log",
                            uneven.n - NAMED_PHOTOGRAPHS);
     observation_set_check(&c->observation, &(struct warning_sink){pipeline_warn, c});
     return STATUS_OK;

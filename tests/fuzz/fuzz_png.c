@@ -21,7 +21,7 @@ static void correct_checksums(uint8_t *png, size_t size)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const uint8_t magic[4] = {0x89, 'P', 'N', 'G'};
-    struct job_photograph p = {.scale = 1.0, .srgb = size % 2 == 1};
+    const struct job_photograph p = photograph_plain(size % 2 == 1 ? JOB_TRANSFER_SRGB : JOB_TRANSFER_LINEAR);
     struct photograph_mean mean;
     struct error err = {0};
     if (size < 8 || memcmp(data, magic, 4) != 0) return 0;

@@ -4,6 +4,7 @@
 #include "geometry/phantom/phantom.h"
 #include "geometry/volume/format/vol_file.h"
 #include "renderer/image/image.h"
+#include "tests/support/camera_files.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -133,6 +134,22 @@ static void photograph_seeds(void)
     image_release(&im);
 }
 
+static void camera_seeds(void)
+{
+    static uint8_t byte[16 * 16 * 4];
+    static uint16_t word[32 * 32];
+    for (size_t i = 0; i < sizeof byte; i++) byte[i] = (uint8_t)(i * 3);
+    for (size_t i = 0; i < 32 * 32; i++) word[i] = (uint16_t)(512 + i * 9);
+    camera_write_jpeg(seed_path("jpeg", "exif.jpg"), 16, 16, byte, 0.01);
+    camera_write_tiff(seed_path("photograph_tiff", "u8.tif"), &(struct camera_tiff){16, 16, 3, 8, .deflate = true},
+                      byte);
+    camera_write_tiff(seed_path("photograph_tiff", "u16.tif"),
+                      &(struct camera_tiff){16, 16, 1, 16, .exposure_s = 0.1, .iso = 100, .aperture = 8}, word);
+    camera_write_tiff(seed_path("photograph_tiff", "f32.tif"), &(struct camera_tiff){8, 8, 4, 32, .planes = true},
+                      byte);
+    camera_write_dng(seed_path("camera_raw", "bayer.dng"), &(struct camera_dng){32, 32, 512, 16383, 0.5, 100, 4}, word);
+}
+
 int main(int argc, char **argv)
 {
     if (argc != 2) return 2;
@@ -142,5 +159,6 @@ int main(int argc, char **argv)
     header_seeds();
     fiber_seeds();
     photograph_seeds();
+    camera_seeds();
     return 0;
 }

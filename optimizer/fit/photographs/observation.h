@@ -6,7 +6,7 @@
 #define SELVEDGE_OPTIMIZER_OBSERVATION_H
 
 #include "base/status.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/fit/photographs/photograph.h"
 #include "renderer/scene/configuration.h"
 
 #include <stdbool.h>
@@ -20,6 +20,7 @@ struct observation {
     double weight;    /* factor of the objective's weight of this observation; 1 */
     size_t n_cell;    /* parts along an edge of the crop of which the contrast is taken; 0: not measured */
     double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
+    struct photograph_record photograph;        /* how it was read; info.format is NULL for a row of a table */
 };
 
 struct observation_set {

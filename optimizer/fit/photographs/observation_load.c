@@ -5,6 +5,9 @@
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
 
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -56,6 +59,7 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
                          "rendering's",
                          p->file);
     }
+    item.photograph = mean.record;
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
     item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
@@ -63,13 +67,57 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
     return observation_set_append(o, &item, err);
 }
 
+/* Either all photographs state a factor of the exposure or none does: otherwise their values have no common scale. */
+static status check_exposures(const struct observation_set *o, size_t first, struct error *err)
+{
+    static const struct {
+        const char *name, *key;
+        size_t at;
+    } factor[] = {{"exposure time", "exposure_s", offsetof(struct photograph_info, exposure_s)},
+                  {"ISO value", "iso", offsetof(struct photograph_info, iso)},
+                  {"f-number", "aperture", offsetof(struct photograph_info, aperture)}};
+    for (size_t k = 0; k < sizeof factor / sizeof *factor; k++) {
+        size_t with = SIZE_MAX, without = SIZE_MAX;
+        for (size_t i = o->n; i-- > first;) {
+            double value;
+            memcpy(&value, (const char *)&o->item[i].photograph.info + factor[k].at, sizeof value);
+            *(isnan(value) ? &without : &with) = i;
+        }
+        if (with == SIZE_MAX || without == SIZE_MAX) continue;
+        char field[sizeof err->field];
+        snprintf(field, sizeof field, OPTION_PHOTOGRAPH_FILE "[%zu]", without - first);
+        return error_set_field(err, STATUS_INVALID, field,
+                               "cannot use photograph '%s': its %s is not known, but that of '%s' is, so their values "
+                               "have no common scale: write '%s' beside it",
+                               o->item[without].name, factor[k].name, o->item[with].name, factor[k].key);
+    }
+    return STATUS_OK;
+}
+
+static void warn_less_trustworthy(const struct observation_set *o, size_t first, const struct warning_sink *warn)
+{
+    size_t n = 0, which = 0;
+    for (size_t i = o->n; i-- > first;)
+        if (o->item[i].photograph.info.less_trustworthy) {
+            n++;
+            which = i;
+        }
+    if (n > 0)
+        warning_send(warn, OPTION_PHOTOGRAPHS,
+                     "%zu of %zu photographs ('%s'%s) have 8 bits, or the curve of a camera's own processing: trust "
+                     "the fitted values less than those of raw files or OpenEXR",
+                     n, o->n - first, o->item[which].name, n > 1 ? " and others" : "");
+}
+
 status observation_set_load(const struct job_document *doc, const char *folder, const struct warning_sink *warn,
                             struct observation_set *o, struct error *err)
 {
     if (doc->measurement_file[0] != '\0') return load_table(doc, folder, o, err);
+    size_t first = o->n;
     for (size_t i = 0; i < doc->n_photograph; i++) {
         status s = load_photograph(doc, i, folder, warn, o, err);
         if (s != STATUS_OK) return s;
     }
-    return STATUS_OK;
+    warn_less_trustworthy(o, first, warn);
+    return check_exposures(o, first, err);
 }

@@ -1,33 +1,46 @@
 /* One photograph to its mean rgb radiance.
  *
- * Reads OpenEXR (linear) and 8/16-bit PNG (declared transfer: job_photograph.srgb), takes the crop, multiplies by the
- * photograph's scale. The standard error of the mean comes from the means of square sub-blocks (8 x 8 of them where the
- * crop allows): cloth has texture that is correlated from pixel to pixel, so single pixels would state an error that is
- * far too small. STATUS_FORMAT / STATUS_INVALID naming the file: unreadable, NaN or infinite pixels, negative mean, all
- * black, saturated (more than 2 % of the crop of a PNG at its largest value), crop outside the picture.
+ * Reads any format of photograph_reader.h, takes the crop, divides by the exposure where it is known, multiplies by the
+ * photograph's scale. The exposure is t (ISO / 100) / N^2, time t in seconds and f-number N; a factor that neither the
+ * document nor the file states is 1 (photographs_check_exposure requires that all photographs state the same ones). The
+ * standard error of the mean comes from the means of square sub-blocks (8 x 8 of them where the crop allows): cloth has
+ * texture that is correlated from pixel to pixel, so single pixels would state an error that is far too small.
+ * STATUS_FORMAT / STATUS_INVALID naming the file: unreadable, NaN or infinite pixels, negative mean, all black,
+ * saturated (more than 2 % of the crop of an integer picture at its largest value), crop outside the picture, linear
+ * samples that are declared as srgb.
  */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 
+#include "optimizer/fit/photographs/reader/photograph_reader.h"
 #include "optimizer/job/job_document.h"
-#include "renderer/image/image.h"
+
+/* What became of a file on its way to radiances. */
+struct photograph_record {
+    struct photograph_info info; /* with the exposure that the document overrides */
+    size_t width, height;        /* of the file, in pixels of the image that was read */
+    double saturated_share;      /* of the crop's pixels that have a channel at full scale, 0 for float samples */
+    double exposure;             /* pixel values were divided by it; 1 when nothing is known */
+    bool resampled;              /* pixels depend on their neighbours as after an enlargement or a strong filter */
+};
 
 struct photograph_mean {
+    struct photograph_record record;
     double mean_rgb[3], se_rgb[3];
-    double saturated_share; /* of the crop's pixels */
-    double block_contrast;  /* standard deviation of sub-block means over the mean, largest channel */
-    char warning[400];      /* "" or why the mean describes the crop badly */
+    double block_contrast; /* standard deviation of sub-block means over the mean, largest channel */
+    char warning[400];     /* "" or why the mean describes the crop badly */
 };
 
 status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
                           struct error *err);
 
-/* The crop as an image, scaled to radiance units (for pictures in the report). *saturated_share: of the crop's pixels
- * that have a channel at full scale, 0 for OpenEXR; may be NULL. */
-status photograph_read(const char *path, const struct job_photograph *p, struct image *im, double *saturated_share,
-                       struct error *err);
+/* A photograph of which nothing but the transfer is declared: scale 1, no crop, exposure and black level as the file
+ * states. */
+struct job_photograph photograph_plain(enum job_transfer transfer);
 
-/* 8/16-bit PNG, grey or rgb, to linear floats: a channel at its largest value is exactly 1, all others are below. */
-status photograph_read_png(const char *path, bool srgb, size_t limit_pixel, struct image *im, struct error *err);
+/* The crop as an image, divided by the exposure and scaled. record may be NULL. The transfer of p is that of integer
+ * samples alone: linear files are read as they are. */
+status photograph_read(const char *path, const struct job_photograph *p, struct image *im,
+                       struct photograph_record *record, struct error *err);
 
 #endif

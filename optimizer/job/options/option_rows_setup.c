@@ -3,7 +3,8 @@
 
 static const char *const set_name[] = {[JOB_SET_FIT] = "fit", [JOB_SET_HELD_OUT] = "held-out", NULL};
 static const char *const lamp_kind[] = {"square", "directional", NULL};
-static const char *const transfer[] = {"linear", "srgb", NULL};
+static const char *const transfer[] = {
+    [JOB_TRANSFER_UNDECLARED] = "undeclared", [JOB_TRANSFER_LINEAR] = "linear", [JOB_TRANSFER_SRGB] = "srgb", NULL};
 
 const struct job_option option_rows_setup[] = {
     {.path = "lamp", .kind = OPTION_SECTION, .check = job_check_lamp, .meaning = "The lamp of every photograph."},
@@ -121,7 +122,7 @@ const struct job_option option_rows_setup[] = {
      .id = OPTION_PHOTOGRAPH_FILE,
      INTO_OF(struct job_photograph, file),
      .required = true,
-     .allowed = "OpenEXR (`.exr`) or PNG (`.png`)",
+     .allowed = "OpenEXR, TIFF, camera raw, PNG, JPEG",
      .meaning = "The picture."},
     {.path = "photographs[].set",
      .kind = OPTION_CHOICE,
@@ -153,9 +154,37 @@ const struct job_option option_rows_setup[] = {
      .allowed = "x0, y0, x1, y1",
      .meaning = "The part of the picture that is used. x1, y1 are excluded; row 0 is at the top."},
     {.path = "photographs[].transfer",
-     .kind = OPTION_SWITCH,
-     INTO_OF(struct job_photograph, srgb),
+     .kind = OPTION_CHOICE,
+     INTO_OF(struct job_photograph, transfer),
      .choice = transfer,
-     .meaning = "How the pixel values of a PNG stand for radiance."},
+     .meaning = "How the values of a PNG, a JPEG or an integer TIFF stand for light: `srgb` as a camera or phone saves "
+                "them, `linear` when they were developed without tone curve. Such a picture is refused without it. "
+                "OpenEXR, float TIFF and camera raw are linear."},
+    {.path = "photographs[].exposure_s",
+     .kind = OPTION_NUMBER,
+     INTO_OF(struct job_photograph, exposure_s),
+     RANGE(1e-9, 1e6),
+     .unit = "s",
+     .left_out = "from the file",
+     .meaning = "Exposure time. Pixel values are divided by it; then all photographs need one."},
+    {.path = "photographs[].iso",
+     .kind = OPTION_NUMBER,
+     INTO_OF(struct job_photograph, iso),
+     RANGE(1, 1e8),
+     .left_out = "from the file",
+     .meaning = "Sensitivity. Pixel values are divided by ISO / 100; then all photographs need one."},
+    {.path = "photographs[].aperture",
+     .kind = OPTION_NUMBER,
+     INTO_OF(struct job_photograph, aperture),
+     RANGE(0.1, 1000),
+     .left_out = "from the file",
+     .meaning = "The f-number N. Pixel values are multiplied by its square; then all photographs need one."},
+    {.path = "photographs[].black_level",
+     .kind = OPTION_NUMBER,
+     INTO_OF(struct job_photograph, black_level),
+     RANGE(-1e9, 1e9),
+     .unit = "values of the file",
+     .left_out = "that of the raw file, else 0",
+     .meaning = "The value that stands for no light. Not for `srgb`."},
     {.path = NULL},
 };

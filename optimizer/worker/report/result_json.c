@@ -3,6 +3,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/cloth/result_geometry.h"
 #include "optimizer/worker/report/json_number.h"
+#include "optimizer/worker/report/photograph_json.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/report/verdict_json.h"
@@ -229,6 +230,8 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
     json_object_set_new(row, "rendering_png", json_string(png));
     json_object_set_new(row, "rendering_exr", json_string(exr));
     json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
+    if (o->photograph.info.format != NULL)
+        json_object_set_new(row, "photograph", photograph_record_json(&o->photograph));
     result_row_options(c, m, i, row);
     return row;
 }

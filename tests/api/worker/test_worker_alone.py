@@ -21,7 +21,7 @@ def run(folder, table=TABLE, expect=0, photographs=(), set_up=None, **fit):
     (folder / "input").mkdir()
     (folder / "input" / "cloth.hair").write_bytes(hair())
     if photographs:
-        document["photographs"] = [{"file": f"p{i:02d}.png", **keys} for i, (_, keys) in enumerate(photographs)]
+        document["photographs"] = [{"file": f"p{i:02d}.png", "transfer": "linear", **keys} for i, (_, keys) in enumerate(photographs)]
         for i, (data, _) in enumerate(photographs):
             (folder / "input" / f"p{i:02d}.png").write_bytes(data)
     else:
@@ -79,7 +79,8 @@ def test_many_uneven_photographs_leave_room_for_other_warnings(tmp_path):
     state = run(tmp_path, photographs=[(half, a) for a in angles], path_budget=1000)
     warnings = state["warnings"]
     uneven = [w for w in warnings if "is not uniform" in w]
-    assert len(uneven) == 3 and "57 more photographs are not uniform: the job's log names them" in warnings
+    assert len(uneven) == 3 and "57 more warnings about photographs are in the job's log" in warnings
+    assert any("60 of 60 photographs ('p00.png' and others) have 8 bits" in w for w in warnings)
     assert (tmp_path / "log.txt").read_text().count("is not uniform") == 60
     assert any("has not converged" in w for w in warnings) and warnings == result(tmp_path)["warnings"]
 

@@ -81,7 +81,7 @@ static status name_file(struct error *err, status s)
 static status detect(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    const struct job_photograph photograph = {.scale = 1.0, .srgb = true};
+    const struct job_photograph photograph = photograph_plain(JOB_TRANSFER_SRGB);
     struct image im;
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth_texture, path);
     status s = photograph_read(path, &photograph, &im, NULL, err);

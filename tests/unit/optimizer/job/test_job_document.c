@@ -62,7 +62,8 @@ static void test_everything_given(void **state)
     assert_int_equal(d->crop_voxel[5], 12);
     assert_false(d->black_sheet);
     assert_int_equal(d->photograph[1].set, JOB_SET_HELD_OUT);
-    assert_true(d->photograph[1].srgb && d->photograph[1].scale == 2.0 && d->photograph[1].light_theta_deg == 150.0);
+    assert_true(d->photograph[1].transfer == JOB_TRANSFER_SRGB && d->photograph[1].scale == 2.0 &&
+                d->photograph[1].light_theta_deg == 150.0);
     const struct scattering_model *m = scattering_find(d->model[0].id);
     assert_true(d->model[0].start[scattering_param_index(m, "C_TT.b")] == 0.3);
     assert_true(isnan(d->model[0].start[scattering_param_index(m, "C_R.b")]));
