@@ -12,7 +12,7 @@ def document(folder, title):
     with open(os.path.join(folder, "phantom.json"), encoding="utf-8") as f:
         voxel_um = json.load(f)["cloth"]["voxel_size_um"]
     job = {"sample": title, "volume": {"files": ["scan.tif"], "voxel_size_um": voxel_um}, "photographs": photographs,
-           "fit": {"model": "two_lobe.v1", "seed": 1, "render_px": 96, "render_samples": 16}}
+           "fit": {"model": "two_lobe.v1", "seed": 1, "render_px": 96}}
     path = os.path.join(folder, "job.json")
     with open(path + ".new", "w", encoding="utf-8") as f:
         json.dump(job, f, indent=1)

@@ -32,6 +32,8 @@ void report_view(const json_t *job, struct job_view *view)
     text_clean(member_text(job, "message"), view->message, sizeof view->message);
     view->fraction = member_number(job, "fraction");
     view->eta_s = member_number(job, "eta_s");
+    view->eta_low_s = member_number(job, "eta_low_s");
+    view->eta_high_s = member_number(job, "eta_high_s");
     view->objective = member_number(job, "objective");
     view->objective_se = member_number(job, "objective_se");
     view->step = member_count(job, "step");

@@ -115,12 +115,22 @@ static void stage_part(const struct job_view *v, char *out, size_t n_out)
         snprintf(out, n_out, "%s", stage);
 }
 
+/* "2:05", or "1:00 to 4:00" where the remaining time is not known well. */
+static void eta_part(const struct job_view *v, char *out, size_t n_out)
+{
+    char low[CLI_SHORT_TEXT], high[CLI_SHORT_TEXT];
+    bool range = v->eta_low_s >= 0.0 && v->eta_high_s >= 0.0;
+    text_duration(range ? v->eta_low_s : v->eta_s, low);
+    text_duration(v->eta_high_s, high);
+    snprintf(out, n_out, "%s%s%s", low, range ? " to " : "", range ? high : "");
+}
+
 void text_progress(const struct job_view *v, size_t n_column, char *out, size_t n_out)
 {
-    char stage[96], fit[160], eta[CLI_SHORT_TEXT], bar[48];
+    char stage[96], fit[160], eta[2 * CLI_SHORT_TEXT + 8], bar[48];
     stage_part(v, stage, sizeof stage);
     fit_part(v, fit, sizeof fit);
-    text_duration(v->eta_s, eta);
+    eta_part(v, eta, sizeof eta);
     double fraction = isnan(v->fraction) ? 0.0 : v->fraction;
     text_bar(fraction, n_column >= 100 ? 32 : 20, bar, sizeof bar);
     int n = snprintf(out, n_out, "%s %3.0f %%  %-18s ETA %s%s", bar, 100.0 * fraction, stage, eta, fit);
@@ -129,9 +139,9 @@ void text_progress(const struct job_view *v, size_t n_column, char *out, size_t 
 
 void text_progress_plain(const struct job_view *v, char *out, size_t n_out)
 {
-    char stage[96], fit[160], eta[CLI_SHORT_TEXT];
+    char stage[96], fit[160], eta[2 * CLI_SHORT_TEXT + 8];
     stage_part(v, stage, sizeof stage);
     fit_part(v, fit, sizeof fit);
-    text_duration(v->eta_s, eta);
+    eta_part(v, eta, sizeof eta);
     snprintf(out, n_out, "%3.0f %%  %s  ETA %s%s", isnan(v->fraction) ? 0.0 : 100.0 * v->fraction, stage, eta, fit);
 }

@@ -23,7 +23,8 @@ void text_clean(const char *in, char *out, size_t n_out);
 /* The state of a watched job; NaN, "" or -1 for what it does not state. */
 struct job_view {
     char state[24], stage[40], message[200];
-    double fraction, eta_s, objective, objective_se, rel_rms;
+    double fraction, eta_s, eta_low_s, eta_high_s; /* low, high: NaN where the remaining time is known well */
+    double objective, objective_se, rel_rms;
     long step, i_stage, n_stage;
 };
 /* Writes one line of at most n_column columns: bar, percentage, stage, ETA, step and objective. */

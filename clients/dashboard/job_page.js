@@ -4,7 +4,7 @@ import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail } from "./log_tail.js";
-import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, verdictTag, when, withError } from "./page_parts.js";
+import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, timeLeft, verdictTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
@@ -33,7 +33,7 @@ function fact(name, value) {
 
 function factsOf(job) {
   const facts = [];
-  if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", duration(job.eta_s)));
+  if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", timeLeft(job)));
   if (job.state === "running" && /^(fitting|fiber radius)/.test(job.message)) facts.push(fact("now", job.message));
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
   const { result } = job; // after the end there is one objective: that of the best model, computed with fresh paths

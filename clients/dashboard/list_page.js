@@ -1,5 +1,5 @@
 // The list of all jobs, newest first, with a drop area for new ones.
-import { duration, el, refill, stateTag, verdictTag, when } from "./page_parts.js";
+import { el, refill, stateTag, timeLeft, verdictTag, when } from "./page_parts.js";
 import { getJson, poll } from "./server_link.js";
 import { submitPanel } from "./submit_panel.js";
 
@@ -13,7 +13,7 @@ function row(job) {
     el("td", { class: "verdict" }, verdictTag(job.verdict)),
     el("td", {}, busy ? el("progress", { max: 1, value: job.fraction, title: `${Math.round(100 * job.fraction)} %` }) : null),
     el("td", {}, job.state === "running" ? job.stage ?? "" : job.state === "failed" ? job.error?.text ?? "" : ""),
-    el("td", { class: "number" }, busy ? duration(job.eta_s) : ""),
+    el("td", { class: "number" }, busy ? timeLeft(job) : ""),
     el("td", { class: "number" }, when(job.created_unix_s)));
 }
 

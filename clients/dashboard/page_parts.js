@@ -37,6 +37,9 @@ export function duration(s) {
   return t >= 3600 ? `${Math.floor(t / 3600)}:${two(Math.floor(t / 60) % 60)}:${two(t % 60)}` : `${Math.floor(t / 60)}:${two(t % 60)}`;
 }
 
+// Remaining time: a range where it is not known well.
+export const timeLeft = (job) => (isNumber(job.eta_low_s) && isNumber(job.eta_high_s) ? `${duration(job.eta_low_s)} to ${duration(job.eta_high_s)}` : duration(job.eta_s));
+
 export function size(n) {
   const unit = ["B", "kB", "MB", "GB", "TB"];
   let i = 0;

@@ -132,7 +132,7 @@ struct job_document {
     size_t n_candidate;                      /* for the next photograph; 0: none are ranked */
     bool candidate_grid;                     /* true: the candidates are the built-in ones */
     struct job_candidate *candidate;
-    size_t render_px, render_sample;
+    size_t render_px, render_sample; /* render_sample 0: chosen from the paths of the fit */
 };
 
 /* Parses and checks n_bytes of text, which need not be NUL-terminated. On success the caller frees *doc with

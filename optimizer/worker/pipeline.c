@@ -4,6 +4,7 @@
 #include "optimizer/job/option_key.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/progress/pipeline_plan.h"
 
 #include <math.h>
 
@@ -44,7 +45,7 @@ static status unmark_from(struct pipeline_context *c, size_t i, struct error *er
 }
 
 /* A finished stage is loaded; if its checkpoint cannot be read it runs again, and so do all later ones. */
-static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, struct error *err)
+static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, bool *loaded, struct error *err)
 {
     const struct stage_code *code = &stage_code[i];
     double start_s = clock_monotonic_s();
@@ -52,8 +53,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
         struct error why = {0};
         if (code->load(c, &why) == STATUS_OK) {
             log_info(c->log, "stage %s: done by an earlier attempt", code->name);
-            worker_status_fraction(c->status, 1.0);
-            worker_status_restart_eta(c->status);
+            *loaded = true;
             return STATUS_OK;
         }
         if (c->doc->geometry_job[0] != '\0' && !code->of_fit)
@@ -80,7 +80,6 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
 {
     size_t n_stage;
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
-    double total = 0.0, done = 0.0;
     bool earlier_ran = false;
     char work[WORKER_PATH_BYTES];
     worker_folder_path(c->folder, JOB_FOLDER_WORK, NULL, work);
@@ -89,15 +88,17 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
         if (s != STATUS_OK) return s;
     }
     c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
-    for (size_t i = 0; i < n_stage; i++) total += is_skipped(c, i) ? 0.0 : info[i].weight;
     for (size_t i = 0; i < n_stage; i++) {
         if (is_skipped(c, i)) continue;
         if (stage_code[i].run == stage_fit) c->n_input_warning = worker_status_n_warning(c->status);
-        worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage, done / total, info[i].weight / total);
-        status s = do_stage(c, i, &earlier_ran, err);
+        bool loaded = false;
+        for (size_t later = i; later < n_stage; later++)
+            if (!is_skipped(c, later)) pipeline_plan_stage(c, info[later].name, later);
+        worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage);
+        status s = do_stage(c, i, &earlier_ran, &loaded, err);
+        worker_status_stage_end(c->status, loaded);
         if (s == STATUS_OK && progress_cancelled(&c->progress)) s = error_set(err, STATUS_CANCELLED, "cancelled");
         if (s != STATUS_OK) return s;
-        done += info[i].weight;
     }
     return STATUS_OK;
 }

@@ -26,6 +26,7 @@ static const char usage[] =
     "                     worked on in files under JOBDIR/work. Results do not depend on it, but volume models of "
     "fiber\n"
     "                     files see coarser voxels (with a warning) where a quarter of it does not hold finer ones\n"
+    "  --speeds FILE      speeds of earlier jobs, by which remaining times are predicted; those of this job are added\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --catalogue        print the scattering models with their parameters, the descent methods and the codes that\n"
     "                     explain why a fit ended, as JSON\n"
@@ -36,6 +37,7 @@ static const char usage[] =
 
 struct arguments {
     const char *folder;
+    const char *speeds; /* NULL: none are remembered */
     size_t n_thread, memory_mib;
     bool quiet;
 };
@@ -61,13 +63,11 @@ static int print_catalogue(void)
 /* Returns -1 to go on, otherwise the exit status of the program. */
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option option[] = {{"threads", required_argument, NULL, 't'},
-                                           {"memory-mib", required_argument, NULL, 'm'},
-                                           {"quiet", no_argument, NULL, 'q'},
-                                           {"help", no_argument, NULL, 'h'},
-                                           {"version", no_argument, NULL, 'v'},
-                                           {"catalogue", no_argument, NULL, 'c'},
-                                           {NULL, 0, NULL, 0}};
+    static const struct option option[] = {
+        {"threads", required_argument, NULL, 't'}, {"memory-mib", required_argument, NULL, 'm'},
+        {"speeds", required_argument, NULL, 's'},  {"quiet", no_argument, NULL, 'q'},
+        {"help", no_argument, NULL, 'h'},          {"version", no_argument, NULL, 'v'},
+        {"catalogue", no_argument, NULL, 'c'},     {NULL, 0, NULL, 0}};
     *a = (struct arguments){.memory_mib = 2048};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         bool ok = true;
@@ -77,6 +77,9 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
             break;
         case 'm':
             ok = parse_count(optarg, (size_t)1 << 32, &a->memory_mib);
+            break;
+        case 's':
+            a->speeds = optarg;
             break;
         case 'q':
             a->quiet = true;
@@ -133,12 +136,27 @@ static void set_signals(void)
     signal(SIGPIPE, SIG_IGN);
 }
 
-static status run_job(struct pipeline_context *c, size_t n_thread, struct error *err)
+/* Adds the speeds of this job to the file, which other jobs may have changed meanwhile. What fails is no error of the
+ * job. */
+static void remember_speeds(struct pipeline_context *c, const char *path)
 {
-    worker_status_stage(c->status, "volume", "Reading the job", 0, 8, 0.0, 0.0);
-    status s = thread_pool_new(n_thread, &c->pool, err);
+    struct speed_book book;
+    struct error err = {0};
+    speed_book_read(path, &book);
+    worker_status_remember(c->status, &book);
+    if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(c->log, "%s", err.text);
+}
+
+static status run_job(struct pipeline_context *c, const struct arguments *a, struct error *err)
+{
+    struct speed_book book = {.n = 0};
+    if (a->speeds != NULL) speed_book_read(a->speeds, &book);
+    worker_status_speeds(c->status, &book);
+    worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
+    status s = thread_pool_new(a->n_thread, &c->pool, err);
     if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
     if (s == STATUS_OK) s = pipeline_run(c, err);
+    if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds);
     return s;
 }
 
@@ -191,7 +209,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         code = WORKER_FAILED;
     } else {
-        s = run_job(&context, a.n_thread, &err);
+        s = run_job(&context, &a, &err);
         code = conclude(context.status, context.log, s, &err);
     }
     worker_status_free(context.status);

@@ -3,6 +3,8 @@
 #include "base/files/durable.h"
 #include "base/utf8.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/stage_table.h"
+#include "optimizer/worker/progress/job_clock.h"
 #include "optimizer/worker/report/json_number.h"
 
 #include <jansson.h>
@@ -26,8 +28,8 @@ struct worker_status {
     pthread_mutex_t mutex; /* everything below */
     char stage[64], message[300];
     size_t i_stage, n_stage;
-    double base, weight, stage_fraction;
-    double started_s, started_unix_s, first_fraction; /* first_fraction: fraction that earlier attempts had done */
+    double started_unix_s;
+    struct job_clock clock;
     bool has_objective;
     size_t step;
     double objective, objective_se;
@@ -43,14 +45,6 @@ static void keep(char *to, size_t n_bytes, const char *text)
     utf8_repair(to);
 }
 
-/* Remaining time by the speed so far; unknown before one per cent is done. */
-static double eta_s(const struct worker_status *st, double fraction)
-{
-    double done = fraction - st->first_fraction;
-    if (done < 0.01 || fraction <= 0.0) return NAN;
-    return (clock_monotonic_s() - st->started_s) * (1.0 - fraction) / done;
-}
-
 static json_t *error_json(const struct error *error)
 {
     if (error == NULL) return json_null();
@@ -58,24 +52,25 @@ static json_t *error_json(const struct error *error)
 }
 
 /* To be called with the mutex held. */
-static char *status_text(const struct worker_status *st, const char *state, const struct error *error)
+static char *status_text(struct worker_status *st, const char *state, const struct error *error)
 {
-    bool over = strcmp(state, "running") != 0;
-    double fraction = strcmp(state, "succeeded") == 0 ? 1.0 : fmin(1.0, st->base + st->weight * st->stage_fraction);
+    struct job_clock_look look = job_clock_look(&st->clock, clock_monotonic_s());
+    if (strcmp(state, "running") != 0) look.eta_s = look.eta_low_s = look.eta_high_s = NAN;
+    if (strcmp(state, "succeeded") == 0) look.fraction = 1.0;
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
     json_t *warnings = json_array();
     for (size_t i = 0; i < st->n_warning; i++) json_array_append_new(warnings, json_string(st->warning[i]));
-    json_t *json =
-        json_pack("{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state",
-                  state, "attempt", (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage",
-                  (json_int_t)st->i_stage, "n_stage", (json_int_t)st->n_stage, "stage_fraction", st->stage_fraction,
-                  "fraction", fraction, "eta_s", over ? json_null() : json_number(eta_s(st, fraction)),
-                  "heartbeat_unix_s", clock_wall_s(), "started_unix_s", st->started_unix_s, "message", st->message,
-                  "objective", st->has_objective ? json_number(st->objective) : json_null(), "objective_se",
-                  st->has_objective ? json_number(st->objective_se) : json_null(), "step",
-                  st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
-                  error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
+    json_t *json = json_pack(
+        "{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state",
+        state, "attempt", (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage", (json_int_t)st->i_stage,
+        "n_stage", (json_int_t)st->n_stage, "stage_fraction", st->clock.fraction, "fraction", look.fraction, "eta_s",
+        json_number(look.eta_s), "eta_low_s", json_number(look.eta_low_s), "eta_high_s", json_number(look.eta_high_s),
+        "heartbeat_unix_s", clock_wall_s(), "started_unix_s", st->started_unix_s, "message", st->message, "objective",
+        st->has_objective ? json_number(st->objective) : json_null(), "objective_se",
+        st->has_objective ? json_number(st->objective_se) : json_null(), "step",
+        st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
+        error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
     if (json != NULL)
         json_object_set_new(json, "verdict", st->verdict != NULL ? json_incref(st->verdict) : json_null());
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(12)) : NULL;
@@ -128,7 +123,10 @@ status worker_status_start(const struct worker_folder *folder, struct log *log, 
     if (st == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: out of memory");
     st->folder = folder;
     st->log = log;
-    st->started_s = clock_monotonic_s();
+    size_t n_stage;
+    const struct speed_book none = {.n = 0};
+    pipeline_stage_table(&n_stage);
+    job_clock_init(&st->clock, n_stage, &none, clock_monotonic_s());
     st->started_unix_s = clock_wall_s();
     snprintf(st->message, sizeof st->message, "starting");
     pthread_mutex_init(&st->mutex, NULL);
@@ -182,32 +180,72 @@ void worker_status_free(struct worker_status *st)
 const atomic_bool *worker_status_cancel(const struct worker_status *st) { return &st->cancel; }
 bool worker_status_stale(const struct worker_status *st) { return atomic_load(&st->stale); }
 
-void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage,
-                         double base, double weight)
+void worker_status_speeds(struct worker_status *st, const struct speed_book *book)
+{
+    size_t n_stage;
+    pipeline_stage_table(&n_stage);
+    pthread_mutex_lock(&st->mutex);
+    job_clock_init(&st->clock, n_stage, book, clock_monotonic_s());
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_plan(struct worker_status *st, size_t i_stage, const char *key, double units, double usual_s)
+{
+    pthread_mutex_lock(&st->mutex);
+    job_clock_plan(&st->clock, i_stage, key, units, usual_s);
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_plan_own(struct worker_status *st, size_t i_stage, const char *key, double seconds)
+{
+    pthread_mutex_lock(&st->mutex);
+    job_clock_plan_own(&st->clock, i_stage, key, seconds);
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_plan_share(struct worker_status *st, size_t i_stage, const char *key, double share, size_t i_of)
+{
+    pthread_mutex_lock(&st->mutex);
+    job_clock_plan_share(&st->clock, i_stage, key, share, i_of);
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage)
 {
     pthread_mutex_lock(&st->mutex);
     snprintf(st->stage, sizeof st->stage, "%s", name);
     keep(st->message, sizeof st->message, title);
     st->i_stage = i_stage;
     st->n_stage = n_stage;
-    st->base = base;
-    st->weight = weight;
-    st->stage_fraction = 0.0;
+    job_clock_begin(&st->clock, i_stage, clock_monotonic_s());
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_stage_end(struct worker_status *st, bool loaded)
+{
+    pthread_mutex_lock(&st->mutex);
+    job_clock_end(&st->clock, loaded, clock_monotonic_s());
     pthread_mutex_unlock(&st->mutex);
 }
 
 void worker_status_fraction(struct worker_status *st, double stage_fraction)
 {
     pthread_mutex_lock(&st->mutex);
-    st->stage_fraction = fmax(st->stage_fraction, fmin(stage_fraction, 1.0)); /* progress does not run backwards */
+    job_clock_fraction(&st->clock, stage_fraction, clock_monotonic_s());
     pthread_mutex_unlock(&st->mutex);
 }
 
 void worker_status_restart_eta(struct worker_status *st)
 {
     pthread_mutex_lock(&st->mutex);
-    st->first_fraction = st->base + st->weight * st->stage_fraction;
-    st->started_s = clock_monotonic_s();
+    job_clock_restart(&st->clock, clock_monotonic_s());
+    pthread_mutex_unlock(&st->mutex);
+}
+
+void worker_status_remember(struct worker_status *st, struct speed_book *book)
+{
+    pthread_mutex_lock(&st->mutex);
+    job_clock_remember(&st->clock, book);
     pthread_mutex_unlock(&st->mutex);
 }
 

@@ -4,6 +4,7 @@
 #define SELVEDGE_OPTIMIZER_WORKER_STATUS_H
 
 #include "base/log.h"
+#include "optimizer/worker/progress/speed_book.h"
 #include "optimizer/worker/worker_folder.h"
 
 #include <jansson.h>
@@ -24,13 +25,20 @@ void worker_status_free(struct worker_status *st);
 const atomic_bool *worker_status_cancel(const struct worker_status *st);
 bool worker_status_stale(const struct worker_status *st);
 
-/* Begins stage i_stage of n_stage. base: fraction of the whole job that is done before it; weight: its share of the
- * job. */
-void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage,
-                         double base, double weight);
+/* Progress and remaining time (job_clock.h). Speeds of earlier jobs are given before the first stage begins, the work
+ * of a stage before that stage. */
+void worker_status_speeds(struct worker_status *st, const struct speed_book *book);
+void worker_status_plan(struct worker_status *st, size_t i_stage, const char *key, double units, double usual_s);
+void worker_status_plan_own(struct worker_status *st, size_t i_stage, const char *key, double seconds);
+void worker_status_plan_share(struct worker_status *st, size_t i_stage, const char *key, double share, size_t i_of);
+/* Begins stage i_stage of n_stage, and ends it; loaded: an earlier attempt has done it. */
+void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage);
+void worker_status_stage_end(struct worker_status *st, bool loaded);
 void worker_status_fraction(struct worker_status *st, double stage_fraction);
-/* Estimates the remaining time from here on, because what is done so far was done by an earlier attempt. */
+/* Measures the running stage from here on, because what is done so far was done by an earlier attempt. */
 void worker_status_restart_eta(struct worker_status *st);
+/* Adds the speeds of this attempt's stages to the book. */
+void worker_status_remember(struct worker_status *st, struct speed_book *book);
 void worker_status_message(struct worker_status *st, const char *text);
 /* Takes over the verdict on the result (verdict_json.h); null until it is reached. */
 void worker_status_verdict(struct worker_status *st, json_t *verdict);

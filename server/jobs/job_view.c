@@ -48,6 +48,8 @@ static void put_progress(json_t *out, const struct job_row *row, const json_t *s
     put(out, "fraction", st, "fraction", JSON_REAL, json_real(0));
     if (row->state == JOB_SUCCEEDED) json_object_set_new(out, "fraction", json_real(1));
     put(out, "eta_s", running ? st : NULL, "eta_s", JSON_REAL, json_null());
+    put(out, "eta_low_s", running ? st : NULL, "eta_low_s", JSON_REAL, json_null());
+    put(out, "eta_high_s", running ? st : NULL, "eta_high_s", JSON_REAL, json_null());
     json_object_set_new(out, "heartbeat_age_s", json_null());
     put(out, "message", st, "message", JSON_STRING, json_string(""));
     put(out, "objective", st, "objective", JSON_REAL, json_null());

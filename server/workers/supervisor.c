@@ -151,7 +151,7 @@ static size_t n_running(const struct supervisor *u)
 static void launch(struct supervisor *u, const char *job_id)
 {
     struct error err = {0};
-    char folder[PATH_BYTES], console[PATH_BYTES];
+    char folder[PATH_BYTES], console[PATH_BYTES], speeds[PATH_BYTES];
     path_join(folder, u->v->settings->data, "jobs", job_id, NULL);
     path_join(console, folder, "console.txt", NULL);
     status s = attempt_prepare(u->v, job_id, &err);
@@ -165,8 +165,9 @@ static void launch(struct supervisor *u, const char *job_id)
     while (slot->used) slot++;
     *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
+    path_join(speeds, u->v->settings->data, "speeds.json", NULL);
     struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes,
-                                   u->v->settings->volume_memory_bytes};
+                                   u->v->settings->volume_memory_bytes, speeds};
     s = worker_launch(u->worker, folder, console, &limits, &slot->pid, &err);
     if (s == STATUS_OK) {
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);

@@ -50,8 +50,8 @@ status worker_launch(const char *program, const char *job_folder, const char *co
     }
     char volume_mib[24];
     snprintf(volume_mib, sizeof volume_mib, "%lld", (long long)(limits->volume_memory_bytes >> 20));
-    char *folder = (char *)(uintptr_t)job_folder,
-         *argv[] = {(char *)(uintptr_t)program, "--memory-mib", volume_mib, folder, NULL};
+    char *folder = (char *)(uintptr_t)job_folder, *speeds = (char *)(uintptr_t)limits->speeds_path,
+         *argv[] = {(char *)(uintptr_t)program, "--memory-mib", volume_mib, "--speeds", speeds, folder, NULL};
     pid_t parent = getpid(), pid = fork();
     if (pid < 0) s = error_set_errno(err, "cannot start worker '%s'", program);
     if (pid == 0) become_worker(program, argv, console_fd, null_fd, limits, parent);

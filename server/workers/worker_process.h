@@ -13,6 +13,7 @@ struct worker_limits {
     int nice;
     int64_t memory_bytes;        /* address space; 0: no limit */
     int64_t volume_memory_bytes; /* passed to the worker as --memory-mib */
+    const char *speeds_path;     /* passed to the worker as --speeds */
 };
 
 struct worker_end {

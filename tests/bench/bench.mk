@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-cloth bench-scan-errors bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
+.PHONY: bench bench-cloth bench-scan-errors bench-progress bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -35,6 +35,11 @@ bench-cloth: | deps-test ## described cloths: fit of measured tables, recovery o
 bench-scan-errors: | deps-test ## scanned cloths: whether the stated errors contain the truth (an hour and a half on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_scan_errors.py --build $(BUILD)
+
+# PROGRESS: some of the jobs, such as PROGRESS="demo fiber_ct weave_ct": fleece alone takes a quarter of an hour
+bench-progress: | deps-test ## predicted against actual remaining time of four jobs, and the largest jump of their progress (half an hour on 2 quiet cores)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/bench_progress.py --build $(BUILD) $(PROGRESS)
 
 docs-pairs: | deps-test ## draw docs/images/photo-pairs.png anew: renderings of four photo pairs (10 minutes, seconds after bench-cloth)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

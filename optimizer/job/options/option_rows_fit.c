@@ -269,7 +269,7 @@ const struct job_option option_rows_fit[] = {
      INTO(render_sample),
      RANGE(1, 65536),
      .unit = "per pixel",
-     .standard = "16",
+     .left_out = "so many that all renderings together take half of the paths of the fit, 2 to 16",
      .meaning = "Samples of the renderings in the result."},
     {.path = NULL},
 };

@@ -8,6 +8,7 @@
 #include "renderer/transport/render.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -129,6 +130,18 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
     return s;
 }
 
+/* Without a number in the job document, all renderings together take this share of the paths of the best model's fit,
+ * within these bounds: pictures do not cost more than the fit. */
+static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0;
+
+size_t result_picture_samples(const struct pipeline_context *c)
+{
+    if (c->doc->render_sample > 0) return c->doc->render_sample;
+    const double px = (double)c->doc->render_px, n = (double)c->observation.n;
+    double paths = picture_share * (double)c->model[pipeline_best_model(c)].fit.n_path;
+    return (size_t)fmin(fmax(floor(paths / (px * px * n)), least_sample), most_sample);
+}
+
 static status write_rendering(struct pipeline_context *c, size_t i, const char *name, double exposure,
                               const struct progress *progress, struct error *err)
 {
@@ -142,7 +155,7 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
         .configuration = &c->observation.item[i].configuration,
         .width = c->doc->render_px,
         .height = c->doc->render_px,
-        .n_sample = c->doc->render_sample,
+        .n_sample = result_picture_samples(c),
         .seed = c->doc->seed ^ 0x70696374757265u,
         .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);

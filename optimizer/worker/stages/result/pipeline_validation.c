@@ -1,5 +1,6 @@
 /* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
  * rows apart. */
+#include "optimizer/worker/stages/result/pipeline_validation.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -13,8 +14,9 @@
 enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
 
 /* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for
- * it: a share of the fit's, but enough for a fair judgement where the fit needed few. */
-static const double validation_rel_se = 0.005, validation_share = 0.7, validation_least_paths = 4e6;
+ * it: a share of the fit's, which together with the pictures (result_pictures.h) stays below the fit, but enough for a
+ * fair judgement where the fit needed few. */
+static const double validation_rel_se = 0.005, validation_share = 0.4, validation_least_paths = 1e6;
 
 static double brightness(const struct observation *o)
 {
@@ -29,6 +31,20 @@ static double relative_path_variance(const struct observation *o, const struct e
     return (double)pilot->n_path * largest / (a * a);
 }
 
+static double validation_budget(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    double least =
+        c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
+    return fmax(validation_share * (double)m->fit.n_path, least);
+}
+
+double pipeline_validation_paths(const struct pipeline_context *c)
+{
+    double n = 0.0;
+    for (size_t i = 0; i < c->n_model; i++) n += validation_budget(c, &c->model[i]);
+    return n;
+}
+
 /* Plans the paths per replica so that both together reach validation_rel_se. When the budget is short, all rows get
  * less in the same proportion. */
 static void plan_validation(const struct pipeline_context *c, const struct pipeline_model *m,
@@ -39,10 +55,7 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
         if (c->observation.item[i].weight > 0.0)
             total +=
                 relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
-    double least =
-        c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
-    double budget = fmax(validation_share * (double)m->fit.n_path, least);
-    double shrink = fmin(1.0, budget / fmax(total, 1.0));
+    double shrink = fmin(1.0, validation_budget(c, m) / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
         double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
                    (validation_rel_se * validation_rel_se);

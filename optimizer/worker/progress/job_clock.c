@@ -1,0 +1,213 @@
+#include "optimizer/worker/progress/job_clock.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* Standard deviations of the logarithm of a time: of a stage without a remembered speed; between jobs where one job is
+ * all that is known, and at least; of the factor by which this job is slower than earlier ones;
+ * and of a stage by this job's own speed. */
+static const double sd_unknown = 0.9, sd_one_job = 0.3, sd_least = 0.08, sd_factor = 0.4, sd_own = 0.4;
+/* The same of elapsed time over the passed share x: by a remembered curve, and by a straight line, times
+ * (1 - x) / sqrt(x). */
+static const double sd_by_curve = 0.12, sd_by_line = 0.35;
+/* A stage below this many seconds is not remembered and says nothing about the others. */
+static const double least_s = 0.3;
+
+void job_clock_init(struct job_clock *c, size_t n_stage, const struct speed_book *book, double now_s)
+{
+    *c = (struct job_clock){.n_stage = n_stage, .began_s = now_s, .stage_began_s = now_s, .from_s = now_s};
+    c->book = *book;
+}
+
+/* ---- expectations ---- */
+
+static void set_curve(struct job_clock_stage *s, const struct speed_entry *e)
+{
+    s->has_curve = e != NULL;
+    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++)
+        s->curve[k] = e != NULL ? e->curve[k] : (double)(k + 1) / SPEED_CURVE_POINTS;
+}
+
+void job_clock_plan(struct job_clock *c, size_t i, const char *key, double units, double usual_s)
+{
+    struct job_clock_stage *s = &c->stage[i];
+    const struct speed_entry *e = speed_book_find(&c->book, key);
+    snprintf(s->key, sizeof s->key, "%s", key);
+    s->planned = true;
+    s->own_speed = false;
+    s->i_of_plus_one = 0;
+    s->units = units;
+    s->expected_s = units * (e != NULL ? exp(e->log_s_per_unit) : usual_s);
+    s->log_sd = sd_unknown;
+    if (e != NULL) {
+        double var = (sd_one_job * sd_one_job + e->n_job * e->log_var) / e->n_job;
+        s->log_sd = sqrt(sd_least * sd_least + var * (1.0 + 1.0 / e->n_job));
+    }
+    set_curve(s, e);
+}
+
+void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double seconds)
+{
+    job_clock_plan(c, i, key, seconds, 1.0);
+    c->stage[i].own_speed = true;
+    c->stage[i].log_sd = fmin(c->stage[i].log_sd, sd_own);
+}
+
+/* Factor by which the stages of this job take longer than expected, shrunk towards 1 by what they do not tell. */
+static double slower_by(const struct job_clock *c)
+{
+    double sum = 0.0, weight = 1.0 / (sd_factor * sd_factor);
+    for (size_t i = 0; i < c->n_stage; i++) {
+        const struct job_clock_stage *s = &c->stage[i];
+        if (!s->ended || s->loaded || s->own_speed || !(s->wall_s >= least_s) || !(s->expected_s > 0.0)) continue;
+        double w = 1.0 / (s->log_sd * s->log_sd);
+        sum += w * log(s->wall_s / s->expected_s);
+        weight += w;
+    }
+    return exp(sum / weight);
+}
+
+void job_clock_plan_share(struct job_clock *c, size_t i, const char *key, double share, size_t i_of)
+{
+    job_clock_plan_own(c, i, key, share);
+    c->stage[i].i_of_plus_one = i_of + 1;
+}
+
+/* Seconds that a stage is expected to take by what is known without its own progress. */
+static double expected_s(const struct job_clock *c, const struct job_clock_stage *s)
+{
+    return s->planned ? s->expected_s * (s->own_speed ? 1.0 : slower_by(c)) : 0.0;
+}
+
+/* Share of the stage's time that has passed at a fraction. */
+static double share_at(const struct job_clock_stage *s, double fraction)
+{
+    double x = fmin(fmax(fraction, 0.0), 1.0) * SPEED_CURVE_POINTS;
+    size_t k = (size_t)x;
+    if (k >= SPEED_CURVE_POINTS) return s->curve[SPEED_CURVE_POINTS - 1];
+    double before = k > 0 ? s->curve[k - 1] : 0.0;
+    return before + (x - (double)k) * (s->curve[k] - before);
+}
+
+/* ---- the stages as they run ---- */
+
+void job_clock_begin(struct job_clock *c, size_t i, double now_s)
+{
+    c->i_stage = i;
+    c->stage[i].began = true;
+    c->stage_began_s = c->from_s = now_s;
+    c->from_share = c->fraction = 0.0;
+    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++) c->stage[i].passed_s[k] = NAN;
+}
+
+void job_clock_fraction(struct job_clock *c, double stage_fraction, double now_s)
+{
+    struct job_clock_stage *s = &c->stage[c->i_stage];
+    c->fraction = fmax(c->fraction, fmin(stage_fraction, 1.0));
+    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++)
+        if (isnan(s->passed_s[k]) && c->fraction * SPEED_CURVE_POINTS >= (double)(k + 1))
+            s->passed_s[k] = now_s - c->stage_began_s;
+}
+
+void job_clock_restart(struct job_clock *c, double now_s)
+{
+    c->from_s = now_s;
+    c->from_share = share_at(&c->stage[c->i_stage], c->fraction);
+}
+
+void job_clock_end(struct job_clock *c, bool loaded, double now_s)
+{
+    struct job_clock_stage *s = &c->stage[c->i_stage];
+    s->ended = true;
+    s->loaded = loaded;
+    s->wall_s = now_s - c->stage_began_s;
+    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++)
+        if (isnan(s->passed_s[k])) s->passed_s[k] = s->wall_s;
+    if (c->from_share > 0.0) s->loaded = true; /* it replayed a journal, so its time says nothing */
+}
+
+/* Expected time of the running stage as a whole, and the standard deviation of its logarithm. */
+static double running_s(const struct job_clock *c, double elapsed_s, double *log_sd)
+{
+    const struct job_clock_stage *s = &c->stage[c->i_stage];
+    const double share = share_at(s, c->fraction), passed = share - c->from_share;
+    double total = fmax(expected_s(c, s), 1e-3);
+    *log_sd = hypot(s->log_sd, s->own_speed ? 0.0 : sd_least);
+    if (passed > 0.0 && elapsed_s > 0.0) {
+        double sd = (s->has_curve ? sd_by_curve : sd_by_line) * (1.0 - share) / sqrt(fmax(passed, 1e-6)) + 0.01;
+        double w = 1.0 / (sd * sd), w_before = 1.0 / (*log_sd * *log_sd);
+        total = exp((w * log(elapsed_s / passed) + w_before * log(total)) / (w + w_before));
+        *log_sd = 1.0 / sqrt(w + w_before);
+    }
+    return total;
+}
+
+/* Remaining time, and its standard deviation. */
+static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
+{
+    const struct job_clock_stage *s = &c->stage[c->i_stage];
+    double sum = 0.0, var = 0.0, log_sd, total = 0.0, running_log_sd = 0.0;
+    const bool runs = s->began && !s->ended;
+    if (runs) {
+        const double elapsed_s = now_s - c->from_s, share = share_at(s, c->fraction);
+        total = running_s(c, elapsed_s, &running_log_sd);
+        double rest = total * (1.0 - c->from_share) - elapsed_s;
+        sum = fmax(rest, 0.5 * (1.0 - share) * total);
+        var = total * running_log_sd * total * running_log_sd * (1.0 - share) * (1.0 - share);
+    }
+    for (size_t i = 0; i < c->n_stage; i++) {
+        const struct job_clock_stage *later = &c->stage[i];
+        if (later->began || !later->planned) continue;
+        double rest = expected_s(c, later);
+        log_sd = later->log_sd;
+        if (later->i_of_plus_one > 0) {
+            const struct job_clock_stage *of = &c->stage[later->i_of_plus_one - 1];
+            rest *= of == s && runs ? total : expected_s(c, of);
+            log_sd = hypot(log_sd, of == s && runs ? running_log_sd : of->log_sd);
+        }
+        sum += rest;
+        var += rest * log_sd * rest * log_sd;
+    }
+    *sd_s = sqrt(var);
+    return sum;
+}
+
+/* Time that the job has taken, with the expected time of what earlier attempts did. */
+static double taken_s(const struct job_clock *c, double now_s)
+{
+    double taken = now_s - c->began_s;
+    for (size_t i = 0; i < c->n_stage; i++)
+        if (c->stage[i].ended && c->stage[i].loaded) taken += expected_s(c, &c->stage[i]);
+    const struct job_clock_stage *s = &c->stage[c->i_stage];
+    if (s->began && !s->ended && c->from_share > 0.0) taken += c->from_share * expected_s(c, s);
+    return taken;
+}
+
+struct job_clock_look job_clock_look(struct job_clock *c, double now_s)
+{
+    struct job_clock_look look = {.eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN};
+    double sd_s, rest = remaining_s(c, now_s, &sd_s), taken = taken_s(c, now_s);
+    if (rest > 0.0) {
+        look.eta_s = rest;
+        double spread = 2.0 * sd_s / rest;
+        if (spread > 0.25) {
+            look.eta_low_s = rest * exp(-spread);
+            look.eta_high_s = rest * exp(fmin(spread, 3.0));
+        }
+        double fraction = fmin(taken / (taken + rest), 0.995);
+        c->shown = fmax(c->shown, fmin(fraction, c->shown + JOB_CLOCK_STEP));
+    }
+    look.fraction = c->shown;
+    return look;
+}
+
+void job_clock_remember(const struct job_clock *c, struct speed_book *book)
+{
+    for (size_t i = 0; i < c->n_stage; i++) {
+        const struct job_clock_stage *s = &c->stage[i];
+        double curve[SPEED_CURVE_POINTS];
+        if (!s->planned || !s->ended || s->loaded || !(s->wall_s >= least_s) || !(s->units > 0.0)) continue;
+        for (size_t k = 0; k < SPEED_CURVE_POINTS; k++) curve[k] = fmin(s->passed_s[k] / s->wall_s, 1.0);
+        speed_book_add(book, s->key, s->wall_s, s->units, curve);
+    }
+}

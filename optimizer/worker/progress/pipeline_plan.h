@@ -1,0 +1,12 @@
+/* What each stage of a job has to do, in units of work whose speed can be remembered: voxels, paths, seconds of the
+ * fit. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_PLAN_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_PLAN_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Plans stage i, of this name (stage_table.h), by what is known now: before the first stage by the job document and the
+ * size of its files, later by what earlier stages have found. */
+void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i);
+
+#endif

@@ -1,0 +1,148 @@
+"""How well do progress and remaining time hold? Prints figures progress.* of real jobs, from their status.json while they run.
+
+    bench_progress.py [--build DIR] [--data DIR] [--threads N] [--keep DIR] [demo] [fiber_ct] [weave_ct] [fleece]
+
+Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated and the true remaining time from a tenth
+of the wall time on, while at least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two
+looks. Each job runs twice on the same folder of remembered speeds, as it would on a machine that has run jobs before; the figures
+with "first" in their name are of the first run, on a machine that knows nothing. --keep keeps the jobs with their records.
+"""
+import argparse
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "tests", "real"))
+import real_jobs  # noqa: E402  pylint: disable=wrong-import-position
+
+LOOK_S = 0.4
+NAMES = ["demo", "fiber_ct", "weave_ct", "fleece"]
+FROM, REST_SHARE, REST_S = 0.1, 0.05, 3.0
+
+
+def program(arguments, name):
+    return os.path.join(ROOT, arguments.build, "bin", name)
+
+
+def phantom(arguments, *command):
+    subprocess.run([program(arguments, "selvedge-phantom"), *map(str, command)], check=True, stdout=subprocess.DEVNULL)
+
+
+def demo_sample(arguments, folder):
+    """The sample of `make demo`, with fewer paths in its photographs."""
+    phantom(arguments, "cloth", "--weave", "twill", "--seed", 7, "--out", folder)
+    phantom(arguments, "photograph", "--fibers", f"{folder}/truth.hair", "--out", folder, "--seed", 11, "--noise", 0.005, "--paths", 32768,
+            "--px", 64, "--param", "C_R=0.06,0.05,0.08", "--param", "C_TT=0.72,0.55,0.35", "--param", "beta_R=4", "--param", "beta_TT=20",
+            "--param", "gamma_TT=18")
+    subprocess.run([sys.executable, "-c", "import sys; sys.path.insert(0, 'clients'); import demo_report; demo_report.document(*sys.argv[1:])",
+                    folder, "twill phantom"], check=True, cwd=ROOT)
+
+
+def fleece_sample(arguments, folder):
+    """A scan of the size of the published Fleece (520 x 520 x 590 voxels), of which only the fibers are traced."""
+    phantom(arguments, "cloth", "--weave", "felt", "--fibers-per-yarn", 1600, "--diameter-voxel", 5, "--felt-tile-um", 1040,
+            "--felt-thickness-um", 1100, "--seed", 3, "--out", folder)
+    with open(os.path.join(folder, "phantom.json"), encoding="utf-8") as f:
+        voxel_um = json.load(f)["cloth"]["voxel_size_um"]
+    with open(os.path.join(folder, "job.json"), "w", encoding="utf-8") as f:
+        json.dump({"sample": "fleece phantom", "volume": {"files": ["scan.tif"], "voxel_size_um": voxel_um}}, f)
+
+
+def sample_of(arguments, name, folder):
+    """Makes FOLDER/job.json and its input files."""
+    os.makedirs(folder)
+    if name == "demo":
+        demo_sample(arguments, folder)
+    elif name == "fleece":
+        fleece_sample(arguments, folder)
+    else:
+        document, files = real_jobs.JOBS[name]
+        shutil.copy(os.path.join(ROOT, "config", "examples", document), os.path.join(folder, "job.json"))
+        for file in files:
+            shutil.copy(os.path.join(arguments.data, file), folder)
+
+
+def make_job(sample, job):
+    os.makedirs(os.path.join(job, "input"))
+    shutil.copy(os.path.join(sample, "job.json"), job)
+    for name in os.listdir(sample):
+        if name != "job.json":
+            os.link(os.path.join(sample, name), os.path.join(job, "input", name))
+
+
+def record(arguments, job, speeds):
+    """Runs the job; [(seconds since the start, status.json)] at every look, and its wall time."""
+    looks, start = [], time.monotonic()
+    command = [program(arguments, "selvedge-worker"), "--quiet", "--speeds", speeds, "--threads", str(arguments.threads), job]
+    with subprocess.Popen(command) as worker:
+        while worker.poll() is None:
+            time.sleep(LOOK_S)
+            with contextlib.suppress(OSError, ValueError), open(os.path.join(job, "status.json"), encoding="utf-8") as f:
+                looks.append((time.monotonic() - start, json.load(f)))
+    wall_s = time.monotonic() - start
+    if worker.returncode != 0:
+        sys.exit(f"bench_progress: the worker ended with {worker.returncode} on {job}")
+    with open(os.path.join(job, "looks.json"), "w", encoding="utf-8") as f:
+        json.dump([(t, look.get("stage"), look.get("stage_fraction"), look["fraction"], look["eta_s"], look.get("eta_low_s"), look.get("eta_high_s")) for t, look in looks], f)
+    return looks, wall_s
+
+
+def worst_ratio(looks, wall_s):
+    """Largest factor between stated and true remaining time; infinite while none is stated."""
+    worst = 1.0
+    for t, look in looks:
+        rest, eta = wall_s - t, look["eta_s"]
+        if t < FROM * wall_s or rest < max(REST_SHARE * wall_s, REST_S) or look["state"] != "running":
+            continue
+        worst = max(worst, max(eta, rest) / max(min(eta, rest), 1e-3) if eta is not None else float("inf"))
+    return worst
+
+
+def largest_jump(looks):
+    """Largest change between two looks while the job runs; a step backwards counts as an infinite one."""
+    fractions = [look["fraction"] for _, look in looks if look["state"] == "running"]
+    steps = [b - a for a, b in zip([0.0] + fractions, fractions)]
+    return float("inf") if min(steps, default=0.0) < 0.0 else max(steps, default=0.0)
+
+
+def figure(name, value, unit):
+    print(json.dumps({"name": f"progress.{name}", "value": round(value, 4), "unit": unit, "better": "lower"}), flush=True)
+
+
+def bench(arguments, name, folder, speeds):
+    sample = os.path.join(folder, f"{name}-sample")
+    if not os.path.exists(sample):
+        sample_of(arguments, name, sample)
+    for run in ("first.", ""):
+        job = os.path.join(folder, f"{name}-{run}job")
+        shutil.rmtree(job, ignore_errors=True)
+        make_job(sample, job)
+        looks, wall_s = record(arguments, job, speeds)
+        figure(f"{name}.{run}worst_eta_ratio_after_10pct", worst_ratio(looks, wall_s), "1")
+        figure(f"{name}.{run}largest_jump", largest_jump(looks), "1")
+        figure(f"{name}.{run}wall_s", wall_s, "s")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default="build")
+    parser.add_argument("--data", default=real_jobs.DATA)
+    parser.add_argument("--threads", type=int, default=os.cpu_count())
+    parser.add_argument("--keep")
+    parser.add_argument("name", nargs="*", choices=NAMES + [[]])
+    arguments = parser.parse_args()
+    with contextlib.ExitStack() as stack:
+        folder = arguments.keep or stack.enter_context(tempfile.TemporaryDirectory())
+        os.makedirs(folder, exist_ok=True)
+        for name in arguments.name or NAMES:
+            bench(arguments, name, folder, os.path.join(folder, f"{name}-speeds.json"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,175 @@
+/* The predicted end of a job: what speeds of earlier jobs, finished stages and the running stage say, and a fraction
+ * that neither falls nor leaps. */
+#include "base/files/durable.h"
+#include "optimizer/worker/progress/job_clock.h"
+#include "tests/support/scratch_folder.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const struct speed_book empty = {.n = 0};
+
+/* Runs stage i for `seconds`, with a fraction that rises as the power `bend` of time. Returns the largest factor
+ * between predicted and true remaining time, from a tenth of total_s, the time of the job, on. */
+static double run_stage(struct job_clock *c, size_t i, double *now_s, double seconds, double bend, double total_s)
+{
+    double worst = 1.0, shown = c->shown;
+    job_clock_begin(c, i, *now_s);
+    for (int k = 1; k < 200; k++) {
+        double t = *now_s + seconds * k / 200.0, rest = total_s - t;
+        job_clock_fraction(c, pow(k / 200.0, bend), t);
+        struct job_clock_look look = job_clock_look(c, t);
+        assert_true(look.fraction >= shown && look.fraction <= shown + JOB_CLOCK_STEP + 1e-12);
+        assert_true(isnan(look.eta_low_s) || (look.eta_low_s < look.eta_s && look.eta_s < look.eta_high_s));
+        shown = look.fraction;
+        if (t > 0.1 * total_s && rest > 0.05 * total_s)
+            worst = fmax(worst, fmax(look.eta_s, rest) / fmin(look.eta_s, rest));
+    }
+    *now_s += seconds;
+    job_clock_fraction(c, 1.0, *now_s);
+    job_clock_end(c, false, *now_s);
+    return worst;
+}
+
+/* A job of two stages of 30 s and 70 s, `slower` times as long. */
+static double run_job(struct speed_book *book, double slower, struct job_clock *c)
+{
+    double now_s = 0.0, worst;
+    job_clock_init(c, 2, book, now_s);
+    job_clock_plan(c, 0, "first", 1000.0, 0.001);
+    job_clock_plan(c, 1, "second", 10.0, 100.0);
+    worst = run_stage(c, 0, &now_s, 30.0 * slower, 2.0, 100.0 * slower);
+    job_clock_plan(c, 1, "second", 10.0, 100.0);
+    worst = fmax(worst, run_stage(c, 1, &now_s, 70.0 * slower, 0.5, 100.0 * slower));
+    job_clock_remember(c, book);
+    return worst;
+}
+
+static void test_remembered_speeds_predict_the_next_job(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    book = empty;
+    assert_true(run_job(&book, 1.0, &c) > 1.25); /* nothing is known, and the fractions are not even */
+    assert_int_equal(book.n, 2);
+    assert_true(run_job(&book, 1.0, &c) < 1.1);
+    assert_true(run_job(&book, 1.0, &c) < 1.05);
+    assert_true(run_job(&book, 1.2, &c) < 1.25); /* another program runs beside it */
+}
+
+static void test_nothing_known_is_a_range(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    book = empty;
+    job_clock_init(&c, 1, &book, 0.0);
+    assert_true(isnan(job_clock_look(&c, 0.0).eta_s));
+    job_clock_plan(&c, 0, "only", 100.0, 1.0);
+    job_clock_begin(&c, 0, 0.0);
+    struct job_clock_look look = job_clock_look(&c, 0.0);
+    assert_true(look.eta_s > 50.0 && look.eta_low_s < 0.5 * look.eta_s && look.eta_high_s > 2.0 * look.eta_s);
+    for (int k = 0; k < 5; k++) run_job(&book, 1.0, &c);
+    job_clock_init(&c, 1, &book, 0.0);
+    job_clock_plan(&c, 0, "first", 1000.0, 1.0);
+    job_clock_begin(&c, 0, 0.0);
+    look = job_clock_look(&c, 0.0);
+    assert_true(fabs(look.eta_s - 30.0) < 0.1 && isnan(look.eta_low_s) == (isnan(look.eta_high_s)));
+}
+
+/* What an earlier attempt has done counts as done, and its time says nothing about the speed. */
+static void test_a_resumed_job(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    book = empty;
+    for (int k = 0; k < 3; k++) run_job(&book, 1.0, &c);
+    job_clock_init(&c, 2, &book, 0.0);
+    job_clock_plan(&c, 0, "first", 1000.0, 1.0);
+    job_clock_plan(&c, 1, "second", 10.0, 1.0);
+    job_clock_begin(&c, 0, 0.0);
+    job_clock_end(&c, true, 0.01);
+    job_clock_begin(&c, 1, 0.01);
+    assert_true(fabs(job_clock_look(&c, 0.01).eta_s - 70.0) < 0.5);
+    job_clock_fraction(&c, 0.7, 0.02); /* half of the time, which the journal gives back at once */
+    job_clock_restart(&c, 0.02);
+    assert_true(fabs(job_clock_look(&c, 0.02).eta_s - 35.0) < 2.0);
+    for (int k = 0; k < 40; k++) job_clock_look(&c, 0.02);
+    assert_true(fabs(c.shown - 0.65) < 0.03);
+    job_clock_fraction(&c, 1.0, 30.0);
+    job_clock_end(&c, false, 30.0);
+    size_t n = book.n;
+    double before = speed_book_find(&book, "second")->log_s_per_unit;
+    job_clock_remember(&c, &book);
+    assert_true(book.n == n && speed_book_find(&book, "second")->log_s_per_unit == before);
+}
+
+static void test_the_book_is_a_file(void **state)
+{
+    const char *folder = *state;
+    char path[512];
+    static struct speed_book book, again;
+    static struct job_clock c;
+    book = empty;
+    snprintf(path, sizeof path, "%s/speeds.json", folder);
+    speed_book_read(path, &again);
+    assert_int_equal(again.n, 0);
+    for (int k = 0; k < 3; k++) run_job(&book, 1.0 + 0.1 * k, &c);
+    assert_int_equal(speed_book_write(path, &book, NULL), STATUS_OK);
+    speed_book_read(path, &again);
+    assert_int_equal(again.n, 2);
+    for (size_t i = 0; i < 2; i++) {
+        assert_string_equal(again.entry[i].key, book.entry[i].key);
+        assert_true(fabs(again.entry[i].log_s_per_unit - book.entry[i].log_s_per_unit) < 1e-4);
+        assert_true(again.entry[i].n_job == 3.0 && fabs(again.entry[i].log_var - book.entry[i].log_var) < 1e-4);
+    }
+    static const char *const damaged[] = {"",
+                                          "{",
+                                          "[]",
+                                          "{\"speeds\":3}",
+                                          "{\"speeds\":{\"a\":{\"n_job\":-1}}}",
+                                          "{\"speeds\":{\"a\":{\"n_job\":1,\"log_s_per_unit\":0,\"log_var\":0,"
+                                          "\"curve\":[0.5,0.4]}}}"};
+    for (size_t i = 0; i < sizeof damaged / sizeof damaged[0]; i++) {
+        assert_int_equal(durable_replace(path, damaged[i], strlen(damaged[i]), NULL), STATUS_OK);
+        speed_book_read(path, &again);
+        assert_int_equal(again.n, 0);
+    }
+}
+
+static void test_a_full_book_forgets_the_first(void **state)
+{
+    (void)state;
+    static struct speed_book book;
+    double curve[SPEED_CURVE_POINTS] = {0};
+    char key[16];
+    book = empty;
+    for (int i = 0; i <= SPEED_BOOK_MAX_ENTRY; i++) {
+        snprintf(key, sizeof key, "key %d", i);
+        speed_book_add(&book, key, 1.0, 1.0, curve);
+    }
+    assert_int_equal(book.n, SPEED_BOOK_MAX_ENTRY);
+    assert_null(speed_book_find(&book, "key 0"));
+    assert_non_null(speed_book_find(&book, "key 1"));
+    assert_non_null(speed_book_find(&book, key));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_remembered_speeds_predict_the_next_job),
+        cmocka_unit_test(test_nothing_known_is_a_range),
+        cmocka_unit_test(test_a_resumed_job),
+        cmocka_unit_test_setup_teardown(test_the_book_is_a_file, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test(test_a_full_book_forgets_the_first),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
