@@ -89,7 +89,8 @@ def record(arguments, job, speeds):
     if worker.returncode != 0:
         sys.exit(f"bench_progress: the worker ended with {worker.returncode} on {job}")
     with open(os.path.join(job, "looks.json"), "w", encoding="utf-8") as f:
-        json.dump([(t, look.get("stage"), look.get("stage_fraction"), look["fraction"], look["eta_s"], look.get("eta_low_s"), look.get("eta_high_s")) for t, look in looks], f)
+        json.dump([(t, *(look.get(key) for key in ("stage", "stage_fraction", "fraction", "eta_s", "eta_low_s", "eta_high_s")))
+                   for t, look in looks], f)
     return looks, wall_s
 
 
