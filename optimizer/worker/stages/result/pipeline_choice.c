@@ -31,15 +31,6 @@ static double judged_square(const struct pipeline_model *m, enum pipeline_choice
     return choice == CHOICE_CROSS_VALIDATION ? m->fit.cross_validation.rel_square : fitted_error(m)->rel_square;
 }
 
-size_t pipeline_best_model(const struct pipeline_context *c)
-{
-    const enum pipeline_choice choice = pipeline_choice(c);
-    size_t best = 0;
-    for (size_t i = 1; i < c->n_model; i++)
-        if (judged_square(&c->model[i], choice) < judged_square(&c->model[best], choice)) best = i;
-    return best;
-}
-
 /* Error of b minus that of a as relative squares, and its standard error. */
 static double difference(const struct pipeline_model *a, const struct pipeline_model *b, enum pipeline_choice choice,
                          double *se)
@@ -48,6 +39,38 @@ static double difference(const struct pipeline_model *a, const struct pipeline_m
         return cross_validation_difference(&a->fit.cross_validation, &b->fit.cross_validation, se);
     *se = hypot(fitted_error(a)->rel_square_se, fitted_error(b)->rel_square_se);
     return fitted_error(b)->rel_square - fitted_error(a)->rel_square;
+}
+
+static size_t lowest_error(const struct pipeline_context *c, enum pipeline_choice choice)
+{
+    size_t lowest = 0;
+    for (size_t i = 1; i < c->n_model; i++)
+        if (judged_square(&c->model[i], choice) < judged_square(&c->model[lowest], choice)) lowest = i;
+    return lowest;
+}
+
+/* Unknowns that were fitted: those with an error. */
+static size_t n_fitted(const struct pipeline_model *m)
+{
+    const struct uncertainty *u = &m->fit.unknown_uncertainty;
+    size_t n = 0;
+    for (size_t p = 0; p < u->n_param; p++) n += u->cov[p * u->n_param + p] > 0.0;
+    return n;
+}
+
+size_t pipeline_best_model(const struct pipeline_context *c)
+{
+    const enum pipeline_choice choice = pipeline_choice(c);
+    const size_t lowest = lowest_error(c, choice);
+    size_t best = lowest;
+    for (size_t i = 0; i < c->n_model && choice == CHOICE_CROSS_VALIDATION; i++) {
+        const struct pipeline_model *m = &c->model[i];
+        double se, more = difference(&c->model[lowest], m, choice, &se);
+        size_t n = n_fitted(m), n_best = n_fitted(&c->model[best]);
+        bool lower = judged_square(m, choice) < judged_square(&c->model[best], choice);
+        if (more <= se && (n < n_best || (n == n_best && lower))) best = i;
+    }
+    return best;
 }
 
 /* Writes "two_lobe.v1 (8.7 +- 0.3 %)". */
@@ -75,7 +98,8 @@ static void warn_of_equals(struct pipeline_context *c, enum pipeline_choice choi
         describe(&c->model[i], choice, model);
         used += (size_t)snprintf(text + used, sizeof text - used, " %s", model);
     }
-    if (used > 0) worker_status_warn(c->status, "%s", text);
+    const char *simpler = best != lowest_error(c, choice) ? "; the one with fewer fitted parameters is the result" : "";
+    if (used > 0) worker_status_warn(c->status, "%s%s", text, simpler);
 }
 
 void pipeline_warn_choice(struct pipeline_context *c)
