@@ -66,8 +66,9 @@ struct reconstruct_report {
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
      * there is none, or the diameter was given. */
     double other_diameter_voxel, diameter_noise_share, other_diameter_noise_share;
+    double trace_edge_voxel; /* edge of the voxels that fibers were found in, per voxel of the scan (trace_grid.h) */
     size_t n_material_voxel, n_kept_voxel; /* V >= eps_d; V >= eps_d and J <= eps_j */
-    size_t n_class_voxel[3];
+    size_t n_class_voxel[3];               /* of the grid that fibers were found in, as the next */
     size_t n_center[3], n_chain[3], n_short_dropped[3];
     size_t n_gap_bridged, n_joined;
     size_t n_fiber, n_vertex;

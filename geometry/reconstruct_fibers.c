@@ -7,11 +7,14 @@
 #include "geometry/fibers/lines/growing.h"
 #include "geometry/fibers/lines/joining.h"
 #include "geometry/fibers/lines/kinks.h"
+#include "geometry/fibers/lines/line_ends.h"
 #include "geometry/fibers/lines/linking.h"
 #include "geometry/fibers/shape/axis_fit.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/fibers/shape/smoothing.h"
 #include "geometry/fibers/slices/centers.h"
+#include "geometry/trace_grid.h"
+#include "geometry/volume/volume_rescale.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -40,6 +43,7 @@ struct fiber_job {
     struct progress inner;
     struct progress_part part;   /* progress that inner reports to */
     double diameter;             /* voxels */
+    double independent;          /* of the voxels of v (axis_profile.h) */
     struct axis_profile profile; /* of the lines so far */
 };
 
@@ -116,40 +120,6 @@ static status smooth_and_drop(struct fiber_job *job, const struct polyline_set *
     return s;
 }
 
-/* Mean density on the way from x over n_step steps of t. */
-static double density_on_way(const struct volume *v, const float x[3], const float t[3], double n_step)
-{
-    double sum = 0.0;
-    int n = 1 + (int)n_step;
-    for (int k = 0; k < n; k++) {
-        size_t i[3];
-        for (int a = 0; a < 3; a++) {
-            double c = floor((double)x[a] + n_step * (k + 0.5) / n * (double)t[a]);
-            i[a] = c <= 0.0 ? 0 : c >= (double)v->n[a] - 1.0 ? v->n[a] - 1 : (size_t)c;
-        }
-        sum += (double)v->density[volume_index(v->n, i[0], i[1], i[2])];
-    }
-    return sum / n;
-}
-
-/* Extends a line that ends shortly before a face to that face, if there is material on the rest of the way. `last`:
- * the last vertex instead of the first. */
-static void reach_face(const struct fiber_job *job, struct polyline_set *p, size_t line, bool last)
-{
-    size_t m = polyline_length(p, line), back = m < 5 ? m - 1 : 4;
-    float *x = p->vertex[last ? p->first[line + 1] - 1 : p->first[line]];
-    const float *y = p->vertex[last ? p->first[line + 1] - 1 - back : p->first[line] + back];
-    float t[3], nearest = INFINITY;
-    for (int a = 0; a < 3; a++) t[a] = (x[a] - y[a]) / (float)back;
-    for (int a = 0; a < 3; a++) { /* number of steps of t until a face is reached */
-        float room = t[a] > 0.0f ? (float)job->v->n[a] - x[a] : x[a], speed = fabsf(t[a]);
-        if (speed > 0.2f && room / speed < nearest) nearest = room / speed;
-    }
-    if (!(nearest > 0.0f && (double)nearest <= fmax(1.5, END_DIAMETERS * job->diameter))) return;
-    if (nearest > 1.5f && density_on_way(job->v, x, t, (double)nearest) < job->o->eps_d) return;
-    for (int a = 0; a < 3; a++) x[a] += nearest * t[a];
-}
-
 /* One pass over the pieces: cuts duplicates, lets the ends grow, and joins ends that meet. `in` is emptied. */
 static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool grow, struct polyline_set *out,
                            struct join_counts *counts, struct error *err)
@@ -175,7 +145,8 @@ static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool 
 
 static struct axis_profile start_profile(const struct fiber_job *job)
 {
-    return (struct axis_profile){.radius = 0.5 * job->diameter, .radius_spread = 0.3, .blur = 0.8, .high = 1.0};
+    return (struct axis_profile){
+        .radius = 0.5 * job->diameter, .radius_spread = 0.3, .blur = 0.8, .high = 1.0, .independent = 1.0};
 }
 
 /* Moves lines that are still in pieces towards their axes, and finds their radii. */
@@ -184,43 +155,20 @@ static status center(struct fiber_job *job, struct polyline_set *lines, struct e
     return polylines_fit(lines, job->v, job->diameter, N_CENTER, &job->profile, job->pool, &job->inner, err);
 }
 
-static bool is_inside(const struct fiber_job *job, const float x[3])
-{
-    for (int a = 0; a < 3; a++)
-        if (!(x[a] >= 0.0f && x[a] <= (float)job->v->n[a])) return false;
-    return true;
-}
-
-/* Copies the lines without vertices at their ends that lie outside of the volume. */
-static status keep_inside(const struct fiber_job *job, const struct polyline_set *in, struct polyline_set *out,
-                          struct error *err)
-{
-    status s = STATUS_OK;
-    for (size_t l = 0; l < in->n_line && s == STATUS_OK; l++) {
-        size_t from = in->first[l], to = in->first[l + 1];
-        while (from < to && !is_inside(job, in->vertex[from])) from++;
-        while (to > from && !is_inside(job, in->vertex[to - 1])) to--;
-        if (to - from < job->o->min_vertex) {
-            job->report->n_short_dropped[in->axis[l]]++;
-            continue;
-        }
-        s = polyline_add_part(out, in, l, from, to, err);
-    }
-    return s;
-}
-
 /* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, with errors for the report. */
 static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool last, struct error *err)
 {
     struct axis_profile profile = start_profile(job);
     profile.measured_curvature = last;
+    if (last) profile.independent = job->independent;
     const double voxel_m = job->v->voxel_size_m[0];
     struct polyline_set even, inside;
     polyline_set_init(&even);
     polyline_set_init(&inside);
     status s = polylines_resample(lines, &even, err);
     if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, N_FIT, &profile, job->pool, &job->inner, err);
-    if (s == STATUS_OK) s = keep_inside(job, &even, &inside, err);
+    if (s == STATUS_OK)
+        s = polylines_keep_inside(&even, job->v->n, job->o->min_vertex, &inside, job->report->n_short_dropped, err);
     if (s == STATUS_OK) {
         job->report->axis_position_se_m = profile.position_se * voxel_m;
         job->report->axis_direction_se_rad = profile.direction_se_rad;
@@ -261,16 +209,8 @@ static status straighten(struct fiber_job *job, struct polyline_set *lines, bool
     return s;
 }
 
-static void finish_lines(struct fiber_job *job, struct polyline_set *lines)
-{
-    classify(lines);
-    for (size_t l = 0; l < lines->n_line; l++) {
-        reach_face(job, lines, l, false);
-        reach_face(job, lines, l, true);
-    }
-}
-
-static status make_lines(struct fiber_job *job, struct polyline_set *lines, struct error *err)
+/* Finds lines and repairs them, until only the last fit is left. */
+static status trace_lines(struct fiber_job *job, struct polyline_set *lines, struct error *err)
 {
     struct polyline_set part[3];
     struct join_counts counts = {0};
@@ -296,18 +236,56 @@ static status make_lines(struct fiber_job *job, struct polyline_set *lines, stru
         s = repair_lines(job, lines, true, &part[1], &counts,
                          err); /* lines on the fibers' axes are easier to distinguish and to join */
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
-    if (s == STATUS_OK) s = fit_axes(job, lines, true, err);
-    if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
-    if (s == STATUS_OK) {
-        job->report->n_gap_bridged = counts.n_gap_bridged;
-        job->report->n_joined = counts.n_joined;
-        finish_lines(job, lines);
-        if (lines->n_line == 0)
-            s = error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
-                                "cannot find fibers: none of the chains of centers has %zu vertices",
-                                job->o->min_vertex);
-    }
+    job->report->n_gap_bridged = counts.n_gap_bridged;
+    job->report->n_joined = counts.n_joined;
     for (int i = 0; i < 3; i++) polyline_set_release(&part[i]);
+    return s;
+}
+
+/* Fits whole lines for the last time and drops what deviates. */
+static status finish_lines(struct fiber_job *job, struct polyline_set *lines, struct error *err)
+{
+    status s = fit_axes(job, lines, true, err);
+    return s == STATUS_OK ? straighten(job, lines, true, job->o->min_vertex, err) : s;
+}
+
+/* Finds lines in voxels of `edge` times those of the scan. The last fit is to the finer of both grids. The lines are in
+ * voxels of the scan. */
+static status trace_rescaled(const struct fiber_job *job, double edge, struct polyline_set *lines, struct error *err)
+{
+    struct volume grid = {0};
+    struct direction_volume direction = {0};
+    struct fiber_job on_grid = *job;
+    size_t n_material, n_kept;
+    on_grid.inner = progress_of_part(&on_grid.part);
+    const struct progress quiet = progress_silent(&on_grid.inner);
+    status s = volume_rescale(job->v, edge, job->pool, &quiet, &grid, err);
+    if (s == STATUS_OK)
+        s = direction_volume_rescale(job->d, &grid, job->o->eps_d, job->pool, &direction, &n_material, &n_kept, err);
+    on_grid.v = &grid;
+    on_grid.d = &direction;
+    on_grid.diameter = job->diameter / edge;
+    on_grid.independent = fmin(1.0, edge * edge * edge);
+    on_grid.profile = start_profile(&on_grid);
+    if (s == STATUS_OK) s = trace_lines(&on_grid, lines, err);
+    if (s == STATUS_OK && edge < 1.0) s = finish_lines(&on_grid, lines, err);
+    trace_grid_rescale_lines(lines, edge);
+    direction_volume_release(&direction);
+    volume_release(&grid);
+    return s;
+}
+
+static status make_lines(struct fiber_job *job, struct polyline_set *lines, struct error *err)
+{
+    const double edge = job->report->trace_edge_voxel;
+    status s = edge == 1.0 ? trace_lines(job, lines, err) : trace_rescaled(job, edge, lines, err);
+    if (s == STATUS_OK && edge >= 1.0) s = finish_lines(job, lines, err);
+    if (s != STATUS_OK) return s;
+    classify(lines);
+    polylines_reach_faces(lines, job->v, job->o->eps_d, END_DIAMETERS * job->diameter);
+    if (lines->n_line == 0)
+        s = error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
+                            "cannot find fibers: none of the chains of centers has %zu vertices", job->o->min_vertex);
     return s;
 }
 
@@ -384,6 +362,7 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
     struct fiber_job job = {.v = v, .d = d, .o = o, .pool = pool, .report = report, .part = {.outer = progress}};
     job.inner = progress_of_part(&job.part);
     job.diameter = report->fiber_diameter_voxel;
+    job.independent = 1.0;
     job.profile = start_profile(&job);
     struct polyline_set lines;
     polyline_set_init(&lines);

@@ -326,6 +326,7 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
     memset(w->total, 0, lines->n_vertex * sizeof *w->total);
     memset(w->radius, 0, lines->n_line * sizeof *w->radius);
     add_bricks(job, w->first_vertex_of, w->total, &shared, w->radius);
+    shared.square /= job->profile.independent;
     for (size_t l = 0; l < lines->n_line; l++)
         w->radius[l].scatter =
             axis_scatter(&w->total[lines->first[l]].radius_gradient, sizeof *w->total / sizeof(float),

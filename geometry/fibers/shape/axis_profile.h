@@ -13,6 +13,7 @@ struct axis_profile {
     /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
+    double independent; /* share of the voxels that have values of their own; below 1 where they are interpolated */
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
      * errors by white noise (relative), root mean square of the errors of single fibers (relative). */
     double radius, radius_spread, radius_se;

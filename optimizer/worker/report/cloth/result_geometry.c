@@ -141,6 +141,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "fiber_diameter_voxel", json_number(g->fiber_diameter_voxel));
     json_object_set_new(json, "fiber_diameter_noise_share", json_number(g->diameter_noise_share));
     json_object_set_new(json, "fiber_diameter_other_voxel", json_number(g->other_diameter_voxel));
+    json_object_set_new(json, "traced_voxel_um", json_number(g->trace_edge_voxel * g->voxel_size_m[0] * um));
     json_object_set_new(json, "n_material_voxel", json_count(g->n_material_voxel));
     json_object_set_new(json, "n_kept_voxel", json_count(g->n_kept_voxel));
     json_object_set_new(json, "n_class_voxel", json_count_list(g->n_class_voxel, 3));

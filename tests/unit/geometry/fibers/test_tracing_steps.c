@@ -137,7 +137,7 @@ static void test_axis_fit(void **state)
                                        {{0.0, 26.6, 16.0}, {1.0, 0.0, 0.0}, 3.5}};
     struct volume v;
     struct polyline_set coarse, lines;
-    struct axis_profile profile = {.radius = 3.2, .blur = 0.8, .high = 1.0};
+    struct axis_profile profile = {.radius = 3.2, .blur = 0.8, .high = 1.0, .independent = 1.0};
     atomic_bool cancel = true;
     const struct progress cancelled = {.cancel = &cancel};
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
@@ -176,7 +176,7 @@ static void test_single_radii(void **state)
                                        {{0.0, 19.5, 16.0}, {1.0, 0.0, 0.0}, 4.4}};
     struct volume v;
     struct polyline_set lines;
-    struct axis_profile profile = {.radius = 3.5, .radius_spread = 0.3, .blur = 0.8, .high = 1.0};
+    struct axis_profile profile = {.radius = 3.5, .radius_spread = 0.3, .blur = 0.8, .high = 1.0, .independent = 1.0};
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, 2, 0.2, 1);
     polyline_set_init(&lines);
@@ -220,7 +220,8 @@ static void test_axis_errors(void **state)
         struct volume v;
         struct polyline_set coarse, lines;
         double position, slope;
-        struct axis_profile profile = {.radius = 3.2, .blur = 0.8, .high = 1.0, .measured_curvature = round == 1};
+        struct axis_profile profile = {
+            .radius = 3.2, .blur = 0.8, .high = 1.0, .independent = 1.0, .measured_curvature = round == 1};
         assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
         test_fill_cylinders(&v, &c, 1, 0.2, 1);
         polyline_set_init(&coarse);
