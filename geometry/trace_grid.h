@@ -9,8 +9,8 @@
 #include "geometry/fibers/lines/polyline.h"
 #include "geometry/reconstruct.h"
 
-/* Edge of the grid's voxels in voxels of the scan, for fibers of this diameter in a scan of n_voxel: 1 if the scan's own
- * grid serves, or a finer one would be too large. */
+/* Edge of the grid's voxels in voxels of the scan, for fibers of this diameter in a scan of n_voxel: 1 if the scan's
+ * own grid serves, or a finer one would be too large. */
 double trace_grid_edge(double diameter_voxel, const size_t n_voxel[3]);
 
 /* Options that count in voxels of the scan, in voxels of `edge` times that, and back with 1 / edge. */
