@@ -1,4 +1,5 @@
 #include "clients/cli/cli_args.h"
+#include "clients/cli/tools/cli_tool.h"
 
 #include <getopt.h>
 #include <stdio.h>
@@ -321,7 +322,7 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
         snprintf(left, sizeof left, "%s %s", c->name, c->operand == NULL ? "" : c->operand);
         put(text, n_bytes, &at, "  %-18s %s\n", left, c->what);
     }
-    put(text, n_bytes, &at, "\noptions of every command:\n");
+    put(text, n_bytes, &at, "%s\noptions of every command:\n", cli_tool_help());
     put_options(OPT_EVERYWHERE | OPT_VERSION, text, n_bytes, &at);
     put(text, n_bytes, &at,
         "\n`selvedge COMMAND --help` describes a command. docs/sample-preparation.md describes the job document.\n"

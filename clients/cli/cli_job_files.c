@@ -36,31 +36,66 @@ static status add(struct cli_file_list *list, const char *folder, const json_t *
     return STATUS_OK;
 }
 
+/* A file that one key of a section names. */
+struct named_file {
+    const char *section[2], *key, *role, *field;
+};
+
+static const struct named_file named[] = {
+    {{"fibers", NULL}, "file", "fibers", "fibers.file"},
+    {{"cloth", NULL}, "texture", "photograph", "cloth.texture"},
+    {{"environment", NULL}, "file", "environment", "environment.file"},
+    {{"measurements", NULL}, "file", "measurements", "measurements.file"},
+    {{"camera", NULL}, "noise_file", "camera_noise", "camera.noise_file"},
+    {{"color", "chart"}, "file", "chart", "color.chart.file"},
+    {{"color", "white"}, "file", "white_reference", "color.white.file"},
+};
+
+static status add_named(const json_t *document, const char *folder, struct cli_file_list *list, struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i < sizeof named / sizeof *named && s == STATUS_OK; i++) {
+        const json_t *section = json_object_get(document, named[i].section[0]);
+        if (named[i].section[1] != NULL) section = json_object_get(section, named[i].section[1]);
+        const json_t *name = json_object_get(section, named[i].key);
+        if (name != NULL) s = add(list, folder, name, named[i].role, named[i].field, err);
+    }
+    return s;
+}
+
+/* The files of a list of names, or of objects with a key "file". */
+static status add_list(const json_t *names, const char *folder, const char *role, const char *field,
+                       struct cli_file_list *list, struct error *err)
+{
+    size_t i, j;
+    json_t *item, *more;
+    json_array_foreach(names, i, item)
+    {
+        char path[128];
+        const json_t *name = json_is_object(item) ? json_object_get(item, "file") : item;
+        snprintf(path, sizeof path, "%s[%zu]%s", field, i, json_is_object(item) ? ".file" : "");
+        status s = add(list, folder, name, role, path, err);
+        if (s != STATUS_OK) return s;
+        json_array_foreach(json_object_get(item, "more_exposures"), j, more)
+        {
+            snprintf(path, sizeof path, "%s[%zu].more_exposures[%zu].file", field, i, j);
+            s = add(list, folder, json_object_get(more, "file"), role, path, err);
+            if (s != STATUS_OK) return s;
+        }
+    }
+    return STATUS_OK;
+}
+
 status cli_job_files_list(const json_t *document, const char *folder, struct cli_file_list *list, struct error *err)
 {
     *list = (struct cli_file_list){0};
-    status s = STATUS_OK;
-    size_t i;
-    json_t *item;
-    json_array_foreach(json_object_get(json_object_get(document, "volume"), "files"), i, item)
-    {
-        char field[64];
-        snprintf(field, sizeof field, "volume.files[%zu]", i);
-        if ((s = add(list, folder, item, "volume", field, err)) != STATUS_OK) goto out;
-    }
-    const json_t *one = json_object_get(json_object_get(document, "fibers"), "file");
-    if (one != NULL && (s = add(list, folder, one, "fibers", "fibers.file", err)) != STATUS_OK) goto out;
-    one = json_object_get(json_object_get(document, "environment"), "file");
-    if (one != NULL && (s = add(list, folder, one, "environment", "environment.file", err)) != STATUS_OK) goto out;
-    one = json_object_get(json_object_get(document, "measurements"), "file");
-    if (one != NULL && (s = add(list, folder, one, "measurements", "measurements.file", err)) != STATUS_OK) goto out;
-    json_array_foreach(json_object_get(document, "photographs"), i, item)
-    {
-        char field[64];
-        snprintf(field, sizeof field, "photographs[%zu].file", i);
-        if ((s = add(list, folder, json_object_get(item, "file"), "photograph", field, err)) != STATUS_OK) goto out;
-    }
-out:
+    const json_t *volume = json_object_get(document, "volume"), *camera = json_object_get(document, "camera");
+    status s = add_list(json_object_get(volume, "files"), folder, "volume", "volume.files", list, err);
+    if (s == STATUS_OK) s = add_named(document, folder, list, err);
+    if (s == STATUS_OK)
+        s = add_list(json_object_get(camera, "dark_frames"), folder, "dark_frame", "camera.dark_frames", list, err);
+    if (s == STATUS_OK)
+        s = add_list(json_object_get(document, "photographs"), folder, "photograph", "photographs", list, err);
     if (s != STATUS_OK) cli_job_files_release(list);
     return s;
 }

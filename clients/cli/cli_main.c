@@ -2,6 +2,7 @@
 #include "base/version.h"
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_text.h"
+#include "clients/cli/tools/cli_tool.h"
 
 #include <curl/curl.h>
 #include <locale.h>
@@ -60,6 +61,11 @@ int main(int argc, char **argv)
     struct cli_args args;
     struct error err = {0};
     setlocale(LC_CTYPE, "");
+    if (argc >= 2 && cli_tool_knows(argv[1])) {
+        cli_tool_run(argv, &err);
+        print_error(&err);
+        return CLI_EXIT_ERROR;
+    }
     if (cli_args_parse(argc, argv, getenv("SELVEDGE_SERVER"), getenv("SELVEDGE_TOKEN"), &args, &err) != STATUS_OK) {
         print_error(&err);
         return CLI_EXIT_USAGE;

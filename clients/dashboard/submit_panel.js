@@ -11,9 +11,14 @@ function filesOf(doc) {
   const add = (name, role) => { if (typeof name === "string" && !list.some((f) => f.name === name)) list.push({ name, role }); };
   for (const name of doc.volume?.files ?? []) add(name, "volume");
   add(doc.fibers?.file, "fibers");
+  add(doc.cloth?.texture, "photograph");
   add(doc.environment?.file, "environment");
   add(doc.measurements?.file, "measurements");
-  for (const p of doc.photographs ?? []) add(p?.file, "photograph");
+  add(doc.camera?.noise_file, "camera_noise");
+  for (const name of doc.camera?.dark_frames ?? []) add(name, "dark_frame");
+  add(doc.color?.chart?.file, "chart");
+  add(doc.color?.white?.file, "white_reference");
+  for (const p of doc.photographs ?? []) for (const q of [p, ...(p?.more_exposures ?? [])]) add(q?.file, "photograph");
   return list;
 }
 

@@ -48,7 +48,14 @@ def files_of(document):
     for key in ("fibers", "environment", "measurements"):
         if "file" in document.get(key, {}):
             names.append((document[key]["file"], key))
-    names += [(p["file"], "photograph") for p in document.get("photographs", [])]
+    if "texture" in document.get("cloth", {}):
+        names.append((document["cloth"]["texture"], "photograph"))
+    camera, color = document.get("camera", {}), document.get("color", {})
+    names += [(camera["noise_file"], "camera_noise")] if "noise_file" in camera else []
+    names += [(name, "dark_frame") for name in camera.get("dark_frames", [])]
+    names += [(color[key]["file"], role) for key, role in (("chart", "chart"), ("white", "white_reference")) if key in color]
+    for p in document.get("photographs", []):
+        names += [(q["file"], "photograph") for q in (p, *p.get("more_exposures", []))]
     return list(dict.fromkeys(names))
 
 

@@ -32,7 +32,9 @@ void job_document_free(struct job_document *doc)
     free(doc->volume_file);
     free(doc->cloth_yarn);
     free(doc->cloth);
+    for (size_t i = 0; i < doc->n_photograph; i++) free(doc->photograph[i].exposure);
     free(doc->photograph);
+    free(doc->dark_frame);
     free(doc->candidate);
     free(doc);
 }

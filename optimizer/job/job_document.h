@@ -19,6 +19,8 @@
 enum {
     JOB_MAX_DOCUMENT_BYTES = 1 << 20,
     JOB_MAX_PHOTOGRAPH = 1024,
+    JOB_MAX_MORE_EXPOSURES = 15,
+    JOB_MAX_DARK_FRAME = 256,
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
     JOB_MAX_CANDIDATE = 1024,
@@ -37,6 +39,12 @@ enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
 /* How integer samples of a picture stand for light. */
 enum job_transfer { JOB_TRANSFER_UNDECLARED, JOB_TRANSFER_LINEAR, JOB_TRANSFER_SRGB };
 
+/* One more exposure of the view of a photograph. */
+struct job_exposure {
+    char file[JOB_MAX_NAME_BYTES];
+    double exposure_s; /* NaN: as the file states */
+};
+
 struct job_photograph {
     char file[JOB_MAX_NAME_BYTES];
     enum job_set set;
@@ -45,6 +53,8 @@ struct job_photograph {
     size_t crop_px[4]; /* all 0: whole picture */
     enum job_transfer transfer;
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
+    size_t n_exposure;                             /* besides the first one, which is `file` */
+    struct job_exposure *exposure;
 };
 
 /* A configuration of which a photograph might be taken. */
@@ -106,6 +116,15 @@ struct job_document {
     /* set-up */
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm, camera_blur_mm;
     bool lamp_directional, camera_far_field;
+    char noise_file[JOB_MAX_NAME_BYTES]; /* record of the camera's noise; "" when none is given */
+    size_t n_dark_frame;
+    char (*dark_frame)[JOB_MAX_NAME_BYTES];
+    /* From the camera's colors to radiances: by a photographed ColorChecker or by a white reference. Members of these
+     * photographs that belong to a view of the cloth are unused. */
+    bool has_color, has_chart, has_white;
+    struct job_photograph chart, white;
+    double chart_corner_px[8]; /* NaN: found in the picture */
+    double white_reflectance[3];
     double environment_rgb[3];
     char environment_file[JOB_MAX_NAME_BYTES]; /* "" when none is given */
     double environment_scale;
@@ -158,7 +177,7 @@ size_t job_texture_cells(const struct job_document *doc);
 double job_texture_cell_mm(const struct job_document *doc);
 
 /* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment",
- * "measurements", "photograph"). */
+ * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* Sets and returns the error of a job that fits the density although no fitted row is lit from behind. */

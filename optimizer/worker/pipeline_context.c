@@ -12,6 +12,7 @@
 void pipeline_context_init(struct pipeline_context *c)
 {
     memset(c, 0, sizeof *c);
+    photograph_process_init(&c->process);
     observation_set_init(&c->observation);
     observation_set_init(&c->fitted);
     observation_set_init(&c->row);
@@ -23,6 +24,7 @@ void pipeline_context_init(struct pipeline_context *c)
 void pipeline_context_release(struct pipeline_context *c)
 {
     job_document_free(c->doc);
+    photograph_process_release(&c->process);
     observation_set_release(&c->observation);
     observation_set_release(&c->fitted);
     observation_set_release(&c->row);

@@ -19,6 +19,7 @@
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/objective/next_photograph.h"
 #include "optimizer/fit/objective/noisy_minimum.h"
+#include "optimizer/fit/photographs/camera/photograph_develop.h"
 #include "optimizer/fit/photographs/observation.h"
 #include "optimizer/fit/verdict/verdict.h"
 #include "optimizer/job/job_document.h"
@@ -127,6 +128,7 @@ struct pipeline_context {
     struct job_document *doc;
     uint64_t fingerprint;               /* of the job document's text and this build of the program */
     struct environment *environment;    /* image of the surroundings; NULL: none */
+    struct photograph_process process;  /* what is known of the camera */
     struct observation_set observation; /* all */
     struct observation_set fitted;      /* those of the set "fit" */
     struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */

@@ -44,8 +44,10 @@ static status load_observations(struct pipeline_context *c, struct error *err)
     char path[WORKER_PATH_BYTES];
     struct uneven_photographs uneven = {.pipeline = c};
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
-    status s =
-        observation_set_load(c->doc, path, &(struct warning_sink){warn_photograph, &uneven}, &c->observation, err);
+    status s = photograph_process_load(&c->process, c->doc, path, err);
+    if (s == STATUS_OK)
+        s = observation_set_load(c->doc, path, &c->process, &(struct warning_sink){warn_photograph, &uneven},
+                                 &c->observation, err);
     if (s != STATUS_OK) return s;
     if (uneven.n > NAMED_PHOTOGRAPHS)
         worker_status_warn(c->status, "%zu more warnings about photographs are in the job's log",

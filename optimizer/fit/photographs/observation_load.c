@@ -31,34 +31,45 @@ static status load_table(const struct job_document *doc, const char *folder, str
     return s;
 }
 
+static status measure_texture(const struct job_document *doc, const struct image *im, struct observation *item,
+                              const struct warning_sink *warn, struct error *err)
+{
+    item->n_cell = job_texture_cells(doc);
+    status s = photograph_contrast(im, item->name, item->n_cell, item->contrast_rgb, item->contrast_se_rgb, err);
+    if (s != STATUS_OK) {
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_TEXTURE_BLOCK);
+        return s;
+    }
+    if (!observation_contrast_known(item) && doc->texture_weight > 0.0)
+        warning_send(
+            warn, OPTION_NONE,
+            "photograph '%s' is black in one of its channels, so its texture is not compared with the rendering's",
+            item->name);
+    return STATUS_OK;
+}
+
 static status load_photograph(const struct job_document *doc, size_t i, const char *folder,
-                              const struct warning_sink *warn, struct observation_set *o, struct error *err)
+                              const struct photograph_process *process, const struct warning_sink *warn,
+                              struct observation_set *o, struct error *err)
 {
     const struct job_photograph *p = &doc->photograph[i];
-    struct photograph_mean mean;
+    struct photograph_mean mean = {0};
     struct observation item = {.set = p->set, .weight = p->weight};
-    char path[4096];
-    snprintf(path, sizeof path, "%s/%s", folder, p->file);
-    status s = photograph_measure(path, p, &mean, err);
+    struct image im;
+    snprintf(item.name, sizeof item.name, "%s", p->file);
+    status s = photograph_develop(process, folder, p, &im, &mean.record, err);
+    if (s == STATUS_OK) {
+        s = photograph_measure_image(&im, p->file, p->transfer, &mean, err);
+        if (s != STATUS_OK) image_release(&im);
+    }
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
         return s;
     }
     if (mean.warning[0] != '\0') warning_send(warn, OPTION_NONE, "%s", mean.warning);
-    snprintf(item.name, sizeof item.name, "%s", p->file);
-    if (doc->texture_block_mm > 0.0) {
-        item.n_cell = job_texture_cells(doc);
-        s = photograph_contrast(path, p, item.n_cell, item.contrast_rgb, item.contrast_se_rgb, err);
-        if (s != STATUS_OK) {
-            if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_TEXTURE_BLOCK);
-            return s;
-        }
-        if (!observation_contrast_known(&item) && doc->texture_weight > 0.0)
-            warning_send(warn, OPTION_NONE,
-                         "photograph '%s' is black in one of its channels, so its texture is not compared with the "
-                         "rendering's",
-                         p->file);
-    }
+    if (doc->texture_block_mm > 0.0) s = measure_texture(doc, &im, &item, warn, err);
+    image_release(&im);
+    if (s != STATUS_OK) return s;
     item.photograph = mean.record;
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
@@ -68,7 +79,8 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
 }
 
 /* Either all photographs state a factor of the exposure or none does: otherwise their values have no common scale. */
-static status check_exposures(const struct observation_set *o, size_t first, struct error *err)
+static status check_exposures(const struct observation_set *o, size_t first, const struct photograph_process *process,
+                              struct error *err)
 {
     static const struct {
         const char *name, *key;
@@ -83,6 +95,14 @@ static status check_exposures(const struct observation_set *o, size_t first, str
             memcpy(&value, (const char *)&o->item[i].photograph.info + factor[k].at, sizeof value);
             *(isnan(value) ? &without : &with) = i;
         }
+        double of_color;
+        memcpy(&of_color, (const char *)&process->color_info + factor[k].at, sizeof of_color);
+        if (process->has_color && isnan(of_color) != (with == SIZE_MAX) && o->n > first)
+            return error_set_field(err, STATUS_INVALID, OPTION_COLOR_CHART,
+                                   "the %s of the photographs is %s, that of the color chart or white reference is %s, "
+                                   "so their values have no common scale: write '%s' beside it",
+                                   factor[k].name, with == SIZE_MAX ? "not known" : "known",
+                                   isnan(of_color) ? "not" : "known", factor[k].key);
         if (with == SIZE_MAX || without == SIZE_MAX) continue;
         char field[sizeof err->field];
         snprintf(field, sizeof field, OPTION_PHOTOGRAPH_FILE "[%zu]", without - first);
@@ -109,15 +129,18 @@ static void warn_less_trustworthy(const struct observation_set *o, size_t first,
                      n, o->n - first, o->item[which].name, n > 1 ? " and others" : "");
 }
 
-status observation_set_load(const struct job_document *doc, const char *folder, const struct warning_sink *warn,
+status observation_set_load(const struct job_document *doc, const char *folder,
+                            const struct photograph_process *process, const struct warning_sink *warn,
                             struct observation_set *o, struct error *err)
 {
+    const struct photograph_process nothing = {0};
+    if (process == NULL) process = &nothing;
     if (doc->measurement_file[0] != '\0') return load_table(doc, folder, o, err);
     size_t first = o->n;
     for (size_t i = 0; i < doc->n_photograph; i++) {
-        status s = load_photograph(doc, i, folder, warn, o, err);
+        status s = load_photograph(doc, i, folder, process, warn, o, err);
         if (s != STATUS_OK) return s;
     }
     warn_less_trustworthy(o, first, warn);
-    return check_exposures(o, first, err);
+    return check_exposures(o, first, process, err);
 }

@@ -90,8 +90,8 @@ struct job_photograph photograph_plain(enum job_transfer transfer)
                                    .black_level = NAN};
 }
 
-status photograph_read(const char *path, const struct job_photograph *p, struct image *im,
-                       struct photograph_record *record, struct error *err)
+status photograph_read_values(const char *path, const struct job_photograph *p, struct image *im,
+                              struct photograph_record *record, struct error *err)
 {
     const struct photograph_request q = {
         .transfer = p->transfer, .black_level = p->black_level, .limit_pixel = LIMIT_PIXEL};
@@ -108,8 +108,23 @@ status photograph_read(const char *path, const struct job_photograph *p, struct 
     r.saturated_share = r.info.full_scale != 1.0 ? saturated_part(im) : 0.0;
     r.resampled = r.info.encoded && neighbour_power(im) < resampled_limit;
     r.exposure = exposure_of(p, &r.info);
-    double factor = p->scale / r.exposure;
+    r.n_exposure = 1;
+    *record = r;
+    return STATUS_OK;
+}
+
+void image_scale(struct image *im, double factor)
+{
     for (size_t i = 0; i < im->width * im->height * im->n_channel; i++) im->pixel[i] *= (float)factor;
+}
+
+status photograph_read(const char *path, const struct job_photograph *p, struct image *im,
+                       struct photograph_record *record, struct error *err)
+{
+    struct photograph_record r;
+    status s = photograph_read_values(path, p, im, &r, err);
+    if (s != STATUS_OK) return s;
+    image_scale(im, p->scale / r.exposure);
     if (record != NULL) *record = r;
     return STATUS_OK;
 }
@@ -170,42 +185,47 @@ static void warn(const struct image *im, const char *name, struct photograph_mea
                  "photograph '%s' has an alpha channel, as edited pictures have: it is opaque and was left out", name);
 }
 
-status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
-                          struct error *err)
+status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
+                                struct photograph_mean *mean, struct error *err)
 {
-    const char *name = path_file_name(path);
-    struct image im;
-    memset(mean, 0, sizeof *mean);
-    status s = photograph_read(path, p, &im, &mean->record, err);
+    const struct photograph_record *r = &mean->record;
+    if (!r->info.encoded && transfer == JOB_TRANSFER_SRGB)
+        return error_set(err, STATUS_INVALID,
+                         "cannot use photograph '%s': its transfer is declared as srgb, but %s%s is linear: leave "
+                         "'transfer' out",
+                         name, r->info.bits == 32 ? "float " : "", r->info.format);
+    status s = check_pixels(im, name, err);
     if (s != STATUS_OK) return s;
-    if (!mean->record.info.encoded && p->transfer == JOB_TRANSFER_SRGB)
-        s = error_set(err, STATUS_INVALID,
-                      "cannot use photograph '%s': its transfer is declared as srgb, but %s %s is linear: leave "
-                      "'transfer' out",
-                      name, mean->record.info.bits == 32 ? "float" : "", mean->record.info.format);
-    if (s == STATUS_OK) s = check_pixels(&im, name, err);
-    if (s != STATUS_OK) goto out;
-    size_t side = im.width < im.height ? im.width : im.height, n_block = side / MIN_BLOCK_PX;
+    size_t side = im->width < im->height ? im->width : im->height, n_block = side / MIN_BLOCK_PX;
     n_block = n_block > MAX_BLOCK ? MAX_BLOCK : n_block < 1 ? 1 : n_block;
     for (size_t c = 0; c < 3; c++) {
         double block_sd;
-        measure_channel(&im, c, n_block, &mean->mean_rgb[c], &block_sd);
+        measure_channel(im, c, n_block, &mean->mean_rgb[c], &block_sd);
         mean->se_rgb[c] = block_sd / (double)n_block;
         if (mean->mean_rgb[c] > 0.0) mean->block_contrast = fmax(mean->block_contrast, block_sd / mean->mean_rgb[c]);
     }
     const double *m = mean->mean_rgb;
     if (m[0] < 0.0 || m[1] < 0.0 || m[2] < 0.0)
-        s = error_set(err, STATUS_INVALID, "cannot use photograph '%s': its mean rgb (%g, %g, %g) is negative", name,
-                      m[0], m[1], m[2]);
-    else if (m[0] + m[1] + m[2] <= 0.0)
-        s = error_set(err, STATUS_INVALID, "cannot use photograph '%s': it is all black", name);
-    else if (mean->record.saturated_share > saturated_limit)
-        s = error_set(err, STATUS_INVALID,
-                      "cannot use photograph '%s': %.1f %% of its pixels are saturated, allowed are %.0f %%", name,
-                      100.0 * mean->record.saturated_share, 100.0 * saturated_limit);
-    else
-        warn(&im, name, mean);
-out:
+        return error_set(err, STATUS_INVALID, "cannot use photograph '%s': its mean rgb (%g, %g, %g) is negative", name,
+                         m[0], m[1], m[2]);
+    if (m[0] + m[1] + m[2] <= 0.0)
+        return error_set(err, STATUS_INVALID, "cannot use photograph '%s': it is all black", name);
+    if (r->saturated_share > saturated_limit)
+        return error_set(err, STATUS_INVALID,
+                         "cannot use photograph '%s': %.1f %% of its pixels are saturated, allowed are %.0f %%", name,
+                         100.0 * r->saturated_share, 100.0 * saturated_limit);
+    warn(im, name, mean);
+    return STATUS_OK;
+}
+
+status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
+                          struct error *err)
+{
+    struct image im;
+    memset(mean, 0, sizeof *mean);
+    status s = photograph_read(path, p, &im, &mean->record, err);
+    if (s != STATUS_OK) return s;
+    s = photograph_measure_image(&im, path_file_name(path), p->transfer, mean, err);
     image_release(&im);
     return s;
 }

@@ -21,7 +21,10 @@ struct photograph_record {
     size_t width, height;        /* of the file, in pixels of the image that was read */
     double saturated_share;      /* of the crop's pixels that have a channel at full scale, 0 for float samples */
     double exposure;             /* pixel values were divided by it; 1 when nothing is known */
-    bool resampled;              /* pixels depend on their neighbours as after an enlargement or a strong filter */
+    bool merged;                 /* by the estimator of exposure_merge.h, of n_exposure pictures */
+    size_t n_exposure;
+    double noise_se_rgb[3]; /* of the mean, by the camera's noise; with merged alone, NaN without a noise record */
+    bool resampled;         /* pixels depend on their neighbours as after an enlargement or a strong filter */
 };
 
 struct photograph_mean {
@@ -31,13 +34,22 @@ struct photograph_mean {
     char warning[400];     /* "" or why the mean describes the crop badly */
 };
 
+/* Reads one file (photograph_read) and measures it. */
 status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
                           struct error *err);
+/* Measures a crop that has been read; name: of its file. mean->record is set before. transfer: as declared. */
+status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
+                                struct photograph_mean *mean, struct error *err);
 
 /* A photograph of which nothing but the transfer is declared: scale 1, no crop, exposure and black level as the file
  * states. */
 struct job_photograph photograph_plain(enum job_transfer transfer);
 
+/* The crop as the file's values: neither divided by the exposure, which record states, nor scaled. */
+status photograph_read_values(const char *path, const struct job_photograph *p, struct image *im,
+                              struct photograph_record *record, struct error *err);
+/* Multiplies all pixels. */
+void image_scale(struct image *im, double factor);
 /* The crop as an image, divided by the exposure and scaled. record may be NULL. The transfer of p is that of integer
  * samples alone: linear files are read as they are. */
 status photograph_read(const char *path, const struct job_photograph *p, struct image *im,

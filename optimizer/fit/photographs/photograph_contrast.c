@@ -1,8 +1,5 @@
 #include "optimizer/fit/photographs/photograph_contrast.h"
 
-#include "base/files/durable.h"
-#include "optimizer/fit/photographs/photograph.h"
-
 #include <math.h>
 #include <stdlib.h>
 
@@ -49,19 +46,16 @@ status image_contrast(const struct image *im, size_t channel, size_t n_cell, dou
     return STATUS_OK;
 }
 
-status photograph_contrast(const char *path, const struct job_photograph *p, size_t n_cell, double contrast_rgb[3],
+status photograph_contrast(const struct image *im, const char *name, size_t n_cell, double contrast_rgb[3],
                            double se_rgb[3], struct error *err)
 {
-    struct image im;
-    status s = photograph_read(path, p, &im, NULL, err);
-    if (s != STATUS_OK) return s;
-    if (im.width < 2 * n_cell || im.height < 2 * n_cell)
-        s = error_set(err, STATUS_INVALID,
-                      "cannot measure the contrast of photograph '%s': its %zu x %zu pixels leave fewer than 2 x 2 for "
-                      "each of %zu x %zu parts",
-                      path_file_name(path), im.width, im.height, n_cell, n_cell);
+    if (im->width < 2 * n_cell || im->height < 2 * n_cell)
+        return error_set(err, STATUS_INVALID,
+                         "cannot measure the contrast of photograph '%s': its %zu x %zu pixels leave fewer than 2 x 2 "
+                         "for each of %zu x %zu parts",
+                         name, im->width, im->height, n_cell, n_cell);
+    status s = STATUS_OK;
     for (size_t c = 0; c < 3 && s == STATUS_OK; c++)
-        s = image_contrast(&im, c, n_cell, &contrast_rgb[c], &se_rgb[c], err);
-    image_release(&im);
+        s = image_contrast(im, c, n_cell, &contrast_rgb[c], &se_rgb[c], err);
     return s;
 }

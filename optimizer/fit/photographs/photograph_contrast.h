@@ -17,8 +17,8 @@
 #include "optimizer/job/job_document.h"
 #include "renderer/image/image.h"
 
-/* STATUS_INVALID naming the file: fewer than 2 x 2 pixels in a part. Otherwise as photograph_measure. */
-status photograph_contrast(const char *path, const struct job_photograph *p, size_t n_cell, double contrast_rgb[3],
+/* Of a crop; name: of its file. STATUS_INVALID: fewer than 2 x 2 pixels in a part. STATUS_NO_MEMORY. */
+status photograph_contrast(const struct image *im, const char *name, size_t n_cell, double contrast_rgb[3],
                            double se_rgb[3], struct error *err);
 /* Of one channel of a picture with at least 2 x 2 pixels in a part; contrast 0 where the mean is not positive. */
 status image_contrast(const struct image *im, size_t channel, size_t n_cell, double *contrast, double *se,

@@ -60,6 +60,17 @@ status job_check_crop_px(const struct option_value *v, struct error *err)
                            "'%s' is empty: the order is x0, y0, x1, y1 with x0 < x1 and y0 < y1", v->path);
 }
 
+status job_check_color(const struct option_value *v, struct error *err)
+{
+    struct job_document *doc = v->doc;
+    doc->chart.scale = doc->white.scale = 1.0;
+    if (doc->has_chart != doc->has_white) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           doc->has_chart ? "'%s' has both 'chart' and 'white': give one of them"
+                                          : "'%s' needs 'chart' or 'white'",
+                           v->path);
+}
+
 status job_check_photographs(const struct option_value *v, struct error *err)
 {
     for (size_t i = 0; i < v->doc->n_photograph; i++)
@@ -143,6 +154,12 @@ static int compare_names(const void *a, const void *b)
     return strcmp(*x, *y);
 }
 
+static void count_name(void *context, const char *name, const char *role)
+{
+    (void)name, (void)role;
+    ++*(size_t *)context;
+}
+
 static void collect_name(void *context, const char *name, const char *role)
 {
     struct name_list *list = context;
@@ -156,10 +173,19 @@ static status named_twice(const struct job_document *doc, const char *name, stru
     char path[JSON_PATH_BYTES] = "measurements.file";
     if (strcmp(doc->cloth_texture, name) == 0) snprintf(path, sizeof path, "cloth.texture");
     if (strcmp(doc->environment_file, name) == 0) snprintf(path, sizeof path, "environment.file");
+    if (strcmp(doc->noise_file, name) == 0) snprintf(path, sizeof path, "camera.noise_file");
+    if (strcmp(doc->chart.file, name) == 0) snprintf(path, sizeof path, "color.chart.file");
+    if (strcmp(doc->white.file, name) == 0) snprintf(path, sizeof path, "color.white.file");
     for (size_t i = 0; i < doc->n_volume_file; i++)
         if (strcmp(doc->volume_file[i], name) == 0) snprintf(path, sizeof path, "volume.files[%zu]", i);
-    for (size_t i = 0; i < doc->n_photograph; i++)
+    for (size_t i = 0; i < doc->n_dark_frame; i++)
+        if (strcmp(doc->dark_frame[i], name) == 0) snprintf(path, sizeof path, "camera.dark_frames[%zu]", i);
+    for (size_t i = 0; i < doc->n_photograph; i++) {
         if (strcmp(doc->photograph[i].file, name) == 0) snprintf(path, sizeof path, "photographs[%zu].file", i);
+        for (size_t j = 0; j < doc->photograph[i].n_exposure; j++)
+            if (strcmp(doc->photograph[i].exposure[j].file, name) == 0)
+                snprintf(path, sizeof path, "photographs[%zu].more_exposures[%zu].file", i, j);
+    }
     return error_set_field(err, STATUS_INVALID, path,
                            "'%s' names the file '%s' a second time: each input file has one use", path, name);
 }
@@ -167,8 +193,11 @@ static status named_twice(const struct job_document *doc, const char *name, stru
 static status check_files(const struct job_document *doc, struct error *err)
 {
     status s = STATUS_OK;
-    struct name_list list = {.name = malloc((doc->n_volume_file + doc->n_photograph + 4) * sizeof *list.name)};
+    struct name_list list = {0};
+    job_document_visit_files(doc, count_name, &list.n);
+    list.name = malloc((list.n + 1) * sizeof *list.name);
     if (list.name == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check the job document: out of memory");
+    list.n = 0;
     job_document_visit_files(doc, collect_name, &list);
     qsort(list.name, list.n, sizeof *list.name, compare_names);
     for (size_t i = 1; i < list.n && s == STATUS_OK; i++)

@@ -7,7 +7,11 @@
 #include "optimizer/job/options/option_table.h"
 
 /* Each ends with a row without a path. */
-extern const struct job_option option_rows_cloth[], option_rows_described[], option_rows_setup[], option_rows_fit[];
+extern const struct job_option option_rows_cloth[], option_rows_described[], option_rows_setup[], option_rows_camera[],
+    option_rows_fit[];
+
+/* Words of enum job_transfer. */
+extern const char *const job_transfer_names[];
 
 #define INTO_OF(type, member) .stored = true, .at = offsetof(type, member)
 #define TEXT_INTO_OF(type, member) INTO_OF(type, member), .n = sizeof((type *)NULL)->member
@@ -22,6 +26,40 @@ extern const struct job_option option_rows_cloth[], option_rows_described[], opt
                    .element_bytes = sizeof *((struct job_document *)NULL)->pointer
 
 #define RANGE(from, to) .lower = (from), .upper = (to)
+
+/* Rows of what a picture file may not state itself: members of the struct job_photograph that offset_of gives. */
+#define PICTURE(list, offset_of, transfers)                                                                            \
+    {.path = list ".transfer",                                                                                         \
+     .kind = OPTION_CHOICE,                                                                                            \
+     offset_of(transfer),                                                                                              \
+     .choice = transfers,                                                                                              \
+     .meaning = "How the values of a PNG, a JPEG or an integer TIFF stand for light: `srgb` as a camera or phone "     \
+                "saves them, `linear` when they were developed without tone curve. Such a picture is refused "         \
+                "without it. OpenEXR, float TIFF and camera raw are linear."},                                         \
+        {.path = list ".exposure_s",                                                                                   \
+         .kind = OPTION_NUMBER,                                                                                        \
+         offset_of(exposure_s),                                                                                        \
+         RANGE(1e-9, 1e6),                                                                                             \
+         .unit = "s",                                                                                                  \
+         .left_out = "from the file",                                                                                  \
+         .meaning = "Exposure time. Pixel values are divided by it; then all photographs need one."},                  \
+        {.path = list ".iso",                                                                                          \
+         .kind = OPTION_NUMBER,                                                                                        \
+         offset_of(iso),                                                                                               \
+         RANGE(1, 1e8),                                                                                                \
+         .left_out = "from the file",                                                                                  \
+         .meaning = "Sensitivity. Pixel values are divided by ISO / 100; then all photographs need one."},             \
+        {.path = list ".aperture",                                                                                     \
+         .kind = OPTION_NUMBER,                                                                                        \
+         offset_of(aperture),                                                                                          \
+         RANGE(0.1, 1000),                                                                                             \
+         .left_out = "from the file",                                                                                  \
+         .meaning = "The f-number N. Pixel values are multiplied by its square; then all photographs need one."},      \
+    {                                                                                                                  \
+        .path = list ".black_level", .kind = OPTION_NUMBER, offset_of(black_level), RANGE(-1e9, 1e9),                  \
+        .unit = "values of the file", .left_out = "that of the raw file, else 0",                                      \
+        .meaning = "The value that stands for no light. Not for `srgb`."                                               \
+    }
 
 /* Rows of the angles of a photograph or of a candidate: members of the struct `type` in the list `list`. */
 #define ANGLE(list, type, name, from, to, ...)                                                                         \

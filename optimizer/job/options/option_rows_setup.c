@@ -3,8 +3,7 @@
 
 static const char *const set_name[] = {[JOB_SET_FIT] = "fit", [JOB_SET_HELD_OUT] = "held-out", NULL};
 static const char *const lamp_kind[] = {"square", "directional", NULL};
-static const char *const transfer[] = {
-    [JOB_TRANSFER_UNDECLARED] = "undeclared", [JOB_TRANSFER_LINEAR] = "linear", [JOB_TRANSFER_SRGB] = "srgb", NULL};
+#define INTO_PHOTOGRAPH(member) INTO_OF(struct job_photograph, member)
 
 const struct job_option option_rows_setup[] = {
     {.path = "lamp", .kind = OPTION_SECTION, .check = job_check_lamp, .meaning = "The lamp of every photograph."},
@@ -64,6 +63,25 @@ const struct job_option option_rows_setup[] = {
          "Blur of the camera on the cloth: standard deviation of a Gaussian. Renderings are blurred by it, and so "
          "is the texture that they are fitted with; means hardly change. Some 0.5 pixels are usual for a "
          "sharp photograph."},
+    {.path = "camera.noise_file",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_CAMERA_NOISE,
+     INTO(noise_file),
+     .left_out = "none",
+     .allowed = "written by `selvedge calibrate-camera`",
+     .meaning = "The record of the camera's noise. Exposures are weighted by it, and the mean of read noise and dark "
+                "current is subtracted. Upload it with the role `camera_noise`."},
+    {.path = "camera.dark_frames",
+     .kind = OPTION_FILE_NAMES,
+     .id = OPTION_DARK_FRAMES,
+     .stored = true,
+     .at = offsetof(struct job_document, dark_frame),
+     .count_at = offsetof(struct job_document, n_dark_frame),
+     .element_bytes = JOB_MAX_NAME_BYTES,
+     .upper = JOB_MAX_DARK_FRAME,
+     .left_out = "none",
+     .meaning = "Pictures with the lens covered. Their mean is subtracted from every photograph of the same exposure "
+                "time, pixel by pixel. Each exposure time needs at least one. Role `dark_frame`."},
     {.path = "environment",
      .kind = OPTION_SECTION,
      .left_out = "none",
@@ -153,38 +171,32 @@ const struct job_option option_rows_setup[] = {
      .left_out = "whole picture",
      .allowed = "x0, y0, x1, y1",
      .meaning = "The part of the picture that is used. x1, y1 are excluded; row 0 is at the top."},
-    {.path = "photographs[].transfer",
-     .kind = OPTION_CHOICE,
-     INTO_OF(struct job_photograph, transfer),
-     .choice = transfer,
-     .meaning = "How the values of a PNG, a JPEG or an integer TIFF stand for light: `srgb` as a camera or phone saves "
-                "them, `linear` when they were developed without tone curve. Such a picture is refused without it. "
-                "OpenEXR, float TIFF and camera raw are linear."},
-    {.path = "photographs[].exposure_s",
+    PICTURE("photographs[]", INTO_PHOTOGRAPH, job_transfer_names),
+    {.path = "photographs[].more_exposures",
+     .kind = OPTION_LIST,
+     .stored = true,
+     .at = offsetof(struct job_photograph, exposure),
+     .count_at = offsetof(struct job_photograph, n_exposure),
+     .element_bytes = sizeof(struct job_exposure),
+     .upper = JOB_MAX_MORE_EXPOSURES,
+     .left_out = "none",
+     .items = "exposures",
+     .meaning =
+         "More exposures of the same view: the camera, its ISO value and its f-number unchanged. They are merged "
+         "with `file` by their exposure times and the camera's noise (`camera.noise_file`); what one saturates, "
+         "the others supply."},
+    {.path = "photographs[].more_exposures[].file",
+     .kind = OPTION_FILE_NAME,
+     INTO_OF(struct job_exposure, file),
+     .required = true,
+     .allowed = "as `photographs[].file`",
+     .meaning = "The picture."},
+    {.path = "photographs[].more_exposures[].exposure_s",
      .kind = OPTION_NUMBER,
-     INTO_OF(struct job_photograph, exposure_s),
+     INTO_OF(struct job_exposure, exposure_s),
      RANGE(1e-9, 1e6),
      .unit = "s",
      .left_out = "from the file",
-     .meaning = "Exposure time. Pixel values are divided by it; then all photographs need one."},
-    {.path = "photographs[].iso",
-     .kind = OPTION_NUMBER,
-     INTO_OF(struct job_photograph, iso),
-     RANGE(1, 1e8),
-     .left_out = "from the file",
-     .meaning = "Sensitivity. Pixel values are divided by ISO / 100; then all photographs need one."},
-    {.path = "photographs[].aperture",
-     .kind = OPTION_NUMBER,
-     INTO_OF(struct job_photograph, aperture),
-     RANGE(0.1, 1000),
-     .left_out = "from the file",
-     .meaning = "The f-number N. Pixel values are multiplied by its square; then all photographs need one."},
-    {.path = "photographs[].black_level",
-     .kind = OPTION_NUMBER,
-     INTO_OF(struct job_photograph, black_level),
-     RANGE(-1e9, 1e9),
-     .unit = "values of the file",
-     .left_out = "that of the raw file, else 0",
-     .meaning = "The value that stands for no light. Not for `srgb`."},
+     .meaning = "Its exposure time."},
     {.path = NULL},
 };

@@ -287,6 +287,7 @@ static void put_job(json_t *json, struct pipeline_context *c)
 {
     json_object_set_new(json, "verdict", verdict_json(&c->verdict));
     json_object_set_new(json, "geometry", result_geometry_json(c));
+    json_object_set_new(json, "color", photograph_color_json(&c->process, c->doc));
     json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
     json_object_set_new(json, "stages", stages_json(c));
     json_object_set_new(json, "warnings", result_warnings_json(c));

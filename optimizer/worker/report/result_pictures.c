@@ -122,8 +122,8 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
 {
     char path[WORKER_PATH_BYTES];
     struct image im;
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->photograph[i].file, path);
-    status s = photograph_read(path, &c->doc->photograph[i], &im, NULL, err);
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
+    status s = photograph_develop(&c->process, path, &c->doc->photograph[i], &im, NULL, err);
     if (s != STATUS_OK) return s;
     s = write_image(c, &im, "photographs", name, exposure, false, err);
     image_release(&im);
@@ -173,6 +173,9 @@ status result_renderings_write(struct pipeline_context *c, double base, struct e
     status s = result_picture_names(&c->observation, &name, err);
     if (s == STATUS_OK) s = make_folder(c, "renderings", err);
     if (s == STATUS_OK && c->doc->n_photograph > 0) s = make_folder(c, "photographs", err);
+    if (s == STATUS_OK && c->process.chart_picture.pixel != NULL) s = make_folder(c, "pictures", err);
+    if (s == STATUS_OK && c->process.chart_picture.pixel != NULL)
+        s = write_image(c, &c->process.chart_picture, "pictures", "color-chart", 1.0, false, err);
     for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++)
         s = write_photograph(c, i, name[i], exposure, err);
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {

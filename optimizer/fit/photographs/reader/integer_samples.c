@@ -16,12 +16,13 @@ status integer_samples_declare(const char *path, const struct photograph_request
     info->full_scale = largest - info->black_level;
     info->less_trustworthy = bits <= 8 || q->transfer == JOB_TRANSFER_SRGB;
     if (q->transfer == JOB_TRANSFER_UNDECLARED)
-        return error_set(err, STATUS_INVALID,
-                         "cannot use photograph '%s': a %u-bit %s does not say how its values stand for light. Write "
-                         "\"transfer\": \"srgb\" if a camera or phone saved it, or \"transfer\": \"linear\" if it was "
-                         "developed without tone curve and gamma; better give the raw file or OpenEXR, which need "
-                         "neither",
-                         name, bits, info->format);
+        return error_set(
+            err, STATUS_INVALID,
+            "cannot use photograph '%s': a %s of %u bits does not say how its values stand for light. Write "
+            "\"transfer\": \"srgb\" if a camera or phone saved it, or \"transfer\": \"linear\" if it was "
+            "developed without tone curve and gamma; better give the raw file or OpenEXR, which need "
+            "neither",
+            name, info->format, bits);
     if (info->black_level != 0.0 && q->transfer == JOB_TRANSFER_SRGB)
         return error_set(err, STATUS_INVALID,
                          "cannot use photograph '%s': a black level is a value of linear samples, and its transfer "

@@ -184,7 +184,7 @@ static void test_real_tables(void **state)
         }
         fclose(f);
         observation_set_init(&o);
-        if (observation_set_load(&doc, folder, NULL, &o, &err) != STATUS_OK) fail_msg("%s", err.text);
+        if (observation_set_load(&doc, folder, NULL, NULL, &o, &err) != STATUS_OK) fail_msg("%s", err.text);
         assert_int_equal(observation_set_count(&o, JOB_SET_FIT), 16);
         assert_int_equal(observation_set_count(&o, JOB_SET_HELD_OUT), 24);
         observation_set_release(&o);

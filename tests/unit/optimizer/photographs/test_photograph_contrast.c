@@ -1,6 +1,7 @@
 /* Contrasts of photographs: of a chess board with noise, their stated errors, and blocks whose edges divide pixels. */
 #include "optimizer/fit/photographs/observation.h"
 #include "optimizer/fit/photographs/observation_load.h"
+#include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/chess_board.h"
@@ -71,9 +72,12 @@ static void test_photograph(void **state)
     struct error err = {0};
     assert_int_equal(image_write_exr(&im, path, NULL), STATUS_OK);
     image_release(&im);
-    assert_int_equal(photograph_contrast(path, &whole, BOARD_SIDE, rgb, rgb_se, NULL), STATUS_OK);
+    assert_int_equal(photograph_read(path, &whole, &im, NULL, NULL), STATUS_OK);
+    assert_int_equal(photograph_contrast(&im, "board.exr", BOARD_SIDE, rgb, rgb_se, NULL), STATUS_OK);
     assert_true(fabs(rgb[2] / contrast - 1.0) < 1e-5);
-    assert_int_equal(photograph_contrast(path, &whole, CONFIGURATION_MAX_CELLS + 1, rgb, rgb_se, &err), STATUS_INVALID);
+    assert_int_equal(photograph_contrast(&im, "board.exr", CONFIGURATION_MAX_CELLS + 1, rgb, rgb_se, &err),
+                     STATUS_INVALID);
+    image_release(&im);
     assert_non_null(strstr(err.text, "board.exr"));
 }
 
@@ -136,7 +140,7 @@ static void test_warning_of_a_black_channel(void **state)
             assert_int_equal(image_write_exr(&im, path, NULL), STATUS_OK);
             image_release(&im);
             observation_set_init(&o);
-            if (observation_set_load(&doc, folder, &(struct warning_sink){count_warning, &n_warning}, &o, &err) !=
+            if (observation_set_load(&doc, folder, NULL, &(struct warning_sink){count_warning, &n_warning}, &o, &err) !=
                 STATUS_OK)
                 fail_msg("%s", err.text);
             assert_int_equal(n_warning, black && used);

@@ -142,7 +142,7 @@ static void test_jpeg(void **state)
         assert_true(fabs((double)im.pixel[c] - srgb(rgb[c] / 255.0)) <
                     0.02); /* one of 255 steps, from the color space */
     image_release(&im);
-    check_refused(path, &no_transfer, "8-bit JPEG");
+    check_refused(path, &no_transfer, "JPEG of 8 bits");
     camera_write_jpeg(path, EDGE, EDGE, rgb, 0.02);
     read_ok(path, &p, &im, &r);
     assert_true(fabs(r.info.exposure_s - 0.02) < 1e-9 && r.info.iso == 200.0 && r.info.aperture == 8.0);

@@ -1,0 +1,39 @@
+#include "clients/cli/tools/cli_tool.h"
+
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char program[] = "selvedge-camera";
+static const char *const command[] = {"photo", "calibrate-camera"};
+
+bool cli_tool_knows(const char *word)
+{
+    for (size_t i = 0; i < sizeof command / sizeof *command; i++)
+        if (strcmp(command[i], word) == 0) return true;
+    return false;
+}
+
+const char *cli_tool_help(void)
+{
+    return "  photo FILE...      show what becomes of a photograph (needs no daemon)\n"
+           "  calibrate-camera   make the record of a camera's noise from dark and flat frames (needs no daemon)\n";
+}
+
+status cli_tool_run(char **argv, struct error *err)
+{
+    char own[PATH_MAX], path[PATH_MAX + sizeof program];
+    ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
+    if (n > 0) {
+        own[n] = '\0';
+        char *slash = strrchr(own, '/');
+        if (slash != NULL) slash[1] = '\0';
+        snprintf(path, sizeof path, "%s%s", own, program);
+        execv(path, argv);
+    }
+    execvp(program, argv);
+    return error_set(err, STATUS_NOT_FOUND,
+                     "cannot run `selvedge %s`: the program '%s' is neither beside this one nor in PATH", argv[1],
+                     program);
+}

@@ -1,0 +1,19 @@
+/* Commands of `selvedge` that need no daemon and read pictures: another program of the product runs them, because the
+ * client itself knows HTTP only. */
+#ifndef SELVEDGE_CLIENTS_CLI_TOOL_H
+#define SELVEDGE_CLIENTS_CLI_TOOL_H
+
+#include "base/status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Whether word is such a command ("photo"). */
+bool cli_tool_knows(const char *word);
+/* Replaces this process by the program that runs the command argv[1]: the one beside this program, or else in PATH.
+ * Returns only on failure: STATUS_NOT_FOUND. */
+status cli_tool_run(char **argv, struct error *err);
+/* One line for each command, for the help text. */
+const char *cli_tool_help(void);
+
+#endif

@@ -1,0 +1,26 @@
+/* The commands of the program selvedge-camera, which `selvedge photo` and `selvedge calibrate-camera` run. A command
+ * writes to stdout and stderr and returns the exit code: 0 done, 1 failed, 2 wrong arguments. */
+#ifndef SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
+#define SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
+
+#include "base/status.h"
+
+int camera_command_photo(int argc, char **argv);
+int camera_command_calibrate(int argc, char **argv);
+
+/* An option of a command: --name followed by words up to the next option. */
+struct camera_option {
+    const char *name; /* "" takes the words before the first option */
+    size_t least, most;
+    const char *const *word; /* filled in: points into argv */
+    size_t n;
+};
+
+/* STATUS_INVALID with a text for the user. */
+status camera_options_parse(int argc, char **argv, struct camera_option *option, size_t n_option, struct error *err);
+/* A positive number; NaN for an option that is not given. */
+status camera_option_number(const struct camera_option *o, double *out, struct error *err);
+/* undeclared, linear or srgb. */
+status camera_option_transfer(const struct camera_option *o, unsigned *transfer, struct error *err);
+
+#endif

@@ -1,0 +1,215 @@
+#include "base/files/durable.h"
+#include "optimizer/camera/camera_commands.h"
+#include "optimizer/fit/photographs/camera/photograph_develop.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FILES, CROP, TRANSFER, EXPOSURE, ISO, APERTURE, BLACK, OUT, JOB, N_OPTION };
+
+static void print_stated(const char *name, double value, const char *unit)
+{
+    if (isnan(value))
+        printf("  %-14s not stated\n", name);
+    else
+        printf("  %-14s %.6g%s\n", name, value, unit);
+}
+
+static void print_mean(const char *name, const struct photograph_mean *m)
+{
+    const struct photograph_record *r = &m->record;
+    printf("%s\n  %-14s %s, %u bit%s%s%s\n", name, "read as", r->info.format, r->info.bits,
+           r->info.encoded ? ", curve as declared" : ", linear", r->info.camera[0] != '\0' ? ", " : "", r->info.camera);
+    printf("  %-14s %zu x %zu pixels\n", "size", r->width, r->height);
+    print_stated("black level", r->info.black_level, " subtracted");
+    print_stated("exposure", r->info.exposure_s, " s");
+    print_stated("ISO", r->info.iso, "");
+    print_stated("f-number", r->info.aperture, "");
+    printf("  %-14s %.6g (pixel values are divided by it)%s\n", "exposure value", r->exposure,
+           r->n_exposure > 1 ? ", merged" : "");
+    printf("  %-14s %.6g %.6g %.6g\n", "mean rgb", m->mean_rgb[0], m->mean_rgb[1], m->mean_rgb[2]);
+    printf("  %-14s %.2g %.2g %.2g\n", "standard error", m->se_rgb[0], m->se_rgb[1], m->se_rgb[2]);
+    if (r->merged && !isnan(r->noise_se_rgb[0]))
+        printf("  %-14s %.2g %.2g %.2g\n", "camera's noise", r->noise_se_rgb[0], r->noise_se_rgb[1],
+               r->noise_se_rgb[2]);
+    printf("  %-14s %.2f %%\n", "saturated", 100.0 * r->saturated_share);
+    printf("  %-14s means of parts scatter by %.1f %%\n", "uniformity", 100.0 * m->block_contrast);
+    if (r->info.less_trustworthy) printf("  %-14s 8 bits, or a camera's own processing: less trustworthy\n", "warning");
+    if (m->warning[0] != '\0') printf("  %-14s %s\n", "warning", m->warning);
+}
+
+/* Draws the outline of the crop in red, two pixels wide or more in large pictures. */
+static void draw_crop(struct image *im, const size_t crop[4], float bright)
+{
+    size_t wide = 1 + im->width / 400;
+    for (size_t y = 0; y < im->height; y++)
+        for (size_t x = 0; x < im->width; x++) {
+            bool in = x >= crop[0] && x < crop[2] && y >= crop[1] && y < crop[3];
+            bool inner = x >= crop[0] + wide && x + wide < crop[2] && y >= crop[1] + wide && y + wide < crop[3];
+            float *p = im->pixel + 3 * (y * im->width + x);
+            if (in && !inner) p[0] = bright, p[1] = p[2] = 0.0f;
+        }
+}
+
+static int compare_float(const void *a, const void *b)
+{
+    float x, y;
+    memcpy(&x, a, sizeof x);
+    memcpy(&y, b, sizeof y);
+    return x < y ? -1 : x > y;
+}
+
+static status write_picture(const char *path, const struct job_photograph *p, const char *out, struct error *err)
+{
+    enum { N = 4096 };
+    struct job_photograph whole = *p;
+    struct image im;
+    float value[N];
+    memset(whole.crop_px, 0, sizeof whole.crop_px);
+    status s = photograph_read(path, &whole, &im, NULL, err);
+    if (s != STATUS_OK) return s;
+    size_t n = im.width * im.height * 3, crop[4] = {0, 0, im.width, im.height};
+    for (size_t i = 0; i < N; i++) value[i] = im.pixel[(size_t)((double)i / N * (double)n)];
+    qsort(value, N, sizeof *value, compare_float);
+    float bright = fmaxf(value[N * 99 / 100], 1e-30f);
+    draw_crop(&im, p->crop_px[2] > 0 ? p->crop_px : crop, bright);
+    s = image_write_png(&im, 1.0 / (double)bright, out, err);
+    image_release(&im);
+    return s;
+}
+
+static status read_number(const char *word, double lower, double *out, struct error *err)
+{
+    char *end;
+    *out = strtod(word, &end);
+    if (end != word && *end == '\0' && isfinite(*out) && *out >= lower && *out < 1e9) return STATUS_OK;
+    return error_set(err, STATUS_INVALID, "'%s' is no number that is allowed here", word);
+}
+
+static status photograph_of_options(const struct camera_option *o, struct job_photograph *p, struct error *err)
+{
+    unsigned transfer = 0;
+    status s = camera_option_transfer(&o[TRANSFER], &transfer, err);
+    *p = photograph_plain((enum job_transfer)transfer);
+    if (s == STATUS_OK) s = camera_option_number(&o[EXPOSURE], &p->exposure_s, err);
+    if (s == STATUS_OK) s = camera_option_number(&o[ISO], &p->iso, err);
+    if (s == STATUS_OK) s = camera_option_number(&o[APERTURE], &p->aperture, err);
+    if (s == STATUS_OK && o[BLACK].n > 0) s = read_number(o[BLACK].word[0], -1e9, &p->black_level, err);
+    for (size_t i = 0; i < 4 && s == STATUS_OK && o[CROP].n > 0; i++) {
+        double at = 0.0;
+        s = read_number(o[CROP].word[i], 0.0, &at, err);
+        p->crop_px[i] = (size_t)at;
+    }
+    if (s == STATUS_OK && o[CROP].n > 0 && (p->crop_px[2] <= p->crop_px[0] || p->crop_px[3] <= p->crop_px[1]))
+        s = error_set(err, STATUS_INVALID, "--crop-px is empty: the order is x0 y0 x1 y1");
+    if (s == STATUS_OK && o[OUT].n > 0 && o[FILES].n != 1)
+        s = error_set(err, STATUS_INVALID, "--out goes with one photograph");
+    if (s == STATUS_OK && (o[FILES].n > 0) == (o[JOB].n > 0))
+        s = error_set(err, STATUS_INVALID, "give photographs, or --job with a job document");
+    return s;
+}
+
+static int preview_files(const struct camera_option *o, const struct job_photograph *p)
+{
+    int exit_code = 0;
+    for (size_t i = 0; i < o[FILES].n; i++) {
+        struct photograph_mean mean = {0};
+        struct error err = {0};
+        status s = photograph_measure(o[FILES].word[i], p, &mean, &err);
+        if (mean.record.info.format != NULL) print_mean(path_file_name(o[FILES].word[i]), &mean);
+        if (s == STATUS_OK && o[OUT].n > 0) s = write_picture(o[FILES].word[i], p, o[OUT].word[0], &err);
+        if (s == STATUS_OK) continue;
+        fprintf(stderr, "error: %s\n", err.text);
+        exit_code = 1;
+    }
+    return exit_code;
+}
+
+static status read_document(const char *path, char *folder, size_t n_folder, struct job_document **doc,
+                            struct error *err)
+{
+    char *text = NULL;
+    size_t n = 0;
+    const char *name = path_file_name(path);
+    snprintf(folder, n_folder, "%.*s", (int)(name - path), path);
+    if (folder[0] == '\0') snprintf(folder, n_folder, ".");
+    status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
+    if (s == STATUS_OK) s = job_document_parse(text, n, doc, err);
+    free(text);
+    return s;
+}
+
+static void print_color(const struct photograph_process *k)
+{
+    if (!k->has_color) return;
+    printf("colors\n");
+    for (size_t i = 0; i < 3; i++)
+        printf("  %-14s %10.4g %10.4g %10.4g\n", i == 0 ? "matrix" : "", k->matrix[3 * i], k->matrix[3 * i + 1],
+               k->matrix[3 * i + 2]);
+    if (k->chart_picture.pixel == NULL) return;
+    double before = 0.0, after = 0.0;
+    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
+        before += k->chart.delta_e_before[i] / COLOR_CHART_PATCHES;
+        after += k->chart.delta_e_after[i] / COLOR_CHART_PATCHES;
+    }
+    printf("  %-14s %s; CIEDE2000 %.2f before, %.2f after the matrix\n", "chart",
+           k->chart.found_automatically ? "found" : "at the corners given", before, after);
+}
+
+static int preview_job(const char *path)
+{
+    char folder[4096];
+    struct job_document *doc = NULL;
+    struct photograph_process process;
+    struct error err = {0};
+    int exit_code = 0;
+    photograph_process_init(&process);
+    status s = read_document(path, folder, sizeof folder, &doc, &err);
+    if (s == STATUS_OK) s = photograph_process_load(&process, doc, folder, &err);
+    if (s == STATUS_OK) print_color(&process);
+    if (s != STATUS_OK) {
+        fprintf(stderr, "error: %s\n", err.text);
+        exit_code = 1;
+    }
+    for (size_t i = 0; s == STATUS_OK && i < doc->n_photograph; i++) {
+        const struct job_photograph *p = &doc->photograph[i];
+        struct photograph_mean mean = {0};
+        struct image im;
+        status one = photograph_develop(&process, folder, p, &im, &mean.record, &err);
+        if (one == STATUS_OK) {
+            one = photograph_measure_image(&im, p->file, p->transfer, &mean, &err);
+            image_release(&im);
+        }
+        if (mean.record.info.format != NULL) print_mean(p->file, &mean);
+        if (one != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
+        exit_code = one == STATUS_OK ? exit_code : 1;
+    }
+    photograph_process_release(&process);
+    job_document_free(doc);
+    return exit_code;
+}
+
+int camera_command_photo(int argc, char **argv)
+{
+    struct camera_option o[N_OPTION] = {[FILES] = {"", 0, 10000, NULL, 0},
+                                        [CROP] = {"crop-px", 0, 4, NULL, 0},
+                                        [TRANSFER] = {"transfer", 0, 1, NULL, 0},
+                                        [EXPOSURE] = {"exposure-s", 0, 1, NULL, 0},
+                                        [ISO] = {"iso", 0, 1, NULL, 0},
+                                        [APERTURE] = {"aperture", 0, 1, NULL, 0},
+                                        [BLACK] = {"black-level", 0, 1, NULL, 0},
+                                        [OUT] = {"out", 0, 1, NULL, 0},
+                                        [JOB] = {"job", 0, 1, NULL, 0}};
+    struct error err = {0};
+    struct job_photograph p;
+    status s = camera_options_parse(argc, argv, o, N_OPTION, &err);
+    if (s == STATUS_OK && o[CROP].n % 4 != 0) s = error_set(&err, STATUS_INVALID, "--crop-px takes four numbers");
+    if (s == STATUS_OK) s = photograph_of_options(o, &p, &err);
+    if (s != STATUS_OK) {
+        fprintf(stderr, "error: %s; `selvedge photo --help` lists the options\n", err.text);
+        return 2;
+    }
+    return o[JOB].n > 0 ? preview_job(o[JOB].word[0]) : preview_files(o, &p);
+}

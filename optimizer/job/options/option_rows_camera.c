@@ -1,0 +1,87 @@
+/* Rows of the option table: from the colors of a camera to radiances. */
+#include "optimizer/job/options/option_rows.h"
+
+const char *const job_transfer_names[] = {
+    [JOB_TRANSFER_UNDECLARED] = "undeclared", [JOB_TRANSFER_LINEAR] = "linear", [JOB_TRANSFER_SRGB] = "srgb", NULL};
+
+#define INTO_CHART(member) INTO(chart.member)
+#define INTO_WHITE(member) INTO(white.member)
+
+const struct job_option option_rows_camera[] = {
+    {.path = "color",
+     .kind = OPTION_SECTION,
+     INTO(has_color),
+     .check = job_check_color,
+     .left_out = "pixel values times `scale` are radiances",
+     .meaning = "From the colors of the camera to radiances: a photograph of a ColorChecker, or of a white reference, "
+                "taken with the camera and the lamp of the job. `scale` of a photograph then stays 1."},
+    {.path = "color.chart",
+     .kind = OPTION_SECTION,
+     INTO(has_chart),
+     .left_out = "this or `white`",
+     .meaning =
+         "A ColorChecker Classic of 24 patches that lies flat in the place of the cloth. A 3 x 3 matrix is fitted "
+         "to it that matches the white patch exactly."},
+    {.path = "color.chart.file",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_COLOR_CHART,
+     INTO(chart.file),
+     .required = true,
+     .allowed = "as `photographs[].file`",
+     .meaning = "The picture. Upload it with the role `chart`."},
+    PICTURE("color.chart", INTO_CHART, job_transfer_names),
+    {.path = "color.chart.light_theta_deg",
+     .kind = OPTION_NUMBER,
+     INTO(chart.light_theta_deg),
+     RANGE(0, 89),
+     .unit = "degrees",
+     .standard = "0",
+     .meaning = "Angle of the lamp from the normal of the chart. 0 also for a chart that faces the lamp."},
+    {.path = "color.chart.corners_px",
+     .kind = OPTION_NUMBERS,
+     NUMBERS_INTO(chart_corner_px),
+     RANGE(-1e6, 1e6),
+     .unit = "pixels",
+     .left_out = "found in the picture",
+     .allowed = "x, y of four points",
+     .meaning = "Outer corners of the corner patches, in this order: dark skin, bluish green, black, white (the first "
+                "patch, then around the chart along its rows)."},
+    {.path = "color.white",
+     .kind = OPTION_SECTION,
+     INTO(has_white),
+     .left_out = "this or `chart`",
+     .meaning = "A white reference that lies in the place of the cloth. Each channel gets the factor that makes it as "
+                "bright as it is."},
+    {.path = "color.white.file",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_COLOR_WHITE,
+     INTO(white.file),
+     .required = true,
+     .allowed = "as `photographs[].file`",
+     .meaning = "The picture. Upload it with the role `white_reference`."},
+    PICTURE("color.white", INTO_WHITE, job_transfer_names),
+    {.path = "color.white.crop_px",
+     .kind = OPTION_COUNTS,
+     NUMBERS_INTO(white.crop_px),
+     RANGE(0, 1 << 20),
+     .check = job_check_crop_px,
+     .unit = "pixels",
+     .left_out = "whole picture",
+     .allowed = "x0, y0, x1, y1",
+     .meaning = "The part of the picture that shows the reference."},
+    {.path = "color.white.light_theta_deg",
+     .kind = OPTION_NUMBER,
+     INTO(white.light_theta_deg),
+     RANGE(0, 89),
+     .unit = "degrees",
+     .standard = "0",
+     .meaning = "Angle of the lamp from the normal of the reference. 0 also for a reference that faces the lamp."},
+    {.path = "color.white.reflectance",
+     .kind = OPTION_NUMBER_OR_LIST,
+     NUMBERS_INTO(white_reflectance),
+     RANGE(0.01, 2),
+     .standard = "0.99",
+     .allowed = "one number, or red, green, blue; 0.01..2",
+     .meaning = "Reflectance of the reference for the angles of the photograph: 0.99 for sintered PTFE."},
+    {.path = NULL},
+};
