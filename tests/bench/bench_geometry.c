@@ -6,6 +6,9 @@
  *       fragments_per_fiber, merges              counts per fiber
  *       centerline_rms_voxel, direction_mean_deg, direction_p95_deg
  *       radius_bias                              |found / true - 1|
+ *       direction_volume_mean_deg, direction_volume_p95_deg, direction_volume_rim_mean_deg
+ *           errors of direction.vol inside of the true fibers and around them (geometry/grade/compare_directions.h),
+ *           here and below
  *       contrast, valley_depth, safe_share       the grade of the scan (geometry/grade/scan_grade.h), here and below
  *   geometry.<weave>.<condition>.<figure>: one of the conditions of the table below
  *       precision, recall, fragments, merges, axis_rms_voxel, direction_mean_deg, direction_p95_deg, radius_bias
@@ -126,6 +129,9 @@ static void print_figures(const char *name, const struct condition *k, const str
     print(name, "merges", c->merges_per_fiber, "1", "lower");
     print(name, "direction_mean_deg", c->direction_mean_deg, "deg", "lower");
     print(name, "direction_p95_deg", c->direction_p95_deg, "deg", "lower");
+    print(name, "direction_volume_mean_deg", r->transferred.inside.mean_deg, "deg", "lower");
+    print(name, "direction_volume_p95_deg", r->transferred.inside.p95_deg, "deg", "lower");
+    print(name, "direction_volume_rim_mean_deg", r->transferred.rim.mean_deg, "deg", "lower");
     print(name, "radius_bias", 0.01 * fabs(c->radius_bias_percent), "1", "lower");
     print(name, "contrast", r->grade.contrast, "1", "higher");
     print(name, "valley_depth", r->grade.valley_depth, "1", "higher");
@@ -133,6 +139,17 @@ static void print_figures(const char *name, const struct condition *k, const str
     if (k->plain) return;
     print(name, "radius_rms", 0.01 * c->radius_rms_percent, "1", "lower");
     print(name, "cpu_us_per_material_voxel", 1e6 * r->cpu_s / (double)r->report.n_material_voxel, "us", "lower");
+}
+
+/* What the transfer of directions changes. */
+static void print_directions(const char *name, const struct phantom_reconstruction *r)
+{
+    const struct direction_compare *a = &r->filtered, *b = &r->transferred;
+    fprintf(stderr,
+            "%s: directions of voxels by the filter and after the transfer: mean %.2f, %.2f, 95 %% %.1f, %.1f inside, "
+            "mean %.2f, %.2f, 95 %% %.1f, %.1f degrees in the rim; %.2f %% of the voxels inside are kept\n",
+            name, a->inside.mean_deg, b->inside.mean_deg, a->inside.p95_deg, b->inside.p95_deg, a->rim.mean_deg,
+            b->rim.mean_deg, a->rim.p95_deg, b->rim.p95_deg, 100.0 * b->kept_share);
 }
 
 static status bench_phantom(const struct selection *s, const char *name, enum phantom_weave w,
@@ -160,6 +177,7 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
                 "radius %+.1f %%\n",
                 name, r.v.n[0], r.v.n[1], r.v.n[2], c->n_true, c->n_true_piece, c->n_found, r.wall_s,
                 r.report.fiber_diameter_voxel, c->radius_bias_percent);
+        print_directions(name, &r);
         print_figures(name, k, &r);
     }
     phantom_reconstruction_release(&r);

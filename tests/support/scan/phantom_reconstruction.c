@@ -20,6 +20,24 @@ void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weav
     if (weave == PHANTOM_PLAIN || weave == PHANTOM_VELVET) o->n_yarn[0] = o->n_yarn[1] = 4;
 }
 
+static double processor_s(void)
+{
+    struct rusage u;
+    getrusage(RUSAGE_SELF, &u);
+    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+}
+
+/* Compares the directions with the truth, outside of the measured time. */
+static status compare(struct phantom_reconstruction *r, const struct direction_volume *d, struct thread_pool *pool,
+                      struct direction_compare *result, struct error *err)
+{
+    double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
+    status s = compare_directions(&r->truth, d, pool, result, err);
+    r->wall_s -= clock_monotonic_s() - start_s;
+    r->cpu_s -= processor_s() - start_cpu_s;
+    return s;
+}
+
 static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *pool, struct error *err)
 {
     struct direction_volume d = {0};
@@ -30,8 +48,10 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     if (s == STATUS_OK && r->option.hollow_fibers)
         s = lumens_fill(&r->v, r->report.noise_sd, &r->report.lumen_share, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &r->option, pool, NULL, &d, &r->report, err);
+    if (s == STATUS_OK) s = compare(r, &d, pool, &r->filtered, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &r->option, pool, NULL, &r->found, &r->report, err);
     if (s == STATUS_OK) s = reconstruct_transfer(&r->found, &d, pool, NULL, &r->report, err);
+    if (s == STATUS_OK) s = compare(r, &d, pool, &r->transferred, err);
     direction_volume_release(&d);
     return s;
 }
@@ -83,13 +103,6 @@ static status make_cubes(struct phantom_reconstruction *r, struct thread_pool *p
     return STATUS_OK;
 }
 
-static double processor_s(void)
-{
-    struct rusage u;
-    getrusage(RUSAGE_SELF, &u);
-    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
 status phantom_reconstruct_scan(const struct phantom_option *o, const struct phantom_scan_option *option,
                                 struct phantom_reconstruction *r, struct error *err)
 {
@@ -99,6 +112,7 @@ status phantom_reconstruct_scan(const struct phantom_option *o, const struct pha
     fiber_set_init(&r->truth);
     fiber_set_init(&r->found);
     r->v = (struct volume){0};
+    r->wall_s = r->cpu_s = 0.0;
     scan.voxel_size_m = o->voxel_size_m;
     scan.section = o->section;
     status s = thread_pool_new(0, &pool, err);
@@ -110,8 +124,8 @@ status phantom_reconstruct_scan(const struct phantom_option *o, const struct pha
     double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
     if (s == STATUS_OK && r->slice_voxel > 0.0) s = make_cubes(r, pool, err);
     if (s == STATUS_OK) s = reconstruct(r, pool, err);
-    r->wall_s = clock_monotonic_s() - start_s;
-    r->cpu_s = processor_s() - start_cpu_s;
+    r->wall_s += clock_monotonic_s() - start_s;
+    r->cpu_s += processor_s() - start_cpu_s;
     const struct compare_option c = {.voxel_size_m = o->voxel_size_m};
     if (s == STATUS_OK) s = compare_fibers(&r->truth, &r->found, &c, &r->compare, err);
     if (s == STATUS_OK) s = scan_grade_measure(&r->v, &r->found, pool, NULL, &r->grade, NULL, err);

@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_TESTS_PHANTOM_RECONSTRUCTION_H
 #define SELVEDGE_TESTS_PHANTOM_RECONSTRUCTION_H
 
+#include "geometry/grade/compare_directions.h"
 #include "geometry/grade/scan_grade.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/phantom/phantom.h"
@@ -11,11 +12,12 @@ struct phantom_reconstruction {
     struct volume v; /* the scan with densities mapped to [0, 1] */
     struct fiber_set truth, found;
     struct compare_report compare;
+    struct direction_compare filtered, transferred; /* the direction volume before and after the transfer */
     struct scan_grade grade;
     struct reconstruct_option option;
     double slice_voxel; /* spacing of the scan's slices in voxels, as thick as that: 0 (1), or a multiple of 0.5 */
     struct reconstruct_report report;
-    double wall_s, cpu_s; /* of the reconstruction */
+    double wall_s, cpu_s; /* of the reconstruction, without the comparisons */
 };
 
 /* Options for a cloth whose fibers are diameter_voxel voxels of 2 um thick: the default phantom of the weave with all
