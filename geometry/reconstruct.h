@@ -13,6 +13,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/grade/scan_grade.h"
+#include "geometry/grade/scan_trial.h"
 #include "geometry/orientation/alignment.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
@@ -77,6 +78,7 @@ struct reconstruct_report {
     double radius_se_m[3]; /* standard error; NaN where the radius was given */
     /* Radius of the profile that was fitted to the axes: a second measurement, by the edges instead of the mass. */
     double profile_radius_m;
+    double profile_blur_m;     /* standard deviation of the blur that the profile has: of the scan and of its voxels */
     double radius_spread;      /* standard deviation of the radii of single fibers over their mean, without errors */
     double single_radius_se_m; /* typical standard error of the radius of one fiber */
     /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
@@ -84,6 +86,7 @@ struct reconstruct_report {
     bool radius_per_axis;          /* each class has a radius of its own */
     double dice;                   /* overlap of fibers of radius r with kept voxels */
     struct scan_grade grade;       /* how clearly the scan shows the fibers; set by the caller of reconstruct_fibers */
+    struct scan_trial trial;       /* with reconstruct_trial; else not made */
     double direction_noise_deg[2]; /* before and after the transfer (direction_noise.h) */
     double direction_change_mean_deg; /* between filtered and transferred directions */
 };
@@ -108,6 +111,14 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
 status reconstruct_fibers(const struct volume *v, const struct direction_volume *d, struct reconstruct_option *o,
                           struct thread_pool *pool, const struct progress *progress, struct fiber_set *f,
                           struct reconstruct_report *report, struct error *err);
+
+/* Optional part of the step "fibers": scans a phantom of the fibers f with the noise (its strength and its correlation)
+ * and the blur of the scan v, reconstructs it, and writes into report->trial how well f is found again. At most 2^24
+ * voxels from the middle of the scan are tried. report: as filled by reconstruct_fibers. The fibers of the phantom are
+ * solid discs. What cannot be reconstructed is no error: the trial then is not made. */
+status reconstruct_trial(const struct volume *v, const struct fiber_set *f, const struct reconstruct_option *option,
+                         struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
+                         struct error *err);
 
 /* Step "directions": voxels within 2r of a polyline get its tangent as direction (thesis 5.6.7). */
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,

@@ -173,6 +173,7 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool l
         job->report->axis_position_se_m = profile.position_se * voxel_m;
         job->report->axis_direction_se_rad = profile.direction_se_rad;
         job->report->profile_radius_m = profile.radius * voxel_m;
+        job->report->profile_blur_m = profile.blur * voxel_m;
         job->report->radius_spread = profile.radius_spread;
         job->report->single_radius_se_m = profile.radius_se * profile.radius * voxel_m;
         polyline_set_release(lines);
@@ -233,8 +234,7 @@ static status trace_lines(struct fiber_job *job, struct polyline_set *lines, str
     if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
     if (s == STATUS_OK)
-        s = repair_lines(job, lines, true, &part[1], &counts,
-                         err); /* lines on the fibers' axes are easier to distinguish and to join */
+        s = repair_lines(job, lines, true, &part[1], &counts, err); /* lines on axes are easier to join */
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
     job->report->n_gap_bridged = counts.n_gap_bridged;
     job->report->n_joined = counts.n_joined;

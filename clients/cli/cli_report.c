@@ -215,6 +215,15 @@ static void print_geometry(const json_t *g, FILE *out)
     if (json_is_object(grade))
         fprintf(out, "single fibers in the scan: %s, %.0f %% of their length is sure\n", member_text(grade, "verdict"),
                 100.0 * member_number(grade, "safe_share"));
+    const json_t *trial = json_object_get(g, "trial");
+    if (json_is_object(trial))
+        fprintf(
+            out,
+            "what this scan can give: %.1f %% of the length, axes to %.2f voxels, %.2f pieces a fiber, %.3f merges, "
+            "radii to %.1f %%\n",
+            100.0 * member_number(trial, "recall"), member_number(trial, "axis_rms_voxel"),
+            member_number(trial, "fragments"), member_number(trial, "merges"),
+            100.0 * member_number(trial, "radius_rms"));
 }
 
 static void report_verdict(const json_t *verdict, FILE *out)

@@ -17,6 +17,9 @@ export function qualityRows(g) {
     ["fiber diameter", `${number(g.fiber_diameter_voxel)} voxels`, "fibers are distinguished from 4 on"],
     ["direction noise", pair(g.direction_noise_deg, (x) => `${number(x)}°`), "between neighbouring voxels, before / after fiber directions replaced those of voxels"],
     ["density step at the seams", pair(g.seam_density?.ratio, (x) => number(x)), "across x / y; 1 is no seam"]);
+  const t = g.trial;
+  if (t) rows.push(["what this scan can give", `${percent(t.recall, 1)} of the length, axes to ${number(t.axis_rms_voxel, 2)} voxels, ${number(t.fragments)} pieces a fiber, ${number(t.merges, 2)} merges, radii to ${percent(t.radius_rms, 1)}`,
+    "of a phantom of these fibers with the noise and blur of this scan"]);
   rows.push(["fiber ends that continue", pair(g.seam_fibers?.continued, (x) => percent(x, 0)), "across the seams in x / y"]);
   const a = g.alignment;
   if (a) rows.push(["alignment", a.applied ? `turned ${number(a.rotation_deg)}°, sheared ${number(a.shear_deg)}°, tilted ${number(a.tilt_deg)}°` : "not needed or not possible",

@@ -139,6 +139,12 @@ static void print_cloth(const struct pipeline_context *c, FILE *out)
                 "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those "
                 "inside\n",
                 c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
+    if (c->geometry.trial.made)
+        fprintf(out,
+                "         such a scan can give %.1f %% of the length, axes to %.2f voxels, %.2f pieces a fiber, %.3f "
+                "merges, radii to %.1f %%\n",
+                100.0 * c->geometry.trial.recall, c->geometry.trial.axis_rms_voxel, c->geometry.trial.fragments,
+                c->geometry.trial.merges, 100.0 * c->geometry.trial.radius_rms);
     fprintf(out, "         quality.html shows how good the geometry is\n\n");
 }
 

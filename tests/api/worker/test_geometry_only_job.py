@@ -30,11 +30,14 @@ def start(d, document, files):
 
 
 def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
-    first = start(real, {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}}, [("scan.tif", "volume", (scan / "scan.tif").read_bytes())])
+    first = start(real, {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0, "trial": True}}, [("scan.tif", "volume", (scan / "scan.tif").read_bytes())])
     state = real.wait_state(first, "succeeded", timeout_s=120)
     made = state["result"]
     assert made["parameters"] == made["rows"] == made["models"] == [] and made["model"] is None
     assert made["geometry"]["n_fiber"] > 20 and made["geometry"]["grade"]["verdict"] == "resolved" and made["geometry"]["from_job"] is None
+    trial = made["geometry"]["trial"]
+    assert trial["recall"] > 0.9 and trial["axis_rms_voxel"] < 0.5 and trial["n_true"] == made["geometry"]["n_fiber"]
+    assert 3 < trial["signal_to_noise"] < 8 and trial["noise_sd_voxel"] < 0.4 and 0.4 < trial["blur_sd_voxel"] < 1.0
     done = {s["name"]: s["wall_s"] for s in made["stages"]}
     assert done["directions"] is not None and done["scene"] is None and done["fit"] is None
     listed = {f["path"] for f in real.get(f"/v1/jobs/{first}/results").json()["files"]}
@@ -43,7 +46,7 @@ def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
     second = start(real, {"geometry": {"job": first}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
     fitted = real.wait_state(second, "succeeded", timeout_s=120)["result"]
     assert fitted["geometry"]["from_job"] == first and len(fitted["parameters"]) > 3
-    for key in ("n_fiber", "total_length_mm", "radius_um", "dice", "grade", "options"):
+    for key in ("n_fiber", "total_length_mm", "radius_um", "dice", "grade", "trial", "options"):
         assert fitted["geometry"][key] == made["geometry"][key]
     wall_s = {s["name"]: s["wall_s"] for s in fitted["stages"]}
     assert all(wall_s[stage] is None for stage in ("volume", "orientation", "fibers", "directions")) and wall_s["fit"] is not None

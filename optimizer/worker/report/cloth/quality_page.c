@@ -106,6 +106,26 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     close_table(out);
 }
 
+/* What such a scan can give. */
+static void print_trial(const struct scan_trial *t, FILE *out)
+{
+    if (!t->made) return;
+    open_table(out, "What this scan can give");
+    row(out, "length found again", "of a phantom of these fibers with the noise and blur of the scan", "%.1f %%",
+        100.0 * t->recall);
+    row(out, "axes", "root mean square distance from the true ones", "%.2f voxels", t->axis_rms_voxel);
+    row(out, "pieces of a fiber", "1: no fiber is broken", "%.2f", t->fragments);
+    row(out, "merges", "joins of different fibers, per fiber", "%.3f", t->merges);
+    row(out, "radius of a fiber", "mean error, and root mean square", "%+.1f %%, %.1f %%", 100.0 * t->radius_bias,
+        100.0 * t->radius_rms);
+    row(out, "directions of voxels", "mean error, and what 95 % stay below", "%.1f&deg;, %.1f&deg;",
+        t->voxel_direction_mean_deg, t->voxel_direction_p95_deg);
+    row(out, "noise of the phantom", "signal-to-noise, and the blur that correlates it", "%.1f, %.2f voxels", t->snr,
+        t->noise_sd_voxel);
+    row(out, "blur of the phantom", "standard deviation", "%.2f voxels", t->blur_sd_voxel);
+    close_table(out);
+}
+
 /* Writes a cell with a figure, or with a dash when there is none. */
 static void figure(FILE *out, double v)
 {
@@ -224,6 +244,7 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
     }
     print_fibers(c, l, out);
     if (c->doc->has_volume) print_scan(c, out);
+    print_trial(&c->geometry.trial, out);
     print_seam(c, out);
     print_pictures(c, out);
     if (c->doc->has_volume) print_chosen(c, out);

@@ -97,6 +97,34 @@ static json_t *grade_json(const struct scan_grade *g)
                      json_count(g->n_dropped));
 }
 
+/* What such a scan can give; null unless a trial was asked for and could be made. */
+static json_t *trial_json(const struct scan_trial *t)
+{
+    if (!t->made) return json_null();
+    json_t *json = json_pack("{s:o, s:o, s:o}", "n_voxel", json_count_list(t->n_voxel, 3), "n_true",
+                             json_count(t->n_true), "n_found", json_count(t->n_found));
+    const struct {
+        const char *key;
+        double value;
+    } figure[] = {{"signal_to_noise", t->snr > 0.0 ? t->snr : NAN},
+                  {"noise_sd_voxel", t->noise_sd_voxel},
+                  {"blur_sd_voxel", t->blur_sd_voxel},
+                  {"recall", t->recall},
+                  {"precision", t->precision},
+                  {"fragments", t->fragments},
+                  {"merges", t->merges},
+                  {"axis_rms_voxel", t->axis_rms_voxel},
+                  {"direction_mean_deg", t->direction_mean_deg},
+                  {"direction_p95_deg", t->direction_p95_deg},
+                  {"radius_bias", t->radius_bias},
+                  {"radius_rms", t->radius_rms},
+                  {"voxel_direction_mean_deg", t->voxel_direction_mean_deg},
+                  {"voxel_direction_p95_deg", t->voxel_direction_p95_deg}};
+    for (size_t i = 0; i < sizeof figure / sizeof *figure; i++)
+        json_object_set_new(json, figure[i].key, json_number(figure[i].value));
+    return json;
+}
+
 static void set_radii(json_t *json, const struct reconstruct_report *g)
 {
     const double um = 1e6;
@@ -157,6 +185,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "radius_score", json_number_list(g->radius_score, 3, 1.0));
     json_object_set_new(json, "dice", json_number(g->dice));
     json_object_set_new(json, "grade", grade_json(&g->grade));
+    json_object_set_new(json, "trial", trial_json(&g->trial));
     json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));
     json_object_set_new(json, "direction_change_mean_deg", json_number(g->direction_change_mean_deg));
     json_object_set_new(json, "alignment", alignment_json(o, g));

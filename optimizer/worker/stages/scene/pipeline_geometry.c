@@ -294,18 +294,32 @@ static status grade_fibers(struct pipeline_context *c, struct error *err)
     return s;
 }
 
+/* Traces the fibers of the scan, grades them, and makes the trial if the job asks for it. */
+static status trace_fibers(struct pipeline_context *c, struct error *err)
+{
+    struct progress_part part;
+    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, c->doc->trial ? 0.5 : 1.0);
+    status s = pipeline_need_volume(c, err);
+    if (s == STATUS_OK)
+        s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &inner, &c->fiber, &c->geometry, err);
+    if (s == STATUS_OK) s = grade_fibers(c, err);
+    part = (struct progress_part){&c->progress, 0.5, 0.5};
+    if (s == STATUS_OK && c->doc->trial) {
+        struct reconstruct_option asked;
+        set_options(c->doc, &asked);
+        s = reconstruct_trial(&c->volume, &c->fiber, &asked, c->pool, &inner, &c->geometry, err);
+    }
+    volume_release(&c->volume);
+    memset(&c->volume, 0, sizeof c->volume);
+    return s;
+}
+
 status stage_fibers(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     status s;
     if (c->doc->has_volume) {
-        s = pipeline_need_volume(c, err);
-        if (s == STATUS_OK)
-            s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &c->progress, &c->fiber,
-                                   &c->geometry, err);
-        if (s == STATUS_OK) s = grade_fibers(c, err);
-        volume_release(&c->volume);
-        memset(&c->volume, 0, sizeof c->volume);
+        s = trace_fibers(c, err);
         if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
         if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
     } else {
