@@ -75,8 +75,11 @@ status direction_set_init(struct direction_set *s, size_t n, struct error *err)
     *s = (struct direction_set){0};
     if (n < 32 || n > UINT16_MAX) return error_set(err, STATUS_INVALID, "cannot make a set of %zu directions", n);
     s->node = calloc(n, sizeof *s->node);
-    if (s->node == NULL)
+    for (int a = 0; a < 3; a++) s->component[a] = malloc(n * sizeof *s->component[a]);
+    if (s->node == NULL || s->component[0] == NULL || s->component[1] == NULL || s->component[2] == NULL) {
+        direction_set_release(s);
         return error_set(err, STATUS_NO_MEMORY, "cannot make a set of %zu directions: out of memory", n);
+    }
     s->n = n;
     const double golden = M_PI * (3.0 - sqrt(5.0));
     for (size_t i = 0; i < n; i++) {
@@ -86,6 +89,7 @@ status direction_set_init(struct direction_set *s, size_t n, struct error *err)
         node->d[1] = (float)(r * sin(phi));
         node->d[2] = (float)z;
         tangent_frame(node->d, node->e1, node->e2);
+        for (int a = 0; a < 3; a++) s->component[a][i] = node->d[a];
     }
     for (size_t i = 0; i < n; i++) {
         find_neighbours(s, i);
@@ -98,20 +102,29 @@ void direction_set_release(struct direction_set *s)
 {
     if (s == NULL) return;
     free(s->node);
+    for (int a = 0; a < 3; a++) free(s->component[a]);
     *s = (struct direction_set){0};
+}
+
+/* |c| as an integer of the same order, because the largest of floats is not found in vector registers. */
+static int32_t order_of(float c)
+{
+    int32_t bits;
+    c = fabsf(c);
+    memcpy(&bits, &c, sizeof bits);
+    return bits;
 }
 
 size_t direction_set_nearest(const struct direction_set *s, const float d[3])
 {
-    size_t best = 0;
-    float most = -1.0f;
+    const float *x = s->component[0], *y = s->component[1], *z = s->component[2], a = d[0], b = d[1], c = d[2];
+    int32_t most = 0;
     for (size_t i = 0; i < s->n; i++) {
-        float c = fabsf(dot3(s->node[i].d, d));
-        if (c > most) {
-            most = c;
-            best = i;
-        }
+        int32_t order = order_of(x[i] * a + y[i] * b + z[i] * c);
+        most = order > most ? order : most;
     }
+    size_t best = 0;
+    while (best + 1 < s->n && order_of(x[best] * a + y[best] * b + z[best] * c) != most) best++;
     return best;
 }
 

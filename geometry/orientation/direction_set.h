@@ -19,6 +19,7 @@ struct direction_node {
 struct direction_set {
     size_t n;
     struct direction_node *node;
+    float *component[3]; /* of all nodes, beside each other, for the search of the nearest */
 };
 
 /* Makes n directions on a Fibonacci spiral, 32 <= n <= 65535. STATUS_NO_MEMORY, STATUS_INVALID. */

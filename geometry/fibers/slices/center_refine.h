@@ -10,12 +10,15 @@
 
 #include "geometry/fibers/slices/centers.h"
 
+#include <stdbool.h>
+
 struct refine_slice {
     const float *image; /* width x height densities */
     size_t width, height;
     float *owner, *distance; /* scratch arrays of the same size */
 };
 
-void centers_refine(const struct refine_slice *slice, struct center *center, size_t n);
+/* Returns false when memory is out. */
+bool centers_refine(const struct refine_slice *slice, struct center *center, size_t n);
 
 #endif

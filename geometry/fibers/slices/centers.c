@@ -71,7 +71,8 @@ static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
     return inside;
 }
 
-static bool is_peak(const struct view *w, const float *response, size_t u, size_t v)
+/* Whether a pixel at the border of a picture is a peak among its neighbours there; of equal pixels the first is. */
+static bool is_border_peak(const struct view *w, const float *response, size_t u, size_t v)
 {
     float c = response[v * w->width + u];
     for (size_t y = v > 0 ? v - 1 : 0; y <= v + 1 && y < w->height; y++)
@@ -82,7 +83,28 @@ static bool is_peak(const struct view *w, const float *response, size_t u, size_
     return true;
 }
 
-/* Offset of the maximum of the paraboloid fitted to a 3 x 3 neighbourhood, at most one pixel. */
+/* The same for n inner pixels of a row: marks the strong peaks. Without branches, so that the loop is vectorised. */
+static void mark_peaks(const float *p, size_t width, size_t n, uint8_t *restrict mark)
+{
+    const float *before = p - width, *after = p + width;
+    for (size_t u = 0; u < n; u++) {
+        float c = p[u];
+        mark[u] = (c >= MIN_STRENGTH) & (c > p[u - 1]) & (c >= p[u + 1]) & (c > before[u - 1]) & (c > before[u]) &
+                  (c > before[u + 1]) & (c >= after[u - 1]) & (c >= after[u]) & (c >= after[u + 1]);
+    }
+}
+
+/* Marks the strong peaks of one row of a response. */
+static void mark_row(const struct view *w, const float *response, size_t v, uint8_t *mark)
+{
+    const float *row = response + v * w->width;
+    bool inner = v > 0 && v + 1 < w->height && w->width > 2;
+    if (inner) mark_peaks(row + 1, w->width, w->width - 2, mark + 1);
+    for (size_t u = 0; u < w->width; u = inner && u == 0 ? w->width - 1 : u + 1)
+        mark[u] = row[u] >= MIN_STRENGTH && is_border_peak(w, response, u, v);
+}
+
+/* Offset of the maximum of the paraboloid through 3 x 3 pixels, at most one pixel. */
 static void refine_position(const struct view *w, const float *response, size_t u, size_t v, float offset[2])
 {
     offset[0] = offset[1] = 0.0f;
@@ -160,27 +182,36 @@ static float radius_at(const struct detect_job *job, const float *peak, size_t n
     return (float)fmin(MOST_RADIUS * half, fmax(LEAST_RADIUS * half, r));
 }
 
+/* Adds the center of the peak at a pixel of scale s, if it is a peak among the scales too. */
+static bool add_peak(const struct detect_job *job, const struct view *w, int s, size_t u, size_t v,
+                     struct slice_result *r)
+{
+    const size_t n_pixel = w->width * w->height, at = v * w->width + u;
+    const float *map = w->response + (size_t)s * n_pixel;
+    if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at])) return true;
+    float offset[2];
+    refine_position(w, map, u, v, offset);
+    struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
+                       .v = w->origin[1] + (float)v + 0.5f + offset[1],
+                       .radius = radius_at(job, map + at, n_pixel, s),
+                       .strength = map[at]};
+    return !find_slope(job, w->i_slice, &c) || push(r, &c);
+}
+
 static bool collect_peaks(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
-    size_t n_pixel = w->width * w->height;
-    for (int s = 0; s < N_SCALE; s++)
-        for (size_t v = 0; v < w->height; v++)
-            for (size_t u = 0; u < w->width; u++) {
-                const float *map = w->response + (size_t)s * n_pixel;
-                size_t at = v * w->width + u;
-                if (map[at] < MIN_STRENGTH) continue;
-                if (!is_peak(w, map, u, v)) continue;
-                if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at]))
-                    continue;
-                float offset[2];
-                refine_position(w, map, u, v, offset);
-                struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
-                                   .v = w->origin[1] + (float)v + 0.5f + offset[1],
-                                   .radius = radius_at(job, map + at, n_pixel, s),
-                                   .strength = map[at]};
-                if (find_slope(job, w->i_slice, &c) && !push(r, &c)) return false;
-            }
-    return true;
+    const size_t n_pixel = w->width * w->height;
+    uint8_t *mark = malloc(w->width + 1);
+    bool fits = mark != NULL;
+    for (int s = 0; s < N_SCALE && fits; s++)
+        for (size_t v = 0; v < w->height && fits; v++) {
+            mark_row(w, w->response + (size_t)s * n_pixel, v, mark);
+            const uint8_t *end = mark + w->width;
+            for (const uint8_t *m = mark; (m = memchr(m, 1, (size_t)(end - m))) != NULL && fits; m++)
+                fits = add_peak(job, w, s, (size_t)(m - mark), v, r);
+        }
+    free(mark);
+    return fits;
 }
 
 static int stronger_first(const void *a, const void *b)
@@ -271,11 +302,11 @@ static void detect_slice(void *context, size_t i_task, size_t i_thread)
         r->failed = vision_blob_response(w.image, w.width, w.height, job->sigma[s], w.response + (size_t)s * n_pixel,
                                          &job->error[i_thread]);
     if (r->failed != STATUS_OK) return;
-    if (!collect_peaks(job, &w, r) || !thin_out(job, &w, r))
-        r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    bool fits = collect_peaks(job, &w, r) && thin_out(job, &w, r);
     move_centers(r, -w.origin[0], -w.origin[1]);
     const struct refine_slice slice = {w.image, w.width, w.height, w.response, w.response + n_pixel};
-    centers_refine(&slice, r->center, r->n);
+    if (!fits || !centers_refine(&slice, r->center, r->n))
+        r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
     move_centers(r, w.origin[0], w.origin[1]);
     if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
@@ -311,11 +342,10 @@ static status detect_slabs(struct detect_job *job, const struct slice_source *so
         if (s == STATUS_CANCELLED) error_set(err, s, "finding fiber centers was cancelled");
         progress_report(progress, (double)(job->first + n_here) / (double)n);
     }
-    for (size_t t = 0, n_thread = thread_pool_n_thread(pool); t < n_thread && s == STATUS_OK; t++)
-        if (job->error[t].code != STATUS_OK) {
-            s = job->error[t].code;
-            if (err != NULL) *err = job->error[t];
-        }
+    for (size_t t = 0, n_thread = thread_pool_n_thread(pool); t < n_thread && s == STATUS_OK; t++) {
+        s = job->error[t].code;
+        if (s != STATUS_OK && err != NULL) *err = job->error[t];
+    }
     return s;
 }
 

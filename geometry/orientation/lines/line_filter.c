@@ -128,6 +128,32 @@ no_memory:
 
 size_t line_filter_scratch(const struct line_filter *f) { return f->edge_x * f->edge * f->edge + LANES; }
 
+/* A row of the volume, or NULL where it lies outside. */
+static const float *row_of(const struct volume *v, ptrdiff_t j, ptrdiff_t k)
+{
+    bool inside = j >= 0 && k >= 0 && j < (ptrdiff_t)v->n[1] && k < (ptrdiff_t)v->n[2];
+    return inside ? v->density + volume_index(v->n, 0, (size_t)j, (size_t)k) : NULL;
+}
+
+/* Copies the neighbourhood of a voxel near a face. Outside of the volume the mirror image through the voxel is taken,
+ * or 0 if that lies outside too. */
+static void copy_neighbourhood(const struct line_filter *f, const struct volume *v, const ptrdiff_t centre[3],
+                               float *out)
+{
+    const ptrdiff_t half = (ptrdiff_t)f->half, n = (ptrdiff_t)f->n[0];
+    for (ptrdiff_t z = -half; z <= half; z++)
+        for (ptrdiff_t y = -half; y <= half; y++, out += f->edge_x) {
+            const float *row = row_of(v, centre[1] + y, centre[2] + z);
+            const float *mirrored = row_of(v, centre[1] - y, centre[2] - z);
+            for (ptrdiff_t x = -half; x <= half; x++) {
+                ptrdiff_t at = centre[0] + x, back = centre[0] - x;
+                bool inside = row != NULL && at >= 0 && at < n;
+                bool inside_mirrored = mirrored != NULL && back >= 0 && back < n;
+                out[x + half] = inside ? row[at] : inside_mirrored ? mirrored[back] : 0.0f;
+            }
+        }
+}
+
 struct line_filter_site line_filter_at(const struct line_filter *f, const struct volume *v, size_t i, size_t j,
                                        size_t k, float *scratch)
 {
@@ -135,25 +161,7 @@ struct line_filter_site line_filter_at(const struct line_filter *f, const struct
     const size_t *n = f->n;
     if (i >= half && j >= half && k >= half && i + half + LANES < n[0] && j + half < n[1] && k + half < n[2])
         return (struct line_filter_site){v->density + volume_index(n, i, j, k), false};
-    float *out = scratch;
-    for (size_t z = 0; z < f->edge; z++)
-        for (size_t y = 0; y < f->edge; y++, out += f->edge_x - f->edge)
-            for (size_t x = 0; x < f->edge; x++, out++) {
-                /* index + half, so that no index is negative; the mirror image of c is 2 * centre - c */
-                size_t at[3] = {i + x, j + y, k + z}, centre[3] = {i, j, k}, mirrored[3];
-                bool inside = true, inside_mirrored = true;
-                for (int a = 0; a < 3; a++) {
-                    inside = inside && at[a] >= half && at[a] < n[a] + half;
-                    mirrored[a] = 2 * (centre[a] + half) - at[a];
-                    inside_mirrored = inside_mirrored && mirrored[a] >= half && mirrored[a] < n[a] + half;
-                }
-                if (inside)
-                    *out = v->density[volume_index(n, at[0] - half, at[1] - half, at[2] - half)];
-                else
-                    *out = inside_mirrored
-                               ? v->density[volume_index(n, mirrored[0] - half, mirrored[1] - half, mirrored[2] - half)]
-                               : 0.0f;
-            }
+    copy_neighbourhood(f, v, (const ptrdiff_t[3]){(ptrdiff_t)i, (ptrdiff_t)j, (ptrdiff_t)k}, scratch);
     return (struct line_filter_site){scratch + (half * f->edge + half) * f->edge_x + half, true};
 }
 
