@@ -42,6 +42,8 @@
 #define OPTION_TEXTURE_PX_PER_MM "texture_px_per_mm"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
+#define OPTION_RIG "rig_file"
+#define OPTION_PHOTOGRAPH_VIEW "photograph_view"
 #define OPTION_CAMERA_NOISE "camera_noise"
 #define OPTION_DARK_FRAMES "dark_frames"
 #define OPTION_COLOR_CHART "color_chart"

@@ -45,7 +45,7 @@ class JobFailed(Exception):
 def files_of(document):
     """Return the input files that a job document names, each once: [(name, role), ...]."""
     names = [(n, "volume") for n in document.get("volume", {}).get("files", [])]
-    for key in ("fibers", "environment", "measurements"):
+    for key in ("fibers", "environment", "measurements", "rig"):
         if "file" in document.get(key, {}):
             names.append((document[key]["file"], key))
     if "texture" in document.get("cloth", {}):

@@ -50,7 +50,11 @@ struct job_photograph {
     enum job_set set;
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
     double scale, weight;
-    size_t crop_px[4]; /* all 0: whole picture */
+    /* As given: a view of the rig (""), or places in mm from the orbit center (NaN). The angles follow from either. */
+    char view[64];
+    double light_position_mm[3], camera_position_mm[3];
+    double light_distance_cm, camera_distance_cm; /* NaN: those of the document */
+    size_t crop_px[4];                            /* all 0: whole picture */
     enum job_transfer transfer;
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
     size_t n_exposure;                             /* besides the first one, which is `file` */
@@ -116,6 +120,7 @@ struct job_document {
     /* set-up */
     double lamp_side_cm, lamp_distance_cm, camera_distance_cm, crop_cm, camera_blur_mm;
     bool lamp_directional, camera_far_field;
+    char rig_file[JOB_MAX_NAME_BYTES];   /* "" when none is given */
     char noise_file[JOB_MAX_NAME_BYTES]; /* record of the camera's noise; "" when none is given */
     size_t n_dark_frame;
     char (*dark_frame)[JOB_MAX_NAME_BYTES];
@@ -184,6 +189,8 @@ void job_document_visit_files(const struct job_document *doc,
 status job_density_undetermined(bool black_sheet, struct error *err);
 /* Returns STATUS_INVALID with the key `path` when job_file_name_valid is false. */
 status job_check_file_name(const char *path, const char *name, struct error *err);
+/* Angles and distance of a place in mm from the orbit center: x along the weft, y along the warp, z up. */
+void job_angles_of_position(const double position_mm[3], double *theta_deg, double *phi_deg, double *distance_cm);
 /* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
 bool job_file_name_valid(const char *name);
 /* Makes a valid file name of any text: other characters become '_', and it is cut to 127 bytes. */

@@ -37,6 +37,7 @@ void job_document_visit_files(const struct job_document *doc,
     if (doc->cloth_texture[0] != '\0') visit(context, doc->cloth_texture, "photograph");
     if (doc->environment_file[0] != '\0') visit(context, doc->environment_file, "environment");
     if (doc->measurement_file[0] != '\0') visit(context, doc->measurement_file, "measurements");
+    if (doc->rig_file[0] != '\0') visit(context, doc->rig_file, "rig");
     if (doc->noise_file[0] != '\0') visit(context, doc->noise_file, "camera_noise");
     for (size_t i = 0; i < doc->n_dark_frame; i++) visit(context, doc->dark_frame[i], "dark_frame");
     if (doc->chart.file[0] != '\0') visit(context, doc->chart.file, "chart");

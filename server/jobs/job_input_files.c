@@ -44,8 +44,8 @@ out:
 
 static bool role_valid(const char *role)
 {
-    static const char *const known[] = {"volume", "fibers",     "measurements", "photograph",     "environment",
-                                        "chart",  "dark_frame", "camera_noise", "white_reference"};
+    static const char *const known[] = {"volume", "fibers",     "measurements", "photograph",      "environment",
+                                        "chart",  "dark_frame", "camera_noise", "white_reference", "rig"};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcmp(role, known[i]) == 0) return true;
     return false;
@@ -61,7 +61,7 @@ static status check_declaration(struct job_service *v, struct file_row *row, str
         return error_set_field(
             err, STATUS_INVALID, "role",
             "role '%.31s' is not one of volume, fibers, measurements, photograph, environment, chart, dark_frame, "
-            "camera_noise, white_reference",
+            "camera_noise, white_reference, rig",
             row->role);
     if (row->size_bytes < 1)
         return error_set_field(err, STATUS_INVALID, "size",

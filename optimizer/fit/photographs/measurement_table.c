@@ -1,7 +1,7 @@
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "base/option_id.h"
+#include "optimizer/fit/photographs/table/table_text.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,6 +50,7 @@ struct table {
     const char *file;
     const struct job_document *doc;
     size_t line;
+    char separator; /* '\0' before the header or Excel's line "sep=;" has set it */
     size_t n_column;
     int column[MAX_CELL];    /* which enum column the file's column i is */
     int place[COLUMN_COUNT]; /* the file's column for an enum column, or -1 */
@@ -62,22 +63,11 @@ struct table {
 #define table_error(t, code, ...)                                                                                      \
     error_set_field(err, (code), OPTION_MEASUREMENT_FILE, "cannot use table '%s': line %zu: " __VA_ARGS__)
 
-/* Cuts a line into cells at commas and strips blanks, in place. */
 static status split(struct table *t, char *line, struct error *err)
 {
-    t->n_cell = 0;
-    for (char *p = line;;) {
-        if (t->n_cell == MAX_CELL)
-            return table_error(t, STATUS_FORMAT, "more than %d cells", t->file, t->line, MAX_CELL);
-        char *end = p + strcspn(p, ",");
-        bool last = *end == '\0';
-        *end = '\0';
-        while (*p == ' ' || *p == '\t') p++;
-        for (char *q = end; q > p && (q[-1] == ' ' || q[-1] == '\t' || q[-1] == '\r'); q--) q[-1] = '\0';
-        t->cell[t->n_cell++] = p;
-        if (last) return STATUS_OK;
-        p = end + 1;
-    }
+    t->n_cell = table_text_split(line, t->separator, t->cell, MAX_CELL);
+    if (t->n_cell <= MAX_CELL) return STATUS_OK;
+    return table_error(t, STATUS_FORMAT, "more than %d cells", t->file, t->line, MAX_CELL);
 }
 
 static status read_header(struct table *t, struct error *err)
@@ -105,11 +95,9 @@ static status cell_number(const struct table *t, enum column c, double missing, 
     *out = missing;
     if (t->place[c] < 0) return STATUS_OK;
     const char *text = t->cell[t->place[c]];
-    char *end;
-    *out = strtod(text, &end);
-    if (end == text || *end != '\0')
-        return table_error(t, STATUS_FORMAT, "column '%s': '%.40s' is not a number", t->file, t->line, column_name[c],
-                           text);
+    if (!table_text_number(text, out))
+        return table_error(t, STATUS_FORMAT, "column '%s': '%.40s' is not a number (write 1234.5 or 1234,5)", t->file,
+                           t->line, column_name[c], text);
     if (!isfinite(*out))
         return table_error(t, STATUS_INVALID, "column '%s' is '%.40s': it must be finite", t->file, t->line,
                            column_name[c], text);
@@ -216,42 +204,60 @@ static status read_row(struct table *t, struct observation_set *o, struct error 
     return observation_set_append(o, &item, err);
 }
 
+/* Whether a line has separators alone. */
+static bool is_empty(const struct table *t)
+{
+    for (size_t i = 0; i < t->n_cell; i++)
+        if (t->cell[i][0] != '\0') return false;
+    return true;
+}
+
+/* Reads a comment, an empty line, the header or a row. */
+static status read_line(struct table *t, char *line, bool *header, struct observation_set *o, struct error *err)
+{
+    size_t first = strspn(line, " \t\r");
+    if (line[first] == '\0' || line[first] == '#') return STATUS_OK;
+    if (t->separator == '\0') {
+        if (table_text_is_separator_line(line, &t->separator)) return STATUS_OK;
+        t->separator = table_text_separator(line);
+    }
+    status s = split(t, line, err);
+    if (s != STATUS_OK || is_empty(t)) return s;
+    while (t->n_cell > t->n_column && t->cell[t->n_cell - 1][0] == '\0') t->n_cell--; /* of spreadsheet programs */
+    s = *header ? read_row(t, o, err) : read_header(t, err);
+    *header = true;
+    return s;
+}
+
 status measurement_table_parse(const char *text, size_t n_bytes, const char *name, const struct job_document *doc,
                                struct observation_set *o, struct error *err)
 {
     struct table t = {.file = name, .doc = doc};
     status s = STATUS_OK;
     bool header = false;
+    if (table_text_is_utf16(text, n_bytes))
+        return error_set_field(err, STATUS_FORMAT, OPTION_MEASUREMENT_FILE,
+                               "cannot use table '%s': it is UTF-16 text: save it as CSV UTF-8", name);
     char *copy = malloc(n_bytes + 1);
     if (copy == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read table '%s': out of memory", name);
     memcpy(copy, text, n_bytes);
     copy[n_bytes] = '\0';
-    if (strlen(copy) != n_bytes) {
+    if (strlen(copy) != n_bytes)
         s = error_set_field(err, STATUS_FORMAT, OPTION_MEASUREMENT_FILE,
                             "cannot use table '%s': it is not text (zero byte)", name);
-        goto out;
-    }
-    char *p = copy;
-    if (strncmp(p, "\xef\xbb\xbf", 3) == 0) p += 3; /* byte order mark of spreadsheet programs */
-    while (p != NULL && *p != '\0') {
+    for (char *p = table_text_begin(copy); s == STATUS_OK && p != NULL && *p != '\0';) {
         char *end = strchr(p, '\n'), *line = p;
         if (end != NULL) *end = '\0';
         p = end != NULL ? end + 1 : NULL;
         t.line++;
-        size_t first = strspn(line, " \t\r");
-        if (line[first] == '\0' || line[first] == '#') continue;
-        s = split(&t, line, err);
-        if (s == STATUS_OK) s = header ? read_row(&t, o, err) : read_header(&t, err);
-        if (s != STATUS_OK) goto out;
-        header = true;
+        s = read_line(&t, line, &header, o, err);
     }
-    if (!header)
+    if (s == STATUS_OK && !header)
         s = error_set_field(err, STATUS_FORMAT, OPTION_MEASUREMENT_FILE, "cannot use table '%s': it has no header line",
                             name);
-    else if (observation_set_count(o, JOB_SET_FIT) == 0)
+    else if (s == STATUS_OK && observation_set_count(o, JOB_SET_FIT) == 0)
         s = error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE,
                             "cannot use table '%s': it has no row of the set 'fit'", name);
-out:
     free(copy);
     return s;
 }

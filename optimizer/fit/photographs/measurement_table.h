@@ -1,6 +1,7 @@
 /* A table of measured mean radiances (CSV).
  *
- * Lines that start with '#' are comments. The first other line names the columns, in any order:
+ * Cells stand between commas, semicolons or tabs, numbers have a decimal point or comma (table_text.h). Lines that
+ * start with '#' are comments. The first other line names the columns, in any order:
  *   set (fit | held-out), light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, r, g, b           required
  *   index, name, cloth_rotation_deg (0), r_se, g_se, b_se (0), weight (1)                                     optional
  * cloth_rotation_deg "all": the row is a mean over all rotations of the cloth, and is compared with renderings of

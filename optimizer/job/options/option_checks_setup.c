@@ -3,6 +3,7 @@
 #include "optimizer/job/json/json_field.h"
 #include "optimizer/job/options/option_checks.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,10 +72,65 @@ status job_check_color(const struct option_value *v, struct error *err)
                            v->path);
 }
 
+/* Whether both angles of a lamp or camera are given, or neither; *given says which. */
+static status check_angles(const char *list, size_t i, const char *what, const double angle[2], bool *given,
+                           struct error *err)
+{
+    static const char *const name[] = {"theta_deg", "phi_deg"};
+    char path[JSON_PATH_BYTES];
+    *given = !isnan(angle[0]) || !isnan(angle[1]);
+    for (size_t k = 0; k < 2 && *given; k++) {
+        if (!isnan(angle[k])) continue;
+        snprintf(path, sizeof path, "%s[%zu].%s_%s", list, i, what, name[k]);
+        return error_set_field(err, STATUS_INVALID, path, "'%s' is missing: the other angle is given", path);
+    }
+    return STATUS_OK;
+}
+
+/* Where a lamp or camera is: by a view of the rig, by angles, or by a position, from which the angles are made. */
+static status check_place(const struct option_value *v, size_t i, const char *what, double *theta_deg, double *phi_deg,
+                          const double position_mm[3], double *distance_cm, struct error *err)
+{
+    char path[JSON_PATH_BYTES];
+    bool angles, position = !isnan(position_mm[0]), view = v->doc->photograph[i].view[0] != '\0';
+    status s = check_angles(v->path, i, what, (double[2]){*theta_deg, *phi_deg}, &angles, err);
+    if (s != STATUS_OK) return s;
+    snprintf(path, sizeof path, "%s[%zu].%s_%s", v->path, i, what, position ? "position_mm" : "theta_deg");
+    if (angles + position + view > 1)
+        return error_set_field(err, STATUS_INVALID, path, "'%s' is given as well as %s: give one of them", path,
+                               view ? "'view'" : "angles");
+    if (angles + position + view == 0)
+        return error_set_field(err, STATUS_INVALID, path,
+                               "'%s' is missing: give both angles, '%s_position_mm', or a 'view' of the rig", path,
+                               what);
+    *distance_cm = NAN;
+    if (!position) return STATUS_OK;
+    job_angles_of_position(position_mm, theta_deg, phi_deg, distance_cm);
+    bool camera = what[0] == 'c', behind = !camera && *theta_deg > 90.0 && !v->doc->black_sheet;
+    if (*distance_cm >= 1.0 && (*theta_deg < (camera ? 89.999 : 90.0) || behind)) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, path, "'%s' is %s", path,
+                           *distance_cm < 1.0 ? "nearer than 10 mm to the orbit center"
+                                              : "not above the cloth (a lamp may be behind it without black_sheet)");
+}
+
 status job_check_photographs(const struct option_value *v, struct error *err)
 {
-    for (size_t i = 0; i < v->doc->n_photograph; i++)
-        if (v->doc->photograph[i].set == JOB_SET_FIT) return STATUS_OK;
+    bool fitted = false;
+    for (size_t i = 0; i < v->doc->n_photograph; i++) {
+        struct job_photograph *p = &v->doc->photograph[i];
+        char path[JSON_PATH_BYTES];
+        fitted = fitted || p->set == JOB_SET_FIT;
+        status s = check_place(v, i, "light", &p->light_theta_deg, &p->light_phi_deg, p->light_position_mm,
+                               &p->light_distance_cm, err);
+        if (s == STATUS_OK)
+            s = check_place(v, i, "camera", &p->camera_theta_deg, &p->camera_phi_deg, p->camera_position_mm,
+                            &p->camera_distance_cm, err);
+        if (s != STATUS_OK) return s;
+        if (p->view[0] == '\0' || v->doc->rig_file[0] != '\0') continue;
+        snprintf(path, sizeof path, "%s[%zu].view", v->path, i);
+        return error_set_field(err, STATUS_INVALID, path, "'%s' needs 'rig': the file that describes the views", path);
+    }
+    if (fitted) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' has no photograph with \"set\": \"fit\": give at least one", v->path);
 }
@@ -138,7 +194,9 @@ static status check_density(const struct job_document *doc, struct error *err)
 {
     bool from_behind = false;
     for (size_t i = 0; i < doc->n_photograph; i++)
-        if (doc->photograph[i].set == JOB_SET_FIT && doc->photograph[i].light_theta_deg > 90.0) from_behind = true;
+        if (doc->photograph[i].set == JOB_SET_FIT &&
+            (doc->photograph[i].light_theta_deg > 90.0 || doc->photograph[i].view[0] != '\0'))
+            from_behind = true; /* the rig is read later */
     if (!doc->fit_density || from_behind || (doc->n_photograph == 0 && !doc->black_sheet)) return STATUS_OK;
     return job_density_undetermined(doc->black_sheet, err);
 }
@@ -173,6 +231,7 @@ static status named_twice(const struct job_document *doc, const char *name, stru
     char path[JSON_PATH_BYTES] = "measurements.file";
     if (strcmp(doc->cloth_texture, name) == 0) snprintf(path, sizeof path, "cloth.texture");
     if (strcmp(doc->environment_file, name) == 0) snprintf(path, sizeof path, "environment.file");
+    if (strcmp(doc->rig_file, name) == 0) snprintf(path, sizeof path, "rig.file");
     if (strcmp(doc->noise_file, name) == 0) snprintf(path, sizeof path, "camera.noise_file");
     if (strcmp(doc->chart.file, name) == 0) snprintf(path, sizeof path, "color.chart.file");
     if (strcmp(doc->white.file, name) == 0) snprintf(path, sizeof path, "color.white.file");

@@ -67,15 +67,14 @@ extern const char *const job_transfer_names[];
         .path = list "." #name, .kind = OPTION_NUMBER, RANGE(from, to), .unit = "degrees", INTO_OF(type, name),        \
         __VA_ARGS__                                                                                                    \
     }
-#define ANGLES(list, type)                                                                                             \
-    ANGLE(list, type, light_theta_deg, 0, 180, .required = true, .check = job_check_light_theta,                       \
+#define ANGLES(list, type, missing)                                                                                    \
+    ANGLE(list, type, light_theta_deg, 0, 180, missing, .check = job_check_light_theta,                                \
           .allowed = "0 to below 90; above 90 to 180 without the black sheet",                                         \
           .meaning = "Angle of the lamp from the normal of the cloth. Above 90 the lamp is behind the cloth."),        \
-        ANGLE(list, type, light_phi_deg, -360, 360, .required = true,                                                  \
-              .meaning = "Azimuth of the lamp, from +x towards +y."),                                                  \
-        ANGLE(list, type, camera_theta_deg, 0, 89.999, .required = true, .allowed = "0 to below 90",                   \
+        ANGLE(list, type, light_phi_deg, -360, 360, missing, .meaning = "Azimuth of the lamp, from +x towards +y."),   \
+        ANGLE(list, type, camera_theta_deg, 0, 89.999, missing, .allowed = "0 to below 90",                            \
               .meaning = "Angle of the camera from the normal of the cloth."),                                         \
-        ANGLE(list, type, camera_phi_deg, -360, 360, .required = true,                                                 \
+        ANGLE(list, type, camera_phi_deg, -360, 360, missing,                                                          \
               .meaning = "Azimuth of the camera, from +x towards +y."),                                                \
         ANGLE(list, type, cloth_rotation_deg, -360, 360, .standard = "0",                                              \
               .meaning = "Turn of the cloth about its normal, counter-clockwise seen from above, under fixed lamp "    \

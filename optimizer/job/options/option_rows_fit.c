@@ -256,7 +256,7 @@ const struct job_option option_rows_fit[] = {
      INTO(candidate_grid),
      .standard = "false",
      .meaning = "Instead of a list: 56 configurations of lamp, camera and cloth, 60 without the black sheet."},
-    ANGLES("fit.candidates[]", struct job_candidate),
+    ANGLES("fit.candidates[]", struct job_candidate, .required = true),
     {.path = "fit.render_px",
      .kind = OPTION_COUNT,
      INTO(render_px),

@@ -3,6 +3,7 @@
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/camera/exposure_merge.h"
+#include "optimizer/fit/photographs/camera/rig.h"
 #include "optimizer/fit/photographs/color/color_matrix.h"
 
 #include <math.h>
@@ -116,18 +117,21 @@ struct exposures {
     struct photograph_record record[EXPOSURE_MAX];
 };
 
+static bool has_lens(const struct photograph_process *k) { return k->lens.has_vignetting || k->lens.has_distortion; }
+
 static status read_exposure(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
                             size_t i, struct exposures *e, struct error *err)
 {
     struct job_photograph own = *p;
     char path[PATH_BYTES];
     e->name[i] = i == 0 ? p->file : p->exposure[i - 1].file;
+    if (has_lens(k)) memset(own.crop_px, 0, sizeof own.crop_px); /* the crop is one of the corrected picture */
     if (i > 0) own.exposure_s = p->exposure[i - 1].exposure_s;
     snprintf(path, sizeof path, "%s/%s", folder, e->name[i]);
     status s = photograph_read_values(path, &own, &e->image[i], &e->record[i], err);
     if (s != STATUS_OK) return s;
     e->n++;
-    return subtract_dark(k, p, e->name[i], &e->record[i], &e->image[i], err);
+    return subtract_dark(k, &own, e->name[i], &e->record[i], &e->image[i], err);
 }
 
 static bool differ(double a, double b) { return !(a == b || (isnan(a) && isnan(b))); }
@@ -200,6 +204,26 @@ static void apply_color(const struct photograph_process *k, struct image *im, do
     for (size_t c = 0; c < 3; c++) se[c] = sqrt(out[c]);
 }
 
+/* A lamp at twice the distance gives a quarter of the light, and radiances are relative to the light that there is. */
+static double distance_factor(const struct photograph_process *k, const struct job_photograph *p)
+{
+    double ratio = p->light_distance_cm / k->lamp_distance_cm;
+    return ratio > 0.0 ? ratio * ratio : 1.0;
+}
+
+/* Of the crop's pixels in the picture before the correction of the lens. */
+static double saturated_in_crop(const struct image *im, const size_t crop[4], const struct photograph_record *r)
+{
+    size_t x1 = crop[2] > 0 ? crop[2] : im->width, y1 = crop[3] > 0 ? crop[3] : im->height, n = 0;
+    if (r->info.full_scale == 1.0 || x1 > im->width || y1 > im->height) return 0.0;
+    for (size_t y = crop[1]; y < y1; y++)
+        for (size_t x = crop[0]; x < x1; x++) {
+            const float *p = im->pixel + 3 * (y * im->width + x);
+            n += fmaxf(p[0], fmaxf(p[1], p[2])) >= 1.0f;
+        }
+    return (double)n / (double)((x1 - crop[0]) * (y1 - crop[1]));
+}
+
 status photograph_develop(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
                           struct image *im, struct photograph_record *record, struct error *err)
 {
@@ -212,9 +236,14 @@ status photograph_develop(const struct photograph_process *k, const char *folder
     if (s == STATUS_OK && merged) s = check_exposures(e, err);
     if (s == STATUS_OK && merged) s = check_noise(k, e, err);
     if (s == STATUS_OK && merged) merge(k, e);
+    if (s == STATUS_OK && has_lens(k)) {
+        if (e->n == 1) e->record[0].saturated_share = saturated_in_crop(&e->image[0], p->crop_px, &e->record[0]);
+        s = lens_correct(&k->lens, p->crop_px, &e->image[0], err);
+        if (s != STATUS_OK) error_prefix(err, s, "cannot use photograph '%s'", p->file);
+    }
     if (s == STATUS_OK) {
         if (k->has_color) apply_color(k, &e->image[0], e->record[0].noise_se_rgb);
-        double factor = p->scale / e->record[0].exposure;
+        double factor = p->scale / e->record[0].exposure * distance_factor(k, p);
         image_scale(&e->image[0], factor);
         for (size_t c = 0; c < 3; c++) e->record[0].noise_se_rgb[c] *= factor;
         *im = e->image[0];
@@ -286,12 +315,17 @@ static status load_color(struct photograph_process *k, const struct job_document
     return s;
 }
 
-status photograph_process_load(struct photograph_process *k, const struct job_document *doc, const char *folder,
+status photograph_process_load(struct photograph_process *k, struct job_document *doc, const char *folder,
                                struct error *err)
 {
     char path[PATH_BYTES];
     status s = STATUS_OK;
-    if (doc->noise_file[0] != '\0') {
+    if (doc->rig_file[0] != '\0') {
+        snprintf(path, sizeof path, "%s/%s", folder, doc->rig_file);
+        s = rig_apply(path, doc, &k->lens, err);
+    }
+    k->lamp_distance_cm = doc->lamp_directional ? NAN : doc->lamp_distance_cm;
+    if (s == STATUS_OK && doc->noise_file[0] != '\0') {
         snprintf(path, sizeof path, "%s/%s", folder, doc->noise_file);
         s = noise_record_read(path, &k->noise, err);
         k->has_noise = s == STATUS_OK;

@@ -2,14 +2,16 @@
  * of its noise, several exposures, a color chart or a white reference.
  *
  * Steps: each exposure is read and cropped; the mean of the dark frames of its exposure time is subtracted; exposures
- * are merged (exposure_merge.h); the values are divided by the exposure (photograph.h), multiplied by the color matrix
- * and by the scale.
+ * are merged (exposure_merge.h); the errors of the lens are removed (lens.h); the values are divided by the exposure
+ * (photograph.h), multiplied by the color matrix, by the scale, and by the square of the lamp's distance over that of
+ * the document.
  * Ownership: init/release.
  */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_DEVELOP_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_DEVELOP_H
 
 #include "base/warning.h"
+#include "optimizer/fit/photographs/camera/lens.h"
 #include "optimizer/fit/photographs/camera/noise_record.h"
 #include "optimizer/fit/photographs/color/color_chart.h"
 #include "optimizer/fit/photographs/photograph.h"
@@ -26,7 +28,9 @@ struct photograph_process {
     struct noise_record noise;
     size_t n_dark;
     struct dark_mean *dark;
-    bool has_color; /* matrix: from the camera's rgb, over its exposure, to radiances */
+    struct lens lens;        /* of the rig */
+    double lamp_distance_cm; /* that chart, white reference and scale belong to; NaN: does not matter */
+    bool has_color;          /* matrix: from the camera's rgb, over its exposure, to radiances */
     double matrix[9];
     struct photograph_info color_info; /* of the photograph of the chart or of the white reference */
     struct color_chart chart;          /* with has_color and the document's has_chart */
@@ -35,8 +39,9 @@ struct photograph_process {
 
 void photograph_process_init(struct photograph_process *k);
 void photograph_process_release(struct photograph_process *k);
-/* Reads the files of the camera that the document names; they are in `folder`. Errors have the option in err->field. */
-status photograph_process_load(struct photograph_process *k, const struct job_document *doc, const char *folder,
+/* Reads the files of camera and rig that the document names; they are in `folder`. Gives photographs the angles of the
+ * views that they name (rig.h). Errors have the option in err->field. */
+status photograph_process_load(struct photograph_process *k, struct job_document *doc, const char *folder,
                                struct error *err);
 /* Develops a photograph of the job. record may be NULL. Errors as in photograph_read; STATUS_INVALID besides: exposures
  * of different sizes, ISO values or f-numbers, or of unknown time; no dark frame of the exposure time; a noise record

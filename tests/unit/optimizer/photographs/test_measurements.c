@@ -57,6 +57,39 @@ static void test_read(void **state)
     observation_set_release(&o);
 }
 
+/* The same two rows as spreadsheet programs write them. */
+static void test_spreadsheets(void **state)
+{
+    static const char *const text[] = {
+        "\xef\xbb\xbfset;light_theta_deg;light_phi_deg;camera_theta_deg;camera_phi_deg;r;g;b;name\r\n"
+        "fit;20,5;0;30;180;0,125;2,5e-1;1;a, b\r\n;;;;;;;;\r\nheld-out;10;0;0;0;1;1;1;\r\n",
+        "sep=;\nset;light_theta_deg;light_phi_deg;camera_theta_deg;camera_phi_deg;r;g;b;name;;\n"
+        "fit;20.5;0;30;180;0.125;0.25;1;a, b;;\nheld-out;10;0;0;0;1;1;1;;;\n",
+        "# by hand\nset\tlight_theta_deg\tlight_phi_deg\tcamera_theta_deg\tcamera_phi_deg\tr\tg\tb\tname\n"
+        "fit\t20,5\t0\t30\t180\t0,125\t0.25\t1\ta, b\nheld-out\t10\t0\t0\t0\t1\t1\t1\t\n",
+        "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b,name\r"
+        "fit,\"20,5\",0,30,180,\"0,125\",0.25,1,\"a, b\"\rheld-out,10,0,0,0,1,1,1,\r",
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
+        struct observation_set o;
+        struct error err = {0};
+        observation_set_init(&o);
+        if (measurement_table_parse(text[i], strlen(text[i]), "t.csv", &set_up, &o, &err) != STATUS_OK)
+            fail_msg("%zu: %s", i, err.text);
+        assert_int_equal(o.n, 2);
+        assert_true(fabs(o.item[0].configuration.light_theta_rad * 180.0 / M_PI - 20.5) < 1e-12);
+        assert_true(o.item[0].mean_rgb[0] == 0.125 && o.item[0].mean_rgb[1] == 0.25 && o.item[1].mean_rgb[2] == 1.0);
+        assert_string_equal(o.item[0].name, "a__b");
+        assert_string_equal(o.item[1].name, "held-out-00");
+        observation_set_release(&o);
+    }
+    check_error("set;light_theta_deg;light_phi_deg;camera_theta_deg;camera_phi_deg;r;g;b\nfit;1;0;30;180;1.234,5;1;1\n",
+                STATUS_FORMAT, "column 'r': '1.234,5' is not a number");
+    check_error("\xff\xfes", STATUS_FORMAT, "UTF-16");
+    check_error("sep=;\n", STATUS_FORMAT, "no header line");
+}
+
 static void test_rotations(void **state)
 {
     (void)state;
@@ -193,8 +226,12 @@ static void test_real_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read),   cmocka_unit_test(test_rotations),
-                                       cmocka_unit_test(test_names),  cmocka_unit_test(test_too_many_renderings),
-                                       cmocka_unit_test(test_errors), cmocka_unit_test(test_real_tables)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read),
+                                       cmocka_unit_test(test_rotations),
+                                       cmocka_unit_test(test_spreadsheets),
+                                       cmocka_unit_test(test_names),
+                                       cmocka_unit_test(test_too_many_renderings),
+                                       cmocka_unit_test(test_errors),
+                                       cmocka_unit_test(test_real_tables)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
