@@ -132,7 +132,7 @@ static struct job_document *parse(const char *camera_keys, const char *photograp
     "{\"file\":\"" name "0.dng\",\"more_exposures\":[{\"file\":\"" name "1.dng\"},{\"file\":\"" name                   \
     "2.dng\"}]," ANGLES "}"
 
-static status load(void **state, const struct job_document *doc, struct observation_set *o, struct error *err)
+static status load(void **state, struct job_document *doc, struct observation_set *o, struct error *err)
 {
     char folder[1024];
     const char *path = scratch_path(state, "x");
