@@ -25,6 +25,7 @@ struct cli {
 };
 
 status cli_submit(struct cli *cli, int *exit_code, struct error *err);
+status cli_check(struct cli *cli, int *exit_code, struct error *err);
 status cli_status(struct cli *cli, int *exit_code, struct error *err);
 status cli_watch(struct cli *cli, int *exit_code, struct error *err);
 status cli_list(struct cli *cli, int *exit_code, struct error *err);

@@ -35,6 +35,11 @@ static const struct cli_command {
          "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
          "continues a submit that was interrupted. Prints the job's id on standard output.\n",
          OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE, "a job document"},
+    [CLI_CHECK] =
+        {"check", "JOB.json", "check a job document and its files, without a server",
+         "Every file is opened and judged, and all faults are printed at once; nothing is uploaded. Files are taken\n"
+         "from the document's folder (or --input-dir). Exit status 1 when there are faults.\n",
+         OPT_INPUT | OPT_JSON, "a job document"},
     [CLI_RECONSTRUCT] =
         {"reconstruct", "SCAN", "trace the fibers of a scan, without photographs, and download the results",
          "SCAN is a file (TIFF, .mhd, .mha, .nrrd, .nhdr, .vol) or a folder of TIFF slices. The job ends with the\n"
@@ -77,7 +82,7 @@ static const struct cli_option {
     {OPT_VOXEL, 0, "voxel-um", "UM", "edge of a voxel in micrometres, or three, such as 2,2,3 (default: the file's)"},
     {OPT_AXES, 0, "axes", "XYZ", "which axis of the file is weft, warp and height, such as xzy (default: xyz)"},
     {OPT_ALIGN, 0, "align", NULL, "turn weft and warp to x and y, and crop to what repeats"},
-    {OPT_JSON, 0, "json", NULL, "print the server's JSON"},
+    {OPT_JSON, 0, "json", NULL, "print JSON"},
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
     {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")"},

@@ -12,6 +12,7 @@
 
 enum cli_command_id {
     CLI_SUBMIT,
+    CLI_CHECK,
     CLI_RECONSTRUCT,
     CLI_STATUS,
     CLI_WATCH,
@@ -29,7 +30,8 @@ enum cli_command_id {
 struct cli_args {
     enum cli_command_id command;
     const char *server, *token;
-    const char *operand;   /* a job document for submit, a scan for reconstruct, a job id for the other commands */
+    const char
+        *operand; /* a job document for submit and check, a scan for reconstruct, a job id for the other commands */
     const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */

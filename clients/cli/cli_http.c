@@ -264,7 +264,11 @@ status http_problem(const struct http_reply *reply, struct error *err)
     if (name != NULL && strcmp(name, status_name(STATUS_CHECKSUM)) == 0) code = STATUS_CHECKSUM;
     const char *text = detail != NULL ? detail : title;
     if (reply->code == 401 && text == NULL) text = "the server requires an access token; set SELVEDGE_TOKEN";
-    if (text != NULL)
+    size_t n_more = json_array_size(json_object_get(problem, "errors"));
+    if (text != NULL && n_more > 1)
+        error_set_field(err, code, field == NULL ? "" : field,
+                        "%s; the document has %zu faults in all, `selvedge check` lists them", text, n_more);
+    else if (text != NULL)
         error_set_field(err, code, field == NULL ? "" : field, "%s", text);
     else
         error_set(err, code, "the server replied with HTTP status %ld and no explanation", reply->code);

@@ -1,4 +1,5 @@
 #include "optimizer/job/job_document.h"
+#include "optimizer/job/check/job_faults.h"
 #include "optimizer/job/job_document_parts.h"
 #include "optimizer/job/options/option_reader.h"
 
@@ -44,23 +45,50 @@ bool job_document_geometry_only(const struct job_document *doc)
     return doc->n_photograph == 0 && doc->measurement_file[0] == '\0';
 }
 
+/* The text as JSON; NULL with an error. */
+static json_t *read_json(const char *text, size_t n_bytes, struct error *err)
+{
+    json_error_t at;
+    if (n_bytes > JOB_MAX_DOCUMENT_BYTES) {
+        error_set(err, STATUS_TOO_LARGE, "the job document has %zu bytes, the limit is %d", n_bytes,
+                  JOB_MAX_DOCUMENT_BYTES);
+        return NULL;
+    }
+    json_t *json = json_loadb(text, n_bytes, JSON_REJECT_DUPLICATES, &at);
+    if (json == NULL)
+        error_set(err, STATUS_INVALID, "the job document is not valid JSON: line %d, column %d: %s", at.line, at.column,
+                  at.text);
+    return json;
+}
+
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err)
 {
     struct job_document *d = NULL;
-    json_error_t at;
-    if (n_bytes > JOB_MAX_DOCUMENT_BYTES)
-        return error_set(err, STATUS_TOO_LARGE, "the job document has %zu bytes, the limit is %d", n_bytes,
-                         JOB_MAX_DOCUMENT_BYTES);
-    json_t *json = json_loadb(text, n_bytes, JSON_REJECT_DUPLICATES, &at);
-    if (json == NULL)
-        return error_set(err, STATUS_INVALID, "the job document is not valid JSON: line %d, column %d: %s", at.line,
-                         at.column, at.text);
-    status s = document_new(&d, err);
-    if (s == STATUS_OK) s = job_options_read(json, d, err);
+    struct error fault = {0};
+    json_t *json = read_json(text, n_bytes, &fault);
+    status s = json != NULL ? document_new(&d, &fault) : fault.code;
+    if (s == STATUS_OK) s = job_options_read(json, d, &fault);
     json_decref(json);
     if (s == STATUS_OK)
         *doc = d;
-    else
+    else {
+        if (err != NULL) *err = fault;
         job_document_free(d);
+    }
     return s;
+}
+
+void job_document_inspect(const char *text, size_t n_bytes, struct job_document **doc, struct job_fault_list *list)
+{
+    struct error fault = {0};
+    json_t *json = read_json(text, n_bytes, &fault);
+    *doc = NULL;
+    status s = json != NULL ? document_new(doc, &fault) : fault.code;
+    if (s == STATUS_OK) {
+        (*doc)->fault = list;
+        s = job_options_read(json, *doc, &fault);
+        (*doc)->fault = NULL;
+    }
+    json_decref(json);
+    if (s != STATUS_OK) job_faults_add(list, &fault);
 }

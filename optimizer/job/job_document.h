@@ -72,7 +72,10 @@ struct job_cloth_yarn {
     char name[MODEL_SET_NAME_BYTES]; /* "": none */
 };
 
+struct job_fault_list;
+
 struct job_document {
+    struct job_fault_list *fault; /* all faults go there while the document is read; NULL: reading ends at the first */
     char sample[256];
     /* volume */
     bool has_volume;

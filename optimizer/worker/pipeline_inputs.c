@@ -2,6 +2,7 @@
  * observations. */
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/fit/baseline/row_slips.h"
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/job/job_folder.h"
@@ -52,8 +53,10 @@ static status load_observations(struct pipeline_context *c, struct error *err)
     if (uneven.n > NAMED_PHOTOGRAPHS)
         worker_status_warn(c->status, "%zu more warnings about photographs are in the job's log",
                            uneven.n - NAMED_PHOTOGRAPHS);
-    observation_set_check(&c->observation, &(struct warning_sink){pipeline_warn, c});
-    return STATUS_OK;
+    const struct warning_sink warn = {pipeline_warn, c};
+    if (c->doc->measurement_file[0] != '\0') s = row_slips_check_angles(&c->observation, OPTION_MEASUREMENT_FILE, err);
+    if (s == STATUS_OK) observation_set_check(&c->observation, &warn);
+    return s == STATUS_OK ? row_slips_warn(&c->observation, &warn, err) : s;
 }
 
 /* The image of the surroundings, which every observation is taken under. */

@@ -3,6 +3,7 @@
 #include "base/thread_pool.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/json/catalogue_json.h"
+#include "optimizer/worker/check/job_check.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/result_json.h"
 
@@ -28,6 +29,8 @@ static const char usage[] =
     "                     files see coarser voxels (with a warning) where a quarter of it does not hold finer ones\n"
     "  --speeds FILE      speeds of earlier jobs, by which remaining times are predicted; those of this job are added\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
+    "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
+    "                     exit status 1 when there are faults\n"
     "  --catalogue        print the scattering models with their parameters, the descent methods and the codes that\n"
     "                     explain why a fit ended, as JSON\n"
     "  --version, --help\n"
@@ -38,6 +41,7 @@ static const char usage[] =
 struct arguments {
     const char *folder;
     const char *speeds; /* NULL: none are remembered */
+    const char *check;  /* a document to check; NULL: the job is run */
     size_t n_thread, memory_mib;
     bool quiet;
 };
@@ -60,14 +64,32 @@ static int print_catalogue(void)
     return ok && putchar('\n') != EOF ? WORKER_SUCCEEDED : WORKER_FAILED;
 }
 
+static int print_check(const struct arguments *a)
+{
+    struct error err = {0};
+    json_t *report = NULL;
+    if (job_check(a->check, a->folder, &report, &err) != STATUS_OK) {
+        fprintf(stderr, "selvedge-worker: %s\n", err.text);
+        return WORKER_USAGE;
+    }
+    bool good = json_array_size(json_object_get(report, "faults")) == 0;
+    bool ok = json_dumpf(report, stdout, JSON_INDENT(1)) == 0 && putchar('\n') != EOF;
+    json_decref(report);
+    return good && ok ? WORKER_SUCCEEDED : WORKER_FAILED;
+}
+
 /* Returns -1 to go on, otherwise the exit status of the program. */
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option option[] = {
-        {"threads", required_argument, NULL, 't'}, {"memory-mib", required_argument, NULL, 'm'},
-        {"speeds", required_argument, NULL, 's'},  {"quiet", no_argument, NULL, 'q'},
-        {"help", no_argument, NULL, 'h'},          {"version", no_argument, NULL, 'v'},
-        {"catalogue", no_argument, NULL, 'c'},     {NULL, 0, NULL, 0}};
+    static const struct option option[] = {{"threads", required_argument, NULL, 't'},
+                                           {"memory-mib", required_argument, NULL, 'm'},
+                                           {"speeds", required_argument, NULL, 's'},
+                                           {"check", required_argument, NULL, 'k'},
+                                           {"quiet", no_argument, NULL, 'q'},
+                                           {"help", no_argument, NULL, 'h'},
+                                           {"version", no_argument, NULL, 'v'},
+                                           {"catalogue", no_argument, NULL, 'c'},
+                                           {NULL, 0, NULL, 0}};
     *a = (struct arguments){.memory_mib = 2048};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         bool ok = true;
@@ -80,6 +102,9 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
             break;
         case 's':
             a->speeds = optarg;
+            break;
+        case 'k':
+            a->check = optarg;
             break;
         case 'q':
             a->quiet = true;
@@ -106,7 +131,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
         return WORKER_USAGE;
     }
     a->folder = argv[optind];
-    return -1;
+    return a->check != NULL ? print_check(a) : -1;
 }
 
 /* Handles a signal that reaches a thread which a library has started before main (OpenBLAS does, where OpenCV loads it)

@@ -1,3 +1,5 @@
+#include "optimizer/job/check/job_faults.h"
+#include "optimizer/job/job_document.h"
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_view.h"
@@ -35,6 +37,20 @@ static void reply_job(struct http_request *r, const char *id, unsigned status_co
     if (created) reply_header(r, "Location", location);
     if (replayed) reply_header(r, "Idempotent-Replay", "true");
     job_row_release(&row);
+}
+
+/* Everything that is wrong with a job document, as the member "errors" of a problem; NULL when there is nothing. */
+static json_t *document_faults(const struct http_request *r)
+{
+    struct job_fault_list *list = calloc(1, sizeof *list);
+    struct job_document *doc = NULL;
+    json_t *extra = NULL;
+    if (list == NULL) return NULL;
+    job_document_inspect(r->body, r->n_body, &doc, list);
+    if (list->n > 0) extra = json_pack("{s:o}", "errors", job_faults_json(list));
+    job_document_free(doc);
+    free(list);
+    return extra;
 }
 
 static void reply_refusal(struct http_request *r, const struct job_refusal *refusal, const struct error *err)
@@ -76,7 +92,10 @@ void handle_create_job(struct http_request *r)
     if (!body_is_json(r)) return;
     const struct job_request request = {r->body, r->n_body, key};
     if (job_create(r->service, &request, id, &replayed, &refusal, &err) != STATUS_OK)
-        reply_refusal(r, &refusal, &err);
+        if (err.code == STATUS_INVALID && refusal.code == NULL)
+            reply_problem(r, NULL, &err, document_faults(r));
+        else
+            reply_refusal(r, &refusal, &err);
     else
         reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
 }
@@ -112,7 +131,7 @@ void handle_put_document(struct http_request *r)
     status s = job_replace_document(r->service, r->param[0], r->body, r->n_body, p.wanted != NULL ? check_tag : NULL,
                                     &p, &err);
     if (s != STATUS_OK)
-        reply_problem(r, p.failed ? "precondition" : NULL, &err, NULL);
+        reply_problem(r, p.failed ? "precondition" : NULL, &err, s == STATUS_INVALID ? document_faults(r) : NULL);
     else
         reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
 }

@@ -1,8 +1,11 @@
 #include "optimizer/job/options/option_reader.h"
+#include "optimizer/job/check/job_faults.h"
+#include "optimizer/job/check/job_slips.h"
 #include "optimizer/job/json/json_field.h"
 #include "optimizer/job/options/option_table.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +14,24 @@ enum { MAX_KEY = 40, MAX_CHOICE = 40 };
 
 static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
                            struct error *err);
+
+/* Number of faults found so far where all are collected. */
+static size_t n_fault(const struct job_document *doc)
+{
+    return doc->fault != NULL ? doc->fault->n + doc->fault->n_more : 0;
+}
+
+/* Ends reading with an error, or keeps it with the other faults and goes on. */
+static status stop_or_keep(status s, const struct error *fault, struct job_document *doc, struct error *err)
+{
+    if (s == STATUS_OK) return s;
+    if (doc->fault == NULL || s == STATUS_NO_MEMORY) {
+        if (err != NULL) *err = *fault;
+        return s;
+    }
+    job_faults_add(doc->fault, fault);
+    return STATUS_OK;
+}
 
 static status no_memory(struct error *err)
 {
@@ -208,11 +229,33 @@ static status read_option(const struct job_option *row, const struct json_field 
     if (v.value == NULL && !row->required) return STATUS_OK;
     if (v.value == NULL && lacks_message(row->kind))
         return error_set_field(err, STATUS_INVALID, f->path, "'%s' lacks '%s'", f->path, key);
+    const size_t n_before = n_fault(doc);
     status s = read_value(row, f, key, base, doc, err);
-    if (s != STATUS_OK || row->check == NULL) return s;
+    if (s != STATUS_OK || row->check == NULL || n_fault(doc) > n_before) return s;
     json_field_path(f, key, path);
     v.path = path;
     return row->check(&v, err);
+}
+
+/* Refuses keys that are not allowed: one by one where all faults are collected. */
+static status check_keys(const struct json_field *f, const char *const *allowed, struct job_document *doc,
+                         struct error *err)
+{
+    struct error fault = {0};
+    status s = json_field_check_keys(f, allowed, &fault);
+    if (s == STATUS_OK || doc->fault == NULL || !json_is_object(f->object)) return stop_or_keep(s, &fault, doc, err);
+    const char *key;
+    json_t *value, *object = (json_t *)(uintptr_t)f->object;
+    json_object_foreach(object, key, value)
+    {
+        struct json_field one = *f;
+        one.object = json_pack("{s:O}", key, value);
+        if (one.object == NULL) continue;
+        s = json_field_check_keys(&one, allowed, &fault);
+        json_decref((json_t *)(uintptr_t)one.object);
+        if (s != STATUS_OK) job_faults_add(doc->fault, &fault);
+    }
+    return STATUS_OK;
 }
 
 /* Reads all members of an object. pattern: its path in the table; base: the struct to which the offsets of the members
@@ -226,9 +269,12 @@ static status read_section(const struct json_field *f, const char *pattern, void
     for (size_t i = 0; (row = job_option_at(i)) != NULL && n < MAX_KEY; i++)
         if ((key = job_option_key_in(row, pattern)) != NULL) allowed[n++] = key;
     allowed[n] = NULL;
-    status s = json_field_check_keys(f, allowed, err);
-    for (size_t i = 0; s == STATUS_OK && (row = job_option_at(i)) != NULL; i++)
-        if ((key = job_option_key_in(row, pattern)) != NULL) s = read_option(row, f, key, base, doc, err);
+    status s = check_keys(f, allowed, doc, err);
+    for (size_t i = 0; s == STATUS_OK && json_is_object(f->object) && (row = job_option_at(i)) != NULL; i++) {
+        struct error fault = {0};
+        if ((key = job_option_key_in(row, pattern)) == NULL) continue;
+        s = stop_or_keep(read_option(row, f, key, base, doc, &fault), &fault, doc, err);
+    }
     return s;
 }
 
@@ -285,12 +331,32 @@ static status default_section(const char *pattern, void *base, struct job_docume
 
 status job_options_default(struct job_document *doc, struct error *err) { return default_section("", doc, doc, err); }
 
+struct first_slip {
+    struct job_document *doc;
+    struct error *err;
+    status outcome;
+};
+
+static void take_slip(void *context, const struct error *slip)
+{
+    struct first_slip *first = context;
+    if (first->outcome == STATUS_OK) first->outcome = stop_or_keep(slip->code, slip, first->doc, first->err);
+}
+
+static status find_slips(struct job_document *doc, struct error *err)
+{
+    struct first_slip first = {doc, err, STATUS_OK};
+    job_find_slips(doc, take_slip, &first);
+    return first.outcome;
+}
+
 status job_options_read(const json_t *document, struct job_document *doc, struct error *err)
 {
     const struct json_field root = {.object = document};
     const struct job_option *row = job_option_find("");
+    const struct option_value whole = {.row = row, .value = document, .path = "", .doc = doc};
+    struct error fault = {0};
     status s = read_section(&root, row->path, doc, doc, err);
-    return s == STATUS_OK
-               ? row->check(&(struct option_value){.row = row, .value = document, .path = "", .doc = doc}, err)
-               : s;
+    if (s == STATUS_OK && n_fault(doc) == 0) s = stop_or_keep(row->check(&whole, &fault), &fault, doc, err);
+    return s == STATUS_OK ? find_slips(doc, err) : s;
 }

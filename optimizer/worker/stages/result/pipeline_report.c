@@ -9,6 +9,7 @@
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/result/pipeline_advice.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_pairing.h"
 #include "optimizer/worker/stages/result/pipeline_skill.h"
 #include "optimizer/worker/stages/result/pipeline_verdict.h"
 
@@ -44,6 +45,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_use(c, pipeline_best_model(c), err);
+    if (s == STATUS_OK) s = pipeline_warn_pairing(c, err);
     if (s == STATUS_OK) warn_of_overlap(c);
     if (s == STATUS_OK) pipeline_reach_verdict(c);
     if (s == STATUS_OK) s = result_json_write(c, err);

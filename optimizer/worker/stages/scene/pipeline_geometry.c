@@ -3,6 +3,7 @@
 #include "geometry/cloth/cloth.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
+#include "optimizer/worker/fiber_file.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/work_file.h"
 
@@ -11,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double um = 1e-6, mm = 1e-3;
+static const double um = 1e-6;
 
 /* Replaces defaults by the options of the document. */
 static void set_options(const struct job_document *doc, struct reconstruct_option *o)
@@ -211,42 +212,13 @@ status stage_directions_load(struct pipeline_context *c, struct error *err)
 
 /* ---- fibers ---- */
 
-/* Refuses fibers as wide as their tile, which no cloth has. A length in a wrong unit makes such fibers; all of them
- * meet across the faces, and the pairs of their ends would be too many to search. */
-static status check_radii(const struct fiber_set *f, const char *name, struct error *err)
-{
-    double most_m = 0.5 * fmin(f->tile_size_m[0], f->tile_size_m[1]);
-    for (size_t i = 0; i < f->n_fiber; i++)
-        if ((double)f->radius_m[i] > most_m)
-            return error_set_field(
-                err, STATUS_INVALID, OPTION_FIBER_FILE,
-                "cannot use fibers '%s': fiber %zu has a radius of %g mm, the tile is %g x %g mm: the unit may "
-                "be wrong, lengths are millimetres",
-                name, i, (double)f->radius_m[i] / mm, f->tile_size_m[0] / mm, f->tile_size_m[1] / mm);
-    return STATUS_OK;
-}
-
 static status read_fiber_file(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    const char *name = c->doc->fiber_file, *dot = strrchr(name, '.');
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, name, path);
-    bool text = dot != NULL && strcmp(dot, ".txt") == 0;
-    status s = text ? fiber_set_read_text(&c->fiber, path, err) : fiber_set_read_hair(&c->fiber, path, err);
-    if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
-        return s;
-    }
-    for (int a = 0; a < 2; a++)
-        if (!isnan(c->doc->tile_mm[a])) c->fiber.tile_size_m[a] = c->doc->tile_mm[a] * mm;
-    if (!(c->fiber.tile_size_m[0] > 0.0 && c->fiber.tile_size_m[1] > 0.0))
-        return error_set_field(err, STATUS_INVALID, OPTION_TILE,
-                               "'%s' is missing: the file '%s' does not say with which period the cloth repeats",
-                               job_option_key(OPTION_TILE), name);
-    fiber_set_classify(&c->fiber);
-    s = fiber_set_validate(&c->fiber, err);
-    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
-    return s == STATUS_OK ? check_radii(&c->fiber, name, err) : s;
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->fiber_file, path);
+    status s = fiber_file_read(path, c->doc, &c->fiber, err);
+    if (s == STATUS_OK) fiber_file_warn(&c->fiber, c->doc, &(struct warning_sink){pipeline_warn, c});
+    return s;
 }
 
 /* Makes the described cloth at the values of the document. */
@@ -314,6 +286,16 @@ static status trace_fibers(struct pipeline_context *c, struct error *err)
     return s;
 }
 
+/* A wrong voxel size makes fibers that no cloth has. */
+static void warn_diameter(struct pipeline_context *c)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < c->fiber.n_fiber; i++) sum += 2.0 * (double)c->fiber.radius_m[i];
+    if (c->fiber.n_fiber > 0)
+        fiber_file_warn_diameter(sum / (double)c->fiber.n_fiber, OPTION_VOXEL_SIZE,
+                                 &(struct warning_sink){pipeline_warn, c});
+}
+
 status stage_fibers(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -322,6 +304,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
         s = trace_fibers(c, err);
         if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
         if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
+        if (s == STATUS_OK) warn_diameter(c);
     } else {
         s = c->doc->cloth != NULL ? build_cloth(c, err) : read_fiber_file(c, err);
         c->geometry.n_fiber = c->fiber.n_fiber;

@@ -1,0 +1,103 @@
+/* selvedge check JOB.json: all faults of a job document and of its files before anything is uploaded. The check itself
+ * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints what it says. */
+#include "clients/cli/cli.h"
+#include "clients/cli/cli_text.h"
+
+#include <errno.h>
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { PATH_ROOM = 4096, EXIT_NO_PROGRAM = 127 };
+
+/* The worker beside this program; else the one that PATH finds. */
+static void find_worker(char path[PATH_ROOM])
+{
+    static const char name[] = "selvedge-worker";
+    ssize_t n = readlink("/proc/self/exe", path, PATH_ROOM - sizeof name - 1);
+    char *slash = NULL;
+    if (n > 0) {
+        path[n] = '\0';
+        slash = strrchr(path, '/');
+    }
+    if (slash != NULL) memcpy(slash + 1, name, sizeof name);
+    if (slash == NULL || access(path, X_OK) != 0) memcpy(path, name, sizeof name);
+}
+
+/* Runs the worker's check and reads what it prints. */
+static status run_worker(const char *document, const char *folder, json_t **report, struct error *err)
+{
+    char worker[PATH_ROOM];
+    int end[2], how = 0;
+    find_worker(worker);
+    if (pipe(end) != 0) return error_set_errno(err, "cannot start '%s'", worker);
+    pid_t pid = fork();
+    if (pid == 0) {
+        dup2(end[1], STDOUT_FILENO);
+        close(end[0]);
+        close(end[1]);
+        execlp(worker, worker, "--check", document, folder, (char *)NULL);
+        _exit(EXIT_NO_PROGRAM);
+    }
+    close(end[1]);
+    FILE *from = pid > 0 ? fdopen(end[0], "r") : NULL;
+    *report = from != NULL ? json_loadf(from, 0, NULL) : NULL;
+    if (from != NULL)
+        fclose(from);
+    else
+        close(end[0]);
+    if (pid < 0) return error_set_errno(err, "cannot start '%s'", worker);
+    while (waitpid(pid, &how, 0) < 0 && errno == EINTR) continue;
+    if (WIFEXITED(how) && WEXITSTATUS(how) == EXIT_NO_PROGRAM)
+        return error_set(err, STATUS_NOT_FOUND, "cannot run '%s', which checks the files: install it beside selvedge",
+                         worker);
+    if (!json_is_object(*report)) return error_set(err, STATUS_INTERNAL, "'%s' could not check '%s'", worker, document);
+    return STATUS_OK;
+}
+
+static size_t print_list(const json_t *list, const char *label, FILE *out)
+{
+    size_t i;
+    const json_t *item;
+    json_array_foreach(list, i, item)
+    {
+        char field[160], detail[700];
+        const char *f = json_string_value(json_object_get(item, "field")),
+                   *d = json_string_value(json_object_get(item, "detail"));
+        text_clean(f != NULL ? f : "", field, sizeof field);
+        text_clean(d != NULL ? d : "", detail, sizeof detail);
+        bool named = field[0] == '\0' || strstr(detail, field) != NULL;
+        fprintf(out, "%s: %s%s%s\n", label, named ? "" : field, named ? "" : ": ", detail);
+    }
+    return json_array_size(list);
+}
+
+status cli_check(struct cli *cli, int *exit_code, struct error *err)
+{
+    char folder[PATH_ROOM];
+    json_t *report = NULL;
+    const struct cli_args *a = cli->args;
+    if (a->input_dir != NULL)
+        snprintf(folder, sizeof folder, "%s", a->input_dir);
+    else
+        cli_folder_of(a->operand, folder, sizeof folder);
+    if (access(a->operand, R_OK) != 0) return error_set_errno(err, "cannot read the job document '%s'", a->operand);
+    status s = run_worker(a->operand, folder, &report, err);
+    if (s == STATUS_OK && a->json) {
+        json_dumpf(report, cli->out, JSON_INDENT(1));
+        fputc('\n', cli->out);
+    }
+    size_t n_fault = json_array_size(json_object_get(report, "faults"));
+    if (s == STATUS_OK && !a->json) {
+        print_list(json_object_get(report, "faults"), "fault", cli->out);
+        size_t n_warning = print_list(json_object_get(report, "warnings"), "warning", cli->out);
+        fprintf(cli->out, "%lld files, %zu faults, %zu warnings%s\n",
+                json_integer_value(json_object_get(report, "n_file")), n_fault, n_warning,
+                n_fault == 0 ? ": the job can be submitted" : "");
+    }
+    if (n_fault > 0) *exit_code = CLI_EXIT_ERROR;
+    json_decref(report);
+    return s;
+}

@@ -1,0 +1,134 @@
+#include "optimizer/fit/baseline/row_slips.h"
+#include "base/angle.h"
+#include "base/option_id.h"
+#include "optimizer/fit/baseline/plain_brdf.h"
+#include "optimizer/job/check/job_slips.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { LEAST_ROWS = 6 };
+
+/* Share of the plain BRDF's error that another reading of the rows must leave, at most, to be the better one; and the
+ * error from which on there is something to explain. */
+static const double better_share = 0.5, least_error = 0.1;
+/* Below this cosine of the lamp the lamp's own size matters. */
+static const double least_cos = 0.05;
+
+status row_slips_check_angles(const struct observation_set *o, const char *field, struct error *err)
+{
+    struct angle_span span = {0};
+    for (size_t i = 0; i < o->n; i++) {
+        const struct configuration *c = &o->item[i].configuration;
+        angle_span_add(&span, c->light_theta_rad * DEG_PER_RAD, c->light_phi_rad * DEG_PER_RAD,
+                       c->camera_theta_rad * DEG_PER_RAD, c->camera_phi_rad * DEG_PER_RAD,
+                       c->cloth_rotation_rad * DEG_PER_RAD);
+    }
+    if (!angle_span_in_radians(&span)) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, field,
+                           "the angles look like radians: the largest one from the normal is %.3g; write degrees",
+                           span.theta);
+}
+
+static bool judged(const struct observation *o)
+{
+    const double *around = o->configuration.environment_rgb;
+    bool dark = o->configuration.environment == NULL && !(around[0] > 0.0 || around[1] > 0.0 || around[2] > 0.0);
+    return dark && o->weight > 0.0 && !observation_is_contrast(o) && o->configuration.light_theta_rad < M_PI_2;
+}
+
+static double incident(const struct observation *o) { return fmax(cos(o->configuration.light_theta_rad), least_cos); }
+
+static int compare_double(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Median over the judged rows of brightness per incident light; NaN without such rows. */
+static status median_reflected(const struct observation_set *rows, double *median, struct error *err)
+{
+    double *v = malloc((rows->n + 1) * sizeof *v);
+    if (v == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check the measurements: out of memory");
+    for (size_t i = 0; i < rows->n; i++) {
+        const struct observation *o = &rows->item[i];
+        v[i] = (o->mean_rgb[0] + o->mean_rgb[1] + o->mean_rgb[2]) / (3.0 * incident(o));
+    }
+    qsort(v, rows->n, sizeof *v, compare_double);
+    *median = rows->n > 0 ? v[rows->n / 2] : NAN;
+    free(v);
+    return STATUS_OK;
+}
+
+static void warn_scale(double median, const struct warning_sink *warn)
+{
+    if (median < ROW_SLIP_DARK)
+        warning_send(warn, OPTION_NONE,
+                     "all rows are dark: half of them are below %.2g of what a white cloth shows under the same lamp; "
+                     "is the scale right? A white diffuser that faces the lamp has the radiance 1",
+                     median);
+    if (median > ROW_SLIP_WHITE)
+        warning_send(warn, OPTION_NONE,
+                     "all rows are above white: half of them are above %.3g times what a white cloth shows under the "
+                     "same lamp; is the scale right? A white diffuser that faces the lamp has the radiance 1",
+                     median);
+}
+
+/* The error of the plain BRDF that is fitted to the rows, each multiplied by factor(row). */
+static status plain_error(const struct observation_set *rows, double (*factor)(const struct observation *o),
+                          double *error, struct error *err)
+{
+    struct observation_set other;
+    struct plain_brdf brdf;
+    observation_set_init(&other);
+    status s = STATUS_OK;
+    for (size_t i = 0; i < rows->n && s == STATUS_OK; i++) {
+        struct observation row = rows->item[i];
+        row.set = JOB_SET_FIT;
+        for (int c = 0; c < 3 && factor != NULL; c++) row.mean_rgb[c] *= factor(&rows->item[i]);
+        s = observation_set_append(&other, &row, err);
+    }
+    if (s == STATUS_OK) s = plain_brdf_fit(&other, &brdf, err);
+    if (s == STATUS_OK) *error = plain_brdf_rel_rms(&brdf, &other, JOB_SET_FIT);
+    observation_set_release(&other);
+    return s;
+}
+
+/* Radiance of a row whose value is a BRDF. */
+static double brdf_to_radiance(const struct observation *o) { return M_PI * incident(o); }
+
+static status warn_brdf(const struct observation_set *rows, const struct warning_sink *warn, struct error *err)
+{
+    double as_given, as_brdf;
+    status s = plain_error(rows, NULL, &as_given, err);
+    if (s == STATUS_OK) s = plain_error(rows, brdf_to_radiance, &as_brdf, err);
+    if (s != STATUS_OK || as_given < least_error || as_brdf > better_share * as_given) return s;
+    warning_send(warn, OPTION_NONE,
+                 "the values look like those of a BRDF (1/sr), not like radiances: they do not fall as the lamp comes "
+                 "in at grazing angles, and a plain surface fits them to %.2g %% if each is multiplied by pi and the "
+                 "cosine of the lamp's angle, and to %.2g %% as they are",
+                 100.0 * as_brdf, 100.0 * as_given);
+    return STATUS_OK;
+}
+
+/* Selects the rows that are judged. */
+static status select_judged(const struct observation_set *o, struct observation_set *rows, struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i < o->n && s == STATUS_OK; i++)
+        if (judged(&o->item[i])) s = observation_set_append(rows, &o->item[i], err);
+    return s;
+}
+
+status row_slips_warn(const struct observation_set *o, const struct warning_sink *warn, struct error *err)
+{
+    struct observation_set rows;
+    double median = NAN;
+    observation_set_init(&rows);
+    status s = select_judged(o, &rows, err);
+    if (s == STATUS_OK) s = median_reflected(&rows, &median, err);
+    if (s == STATUS_OK) warn_scale(median, warn);
+    if (s == STATUS_OK && rows.n >= LEAST_ROWS) s = warn_brdf(&rows, warn, err);
+    observation_set_release(&rows);
+    return s;
+}

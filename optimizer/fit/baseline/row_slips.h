@@ -1,0 +1,20 @@
+/* Slips in measured radiances that no single row shows: another unit, another scale, angles in radians, rows in another
+ * order. They are recognised by what a cloth can reflect under the stated lamps, and by a plain BRDF (plain_brdf.h),
+ * which takes milliseconds. */
+#ifndef SELVEDGE_OPTIMIZER_ROW_SLIPS_H
+#define SELVEDGE_OPTIMIZER_ROW_SLIPS_H
+
+#include "base/warning.h"
+#include "optimizer/fit/photographs/observation.h"
+
+/* Median brightness per incident light of rows lit from the front, of a white diffuser 1, beyond which all rows are
+ * dark or brighter than white: the darkest fabrics reflect 2 %, no fabric in the mean more than it receives. */
+#define ROW_SLIP_DARK 0.003
+#define ROW_SLIP_WHITE 1.25
+
+/* STATUS_INVALID with the option `field` when the angles of the rows look like radians. */
+status row_slips_check_angles(const struct observation_set *o, const char *field, struct error *err);
+/* Warns of the other slips. Rows under an environment, of weight 0 and contrasts are left out. STATUS_NO_MEMORY. */
+status row_slips_warn(const struct observation_set *o, const struct warning_sink *warn, struct error *err);
+
+#endif

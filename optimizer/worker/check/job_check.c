@@ -1,0 +1,63 @@
+#include "optimizer/worker/check/job_check.h"
+#include "base/files/durable.h"
+#include "optimizer/job/check/job_faults.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/check/input_check.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+/* The file exists, is a file and has content. */
+static void look_for(void *context, const char *name, const char *role)
+{
+    struct input_check *c = context;
+    char path[INPUT_PATH_BYTES];
+    struct stat file;
+    struct error fault = {0};
+    input_check_path(c, name, path);
+    c->n_file++;
+    if (name[0] == '\0') return; /* a fault of the document */
+    if (stat(path, &file) != 0)
+        error_set_field(&fault, STATUS_NOT_FOUND, name, "input file '%s' (%s) does not exist in '%s'", name, role,
+                        c->folder);
+    else if (!S_ISREG(file.st_mode))
+        error_set_field(&fault, STATUS_INVALID, name, "input '%s' (%s) is not a regular file", name, role);
+    else if (file.st_size == 0)
+        error_set_field(&fault, STATUS_INVALID, name, "input file '%s' (%s) is empty", name, role);
+    if (fault.code != STATUS_OK) job_faults_add(c->fault, &fault);
+}
+
+static json_t *report_of(struct input_check *c)
+{
+    return json_pack("{s:o, s:o, s:I}", "faults", job_faults_json(c->fault), "warnings", c->warnings, "n_file",
+                     (json_int_t)c->n_file);
+}
+
+status job_check(const char *path, const char *folder, json_t **report, struct error *err)
+{
+    char *text = NULL;
+    size_t n = 0;
+    struct input_check c = {.folder = folder};
+    status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
+    if (s != STATUS_OK) return s;
+    c.fault = calloc(1, sizeof *c.fault);
+    c.warnings = json_array();
+    if (c.fault == NULL || c.warnings == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot check '%s': out of memory", path);
+        json_decref(c.warnings);
+        goto out;
+    }
+    job_document_inspect(text, n, &c.doc, c.fault);
+    if (c.doc != NULL) {
+        job_document_visit_files(c.doc, look_for, &c);
+        input_check_cloth(&c);
+        input_check_rows(&c);
+    }
+    *report = report_of(&c);
+out:
+    job_document_free(c.doc);
+    free(c.fault);
+    free(text);
+    return s;
+}

@@ -1,0 +1,22 @@
+/* The fiber file of a job: read with the tile of the document, and compared with what fibers of cloth are. */
+#ifndef SELVEDGE_OPTIMIZER_FIBER_FILE_H
+#define SELVEDGE_OPTIMIZER_FIBER_FILE_H
+
+#include "base/warning.h"
+#include "geometry/fibers/fiber_set.h"
+#include "optimizer/job/job_document.h"
+
+/* Diameters of textile fibers: microfibers have 2 um, coarse wool and horsehair 100. */
+#define FIBER_LEAST_DIAMETER_UM 1.0
+#define FIBER_MOST_DIAMETER_UM 100.0
+
+/* Reads the file into f (initialised): text when the name ends with ".txt", otherwise the hair format. Fields
+ * OPTION_FIBER_FILE, OPTION_TILE. STATUS_INVALID for a missing tile and for fibers as wide as it. */
+status fiber_file_read(const char *path, const struct job_document *doc, struct fiber_set *f, struct error *err);
+/* Warns of fibers that are thinner or thicker than those of cloth, and of a tile that the fibers do not fill or leave
+ * far behind: a length in a wrong unit makes both. */
+void fiber_file_warn(const struct fiber_set *f, const struct job_document *doc, const struct warning_sink *warn);
+/* Warns of a mean diameter in metres that no textile fiber has. option: what states the lengths. */
+void fiber_file_warn_diameter(double diameter_m, const char *option, const struct warning_sink *warn);
+
+#endif
