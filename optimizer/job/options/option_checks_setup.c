@@ -99,6 +99,8 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
     if (angles + position + view > 1)
         return error_set_field(err, STATUS_INVALID, path, "'%s' is given as well as %s: give one of them", path,
                                view ? "'view'" : "angles");
+    if (angles + position + view == 0 && what[0] == 'c' && v->doc->rig_file[0] != '\0')
+        return STATUS_OK; /* the camera follows from the markers of the rig */
     if (angles + position + view == 0)
         return error_set_field(err, STATUS_INVALID, path,
                                "'%s' is missing: give both angles, '%s_position_mm', or a 'view' of the rig", path,

@@ -3,6 +3,7 @@
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/camera/exposure_merge.h"
+#include "optimizer/fit/photographs/camera/marker_views.h"
 #include "optimizer/fit/photographs/camera/rig.h"
 #include "optimizer/fit/photographs/color/color_matrix.h"
 
@@ -322,7 +323,8 @@ status photograph_process_load(struct photograph_process *k, struct job_document
     status s = STATUS_OK;
     if (doc->rig_file[0] != '\0') {
         snprintf(path, sizeof path, "%s/%s", folder, doc->rig_file);
-        s = rig_apply(path, doc, &k->lens, err);
+        s = rig_apply(path, doc, &k->lens, &k->board, err);
+        if (s == STATUS_OK) s = marker_views_apply(&k->board, &k->lens, folder, doc, err);
     }
     k->lamp_distance_cm = doc->lamp_directional ? NAN : doc->lamp_distance_cm;
     if (s == STATUS_OK && doc->noise_file[0] != '\0') {

@@ -12,6 +12,7 @@
 
 #include "base/warning.h"
 #include "optimizer/fit/photographs/camera/lens.h"
+#include "optimizer/fit/photographs/camera/marker_board.h"
 #include "optimizer/fit/photographs/camera/noise_record.h"
 #include "optimizer/fit/photographs/color/color_chart.h"
 #include "optimizer/fit/photographs/photograph.h"
@@ -28,7 +29,8 @@ struct photograph_process {
     struct noise_record noise;
     size_t n_dark;
     struct dark_mean *dark;
-    struct lens lens;        /* of the rig */
+    struct lens lens; /* of the rig, as the markers */
+    struct marker_board board;
     double lamp_distance_cm; /* that chart, white reference and scale belong to; NaN: does not matter */
     bool has_color;          /* matrix: from the camera's rgb, over its exposure, to radiances */
     double matrix[9];
@@ -40,7 +42,7 @@ struct photograph_process {
 void photograph_process_init(struct photograph_process *k);
 void photograph_process_release(struct photograph_process *k);
 /* Reads the files of camera and rig that the document names; they are in `folder`. Gives photographs the angles of the
- * views that they name (rig.h). Errors have the option in err->field. */
+ * views that they name (rig.h), and crops and cameras by markers (marker_views.h). Errors have the option in err->field. */
 status photograph_process_load(struct photograph_process *k, struct job_document *doc, const char *folder,
                                struct error *err);
 /* Develops a photograph of the job. record may be NULL. Errors as in photograph_read; STATUS_INVALID besides: exposures

@@ -5,6 +5,7 @@
 #include "optimizer/job/json/json_field.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,7 +66,7 @@ static status apply_view(const struct json_field *rig, struct job_document *doc,
     static const char *const key[] = {"lamp", "camera", "cloth_rotation_deg", NULL};
     struct job_photograph *p = &doc->photograph[i];
     struct json_field views, f, lamps, cameras;
-    struct station lamp, camera;
+    struct station lamp, camera = {NAN, NAN, NAN}; /* by markers: not known yet */
     char lamp_name[64], camera_name[64], field[64];
     bool present;
     status s = json_field_object(rig, "views", &views, &present, err);
@@ -77,12 +78,13 @@ static status apply_view(const struct json_field *rig, struct job_document *doc,
     }
     if (s == STATUS_OK) s = json_field_check_keys(&f, key, err);
     if (s == STATUS_OK) s = text_of(&f, "lamp", lamp_name, err);
-    if (s == STATUS_OK) s = text_of(&f, "camera", camera_name, err);
+    bool by_markers = json_object_get(f.object, "camera") == NULL && json_object_get(rig->object, "markers") != NULL;
+    if (s == STATUS_OK && !by_markers) s = text_of(&f, "camera", camera_name, err);
     if (s == STATUS_OK) s = json_field_number(&f, "cloth_rotation_deg", -360.0, 360.0, &p->cloth_rotation_deg, err);
     if (s == STATUS_OK) s = json_field_object(rig, "lamps", &lamps, &present, err);
     if (s == STATUS_OK) s = read_station(&lamps, lamp_name, 180.0, &lamp, err);
     if (s == STATUS_OK) s = json_field_object(rig, "cameras", &cameras, &present, err);
-    if (s == STATUS_OK) s = read_station(&cameras, camera_name, 89.999, &camera, err);
+    if (s == STATUS_OK && !by_markers) s = read_station(&cameras, camera_name, 89.999, &camera, err);
     if (s != STATUS_OK) return s;
     if (lamp.theta_deg >= 90.0 && (doc->black_sheet || lamp.theta_deg == 90.0))
         return error_set(
@@ -127,9 +129,38 @@ static status read_distortion(const struct json_field *lens, struct lens *l, str
     return s;
 }
 
-static status apply(const json_t *json, struct job_document *doc, struct lens *lens, struct error *err)
+static status read_board(const struct json_field *rig, struct marker_board *b, struct error *err)
 {
-    static const char *const key[] = {"selvedge_rig", "lamps", "cameras", "views", "lens", NULL};
+    static const char *const key[] = {"dictionary", "side_mm", "center_mm", NULL};
+    struct json_field f, centers;
+    bool present;
+    status s = json_field_object(rig, "markers", &f, &present, err);
+    if (s != STATUS_OK || !present) return s;
+    s = json_field_check_keys(&f, key, err);
+    if (s == STATUS_OK) s = json_field_text(&f, "dictionary", true, b->dictionary, sizeof b->dictionary, err);
+    if (s == STATUS_OK) s = json_field_required_number(&f, "side_mm", 0.1, 10000.0, &b->side_mm, err);
+    if (s == STATUS_OK) s = json_field_object(&f, "center_mm", &centers, &present, err);
+    size_t n = s == STATUS_OK ? json_object_size(centers.object) : 0;
+    if (s == STATUS_OK && (n < 2 || n > MARKER_MAX))
+        s = error_set(err, STATUS_INVALID, "'markers.center_mm' must name 2 to %d markers", MARKER_MAX);
+    void *iter = json_object_iter((json_t *)(uintptr_t)centers.object);
+    for (; s == STATUS_OK && iter != NULL; iter = json_object_iter_next((json_t *)(uintptr_t)centers.object, iter)) {
+        const char *name = json_object_iter_key(iter);
+        char *end;
+        long id = strtol(name, &end, 10);
+        if (end == name || *end != '\0' || id < 0 || id > 1023)
+            return error_set(err, STATUS_INVALID, "'markers.center_mm.%.40s': the key must be the number of a marker",
+                             name);
+        b->id[b->n] = (int)id;
+        s = required_numbers(&centers, name, 2, 1e5, b->center_mm[b->n++], err);
+    }
+    return s;
+}
+
+static status apply(const json_t *json, struct job_document *doc, struct lens *lens, struct marker_board *board,
+                    struct error *err)
+{
+    static const char *const key[] = {"selvedge_rig", "lamps", "cameras", "views", "lens", "markers", NULL};
     static const char *const lens_key[] = {"vignetting", "distortion", NULL};
     struct json_field rig = {.object = json}, f;
     size_t version = 0;
@@ -142,18 +173,21 @@ static status apply(const json_t *json, struct job_document *doc, struct lens *l
     if (s == STATUS_OK && present) s = json_field_check_keys(&f, lens_key, err);
     if (s == STATUS_OK && present) s = read_vignetting(&f, lens, err);
     if (s == STATUS_OK && present) s = read_distortion(&f, lens, err);
+    if (s == STATUS_OK) s = read_board(&rig, board, err);
     for (size_t i = 0; i < doc->n_photograph && s == STATUS_OK; i++)
         if (doc->photograph[i].view[0] != '\0') s = apply_view(&rig, doc, i, err);
     return s;
 }
 
-status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct error *err)
+status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct marker_board *board,
+                 struct error *err)
 {
     char *text = NULL;
     size_t n = 0;
     json_error_t at;
     const char *name = path_file_name(path);
     *lens = (struct lens){0};
+    *board = (struct marker_board){0};
     status s = file_read_all(path, MAX_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
     json_t *json = json_loadb(text, n, JSON_REJECT_DUPLICATES, &at);
@@ -161,7 +195,7 @@ status rig_apply(const char *path, struct job_document *doc, struct lens *lens, 
     if (json == NULL)
         return error_set_field(err, STATUS_FORMAT, OPTION_RIG, "cannot use rig '%s': it is not JSON: line %d: %s", name,
                                at.line, at.text);
-    s = apply(json, doc, lens, err);
+    s = apply(json, doc, lens, board, err);
     json_decref(json);
     if (s == STATUS_OK) return STATUS_OK;
     if (err != NULL && strncmp(err->field, OPTION_PHOTOGRAPH_VIEW, strlen(OPTION_PHOTOGRAPH_VIEW)) != 0)

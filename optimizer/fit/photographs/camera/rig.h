@@ -8,17 +8,23 @@
  *                "distortion": {"focal_px": [fx, fy], "center_px": [cx, cy], "k": [k1, k2, k3], "p": [p1, p2]}}}
  *
  * A place is given by angles (and distance_cm, by default the document's), or by a position in millimetres from the
- * orbit center: x along the weft, y along the warp, z up. `lens` may be left out.
+ * orbit center: x along the weft, y along the warp, z up. `lens` may be left out, and so may
+ *
+ *    "markers": {"dictionary": "4x4_50", "side_mm": 10, "center_mm": {"0": [-30, 30], "1": [30, 30]}}
+ *
+ * (marker_board.h). With markers a view may leave out its camera, whose place then follows from them.
  */
 #ifndef SELVEDGE_OPTIMIZER_RIG_H
 #define SELVEDGE_OPTIMIZER_RIG_H
 
 #include "optimizer/fit/photographs/camera/lens.h"
+#include "optimizer/fit/photographs/camera/marker_board.h"
 #include "optimizer/job/job_document.h"
 
 /* Reads the rig and gives every photograph of the document that names a view the angles and distances of that view.
  * STATUS_INVALID / STATUS_FORMAT with a text that names file and key; err->field is an option id where a photograph is
  * at fault (an unknown view, a lamp behind the cloth with a black sheet). */
-status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct error *err);
+status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct marker_board *board,
+                 struct error *err);
 
 #endif

@@ -38,12 +38,13 @@ static const char *folder_of(void **state)
 static void test_views(void **state)
 {
     struct lens lens;
+    struct marker_board board;
     struct error err = {0};
     const char *path = scratch_path(state, "rig.json");
     scratch_write(path, good_rig, strlen(good_rig));
     struct job_document *doc = job_document_of_text(
         DOCUMENT("{\"file\":\"a.exr\",\"set\":\"fit\",\"view\":\"v1\"},{\"file\":\"b.exr\",\"view\":\"v2\"}", RIG));
-    if (rig_apply(path, doc, &lens, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (rig_apply(path, doc, &lens, &board, &err) != STATUS_OK) fail_msg("%s", err.text);
     const struct job_photograph *p = doc->photograph;
     assert_true(fabs(p[0].light_theta_deg - 30.0) < 1e-4 && fabs(p[0].light_phi_deg - 90.0) < 1e-9);
     assert_true(fabs(p[0].light_distance_cm - 61.0) < 1e-4 && p[0].camera_distance_cm == 80.0);
@@ -51,11 +52,11 @@ static void test_views(void **state)
     assert_true(p[1].light_theta_deg == 10.0 && isnan(p[1].light_distance_cm) && p[1].cloth_rotation_deg == 0.0);
     assert_true(lens.has_vignetting && !lens.has_distortion && lens.vignetting[0] == -0.3);
     snprintf(doc->photograph[1].view, sizeof doc->photograph[1].view, "v3");
-    assert_int_equal(rig_apply(path, doc, &lens, &err), STATUS_INVALID);
+    assert_int_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "cannot use rig 'rig.json'"));
     assert_non_null(strstr(err.text, "'lamps' has no 'none'"));
     snprintf(doc->photograph[1].view, sizeof doc->photograph[1].view, "v9");
-    assert_int_equal(rig_apply(path, doc, &lens, &err), STATUS_INVALID);
+    assert_int_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_INVALID);
     assert_string_equal(err.field, "photograph_view[1]");
     assert_non_null(strstr(err.text, "'b.exr' names the view 'v9'"));
     job_document_free(doc);
@@ -75,6 +76,11 @@ static void test_bad_rigs(void **state)
          "0]}}}",
          "focal_px' must be at least 1"},
         {"{\"selvedge_rig\":1,\"views\":{\"v1\":{\"camera\":\"a\"}}}", "views.v1.lamp"},
+        {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"center_mm\":{\"1\":[1,2]}}}",
+         "2 to 64 markers"},
+        {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"center_mm\":{\"1\":[1,2],\"a\":[1,"
+         "2]}}}",
+         "the number of a marker"},
         {"{\"selvedge_rig\":1,\"views\":{\"v1\":{\"lamp\":\"a\",\"camera\":\"a\"}},\"lamps\":{\"a\":{\"theta_deg\":1.1}"
          "}}",
          "lamps.a.phi_deg' is missing"},
@@ -95,9 +101,10 @@ static void test_bad_rigs(void **state)
     const char *path = scratch_path(state, "rig.json");
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         struct lens lens;
+        struct marker_board board;
         struct error err = {0};
         scratch_write(path, bad[i].rig, strlen(bad[i].rig));
-        assert_int_not_equal(rig_apply(path, doc, &lens, &err), STATUS_OK);
+        assert_int_not_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_OK);
         if (strstr(err.text, bad[i].part) == NULL || strstr(err.text, "rig.json") == NULL)
             fail_msg("'%s' is not in '%s'", bad[i].part, err.text);
         assert_string_equal(err.field, "rig_file");

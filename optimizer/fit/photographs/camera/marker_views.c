@@ -1,0 +1,180 @@
+#include "optimizer/fit/photographs/camera/marker_views.h"
+
+#include "base/option_id.h"
+#include "geometry/vision/vision_markers.h"
+#include "optimizer/fit/photographs/camera/plane_pose.h"
+#include "optimizer/fit/photographs/photograph.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double largest_misfit = 0.1; /* of a marker's edge */
+
+static int compare_float(const void *a, const void *b)
+{
+    float x, y;
+    memcpy(&x, a, sizeof x);
+    memcpy(&y, b, sizeof y);
+    return x < y ? -1 : x > y;
+}
+
+/* The green channel with a curve that shows dark and bright parts, for the search. */
+static uint8_t *grey_of(const struct image *im)
+{
+    enum { N = 4096 };
+    float value[N];
+    size_t n = im->width * im->height;
+    uint8_t *grey = malloc(n);
+    for (size_t i = 0; i < N; i++) value[i] = im->pixel[3 * (size_t)((double)i / N * (double)n) + 1];
+    qsort(value, N, sizeof *value, compare_float);
+    double bright = fmax((double)value[N * 99 / 100], 1e-30);
+    for (size_t i = 0; i < n && grey != NULL; i++)
+        grey[i] = (uint8_t)lrint(255.0 * sqrt(fmin(fmax((double)im->pixel[3 * i + 1] / bright, 0.0), 1.0)));
+    return grey;
+}
+
+/* The place in the picture without distortion, by fixed-point iteration. */
+static void undistort(const struct lens *l, const double real[2], double ideal[2])
+{
+    memcpy(ideal, real, 2 * sizeof *ideal);
+    for (int i = 0; i < 30 && l->has_distortion; i++) {
+        double back[2];
+        lens_distort(l, ideal, back);
+        for (size_t c = 0; c < 2; c++) ideal[c] += real[c] - back[c];
+    }
+}
+
+/* Adds the four corners of a found marker, if the board has it. */
+static size_t add_corners(const struct marker_board *b, const struct lens *lens, const struct vision_marker *found,
+                          double (*plane)[2], double (*pixel)[2])
+{
+    static const double side[4][2] = {{-0.5, 0.5}, {0.5, 0.5}, {0.5, -0.5}, {-0.5, -0.5}};
+    size_t m = 0;
+    while (m < b->n && b->id[m] != found->id) m++;
+    for (size_t k = 0; k < 4 && m < b->n; k++) {
+        for (size_t c = 0; c < 2; c++) plane[k][c] = b->center_mm[m][c] + side[k][c] * b->side_mm;
+        undistort(lens, found->corner_px + 2 * k, pixel[k]);
+    }
+    return m < b->n ? 4 : 0;
+}
+
+static status find_points(const struct marker_board *b, const struct lens *lens, const struct image *im,
+                          double (*plane)[2], double (*pixel)[2], size_t *n_point, struct error *err)
+{
+    struct vision_marker found[MARKER_MAX];
+    size_t n = 0;
+    *n_point = 0;
+    uint8_t *grey = grey_of(im);
+    if (grey == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for markers: out of memory");
+    status s = vision_find_markers(grey, (size_t[2]){im->width, im->height}, b->dictionary, MARKER_MAX, found, &n, err);
+    free(grey);
+    for (size_t i = 0; i < n && s == STATUS_OK; i++)
+        *n_point += add_corners(b, lens, &found[i], plane + *n_point, pixel + *n_point);
+    if (s == STATUS_OK && *n_point < 8)
+        s = error_set(
+            err, STATUS_INVALID,
+            "it shows %zu of the %zu markers of the rig, at least two are needed: give 'crop_px' and the place "
+            "of the camera, or markers that are sharp and not covered",
+            *n_point / 4, b->n);
+    return s;
+}
+
+status marker_view_find(const struct marker_board *board, const struct lens *lens, const struct image *im,
+                        struct marker_view *v, struct error *err)
+{
+    double plane[4 * MARKER_MAX][2], pixel[4 * MARKER_MAX][2], map[9];
+    const double origin[2] = {0, 0};
+    size_t n = 0;
+    *v = (struct marker_view){0};
+    status s = find_points(board, lens, im, plane, pixel, &n, err);
+    if (s == STATUS_OK)
+        s = plane_map_fit(n, (const double(*)[2])plane, (const double(*)[2])pixel, map, &v->rms_px, err);
+    if (s != STATUS_OK) return s;
+    v->n_marker = n / 4;
+    plane_map_apply(map, origin, v->center_px);
+    v->px_per_mm = plane_map_scale(map, origin);
+    if (v->rms_px > largest_misfit * board->side_mm * v->px_per_mm)
+        return error_set(
+            err, STATUS_INVALID,
+            "its markers lie %.1f pixels (root mean square) from where the rig says: check their places and "
+            "size",
+            v->rms_px);
+    v->has_camera = lens->has_distortion;
+    return v->has_camera ? plane_map_camera(map, lens->focal_px, lens->center_px, v->camera_mm, err) : STATUS_OK;
+}
+
+static status set_crop(const struct marker_view *v, double crop_cm, size_t width, size_t height,
+                       struct job_photograph *p, struct error *err)
+{
+    double half = 0.5 * 10.0 * crop_cm * v->px_per_mm;
+    double from[2] = {rint(v->center_px[0] - half), rint(v->center_px[1] - half)}, edge = fmax(rint(2.0 * half), 1.0);
+    if (from[0] < 0.0 || from[1] < 0.0 || from[0] + edge > (double)width || from[1] + edge > (double)height)
+        return error_set(err, STATUS_INVALID,
+                         "the crop of %g cm about the orbit center, %.0f pixels about (%.0f, %.0f), is not all in the "
+                         "picture",
+                         crop_cm, edge, v->center_px[0], v->center_px[1]);
+    for (size_t c = 0; c < 2; c++) {
+        p->crop_px[c] = (size_t)from[c];
+        p->crop_px[2 + c] = (size_t)(from[c] + edge);
+    }
+    return STATUS_OK;
+}
+
+status marker_view_apply(const struct marker_view *v, double crop_cm, size_t width, size_t height,
+                         struct job_photograph *p, struct error *err)
+{
+    status s = p->crop_px[2] == 0 ? set_crop(v, crop_cm, width, height, p, err) : STATUS_OK;
+    if (s != STATUS_OK || !isnan(p->camera_theta_deg)) return s;
+    if (!v->has_camera)
+        return error_set(err, STATUS_INVALID,
+                         "the place of its camera is not given, and cannot follow from the markers without the focal "
+                         "lengths of the lens ('distortion' of the rig)");
+    job_angles_of_position(v->camera_mm, &p->camera_theta_deg, &p->camera_phi_deg, &p->camera_distance_cm);
+    p->camera_phi_deg += p->cloth_rotation_deg; /* the markers turn with the cloth, the camera does not */
+    if (p->camera_phi_deg > 360.0) p->camera_phi_deg -= 360.0;
+    if (p->camera_phi_deg < -360.0) p->camera_phi_deg += 360.0;
+    return STATUS_OK;
+}
+
+static status apply_to(const struct marker_board *board, const struct lens *lens, const char *folder, double crop_cm,
+                       struct job_photograph *p, struct error *err)
+{
+    struct job_photograph whole = *p;
+    struct marker_view view;
+    struct photograph_record r;
+    struct image im;
+    char path[4096];
+    memset(whole.crop_px, 0, sizeof whole.crop_px);
+    snprintf(path, sizeof path, "%s/%s", folder, p->file);
+    status s = photograph_read_values(path, &whole, &im, &r, err);
+    if (s != STATUS_OK) return s;
+    s = marker_view_find(board, lens, &im, &view, err);
+    if (s == STATUS_OK) s = marker_view_apply(&view, crop_cm, im.width, im.height, p, err);
+    image_release(&im);
+    return s == STATUS_OK ? s : error_prefix(err, s, "cannot use photograph '%s'", p->file);
+}
+
+status marker_views_apply(const struct marker_board *board, const struct lens *lens, const char *folder,
+                          struct job_document *doc, struct error *err)
+{
+    for (size_t i = 0; i < doc->n_photograph; i++) {
+        struct job_photograph *p = &doc->photograph[i];
+        bool no_camera = isnan(p->camera_theta_deg);
+        status s = STATUS_OK;
+        if (board->n > 0 && (no_camera || p->crop_px[2] == 0))
+            s = apply_to(board, lens, folder, doc->crop_cm, p, err);
+        else if (no_camera)
+            s = error_set(
+                err, STATUS_INVALID,
+                "cannot use photograph '%s': the place of its camera is not given, and the rig has no markers "
+                "from which it could follow",
+                p->file);
+        if (s == STATUS_OK) continue;
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
+        return s;
+    }
+    return STATUS_OK;
+}

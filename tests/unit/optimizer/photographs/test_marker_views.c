@@ -1,0 +1,172 @@
+/* Markers around a sample, drawn as a pinhole camera sees them: the crop and the camera's place follow. */
+#include "geometry/vision/vision_markers.h"
+#include "optimizer/fit/photographs/camera/marker_views.h"
+#include "optimizer/fit/photographs/camera/photograph_develop.h"
+#include "optimizer/fit/photographs/camera/plane_pose.h"
+#include "tests/support/scratch_folder.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/support/job_document_text.h"
+
+enum { WIDTH = 900, HEIGHT = 700, BITS = 60, N_MARKER = 4 };
+static const double focal_px = 1500.0, center_px[2] = {440, 360}, side_mm = 22.0;
+static const double place_mm[N_MARKER][2] = {{-40, 40}, {42, 38}, {40, -41}, {-39, -40}};
+static const int marker_id[N_MARKER] = {3, 7, 11, 20};
+
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    for (int k = 0; k < 3; k++) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    double length = sqrt(dot(out, out));
+    for (int k = 0; k < 3; k++) out[k] /= length;
+}
+
+/* Brightness of the plane at a point in mm: white, with the cells of the markers. */
+static double brightness(uint8_t (*marker)[BITS * BITS], double x, double y)
+{
+    for (size_t m = 0; m < N_MARKER; m++) {
+        double u = (x - place_mm[m][0]) / side_mm + 0.5, v = 0.5 - (y - place_mm[m][1]) / side_mm;
+        if (u >= 0.0 && v >= 0.0 && u < 1.0 && v < 1.0)
+            return marker[m][(size_t)(v * BITS) * BITS + (size_t)(u * BITS)] > 127 ? 0.8 : 0.03;
+    }
+    return 0.8;
+}
+
+/* A picture from `camera` (mm), which looks at the origin. covered: how many markers are left out. */
+static void draw(struct image *im, const double camera[3], size_t covered)
+{
+    static uint8_t marker[N_MARKER][BITS * BITS];
+    const double up[3] = {0, 0, 1};
+    double forward[3], right[3], down[3], length = sqrt(dot(camera, camera));
+    for (size_t m = 0; m < N_MARKER; m++) {
+        assert_int_equal(vision_draw_marker("4x4_50", marker_id[m], BITS, marker[m], NULL), STATUS_OK);
+        if (m < covered) memset(marker[m], 255, sizeof marker[m]);
+    }
+    for (int k = 0; k < 3; k++) forward[k] = -camera[k] / length;
+    cross(forward, up, right);
+    cross(forward, right, down);
+    assert_int_equal(image_init(im, WIDTH, HEIGHT, 3, NULL), STATUS_OK);
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 4; i++) { /* 2 x 2 rays a pixel */
+        size_t p = i / 4;
+        double u = ((double)(p % WIDTH) + 0.25 + 0.5 * (double)(i % 2) - center_px[0]) / focal_px;
+        double v = ((double)(p / WIDTH) + 0.25 + 0.5 * (double)(i / 2 % 2) - center_px[1]) / focal_px, ray[3];
+        for (int k = 0; k < 3; k++) ray[k] = forward[k] + u * right[k] + v * down[k];
+        double t = -camera[2] / ray[2], b = brightness(marker, camera[0] + t * ray[0], camera[1] + t * ray[1]);
+        for (size_t c = 0; c < 3; c++) im->pixel[3 * p + c] += (float)(0.25 * b);
+    }
+}
+
+static void camera_at(double theta_deg, double phi_deg, double camera[3])
+{
+    double theta = theta_deg * M_PI / 180.0, phi = phi_deg * M_PI / 180.0;
+    camera[0] = 500.0 * sin(theta) * cos(phi);
+    camera[1] = 500.0 * sin(theta) * sin(phi);
+    camera[2] = 500.0 * cos(theta);
+}
+
+static struct marker_board board(void)
+{
+    struct marker_board b = {.n = N_MARKER, .dictionary = "4x4_50", .side_mm = side_mm};
+    memcpy(b.id, marker_id, sizeof marker_id);
+    memcpy(b.center_mm, place_mm, sizeof place_mm);
+    return b;
+}
+
+static void test_plane_map(void **state)
+{
+    const double map[9] = {3.1, 0.2, 440, -0.1, -2.9, 360, 1e-4, 3e-4, 1},
+                 line[4][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 3}};
+    double plane[6][2] = {{0, 0}, {50, 0}, {0, 50}, {-40, 30}, {20, -60}, {-30, -35}}, pixel[6][2], found[9], rms;
+    struct error err = {0};
+    (void)state;
+    for (size_t i = 0; i < 6; i++) plane_map_apply(map, plane[i], pixel[i]);
+    assert_int_equal(plane_map_fit(6, (const double(*)[2])plane, (const double(*)[2])pixel, found, &rms, &err),
+                     STATUS_OK);
+    assert_true(rms < 1e-6);
+    for (size_t i = 0; i < 9; i++) assert_true(fabs(found[i] / found[8] - map[i]) < 1e-6);
+    assert_int_equal(plane_map_fit(4, line, line, found, &rms, &err), STATUS_NUMERIC);
+}
+
+static void test_camera_from_markers(void **state)
+{
+    static const double place[3][2] = {{35, 200}, {60, -30}, {5, 90}};
+    const struct lens lens = {
+        .has_distortion = true, .focal_px = {focal_px, focal_px}, .center_px = {center_px[0], center_px[1]}};
+    const struct marker_board b = board();
+    (void)state;
+    for (size_t i = 0; i < 3; i++) {
+        double camera[3];
+        struct image im;
+        struct marker_view view;
+        struct error err = {0};
+        camera_at(place[i][0], place[i][1], camera);
+        draw(&im, camera, i); /* up to two markers are covered */
+        if (marker_view_find(&b, &lens, &im, &view, &err) != STATUS_OK) fail_msg("%zu: %s", i, err.text);
+        assert_true(view.n_marker == N_MARKER - i && view.rms_px < 0.6);
+        assert_true(hypot(view.center_px[0] - center_px[0], view.center_px[1] - center_px[1]) < 0.7);
+        assert_true(fabs(view.px_per_mm / 3.0 - 1.0) < 0.01);
+        for (int k = 0; k < 3; k++)
+            if (!(fabs(view.camera_mm[k] - camera[k]) < (i == 2 ? 15.0 : 8.0)))
+                fail_msg("%zu: %g, not %g", i, view.camera_mm[k], camera[k]);
+        image_release(&im);
+    }
+}
+
+static void test_job_with_markers(void **state)
+{
+    static const char rig[] =
+        "{\"selvedge_rig\":1,\"lamps\":{\"a\":{\"theta_deg\":20,\"phi_deg\":0}},\"views\":{\"v\":{\"lamp\":\"a\","
+        "\"cloth_rotation_deg\":30}},\"lens\":{\"distortion\":{\"focal_px\":[1500,1500],\"center_px\":[440,360],"
+        "\"k\":[0,0,0],\"p\":[0,0]}},\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":22,\"center_mm\":{\"3\":[-40,"
+        "40],"
+        "\"7\":[42,38],\"11\":[40,-41],\"20\":[-39,-40]}}}";
+    double camera[3];
+    struct image im;
+    struct error err = {0};
+    struct photograph_process k;
+    char folder[1024];
+    const char *path = scratch_path(state, "rig.json");
+    snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
+    scratch_write(path, rig, strlen(rig));
+    camera_at(35, 200, camera);
+    draw(&im, camera, 0);
+    assert_int_equal(image_write_exr(&im, scratch_path(state, "a.exr"), NULL), STATUS_OK);
+    struct job_document *doc = job_document_of_text(
+        "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\"},\"rig\":{\"file\":\"rig.json\"},\"photographs\":[{\"file\":"
+        "\"a.exr\",\"set\":\"fit\",\"view\":\"v\"}]}");
+    photograph_process_init(&k);
+    if (photograph_process_load(&k, doc, folder, &err) != STATUS_OK) fail_msg("%s", err.text);
+    const struct job_photograph *p = &doc->photograph[0];
+    assert_true(fabs(p->camera_theta_deg - 35.0) < 0.5 && fabs(p->camera_phi_deg - (200.0 - 360.0 + 30.0)) < 0.7);
+    assert_true(fabs(p->camera_distance_cm - 50.0) < 0.6 && p->light_theta_deg == 20.0);
+    assert_true(p->crop_px[0] >= 424 && p->crop_px[0] <= 426 && p->crop_px[2] - p->crop_px[0] == 30);
+    photograph_process_release(&k);
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) im.pixel[i] = 0.5f;
+    assert_int_equal(image_write_exr(&im, scratch_path(state, "a.exr"), NULL), STATUS_OK);
+    doc->photograph[0].crop_px[2] = 0;
+    assert_int_equal(photograph_process_load(&k, doc, folder, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "'a.exr': it shows 0 of the 4 markers"));
+    assert_string_equal(err.field, "photograph_file[0]");
+    photograph_process_release(&k);
+    image_release(&im);
+    job_document_free(doc);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_plane_map),
+        cmocka_unit_test(test_camera_from_markers),
+        cmocka_unit_test(test_job_with_markers),
+    };
+    return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
+}
