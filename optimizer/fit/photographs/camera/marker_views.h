@@ -1,5 +1,5 @@
-/* Crop and camera of a photograph from square markers around the sample (rig.h, "markers"). The markers lie in the plane
- * of the cloth and turn with it. */
+/* Crop and camera of a photograph from square markers around the sample (rig.h, "markers"). The markers lie in the
+ * plane of the cloth and turn with it. */
 #ifndef SELVEDGE_OPTIMIZER_MARKER_VIEWS_H
 #define SELVEDGE_OPTIMIZER_MARKER_VIEWS_H
 

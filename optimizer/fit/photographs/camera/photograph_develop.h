@@ -42,7 +42,8 @@ struct photograph_process {
 void photograph_process_init(struct photograph_process *k);
 void photograph_process_release(struct photograph_process *k);
 /* Reads the files of camera and rig that the document names; they are in `folder`. Gives photographs the angles of the
- * views that they name (rig.h), and crops and cameras by markers (marker_views.h). Errors have the option in err->field. */
+ * views that they name (rig.h), and crops and cameras by markers (marker_views.h). Errors have the option in
+ * err->field. */
 status photograph_process_load(struct photograph_process *k, struct job_document *doc, const char *folder,
                                struct error *err);
 /* Develops a photograph of the job. record may be NULL. Errors as in photograph_read; STATUS_INVALID besides: exposures
