@@ -177,6 +177,7 @@ void worker_status_free(struct worker_status *st)
     free(st);
 }
 
+double worker_status_started_unix_s(const struct worker_status *st) { return st->started_unix_s; }
 const atomic_bool *worker_status_cancel(const struct worker_status *st) { return &st->cancel; }
 bool worker_status_stale(const struct worker_status *st) { return atomic_load(&st->stale); }
 

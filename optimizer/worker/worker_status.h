@@ -22,6 +22,8 @@ status worker_status_start(const struct worker_folder *folder, struct log *log, 
 status worker_status_finish(struct worker_status *st, const char *state, const struct error *error, struct error *err);
 void worker_status_free(struct worker_status *st);
 
+/* Time at which the worker began. */
+double worker_status_started_unix_s(const struct worker_status *st);
 const atomic_bool *worker_status_cancel(const struct worker_status *st);
 bool worker_status_stale(const struct worker_status *st);
 

@@ -123,6 +123,19 @@ void handle_list_results(struct http_request *r)
     job_row_release(&row);
 }
 
+/* Pages among the results run no script; they may have styles and pictures inside. */
+static void reply_result(struct http_request *r, int fd, const char *type)
+{
+    static const char header[] = "Content-Security-Policy";
+    reply_file(r, fd, type);
+    if (r->reply == NULL || strncmp(type, "text/html", 9) != 0) return;
+    const char *usual = MHD_get_response_header(r->reply, header);
+    if (usual != NULL) MHD_del_response_header(r->reply, header, usual);
+    reply_header(r, header,
+                 "default-src 'none'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; base-uri 'none'; "
+                 "form-action 'none'; frame-ancestors 'none'");
+}
+
 void handle_get_result(struct http_request *r)
 {
     struct job_row row;
@@ -132,7 +145,7 @@ void handle_get_result(struct http_request *r)
     if (result_open(r->service, row.id, r->param[1], &fd, &err) != STATUS_OK)
         reply_problem(r, NULL, &err, NULL);
     else
-        reply_file(r, fd, content_type_of(r->param[1]));
+        reply_result(r, fd, content_type_of(r->param[1]));
     job_row_release(&row);
 }
 

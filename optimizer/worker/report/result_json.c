@@ -282,9 +282,29 @@ static json_t *skill_json(const struct pipeline_context *c)
     return json_pack("{s:o, s:o}", "plain_brdf", plain, "heldout_ratio", json_number(twin / c->skill.heldout_rel_rms));
 }
 
+/* What the figures of the file mean, so that it can be read alone. */
+static json_t *definitions_json(void)
+{
+    return json_pack(
+        "{s:s, s:s, s:s, s:s, s:s, s:s}", "radiance",
+        "a perfect white diffuser that faces the lamp has the radiance 1; rgb, linear", "rel_error",
+        "of a row: sqrt(max(0, sum over channels of (A - M)(B - M) / 3)) / max(mean of M, 0.02), M measured, A and B "
+        "two "
+        "independent renderings, whose noise cancels",
+        "rel_rms",
+        "root mean square of the rel_error of all rows of weight above 0 of a set; fit: fitted rows, heldout: "
+        "rows that neither the fit nor the choice of the model has seen",
+        "objective", "sum over fitted rows of weight (A - M)(B - M) / max(mean of M, 0.02)^2, all channels",
+        "standard_error",
+        "..._se, one standard deviation; of parameters with noise of photographs and of tracing and with "
+        "the misfit, of errors by tracing alone",
+        "null", "a number that does not exist");
+}
+
 /* Adds what every job has, also one of geometry only. */
 static void put_job(json_t *json, struct pipeline_context *c)
 {
+    json_object_set_new(json, "definitions", definitions_json());
     json_object_set_new(json, "verdict", verdict_json(&c->verdict));
     json_object_set_new(json, "geometry", result_geometry_json(c));
     json_object_set_new(json, "color", photograph_color_json(&c->process, c->doc));

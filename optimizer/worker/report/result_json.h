@@ -5,6 +5,7 @@
  *   "format", "sample", "method", "seed"            version of this format, and what the job document says
  *   "model", "chosen_by"                            id of the best model, to which all keys but "models" refer, and
  *                                                   the measure by which it was chosen
+ *   "definitions"                                   what errors and units are, in sentences
  *   "verdict"                                       whether the result can be used (verdict.h)
  *   "converged", "reason", "reason_code"            why the fit ended (stop_reason.h)
  *   "parameters"                                    value, standard error (with photograph noise, Monte-Carlo noise and

@@ -4,6 +4,7 @@
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/cloth/quality.h"
+#include "optimizer/worker/report/page/report_page.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
@@ -35,7 +36,8 @@ static status report_geometry(struct pipeline_context *c, struct error *err)
     status s = result_geometry_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);
-    return s == STATUS_OK ? quality_write(c, err) : s;
+    if (s == STATUS_OK) s = quality_write(c, err);
+    return s == STATUS_OK ? report_write(c, err) : s;
 }
 
 status stage_report(struct pipeline_context *c, struct error *err)
@@ -54,5 +56,5 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = quality_write(c, err);
     if (s == STATUS_OK) s = result_renderings_write(c, 0.1, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
-    return s;
+    return s == STATUS_OK ? report_write(c, err) : s;
 }

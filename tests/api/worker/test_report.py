@@ -1,0 +1,82 @@
+"""The report on a job: one page that needs nothing else, its data, and the schema of result.json."""
+import hashlib
+import json
+import os
+import re
+import subprocess
+
+import jsonschema
+import pytest
+from daemon_under_test import ROOT, program
+from small_cloth import TABLE, hair
+from small_exr import exr
+
+pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
+FIT = {"path_budget": 20000, "render_px": 16, "render_samples": 1}
+VIEWS = [(20, 20, 180, 0), (45, 45, 180, 0), (60, 0, 180, 0), (45, 45, 90, 90)]
+
+
+def run(folder, document, **files):
+    (folder / "input").mkdir(parents=True)
+    for name, data in {"cloth.hair": hair(), **files}.items():
+        (folder / "input" / name).write_bytes(data)
+    (folder / "job.json").write_text(json.dumps({"sample": "report <&> \"x\"", "fibers": {"file": "cloth.hair", "voxel_um": 5}, **document}))
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True)
+    return folder / "results"
+
+
+@pytest.fixture(scope="module")
+def of_table(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("report") / "table", {"measurements": {"file": "rows.csv"}, "fit": FIT}, **{"rows.csv": TABLE.encode()})
+
+
+@pytest.fixture(scope="module")
+def of_photographs(tmp_path_factory):
+    photographs = [{"file": f"p{i}.exr", "set": "fit" if i < 3 else "held-out", "light_theta_deg": a, "light_phi_deg": 0, "camera_theta_deg": b,
+                    "camera_phi_deg": c, "cloth_rotation_deg": d} for i, (a, b, c, d) in enumerate(VIEWS)]
+    files = {f"p{i}.exr": exr(24, 24, lambda x, y, i=i: (0.1 + 0.002 * x, 0.08, 0.04 + 0.01 * i)) for i in range(4)}
+    return run(tmp_path_factory.mktemp("report") / "photographs", {"photographs": photographs, "fit": FIT}, **files)
+
+
+def schema():
+    with open(os.path.join(ROOT, "config", "result.schema.json"), encoding="utf-8") as f:
+        return json.load(f)
+
+
+@pytest.mark.parametrize("which", ["of_table", "of_photographs"])
+def test_results_follow_their_schema(which, request):
+    result = json.loads((request.getfixturevalue(which) / "result.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema())
+    jsonschema.Draft202012Validator(schema()).validate(result)
+    for key in ("rows", "parameters", "verdict"):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.Draft202012Validator(schema()).validate({k: v for k, v in result.items() if k != key})
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(schema()).validate({**result, "something": 1})
+
+
+@pytest.mark.parametrize("which", ["of_table", "of_photographs"])
+def test_the_page_needs_nothing_else(which, request):
+    folder = request.getfixturevalue(which)
+    page = (folder / "report.html").read_text()
+    assert not re.search(r"<script|<link rel=\"stylesheet|src=\"(?!data:)|href=\"(?!data:)|url\(", page)
+    assert "report &lt;&amp;&gt; &quot;x&quot;" in page and "<&>" not in page
+    result = json.loads((folder / "result.json").read_text())
+    for text in (result["verdict"]["text"], result["reason"], *(p["name"] for p in result["parameters"]), *(r["name"] for r in result["rows"])):
+        assert text.replace("<", "&lt;").replace(">", "&gt;") in page
+    for title in ("Errors", "Fitted parameters", "Measured and rendered", "Pictures", "Course of the fit", "Correlation of the parameters",
+                  "Gradient certificate", "Geometry", "Settings: the job document", "Inputs", "Program and dates"):
+        assert f"<h2>{title}</h2>" in page
+    pictures = page.count("data:image/png;base64,")
+    assert pictures == (3 if which == "of_photographs" else 1) * len(result["rows"])
+
+
+def test_the_data_beside_it(of_table):
+    data = json.loads((of_table / "report.json").read_text())
+    assert data["result"] == json.loads((of_table / "result.json").read_text())
+    assert data["document"]["fit"] == FIT and data["program"].startswith("selvedge-worker ")
+    inputs = {i["name"]: i for i in data["inputs"]}
+    assert inputs["rows.csv"]["sha256"] == hashlib.sha256(TABLE.encode()).hexdigest() and inputs["rows.csv"]["role"] == "measurements"
+    assert inputs["cloth.hair"]["size"] == len(hair())
+    assert len(data["curve"]) == data["result"]["n_step"] and data["curve"][0]["objective"] > 0
+    assert 0 < data["started_unix_s"] <= data["written_unix_s"]
