@@ -185,14 +185,15 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool l
     return s;
 }
 
-/* Cuts lines at kinks, where they change to another fiber; in the last pass also removes ends that deviate. */
+/* Cuts lines at kinks, where they change to another fiber; in the last pass also removes ends that lie in other
+ * fibers. */
 static status straighten(struct fiber_job *job, struct polyline_set *lines, bool last, size_t min_vertex,
                          struct error *err)
 {
     struct polyline_set out;
     size_t n_cut;
     polyline_set_init(&out);
-    status s = polylines_cut_kinks(lines, job->diameter, OVER_USUAL_TURN, min_vertex, &out, &n_cut, err);
+    status s = polylines_cut_kinks(lines, job->diameter, OVER_USUAL_TURN, min_vertex, last, &out, &n_cut, err);
     if (s == STATUS_OK) {
         polyline_set_release(lines);
         *lines = out;
@@ -200,7 +201,7 @@ static status straighten(struct fiber_job *job, struct polyline_set *lines, bool
     }
     if (s == STATUS_OK && last)
         s = polylines_trim_disagreeing(lines, job->d, MAX_DISAGREEMENT_RAD,
-                                       (size_t)(END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, &n_cut, err);
+                                       (size_t)(END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, err);
     if (s == STATUS_OK && last) {
         polyline_set_release(lines);
         *lines = out;

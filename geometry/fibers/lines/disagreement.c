@@ -1,10 +1,12 @@
 #include "geometry/fibers/lines/disagreement.h"
+#include "geometry/fibers/lines/joining.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 
 enum { REACH = 4 };
+static const float OVERLAP = 0.9f; /* share of the sum of the radii */
 
 /* Squared sine of the angle at vertex i; negative if the voxel is empty. */
 static float sine2(const struct polyline_set *p, size_t line, size_t i, const struct direction_volume *d)
@@ -37,6 +39,13 @@ static bool disagrees(const float *value, size_t n, size_t i, float limit)
     return weight > 0.0f && sum > limit * weight;
 }
 
+static void measure_line(const struct polyline_set *lines, size_t line, const struct direction_volume *d, float *value)
+{
+    scratch_keep_within(d->space);
+    for (size_t i = 0, n = polyline_length(lines, line); i < n; i++)
+        value[i] = sine2(lines, line, lines->first[line] + i, d);
+}
+
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
                                  double max_angle_rad, size_t min_vertex, struct polyline_set *result, size_t *n_cut,
                                  struct error *err)
@@ -48,8 +57,7 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
     *n_cut = 0;
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), run = 0;
-        scratch_keep_within(d->space);
-        for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
+        measure_line(lines, l, d, value);
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
             if (i < n && !disagrees(value, n, i, limit)) continue;
             if (i - run >= min_vertex)
@@ -64,25 +72,26 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
 
 status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
                                   double max_angle_rad, size_t reach, size_t min_vertex, struct polyline_set *result,
-                                  size_t *n_cut, struct error *err)
+                                  struct error *err)
 {
-    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)),
+    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), most = 0.0f,
           *value = malloc((lines->n_vertex + 1) * sizeof *value);
+    struct vertex_grid g = {0};
     if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
-    status s = STATUS_OK;
-    *n_cut = 0;
+    for (size_t l = 0; l < lines->n_line; l++) most = fmaxf(most, lines->radius[l]);
+    status s = vertex_grid_init(&g, lines, d->n, fmaxf(3.0f, 2.0f * most), err);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
-        size_t n = polyline_length(lines, l), from = 0, to = n;
-        scratch_keep_within(d->space);
-        for (size_t i = 0; i < n; i++) value[i] = sine2(lines, l, lines->first[l] + i, d);
+        size_t n = polyline_length(lines, l), begin = lines->first[l], from = 0, to = n;
+        measure_line(lines, l, d, value);
         for (size_t i = 0; i < n && i < reach; i++) {
-            if (disagrees(value, n, i, limit)) from = i + 1;
-            if (disagrees(value, n, n - 1 - i, limit)) to = n - 1 - i;
+            size_t k = n - 1 - i;
+            if (disagrees(value, n, i, limit) && polyline_is_overlapped(lines, &g, l, begin + i, OVERLAP, most))
+                from = i + 1;
+            if (disagrees(value, n, k, limit) && polyline_is_overlapped(lines, &g, l, begin + k, OVERLAP, most)) to = k;
         }
-        *n_cut += to > from ? n - (to - from) : n;
-        if (to < from + min_vertex) continue;
-        s = polyline_add_part(result, lines, l, lines->first[l] + from, lines->first[l] + to, err);
+        if (to >= from + min_vertex) s = polyline_add_part(result, lines, l, begin + from, begin + to, err);
     }
+    vertex_grid_release(&g);
     free(value);
     return s;
 }

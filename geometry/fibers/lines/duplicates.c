@@ -83,3 +83,30 @@ status polylines_remove_duplicates(const struct polyline_set *lines, const size_
     vertex_grid_release(&g);
     return s;
 }
+
+bool polyline_is_overlapped(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i,
+                            float share, float most)
+{
+    const float *x = p->vertex[i];
+    size_t from[3], to[3], c[3];
+    vertex_grid_range(g, x, share * (p->radius[line] + most) + 1.0f, from, to);
+    for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
+        for (c[1] = from[1]; c[1] <= to[1]; c[1]++)
+            for (c[0] = from[0]; c[0] <= to[0]; c[0]++) {
+                size_t cell = (c[2] * g->n[1] + c[1]) * g->n[0] + c[0];
+                for (size_t e = g->first[cell]; e < g->first[cell + 1]; e++) {
+                    size_t other = g->vertex[e], other_line = g->line_of[other];
+                    if (other_line == line) continue;
+                    float near = share * (p->radius[line] + p->radius[other_line]);
+                    float s[3], along = 0.0f, square = 0.0f;
+                    tangent_at(p, other_line, other, s);
+                    for (int a = 0; a < 3; a++) {
+                        float d = x[a] - p->vertex[other][a];
+                        along += d * s[a];
+                        square += d * d;
+                    }
+                    if (along * along <= 1.0f && square - along * along < near * near) return true;
+                }
+            }
+    return false;
+}

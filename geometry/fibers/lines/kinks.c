@@ -49,20 +49,50 @@ status polylines_kink_limit(const struct polyline_set *lines, double diameter_vo
     return STATUS_OK;
 }
 
-status polylines_cut_kinks(const struct polyline_set *lines, double diameter_voxel, double over_usual,
-                           size_t min_vertex, struct polyline_set *result, size_t *n_cut, struct error *err)
+/* Turns from which on the vertices of a line are kinks. */
+struct kink_limit {
+    double middle, end; /* radians per voxel; end: within `near` vertices of an end */
+    size_t near, reach;
+};
+
+static bool is_kink(const struct polyline_set *p, size_t line, size_t i, const struct kink_limit *k)
 {
-    size_t reach = span(diameter_voxel), near = (size_t)(END_DIAMETERS * diameter_voxel + 0.5);
-    double limit;
+    bool near_end = i < p->first[line] + k->near || i + k->near >= p->first[line + 1];
+    return (double)turn_at(p, line, i, k->reach) > (near_end ? k->end : k->middle);
+}
+
+/* Marks the vertices within reach of a kink, or of a run of kinks only the one with the largest turn. */
+static void mark_kinks(const struct polyline_set *p, size_t line, const struct kink_limit *k, bool only_sharpest,
+                       bool *mark)
+{
+    size_t sharpest = SIZE_MAX;
+    for (size_t i = p->first[line] + k->reach; i + k->reach < p->first[line + 1]; i++) {
+        bool kink = is_kink(p, line, i, k);
+        for (size_t m = i - k->reach; kink && !only_sharpest && m <= i + k->reach; m++) mark[m] = true;
+        if (!kink || !only_sharpest) {
+            sharpest = SIZE_MAX;
+            continue;
+        }
+        if (sharpest != SIZE_MAX && turn_at(p, line, i, k->reach) <= turn_at(p, line, sharpest, k->reach)) continue;
+        if (sharpest != SIZE_MAX) mark[sharpest] = false;
+        mark[i] = true;
+        sharpest = i;
+    }
+}
+
+status polylines_cut_kinks(const struct polyline_set *lines, double diameter_voxel, double over_usual,
+                           size_t min_vertex, bool only_sharpest, struct polyline_set *result, size_t *n_cut,
+                           struct error *err)
+{
+    struct kink_limit k = {.near = (size_t)(END_DIAMETERS * diameter_voxel + 0.5), .reach = span(diameter_voxel)};
     bool *kink = calloc(lines->n_vertex + 1, sizeof *kink);
     *n_cut = 0;
     if (kink == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for kinks: out of memory");
-    status s = polylines_kink_limit(lines, diameter_voxel, over_usual, &limit, err);
+    status s = polylines_kink_limit(lines, diameter_voxel, over_usual, &k.middle, err);
+    k.end = END_SHARE * k.middle;
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t begin = lines->first[l], end = lines->first[l + 1], piece = begin;
-        for (size_t i = begin + reach; i + reach < end; i++)
-            if ((double)turn_at(lines, l, i, reach) > (i < begin + near || i + near >= end ? END_SHARE * limit : limit))
-                for (size_t k = i - reach; k <= i + reach; k++) kink[k] = true;
+        mark_kinks(lines, l, &k, only_sharpest, kink);
         for (size_t i = begin; i <= end && s == STATUS_OK; i++) {
             if (i < end && !kink[i]) continue;
             if (i - piece >= min_vertex) s = polyline_add_part(result, lines, l, piece, i, err);
