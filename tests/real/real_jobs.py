@@ -32,7 +32,7 @@ def run_job(name, folder, timeout_s=900, **fit):
     os.makedirs(os.path.join(folder, "input"))
     with open(os.path.join(ROOT, "config", "examples", document)) as f:
         job = json.load(f)
-    job["fit"].update(fit)
+    job["fit"].update({"model": "two_lobe.v1", **fit})  # the published model, whose figures are compared
     with open(os.path.join(folder, "job.json"), "w") as f:
         json.dump(job, f)
     for f in files:
