@@ -147,7 +147,10 @@ static void print_rows(const json_t *rows, FILE *out)
         fprintf(out, "<tr%s><td>", strcmp(page_string(row, "set"), "fit") == 0 ? "" : " class=\"held\"");
         page_escaped(page_string(row, "name"), out);
         fprintf(out, "</td><td>%s</td>", page_string(row, "set"));
-        for (size_t k = 0; k < 5; k++) fprintf(out, "<td class=\"n\">%.1f</td>", page_number(row, angle[k]));
+        bool all = json_is_true(json_object_get(row, "all_rotations"));
+        for (size_t k = 0; k < (all ? 4 : 5); k++)
+            fprintf(out, "<td class=\"n\">%.1f</td>", page_number(row, angle[k]));
+        if (all) fputs("<td class=\"n\">all</td>", out);
         rgb_cell(json_object_get(row, "measured"), out);
         rgb_cell(json_object_get(row, "rendered"), out);
         fputs("<td class=\"n\">", out);
