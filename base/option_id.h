@@ -50,6 +50,7 @@
 #define OPTION_COLOR_WHITE "color_white"
 /* the measurements */
 #define OPTION_MEASUREMENT_FILE "measurement_file"
+#define OPTION_MEASURED_ROWS "measured_rows"
 #define OPTION_PHOTOGRAPHS "photographs"
 #define OPTION_PHOTOGRAPH_FILE "photograph_file"
 /* the fit */

@@ -35,6 +35,7 @@ void job_document_free(struct job_document *doc)
     free(doc->cloth);
     for (size_t i = 0; i < doc->n_photograph; i++) free(doc->photograph[i].exposure);
     free(doc->photograph);
+    free(doc->measured_row);
     free(doc->dark_frame);
     free(doc->candidate);
     free(doc);

@@ -24,6 +24,7 @@ enum {
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
     JOB_MAX_CANDIDATE = 1024,
+    JOB_MAX_MEASURED_ROW = 455, /* as many means over rotations as a table may have */
     JOB_MAX_TEXTURE_CELLS = 32, /* blocks along the edge of a crop; the renderer has the same limit */
     JOB_MAX_MODEL = 8
 };
@@ -73,6 +74,12 @@ struct job_cloth_yarn {
 };
 
 struct job_fault_list;
+
+/* A configuration that is taken from a file of a measured BRDF. */
+struct job_measured_row {
+    enum job_set set;
+    double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
+};
 
 struct job_document {
     struct job_fault_list *fault; /* all faults go there while the document is read; NULL: reading ends at the first */
@@ -139,6 +146,8 @@ struct job_document {
     bool black_sheet;
     /* observations */
     char measurement_file[JOB_MAX_NAME_BYTES]; /* "" when photographs are given */
+    size_t n_measured_row;                     /* 0: the default ones; of files of measured BRDFs */
+    struct job_measured_row *measured_row;
     size_t n_photograph;
     struct job_photograph *photograph;
     /* fit */

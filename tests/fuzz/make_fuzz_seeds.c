@@ -134,6 +134,20 @@ static void photograph_seeds(void)
     image_release(&im);
 }
 
+static void rig_seeds(void)
+{
+    static const char rig[] =
+        "{\"selvedge_rig\":1,\"lamps\":{\"a\":{\"theta_deg\":20,\"phi_deg\":0}},\"cameras\":{\"c\":{\"position_mm\":[1,"
+        "2,"
+        "300]}},\"views\":{\"v\":{\"lamp\":\"a\",\"camera\":\"c\",\"cloth_rotation_deg\":30}},\"lens\":{\"distortion\":"
+        "{"
+        "\"focal_px\":[9,9],\"center_px\":[4,3],\"k\":[0,0,0],\"p\":[0,0]},\"vignetting\":{\"center_px\":[1,1],"
+        "\"radius_px\":4,\"a\":[0,0,0]}},\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":22,\"center_mm\":{\"3\":[-"
+        "40,"
+        "40],\"7\":[42,38]}}}";
+    put("rig", "all.json", rig, "", 0);
+}
+
 static void camera_seeds(void)
 {
     static uint8_t byte[16 * 16 * 4];
@@ -160,5 +174,6 @@ int main(int argc, char **argv)
     fiber_seeds();
     photograph_seeds();
     camera_seeds();
+    rig_seeds();
     return 0;
 }

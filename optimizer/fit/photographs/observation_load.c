@@ -4,6 +4,7 @@
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/fit/photographs/photograph_contrast.h"
+#include "optimizer/fit/photographs/table/brdf_file.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -14,13 +15,19 @@
 
 enum { MAX_TABLE_BYTES = 16 << 20 };
 
-static status load_table(const struct job_document *doc, const char *folder, struct observation_set *o,
-                         struct error *err)
+static status load_table(const struct job_document *doc, const char *folder, const struct warning_sink *warn,
+                         struct observation_set *o, struct error *err)
 {
     char path[4096];
     char *text = NULL;
     size_t n = 0;
+    const brdf_reader *reader = brdf_reader_of_name(doc->measurement_file);
     snprintf(path, sizeof path, "%s/%s", folder, doc->measurement_file);
+    if (reader != NULL) return brdf_file_read(reader, path, doc, warn, o, err);
+    if (doc->n_measured_row > 0)
+        return error_set_field(err, STATUS_INVALID, OPTION_MEASURED_ROWS,
+                               "configurations are chosen for a measured BRDF, but '%s' is a table: its rows say which",
+                               doc->measurement_file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
@@ -137,7 +144,7 @@ status observation_set_load(const struct job_document *doc, const char *folder,
 {
     const struct photograph_process nothing = {0};
     if (process == NULL) process = &nothing;
-    if (doc->measurement_file[0] != '\0') return load_table(doc, folder, o, err);
+    if (doc->measurement_file[0] != '\0') return load_table(doc, folder, warn, o, err);
     size_t first = o->n;
     for (size_t i = 0; i < doc->n_photograph; i++) {
         status s = load_photograph(doc, i, folder, process, warn, o, err);

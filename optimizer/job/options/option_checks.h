@@ -30,6 +30,7 @@ status job_check_light_theta(const struct option_value *v, struct error *err);
 status job_check_crop_px(const struct option_value *v, struct error *err);
 /* Exactly one of chart and white reference. */
 status job_check_color(const struct option_value *v, struct error *err);
+status job_check_measured_rows(const struct option_value *v, struct error *err);
 status job_check_photographs(const struct option_value *v, struct error *err);
 /* the fit */
 status job_check_fit(const struct option_value *v, struct error *err);

@@ -72,6 +72,14 @@ status job_check_color(const struct option_value *v, struct error *err)
                            v->path);
 }
 
+status job_check_measured_rows(const struct option_value *v, struct error *err)
+{
+    for (size_t i = 0; i < v->doc->n_measured_row; i++)
+        if (v->doc->measured_row[i].set == JOB_SET_FIT) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' has no configuration with \"set\": \"fit\": give at least one", v->path);
+}
+
 /* Whether both angles of a lamp or camera are given, or neither; *given says which. */
 static status check_angles(const char *list, size_t i, const char *what, const double angle[2], bool *given,
                            struct error *err)
