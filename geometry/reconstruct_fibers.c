@@ -32,6 +32,9 @@ enum {
  * fibers. */
 #define OVER_USUAL_TURN 2.1
 #define END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
+/* Distance of the axes of neighbours over the sum of their radii, below which one of two fitted lines is wrong: fibers
+ * do not pass through each other. */
+#define TOUCHING 0.85
 #define MAX_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
 
 struct fiber_job {
@@ -120,9 +123,10 @@ static status smooth_and_drop(struct fiber_job *job, const struct polyline_set *
     return s;
 }
 
-/* One pass over the pieces: cuts duplicates, lets the ends grow, and joins ends that meet. `in` is emptied. */
-static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool grow, struct polyline_set *out,
-                           struct join_counts *counts, struct error *err)
+/* One pass over the pieces: cuts duplicates, lets the ends grow, and joins ends that meet. touching: joining.h. `in` is
+ * emptied. */
+static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool grow, double touching,
+                           struct polyline_set *out, struct join_counts *counts, struct error *err)
 {
     struct polyline_set agreeing, single, grown;
     const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, MAX_GROWTH};
@@ -132,7 +136,7 @@ static status repair_lines(struct fiber_job *job, struct polyline_set *in, bool 
     polyline_set_init(&grown);
     status s = polylines_cut_disagreeing(in, job->d, MAX_DISAGREEMENT_RAD, MIN_PIECE, &agreeing, &n_cut, err);
     if (s == STATUS_OK)
-        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, MIN_PIECE, &single, counts, err);
+        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, touching, MIN_PIECE, &single, counts, err);
     if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
     if (s == STATUS_OK)
         s = polylines_join(grow ? &grown : &single, job->v, job->diameter, job->o->eps_d, out, counts, err);
@@ -219,14 +223,14 @@ static status trace_lines(struct fiber_job *job, struct polyline_set *lines, str
     for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
     status s = find_chains(job, &part[0], err);
     enter_part(job, 0.6, 0.65);
-    if (s == STATUS_OK) s = repair_lines(job, &part[0], false, &part[1], &counts, err);
+    if (s == STATUS_OK) s = repair_lines(job, &part[0], false, 0.0, &part[1], &counts, err);
     for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
         s = center(job, &part[1], err);
-        if (s == STATUS_OK) s = repair_lines(job, &part[1], true, &part[2], &counts, err);
+        if (s == STATUS_OK) s = repair_lines(job, &part[1], true, 0.0, &part[2], &counts, err);
         if (s == STATUS_OK) s = center(job, &part[2], err);
-        if (s == STATUS_OK) s = repair_lines(job, &part[2], false, &part[1], &counts, err);
+        if (s == STATUS_OK) s = repair_lines(job, &part[2], false, 0.0, &part[1], &counts, err);
     }
-    if (s == STATUS_OK) s = repair_lines(job, &part[1], true, &part[0], &counts, err);
+    if (s == STATUS_OK) s = repair_lines(job, &part[1], true, 0.0, &part[0], &counts, err);
     if (s == STATUS_OK) {
         classify(&part[0]); /* from classes of subvolumes to axis classes */
         s = smooth_and_drop(job, &part[0], lines, err);
@@ -234,9 +238,10 @@ static status trace_lines(struct fiber_job *job, struct polyline_set *lines, str
     if (s == STATUS_OK) s = center(job, lines, err);
     if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
-    if (s == STATUS_OK)
-        s = repair_lines(job, lines, true, &part[1], &counts, err); /* lines on axes are easier to join */
-    if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], lines, err);
+    /* lines on the fibers' axes are easier to distinguish and to join, and their radii are known */
+    if (s == STATUS_OK) s = repair_lines(job, lines, true, TOUCHING, &part[1], &counts, err);
+    if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], &part[2], err);
+    if (s == STATUS_OK) s = repair_lines(job, &part[2], true, TOUCHING, lines, &counts, err);
     job->report->n_gap_bridged = counts.n_gap_bridged;
     job->report->n_joined = counts.n_joined;
     for (int i = 0; i < 3; i++) polyline_set_release(&part[i]);

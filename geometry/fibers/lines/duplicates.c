@@ -25,20 +25,48 @@ static bool wins(const struct polyline_set *p, size_t a, size_t b)
     return na != nb ? na > nb : a < b;
 }
 
-/* Distance of the axes within which two lines are one fiber: inside of the thicker one, where no other axis can be. */
-static float near_distance(const struct polyline_set *p, size_t a, size_t b, float usual)
+/* Lines that run beside each other, by the cosine of their directions. */
+static const float BESIDE = 0.85f;
+
+/* Distance of the axes within which two lines are one fiber: inside of the thicker one, where no other axis can be, or
+ * of lines beside each other `touching` times the sum of the radii. */
+static float near_distance(const struct polyline_set *p, size_t a, size_t b, float usual, float touching)
 {
     float ra = p->radius[a] > 0.0f ? p->radius[a] : usual, rb = p->radius[b] > 0.0f ? p->radius[b] : usual;
-    return fmaxf(1.0f, 0.9f * fmaxf(ra, rb) + 0.1f * fminf(ra, rb));
+    return fmaxf(fmaxf(1.0f, touching * (ra + rb)), 0.9f * fmaxf(ra, rb) + 0.1f * fminf(ra, rb));
 }
 
-/* Returns whether a line with precedence passes vertex i of `line` within near_distance, which is at most `most`. */
-static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i, float usual,
-                         float most)
+/* What the search for duplicates has in common for all vertices. */
+struct duplicate_search {
+    const struct polyline_set *p;
+    struct vertex_grid grid;
+    float usual, most, touching; /* radius where it is not known; largest near_distance; joining.h */
+};
+
+/* Returns whether vertex `other` of another line passes within near_distance of x, where `line` has tangent t. */
+static bool passes(const struct duplicate_search *s, size_t line, const float x[3], const float t[3], size_t other)
 {
-    const float *x = p->vertex[i];
-    float reach = sqrtf(most * most + 1.0f); /* vertices are at most about 1.5 voxels apart */
+    size_t other_line = s->grid.line_of[other];
+    float d[3], u[3], along = 0.0f, square = 0.0f, cosine = 0.0f;
+    tangent_at(s->p, other_line, other, u);
+    for (int a = 0; a < 3; a++) {
+        d[a] = x[a] - s->p->vertex[other][a];
+        along += d[a] * u[a];
+        square += d[a] * d[a];
+        cosine += t[a] * u[a];
+    }
+    float near = near_distance(s->p, other_line, line, s->usual, fabsf(cosine) > BESIDE ? s->touching : 0.0f);
+    return square <= near * near + 1.0f && square - along * along <= near * near;
+}
+
+/* Returns whether a line with precedence passes vertex i of `line` within near_distance. */
+static bool is_duplicate(const struct duplicate_search *s, size_t line, size_t i)
+{
+    const struct vertex_grid *g = &s->grid;
+    const float *x = s->p->vertex[i];
+    float reach = sqrtf(s->most * s->most + 1.0f), t[3]; /* vertices are at most about 1.5 voxels apart */
     size_t from[3], to[3], c[3];
+    tangent_at(s->p, line, i, t);
     vertex_grid_range(g, x, reach, from, to);
     for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
         for (c[1] = from[1]; c[1] <= to[1]; c[1]++)
@@ -46,41 +74,33 @@ static bool is_duplicate(const struct polyline_set *p, const struct vertex_grid 
                 size_t cell = (c[2] * g->n[1] + c[1]) * g->n[0] + c[0];
                 for (size_t e = g->first[cell]; e < g->first[cell + 1]; e++) {
                     size_t other = g->vertex[e], other_line = g->line_of[other];
-                    if (other_line == line || !wins(p, other_line, line)) continue;
-                    float near = near_distance(p, other_line, line, usual);
-                    float d[3], s[3], along = 0.0f, square = 0.0f;
-                    tangent_at(p, other_line, other, s);
-                    for (int a = 0; a < 3; a++) {
-                        d[a] = x[a] - p->vertex[other][a];
-                        along += d[a] * s[a];
-                        square += d[a] * d[a];
-                    }
-                    if (square <= near * near + 1.0f && square - along * along <= near * near) return true;
+                    if (other_line != line && wins(s->p, other_line, line) && passes(s, line, x, t, other)) return true;
                 }
             }
     return false;
 }
 
 status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                   size_t min_vertex, struct polyline_set *result, struct join_counts *counts,
-                                   struct error *err)
+                                   double touching, size_t min_vertex, struct polyline_set *result,
+                                   struct join_counts *counts, struct error *err)
 {
-    struct vertex_grid g = {0};
-    float usual = (float)(0.5 * diameter_voxel), most = fmaxf(1.0f, usual);
-    for (size_t l = 0; l < lines->n_line; l++) most = fmaxf(most, lines->radius[l]);
-    status s = vertex_grid_init(&g, lines, n_voxel, (float)fmax(3.0, diameter_voxel), err);
+    struct duplicate_search search = {.p = lines, .usual = (float)(0.5 * diameter_voxel), .touching = (float)touching};
+    search.most = fmaxf(1.0f, search.usual);
+    for (size_t l = 0; l < lines->n_line; l++) search.most = fmaxf(search.most, lines->radius[l]);
+    search.most *= fmaxf(1.0f, 2.0f * search.touching);
+    status s = vertex_grid_init(&search.grid, lines, n_voxel, (float)fmax(3.0, diameter_voxel), err);
     counts->n_duplicate = 0;
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t run = lines->first[l];
         for (size_t i = lines->first[l]; i <= lines->first[l + 1] && s == STATUS_OK; i++) {
-            bool cut = i == lines->first[l + 1] || is_duplicate(lines, &g, l, i, usual, most);
+            bool cut = i == lines->first[l + 1] || is_duplicate(&search, l, i);
             if (!cut) continue;
             if (i - run >= min_vertex) s = polyline_add_part(result, lines, l, run, i, err);
             counts->n_duplicate += i < lines->first[l + 1];
             run = i + 1;
         }
     }
-    vertex_grid_release(&g);
+    vertex_grid_release(&search.grid);
     return s;
 }
 
