@@ -378,37 +378,9 @@ static void test_alignment(void **state)
     volume_release(&v);
 }
 
-/* Lines beside each other at 0.75 of the sum of their radii: fibers do not pass through each other, so the shorter one
- * goes where radii are known. Lines that cross at that distance stay. */
-static void test_touching_fibers(void **state)
-{
-    (void)state;
-    const size_t n[3] = {64, 64, 32};
-    for (int round = 0; round < 2; round++) {
-        struct polyline_set in, out;
-        struct join_counts counts = {0};
-        polyline_set_init(&in);
-        polyline_set_init(&out);
-        add_piece(&in, 0, 2.5f, 60.5f, 20.0f);
-        add_piece(&in, 0, 10.5f, 40.5f, 24.5f);
-        assert_int_equal(polyline_begin(&in, 1, NULL), STATUS_OK);
-        for (int k = 0; k < 60; k++)
-            assert_int_equal(polyline_add(&in, (float[3]){50.0f, 2.5f + (float)k, in.vertex[0][2] + 4.5f}, NULL),
-                             STATUS_OK);
-        for (size_t l = 0; l < 3; l++) in.radius[l] = 3.0f;
-        assert_int_equal(polylines_remove_duplicates(&in, n, 6.0, round == 0 ? 0.0 : 0.85, 4, &out, &counts, NULL),
-                         STATUS_OK);
-        assert_int_equal(out.n_line, round == 0 ? 3 : 2);
-        assert_int_equal(out.n_vertex, round == 0 ? in.n_vertex : in.n_vertex - polyline_length(&in, 1));
-        polyline_set_release(&in);
-        polyline_set_release(&out);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_touching_fibers),
         cmocka_unit_test(test_smoothing),
         cmocka_unit_test(test_linking_leaning_neighbours),
         cmocka_unit_test(test_duplicates_and_joins),
