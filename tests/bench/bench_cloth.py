@@ -192,30 +192,43 @@ RECOVERIES = {
 }
 
 
+def read_json(path):
+    with open(path, encoding="utf-8") as f:
+        return json.load(f)
+
+
+def write_json(path, value):
+    with open(path, "w", encoding="utf-8") as f:
+        json.dump(value, f)
+
+
 def run(arguments, *command):
     subprocess.run([os.path.join(arguments.build, "bin", command[0]), *command[1:]], check=True, stdout=sys.stderr)
 
 
 def make_truth(arguments, folder, cloth, sets, groups):
-    """Fibers and photographs of the true cloth, whose random places are not those of the job's cloth."""
+    """Fibers and photographs of the true cloth, whose random places are not those of the job's cloth. Those of an earlier
+    run with the same commands are taken as they are: empty the folder after a change of the renderer."""
     os.makedirs(folder, exist_ok=True)
-    with open(os.path.join(folder, "description.json"), "w", encoding="utf-8") as f:
-        json.dump(dict(of_size(cloth, TRUE_YARNS, 16), seed=77), f)
-    write_views(os.path.join(folder, "views.csv"))
-    run(arguments, "selvedge-phantom", "cloth", "--description", os.path.join(folder, "description.json"), "--out", folder,
-        "--snr", "0", "--voxel-um", "8")
+    description, recipe = os.path.join(folder, "description.json"), os.path.join(folder, "commands.json")
+    make = ["selvedge-phantom", "cloth", "--description", description, "--out", folder, "--snr", "0", "--voxel-um", "8"]
     parameters = []
     for group, values in zip(groups, sets):
         for key, value in values.items():
             parameters += ["--param", f"{group + '.' if len(groups) > 1 else ''}{key}={value}"]
-    run(arguments, "selvedge-phantom", "photograph", "--fibers", os.path.join(folder, "truth.hair"), "--out", folder,
-        "--table", os.path.join(folder, "views.csv"), "--model", arguments.recovery_model, "--paths", "262144",
-        "--px", "32", "--noise", "0.005", "--seed", "11", "--quiet", *parameters,
-        *(["--groups", ",".join(groups)] if len(groups) > 1 else []))
-    with open(os.path.join(folder, "photographs.json"), encoding="utf-8") as f:
-        photographs = json.load(f)
-    with open(os.path.join(folder, "truth.json"), encoding="utf-8") as f:
-        return photographs, json.load(f)
+    photograph = ["selvedge-phantom", "photograph", "--fibers", os.path.join(folder, "truth.hair"), "--out", folder,
+                  "--table", os.path.join(folder, "views.csv"), "--model", arguments.recovery_model, "--paths", "262144",
+                  "--px", "32", "--noise", "0.005", "--seed", "11", "--quiet", *parameters,
+                  *(["--groups", ",".join(groups)] if len(groups) > 1 else [])]
+    wanted = [dict(of_size(cloth, TRUE_YARNS, 16), seed=77), IN_PLANE, OBLIQUE, HELD_OUT, make, photograph]
+    wanted = json.loads(json.dumps(wanted))
+    if not os.path.exists(recipe) or read_json(recipe) != wanted:
+        write_json(description, wanted[0])
+        write_views(os.path.join(folder, "views.csv"))
+        run(arguments, *make)
+        run(arguments, *photograph)
+        write_json(recipe, wanted)
+    return read_json(os.path.join(folder, "photographs.json")), read_json(os.path.join(folder, "truth.json"))
 
 
 def covered(result, truth_numbers, truth_parameters):

@@ -146,7 +146,7 @@ static status run_screening(struct search *s, struct error *err)
     struct cloth_search_result *r = s->result;
     double best[FIT_MAX_PARAM];
     status st = STATUS_OK;
-    if (q->n_screen < 2) return STATUS_OK;
+    if (q->n_screen == 0) return STATUS_OK;
     for (; st == STATUS_OK && r->n_screen < q->n_screen; r->n_screen++)
         st = screen_cloth(s, r->n_screen, best, &r->joint, err); /* its memory is free until the joint fit */
     if (st != STATUS_OK) return st;
@@ -171,14 +171,14 @@ static uint64_t joint_budget(const struct search *s)
 static status run_joint(struct search *s, struct error *err)
 {
     const struct cloth_search *q = s->search;
-    const double done = q->n_screen > 1 ? q->screen_share : 0.0;
+    const double done = q->n_screen > 0 ? q->screen_share : 0.0;
     struct progress_part part;
     struct progress progress = progress_begin_part(&part, q->problem->progress, done, 1.0 - done - q->final_share);
     struct fit_problem problem = *q->problem;
     struct fit_option option = *q->option;
     option.n_extra_start = 0;
     snprintf(s->kind, sizeof s->kind, "numbers of the cloth");
-    if (q->n_screen > 1) problem.path_budget = joint_budget(s);
+    if (q->n_screen > 0) problem.path_budget = joint_budget(s);
     problem.first_path = problem.path_budget / (JOINT_STEPS * 2 * problem.observation->n);
     problem.parameter = s->parameter;
     problem.progress = &progress;

@@ -32,7 +32,8 @@ struct cloth_search {
     const struct fit_problem *problem;
     const struct fit_option *option; /* of all unknowns, extra starts too; numbers are not tied */
     struct cloth_estimator *cloth;
-    /* Cloths of the screening, more than extra starts; 0 or 1: the joint fit begins at the start values. */
+    /* Cloths of the screening, more than extra starts. 1: that of the start values alone, so that the joint fit begins
+     * with parameters that are fitted to it; 0: the joint fit begins at the start values. */
     size_t n_screen;
     uint64_t screen_budget; /* most paths of each of them */
     /* Paths that the budget of `problem` leaves for the whole screening. What the screening takes more or less is the

@@ -14,8 +14,12 @@
 /* BUDGET_FACTOR: where the job states no path budget, that of the method is multiplied by it. LEAST_FITS: joint and
  * final fit have at least so many times the least paths of the method. */
 enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6, LEAST_FITS = 2 };
-/* Shares of the paths: at most, and of the final fit. */
-static const double screen_share = 0.25, final_share = 0.4;
+/* Shares of the paths: of the screening at most, and of the final fit. Cloths of a cheap screening differ by less than
+ * their noise, and the numbers are worth more paths than the parameters on a known cloth, so the joint fit has most. */
+static const double screen_share = 0.1, final_share = 0.25;
+/* A single cloth is screened, that of the start values, if it takes no more than this share. Steps with differences are
+ * too dear for the way from the job's start. */
+static const double single_share = 0.25;
 
 /* ---- the numbers ---- */
 
@@ -249,7 +253,7 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
     double per_cloth = SCREEN_ITERATIONS * least, most = fmin(4.0 + 2.0 * n_free + n_extra, CLOTH_MAX_SCREEN);
     double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));
-    q->n_screen = n_screen >= 2.0 ? (size_t)n_screen : 0;
+    q->n_screen = n_screen < 1.0 && per_cloth <= single_share * whole ? 1 : (size_t)n_screen;
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
     q->final_budget = (uint64_t)fmax(final_share * whole, LEAST_FITS * least);
     const double cost = cloth_estimator_cost(q->cloth->moves, n_free_number(c)), least_joint = LEAST_FITS * least;

@@ -266,6 +266,27 @@ static void test_extra_starts(void **state)
     free(r);
 }
 
+/* A screening of one cloth is a fit to that of the start values, with whose parameters the joint fit begins. */
+static void test_screening_of_one_cloth(void **state)
+{
+    (void)state;
+    struct fake_numbers x;
+    struct cloth_search_result *r = malloc(sizeof *r);
+    double objective[2];
+    for (size_t n_screen = 0; n_screen < 2; n_screen++) {
+        fake_numbers_init(&x, mid_cloth, 11, 0.0, 0.0, 0.0);
+        x.problem.max_iteration = 2;
+        x.search.n_screen = n_screen;
+        fake_numbers_run(&x, r);
+        assert_int_equal(r->n_screen, n_screen);
+        objective[n_screen] = r->joint.objective.value;
+        fake_numbers_release(&x);
+    }
+    for (size_t k = 0; k < FAKE_N_NUMBER; k++) assert_true(r->screened[0].number[k] == x.info[FAKE_N_PARAM + k].start);
+    assert_true(objective[1] < 0.1 * objective[0]);
+    free(r);
+}
+
 /* ---- the result without the numbers ---- */
 
 /* The variance of a parameter is that of the final fit plus what the numbers add, which makes about the joint one. */
@@ -371,6 +392,7 @@ int main(void)
         cmocka_unit_test(test_recovery_and_errors),
         cmocka_unit_test(test_prior_of_an_undetermined_number),
         cmocka_unit_test(test_extra_starts),
+        cmocka_unit_test(test_screening_of_one_cloth),
         cmocka_unit_test(test_marginal),
         cmocka_unit_test(test_screening_within_the_budget),
         cmocka_unit_test_setup_teardown(test_resume, scratch_folder_setup, scratch_folder_teardown),
