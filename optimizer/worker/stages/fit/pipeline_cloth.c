@@ -14,12 +14,13 @@
 /* BUDGET_FACTOR: where the job states no path budget, that of the method is multiplied by it. LEAST_FITS: joint and
  * final fit have at least so many times the least paths of the method. */
 enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6, LEAST_FITS = 2 };
-/* Shares of the paths: of the screening at most, and of the final fit. Cloths of a cheap screening differ by less than
- * their noise, and the numbers are worth more paths than the parameters on a known cloth, so the joint fit has most. */
-static const double screen_share = 0.1, final_share = 0.25;
-/* A single cloth is screened, that of the start values, if it takes no more than this share. Steps with differences are
- * too dear for the way from the job's start. */
-static const double single_share = 0.25;
+/* Shares of the paths, at most: of the screening, and of the final fit. */
+static const double screen_share = 0.25, final_share = 0.4;
+/* Paths that the final fit needs for each row, and the share that it has in any case: with many paths the numbers are
+ * worth more of them than the parameters on a cloth that is known. Nor are cheap fits to more than MOST_CLOTHS worth
+ * theirs, because cloths that are as good as these differ by less than their noise. */
+static const double final_paths = 150000.0, least_final_share = 0.25;
+enum { MOST_CLOTHS = 4 };
 
 /* ---- the numbers ---- */
 
@@ -247,17 +248,18 @@ uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t 
 static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
                         struct fit_problem *problem, struct cloth_search *q)
 {
-    double n_free = (double)n_free_number(c), least = (double)method->least_budget(problem);
+    double least = (double)method->least_budget(problem), n_row = (double)problem->observation->n;
     double whole =
         (double)(c->doc->path_budget > 0 ? c->doc->path_budget : BUDGET_FACTOR * method->info->default_path_budget);
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
-    double per_cloth = SCREEN_ITERATIONS * least, most = fmin(4.0 + 2.0 * n_free + n_extra, CLOTH_MAX_SCREEN);
+    double per_cloth = SCREEN_ITERATIONS * least, most = fmin(MOST_CLOTHS + n_extra, CLOTH_MAX_SCREEN);
     double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));
-    q->n_screen = n_screen < 1.0 && per_cloth <= single_share * whole ? 1 : (size_t)n_screen;
+    q->n_screen = (size_t)n_screen;
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
-    q->final_budget = (uint64_t)fmax(final_share * whole, LEAST_FITS * least);
+    double final = fmin(final_share * whole, fmax(least_final_share * whole, final_paths * n_row));
+    q->final_budget = (uint64_t)fmax(final, LEAST_FITS * least);
     const double cost = cloth_estimator_cost(q->cloth->moves, n_free_number(c)), least_joint = LEAST_FITS * least;
-    double both = fmax((1.0 - final_share) * whole, least_joint * cost); /* of screening and joint fit */
+    double both = fmax(whole - final, least_joint * cost); /* of screening and joint fit */
     q->screen_expected = (uint64_t)fmin((double)q->n_screen * per_cloth, both - least_joint * cost);
     q->least_joint_budget = (uint64_t)least_joint;
     problem->path_budget = (uint64_t)((both - (double)q->screen_expected) / cost);

@@ -2,9 +2,9 @@
  * scattering parameters together (optimizer/fit/cloth). Each model of the job gets its own numbers, and its results are
  * computed on the cloth of these numbers.
  *
- * The path budget of the job counts every path of the search: at most 10 % go to the screening, 25 % to the final fit,
- * and the rest to the joint fit and its differences. All estimates go through one journal, so the search resumes bit by
- * bit. */
+ * The path budget of the job counts every path of the search: at most 25 % go to the screening, 25 to 40 % to the final
+ * fit, and the rest to the joint fit and its differences. All estimates go through one journal, so the search resumes
+ * bit by bit. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CLOTH_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CLOTH_H
 
