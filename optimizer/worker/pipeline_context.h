@@ -30,6 +30,8 @@
 #include "renderer/scene/scene.h"
 #include "renderer/transport/derivative_check.h"
 
+#include <jansson.h>
+
 /* Fresh estimates at the fitted parameters: two replicas of every observation, in the order of `observation`. */
 struct validation {
     struct estimate *replica[2];
@@ -140,6 +142,7 @@ struct pipeline_context {
     struct pipeline_skill skill;   /* filled in before the report */
     size_t n_input_warning;        /* warnings of reading the job and of its geometry */
     struct verdict verdict;        /* of the best model; filled in before the report */
+    json_t *exports;               /* what result.json says of the files for other programs */
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-cloth bench-scan-errors bench-progress bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
+.PHONY: bench bench-cloth bench-scan-errors bench-progress bench-exports bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -40,6 +40,13 @@ bench-scan-errors: | deps-test ## scanned cloths: whether the stated errors cont
 bench-progress: | deps-test ## predicted against actual remaining time of four jobs, and the largest jump of their progress (half an hour on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_progress.py --build $(BUILD) $(PROGRESS)
+
+EXPORTS_PYTHON := $(BUILD)/exports-python
+$(EXPORTS_PYTHON)/bin/mitsuba-is-there:
+	@/usr/bin/python3 -m venv $(EXPORTS_PYTHON) && $(EXPORTS_PYTHON)/bin/pip install -q mitsuba numpy >&2 && touch $@
+bench-exports: $(EXPORTS_PYTHON)/bin/mitsuba-is-there | deps-test ## exported scenes rendered by Mitsuba 3 against the job's own renderings (3 minutes; installs Mitsuba from PyPI into build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python
 
 docs-pairs: | deps-test ## draw docs/images/photo-pairs.png anew: renderings of four photo pairs (10 minutes, seconds after bench-cloth)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

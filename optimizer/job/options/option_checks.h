@@ -39,6 +39,8 @@ status job_check_nuisance(const struct option_value *v, struct error *err);
 status job_check_texture(const struct option_value *v, struct error *err);
 /* Also makes the built-in grid of candidates when the document asks for it. */
 status job_check_candidates(const struct option_value *v, struct error *err);
+/* Exports need a fitted model. */
+status job_check_export(const struct option_value *v, struct error *err);
 
 /* Id of model i and of method i in the catalogues; NULL after the last. */
 const char *job_model_id(size_t i);

@@ -271,5 +271,17 @@ const struct job_option option_rows_fit[] = {
      .unit = "per pixel",
      .left_out = "so many that all renderings together take half of the paths of the fit, 2 to 16",
      .meaning = "Samples of the renderings in the result."},
+    {.path = "export",
+     .kind = OPTION_SECTION,
+     .check = job_check_export,
+     .left_out = "none",
+     .meaning = "Files for other programs, in the folder `export` of the results."},
+    {.path = "export.mitsuba",
+     .kind = OPTION_BOOL,
+     INTO(export_mitsuba),
+     .standard = "false",
+     .meaning =
+         "A scene for Mitsuba 3: fibers, lamp, camera, and hair lobes that come nearest to the fitted scattering "
+         "of the best model, which must be a surface model. The result states how near."},
     {.path = NULL},
 };

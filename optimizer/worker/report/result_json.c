@@ -102,9 +102,7 @@ static json_t *correlation_json(const struct pipeline_model *m)
     return list;
 }
 
-/* Mean of both replicas with the fitted nuisance terms (nuisance.h), and its standard error: the figures to compare
- * with the photograph. */
-static void rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3])
+void result_rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3])
 {
     struct estimate a, b;
     nuisance_show(&m->fit.nuisance, &m->validation.replica[0][i], &a);
@@ -194,7 +192,7 @@ static json_t *model_json(const struct pipeline_context *c, size_t i_model)
     put_fit(json, c, m);
     for (size_t i = 0; i < c->observation.n; i++) {
         double mean[3], se[3];
-        rendered_mean(m, i, mean, se);
+        result_rendered_mean(m, i, mean, se);
         json_t *row = json_pack("{s:o, s:o}", "rendered", json_number_list(mean, 3, 1.0), "rendered_se",
                                 json_number_list(se, 3, 1.0));
         put_row_error(row, c, m, i);
@@ -212,7 +210,7 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
     const double deg = DEG_PER_RAD;
     double rendered[3], se[3];
     char png[200], exr[200], photograph[200];
-    rendered_mean(m, i, rendered, se);
+    result_rendered_mean(m, i, rendered, se);
     snprintf(png, sizeof png, "renderings/%s.png", picture);
     snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
     snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
@@ -328,6 +326,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     json_object_set_new(json, "models", models);
     json_object_set_new(json, "skill", skill_json(c));
     json_object_set_new(json, "radius", radius_json(c));
+    json_object_set(json, "exports", c->exports);
     json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));
     put_job(json, c);
     return json;

@@ -6,6 +6,7 @@
  *   "model", "chosen_by"                            id of the best model, to which all keys but "models" refer, and
  *                                                   the measure by which it was chosen
  *   "definitions"                                   what errors and units are, in sentences
+ *   "exports"                                       files for other programs (docs/exports.md)
  *   "verdict"                                       whether the result can be used (verdict.h)
  *   "converged", "reason", "reason_code"            why the fit ended (stop_reason.h)
  *   "parameters"                                    value, standard error (with photograph noise, Monte-Carlo noise and
@@ -45,6 +46,9 @@ status result_picture_names(const struct observation_set *o, picture_name **name
 /* Exposure of all PNG pictures. It brings the 90th percentile of the brightest measured channels to 0.8. */
 double result_png_exposure(const struct observation_set *o);
 
+/* What model m makes of row i: the mean of both replicas with the fitted nuisance terms (nuisance.h), and its standard
+ * error: the figures to compare with the measurement. */
+void result_rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3]);
 /* Relative error of row i by model m (objective_row_error), and its standard error: the one error of a row that
  * results, summary, report and dashboard show. */
 double result_row_error(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *se);

@@ -1,0 +1,200 @@
+#include "optimizer/worker/report/export/hair_fit.h"
+
+#include <math.h>
+#include <nlopt.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_THETA_O = 6, N_THETA_I = 28, N_PHI = 18, N_TURN = 4, N_UNKNOWN = 6, N_START = 4, N_EVALUATION = 1000 };
+#define N_VALUE ((size_t)N_THETA_O * N_THETA_I * N_PHI * 3)
+/* Cloth scatters light many times, and what returns from it has turned round in some fiber. So the share of light
+ * that is kept, against what is absorbed, counts more than the shapes of the lobes, and what turns back as much. */
+static const double albedo_weight = 4.0, turned_weight = 1.0, least_absorbed = 0.1, least_turned = 0.005;
+enum side { TURNS_BACK, GOES_ON, N_SIDE };
+/* roughness, roughness, index, ln absorption */
+static const double lower[N_UNKNOWN] = {0.03, 0.05, 1.05, -9.0, -9.0, -9.0},
+                    upper[N_UNKNOWN] = {1.0, 1.0, 3.0, 4.0, 4.0, 4.0};
+
+struct target {
+    double theta_o[N_THETA_O], theta_i[N_THETA_I], phi[N_PHI];
+    double weight_o[N_THETA_O], weight_i[N_THETA_I]; /* of solid angles; phi is uniform over half a turn, doubled */
+    double *fiber, *lobes;                           /* [N_THETA_O][N_THETA_I][N_PHI][3] */
+    double share[N_THETA_O][N_SIDE][3];
+};
+
+static void direction(double theta, double phi, float w[3])
+{
+    w[0] = (float)sin(theta);
+    w[1] = (float)(cos(theta) * cos(phi));
+    w[2] = (float)(cos(theta) * sin(phi));
+}
+
+/* Midpoints of equal steps of sin th, so that all have the same solid angle. Light along the fiber is left out. */
+static void make_directions(struct target *t)
+{
+    for (int i = 0; i < N_THETA_O; i++) {
+        t->theta_o[i] = asin((i + 0.5) / N_THETA_O);
+        t->weight_o[i] = cos(t->theta_o[i]) / N_THETA_O;
+    }
+    for (int i = 0; i < N_THETA_I; i++) {
+        t->theta_i[i] = asin(-1.0 + (2.0 * i + 1.0) / N_THETA_I);
+        t->weight_i[i] = 2.0 / N_THETA_I * 2.0 * M_PI / N_PHI;
+    }
+    for (int k = 0; k < N_PHI; k++) t->phi[k] = M_PI * (k + 0.5) / N_PHI;
+}
+
+static void add_fiber(const struct scattering_model *m, const struct scattering_state *state, struct target *t,
+                      size_t i_value, int o, int i, int k)
+{
+    double *at = t->fiber + i_value;
+    for (int turn = 0; turn < 2 * N_TURN; turn++) { /* the other azimuth of each pair mirrors the first */
+        float wi[3], wo[3], s[3];
+        double from = M_PI * (turn + 0.5) / (2 * N_TURN);
+        direction(t->theta_o[o], from, wo);
+        direction(t->theta_i[i], from + (turn % 2 == 0 ? t->phi[k] : -t->phi[k]), wi);
+        m->eval(state, wi, wo, s, NULL);
+        for (int c = 0; c < 3; c++) at[c] += (double)s[c] * cos(t->theta_i[i]) / (2 * N_TURN);
+    }
+}
+
+/* Shares of the light from th_o that leave on the side of where it came from, and on the other side. */
+static void add_shares(const struct target *t, const double *value, double share[N_THETA_O][N_SIDE][3])
+{
+    memset(share, 0, N_THETA_O * sizeof *share);
+    for (int o = 0; o < N_THETA_O; o++)
+        for (int i = 0; i < N_THETA_I; i++)
+            for (int k = 0; k < N_PHI; k++, value += 3)
+                for (int c = 0; c < 3; c++)
+                    share[o][cos(t->phi[k]) > 0.0 ? TURNS_BACK : GOES_ON][c] += value[c] * t->weight_i[i];
+}
+
+static void fill_fiber(const struct scattering_model *m, const struct scattering_state *state, struct target *t)
+{
+    size_t at = 0;
+    for (int o = 0; o < N_THETA_O; o++)
+        for (int i = 0; i < N_THETA_I; i++)
+            for (int k = 0; k < N_PHI; k++, at += 3) add_fiber(m, state, t, at, o, i, k);
+    add_shares(t, t->fiber, t->share);
+}
+
+static struct hair_lobes lobes_of(const double x[N_UNKNOWN])
+{
+    return (struct hair_lobes){x[0], x[1], x[2], {exp(x[3]), exp(x[4]), exp(x[5])}};
+}
+
+static void fill_lobes(const struct hair_lobes *l, struct target *t)
+{
+    for (size_t o = 0; o < N_THETA_O; o++)
+        hair_lobes_density(l, t->theta_o[o], t->theta_i, N_THETA_I, t->phi, N_PHI,
+                           t->lobes + o * N_THETA_I * N_PHI * 3);
+}
+
+/* Mean squared difference over the mean square of the fiber's. */
+static double shape_square(const struct target *t)
+{
+    double difference = 0.0, whole = 0.0;
+    const double *a = t->fiber, *b = t->lobes;
+    for (int o = 0; o < N_THETA_O; o++)
+        for (int j = 0; j < N_THETA_I * N_PHI * 3; j++, a++, b++) {
+            difference += t->weight_o[o] * (*a - *b) * (*a - *b);
+            whole += t->weight_o[o] * *a * *a;
+        }
+    return difference / whole;
+}
+
+static double share_square(const struct target *t)
+{
+    double share[N_THETA_O][N_SIDE][3], sum = 0.0, weight = 0.0;
+    add_shares(t, t->lobes, share);
+    for (int o = 0; o < N_THETA_O; o++)
+        for (int c = 0; c < 3; c++) {
+            double turned = t->share[o][TURNS_BACK][c], kept = turned + t->share[o][GOES_ON][c];
+            double d = (share[o][TURNS_BACK][c] - turned) / fmax(turned, least_turned);
+            double e = (share[o][TURNS_BACK][c] + share[o][GOES_ON][c] - kept) / (1.0 - kept + least_absorbed);
+            sum += t->weight_o[o] * (turned_weight * d * d + albedo_weight * e * e);
+            weight += t->weight_o[o];
+        }
+    return sum / weight;
+}
+
+static double objective(unsigned n, const double *x, double *gradient, void *data)
+{
+    (void)n, (void)gradient;
+    struct target *t = data;
+    const struct hair_lobes l = lobes_of(x);
+    fill_lobes(&l, t);
+    return shape_square(t) + share_square(t);
+}
+
+/* From several starts; the best end counts. */
+static status minimise(struct target *t, double best[N_UNKNOWN], struct error *err)
+{
+    static const double start[N_START][N_UNKNOWN] = {{0.2, 0.4, 1.5, -2.0, -2.0, -2.0},
+                                                     {0.6, 0.8, 1.5, -2.0, -2.0, -2.0},
+                                                     {0.4, 0.2, 1.3, -1.0, -1.0, -1.0},
+                                                     {0.5, 0.3, 1.1, -1.0, -1.0, -1.0}};
+    double lowest = INFINITY;
+    for (int k = 0; k < N_START; k++) {
+        nlopt_opt opt = nlopt_create(NLOPT_LN_SBPLX, N_UNKNOWN);
+        if (opt == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit hair lobes: out of memory");
+        double x[N_UNKNOWN], f = INFINITY;
+        memcpy(x, start[k], sizeof x);
+        nlopt_set_lower_bounds(opt, lower);
+        nlopt_set_upper_bounds(opt, upper);
+        nlopt_set_min_objective(opt, objective, t);
+        nlopt_set_maxeval(opt, N_EVALUATION);
+        nlopt_set_ftol_rel(opt, 1e-5);
+        nlopt_optimize(opt, x, &f); /* also when the evaluations are used up, x is the best point so far */
+        nlopt_destroy(opt);
+        if (!(f < lowest)) continue;
+        lowest = f;
+        memcpy(best, x, sizeof x);
+    }
+    return isfinite(lowest) ? STATUS_OK
+                            : error_set(err, STATUS_INTERNAL, "the hair lobes of an export have no finite error");
+}
+
+static void mean_share(const struct target *t, double share[N_THETA_O][N_SIDE][3], double turned[3], double all[3])
+{
+    double weight = 0.0;
+    for (int o = 0; o < N_THETA_O; o++) weight += t->weight_o[o];
+    for (int c = 0; c < 3; c++) {
+        turned[c] = all[c] = 0.0;
+        for (int o = 0; o < N_THETA_O; o++) {
+            turned[c] += t->weight_o[o] * share[o][TURNS_BACK][c] / weight;
+            all[c] += t->weight_o[o] * (share[o][TURNS_BACK][c] + share[o][GOES_ON][c]) / weight;
+        }
+    }
+}
+
+static status fit_target(struct target *t, struct hair_fit *fit, struct error *err)
+{
+    double x[N_UNKNOWN] = {0}, share[N_THETA_O][N_SIDE][3];
+    status s = minimise(t, x, err);
+    if (s != STATUS_OK) return s;
+    fit->lobes = lobes_of(x);
+    fill_lobes(&fit->lobes, t);
+    fit->rel_rms = sqrt(shape_square(t));
+    add_shares(t, t->lobes, share);
+    mean_share(t, t->share, fit->turned, fit->albedo);
+    mean_share(t, share, fit->lobes_turned, fit->lobes_albedo);
+    return STATUS_OK;
+}
+
+status hair_fit_run(const struct scattering_model *model, const double *param, struct hair_fit *fit, struct error *err)
+{
+    struct target t = {.fiber = calloc(N_VALUE, sizeof(double)), .lobes = calloc(N_VALUE, sizeof(double))};
+    struct scattering_state *state = NULL;
+    status s = t.fiber != NULL && t.lobes != NULL
+                   ? model->prepare(param, &state, err)
+                   : error_set(err, STATUS_NO_MEMORY, "cannot fit hair lobes: out of memory");
+    if (s == STATUS_OK) {
+        make_directions(&t);
+        fill_fiber(model, state, &t);
+        model->release(state);
+        s = fit_target(&t, fit, err);
+    }
+    free(t.fiber);
+    free(t.lobes);
+    return s;
+}

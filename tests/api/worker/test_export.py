@@ -1,0 +1,55 @@
+"""Exports of a job to other programs: the files, what the result says of them, and whether the other program opens them."""
+import csv
+import os
+import subprocess
+
+import pytest
+from daemon_under_test import problem, program
+from small_cloth import start_small_job
+
+pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
+FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1}
+PYTHON = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-python", "bin", "python")
+ROW = os.path.join(os.path.dirname(__file__), "..", "..", "bench", "mitsuba_row.py")
+
+
+def document(**more):
+    return {"sample": "export", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"}, "fit": dict(FIT, **more),
+            "export": {"mitsuba": True}}
+
+
+def save(real, job, folder):
+    files = [f["path"] for f in real.get(f"/v1/jobs/{job}/results").json()["files"] if f["path"].startswith("export/mitsuba/")]
+    for path in files:
+        (folder / os.path.basename(path)).write_bytes(real.get(f"/v1/jobs/{job}/results/{path}").content)
+    return sorted(os.path.basename(p) for p in files)
+
+
+def test_a_scene_for_mitsuba(real, tmp_path):
+    job = start_small_job(real, document())
+    result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
+    assert save(real, job, tmp_path) == ["fibers-0.txt", "rows.csv", "scene.xml"]
+    (export,) = result["exports"]
+    (material,) = export["materials"]
+    assert export["format"] == "mitsuba" and material["group"] is None and 0 < material["rel_rms"] < 1
+    assert material["albedo"] == pytest.approx(material["fitted_albedo"], rel=0.3)
+    curves = [c for c in (tmp_path / "fibers-0.txt").read_text().split("\n\n") if c.strip()]
+    assert len(curves) == result["geometry"]["n_fiber"]
+    assert all(len(c.strip().split("\n")) >= 4 for c in curves), "Mitsuba's B-splines have four control points or more"
+    rows = list(csv.DictReader((tmp_path / "rows.csv").open()))
+    assert [float(r["rendered_g"]) for r in rows] == pytest.approx([r["rendered"][1] for r in result["rows"]], rel=1e-6)
+    if not os.access(PYTHON, os.X_OK):
+        pytest.skip("the files are right; no Mitsuba to open them with (make bench-exports installs it)")
+    done = subprocess.run([PYTHON, ROW, str(tmp_path), "0", "8", "16"], capture_output=True, text=True, check=True)
+    assert all(x > 0 for x in map(float, done.stdout.strip("[]\n").split(",")))
+
+
+def test_a_volume_model_is_not_exported(real):
+    result = real.wait_state(start_small_job(real, document(model="microflake.v1")), "succeeded", timeout_s=120)["result"]
+    assert result["exports"] == []
+    assert [w for w in result["warnings"] if "nothing was exported to Mitsuba" in w]
+
+
+def test_an_export_needs_a_fit(real):
+    job = {"sample": "export", "volume": {"files": ["a.tif"]}, "export": {"mitsuba": True}}
+    problem(real.post("/v1/jobs", json=job), 422, "invalid", field="export.mitsuba")
