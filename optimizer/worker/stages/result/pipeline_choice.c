@@ -58,6 +58,18 @@ static size_t n_fitted(const struct pipeline_model *m)
     return n;
 }
 
+/* Akaike's criterion with its correction for few values (Burnham and Anderson 2002, "Model Selection and Multimodel
+ * Inference", section 2.4): n ln(error^2) + 2 k n / (n - k - 1). Infinite where unknowns are as many as values. */
+static double akaike(const struct pipeline_model *m)
+{
+    const struct cross_validation *v = &m->fit.cross_validation;
+    const struct objective_value *e = fitted_error(m);
+    double n = 0.0, k = (double)n_fitted(m);
+    for (size_t f = 0; f < v->n_fold; f++) n += v->fold_count[f];
+    double square = fmax(fmax(e->rel_square, e->rel_square_se), 1e-12); /* noise may leave less than nothing */
+    return n > k + 1.0 ? n * log(square) + 2.0 * k * n / (n - k - 1.0) : INFINITY;
+}
+
 size_t pipeline_best_model(const struct pipeline_context *c)
 {
     const enum pipeline_choice choice = pipeline_choice(c);
@@ -66,9 +78,7 @@ size_t pipeline_best_model(const struct pipeline_context *c)
     for (size_t i = 0; i < c->n_model && choice == CHOICE_CROSS_VALIDATION; i++) {
         const struct pipeline_model *m = &c->model[i];
         double se, more = difference(&c->model[lowest], m, choice, &se);
-        size_t n = n_fitted(m), n_best = n_fitted(&c->model[best]);
-        bool lower = judged_square(m, choice) < judged_square(&c->model[best], choice);
-        if (more <= se && (n < n_best || (n == n_best && lower))) best = i;
+        if (more <= se && akaike(m) < akaike(&c->model[best])) best = i;
     }
     return best;
 }
@@ -98,7 +108,8 @@ static void warn_of_equals(struct pipeline_context *c, enum pipeline_choice choi
         describe(&c->model[i], choice, model);
         used += (size_t)snprintf(text + used, sizeof text - used, " %s", model);
     }
-    const char *simpler = best != lowest_error(c, choice) ? "; the one with fewer fitted parameters is the result" : "";
+    const char *simpler =
+        best != lowest_error(c, choice) ? "; of these the one with the lowest Akaike criterion is the result" : "";
     if (used > 0) worker_status_warn(c->status, "%s%s", text, simpler);
 }
 

@@ -17,9 +17,9 @@ enum pipeline_choice pipeline_choice(const struct pipeline_context *c);
 const char *pipeline_choice_id(enum pipeline_choice choice);
 /* Index of the model with the lowest error by that measure. If the job gives every photograph a gain, each row has its
  * own. By cross-validation, models whose error is higher by no more than the standard error of the difference count as
- * equal, and of these the one with the fewest fitted unknowns is the best: a difference within its own error is chance,
- * and more unknowns then gain nothing (the one-standard-error rule of Breiman, Friedman, Olshen and Stone 1984; Hastie,
- * Tibshirani, Friedman 2009, section 7.10.1). */
+ * equal (Hastie, Tibshirani, Friedman 2009, section 7.10.1), since a difference within its own error is chance. Of
+ * these the one with the lowest Akaike criterion is the best: the error over the fitted rows, with a price for each
+ * unknown. Where all have as many unknowns as values, the lowest error by cross-validation decides. */
 size_t pipeline_best_model(const struct pipeline_context *c);
 
 /* Warns of models whose error equals that of the best one within the noise, so that the choice between them is chance,

@@ -52,6 +52,25 @@ static void test_of_equal_errors_the_simpler_model(void **state)
     }
 }
 
+/* Folds that tell nothing: the model that describes the fitted rows far better than its unknowns explain is the result,
+ * although the other one's rows that were left out came out a little better by chance. */
+static void test_of_equal_errors_the_one_that_fits(void **state)
+{
+    (void)state;
+    struct pipeline_context *c = calloc(1, sizeof *c);
+    c->n_model = 2;
+    c->model = calloc(2, sizeof *c->model);
+    make_model(&c->model[0], 9, 0.197, 0.15);
+    make_model(&c->model[1], 7, 0.151, 0.0);
+    c->model[0].validation.fit.rel_square = 0.0046;
+    c->model[1].validation.fit.rel_square = 0.137;
+    assert_int_equal(pipeline_best_model(c), 0);
+    c->model[0].validation.fit.rel_square = 0.13; /* two unknowns more explain that */
+    assert_int_equal(pipeline_best_model(c), 1);
+    free(c->model);
+    free(c);
+}
+
 /* A better model with more unknowns is not taken for chance, and of models with as many the lower error decides. */
 static void test_a_clear_difference_decides(void **state)
 {
@@ -93,6 +112,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_of_equal_errors_the_simpler_model),
+        cmocka_unit_test(test_of_equal_errors_the_one_that_fits),
         cmocka_unit_test(test_a_clear_difference_decides),
         cmocka_unit_test(test_fitted_rows_decide_without_folds),
     };
