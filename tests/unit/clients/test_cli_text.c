@@ -100,6 +100,8 @@ static void test_progress_line(void **state)
                          .stage = "fit",
                          .fraction = 0.5,
                          .eta_s = 65,
+                         .eta_low_s = (double)NAN,
+                         .eta_high_s = (double)NAN,
                          .objective = 0.0236,
                          .objective_se = 0.0008,
                          .rel_rms = (double)NAN,
@@ -112,11 +114,18 @@ static void test_progress_line(void **state)
     assert_non_null(strstr(out, "fit (6/8)"));
     assert_non_null(strstr(out, "ETA 1:05"));
     assert_non_null(strstr(out, "step 7  objective 0.02360 +- 0.00080"));
+    v.eta_low_s = 50;
+    v.eta_high_s = 130;
+    text_progress(&v, 200, out, sizeof out);
+    if (strstr(out, "ETA 0:50") == NULL || strstr(out, "2:10") == NULL)
+        fail_msg("no range of remaining time: '%s'", out);
     text_progress(&v, 40, out, sizeof out);
     assert_int_equal(strlen(out), 40);
     v = (struct job_view){.state = "queued",
                           .fraction = (double)NAN,
                           .eta_s = (double)NAN,
+                          .eta_low_s = (double)NAN,
+                          .eta_high_s = (double)NAN,
                           .objective = (double)NAN,
                           .step = -1,
                           .i_stage = -1};

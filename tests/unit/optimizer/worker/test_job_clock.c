@@ -136,8 +136,8 @@ static void test_the_book_is_a_file(void **state)
                                           "[]",
                                           "{\"speeds\":3}",
                                           "{\"speeds\":{\"a\":{\"n_job\":-1}}}",
-                                          "{\"speeds\":{\"a\":{\"n_job\":1,\"log_s_per_unit\":0,\"log_var\":0,"
-                                          "\"curve\":[0.5,0.4]}}}"};
+                                          ("{\"speeds\":{\"a\":{\"n_job\":1,\"log_s_per_unit\":0,\"log_var\":0,"
+                                           "\"curve\":[0.5,0.4]}}}")};
     for (size_t i = 0; i < sizeof damaged / sizeof damaged[0]; i++) {
         assert_int_equal(durable_replace(path, damaged[i], strlen(damaged[i]), NULL), STATUS_OK);
         speed_book_read(path, &again);

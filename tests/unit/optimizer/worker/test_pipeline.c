@@ -202,13 +202,13 @@ static void test_inputs(void **state)
 /* Radii in a wrong unit are refused before all ends on the faces are compared with each other. */
 static void test_fibers_wider_than_the_tile(void **state)
 {
-    static const char document[] = "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.txt\",\"tile_mm\":[1,2]},"
+    static const char document[] = "{\"sample\":\"s\",\"fibers\":{\"file\":\"a.txt\",\"tile_mm\":[0.1,0.2]},"
                                    "\"measurements\":{\"file\":\"a.csv\"}}";
     static const char rows[] = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b\n"
                                "fit,20,0,20,180,.1,.1,.1\nfit,30,0,20,180,.1,.1,.1\nfit,40,0,20,180,.1,.1,.1\n"
                                "fit,50,0,20,180,.1,.1,.1\nfit,60,0,20,180,.1,.1,.1\nfit,70,0,20,180,.1,.1,.1\n";
-    static const char *const fibers[2] = {"0 0.5 0 0.499\n1 0.5 0 0.499\n",
-                                          "0 0.5 0 0.01\n1 0.5 0 0.01\n\n0 0.5 0 0.501\n1 0.5 0 0.501\n"};
+    static const char *const fibers[2] = {"0 0 0 0.0499\n0.1 0.2 0 0.0499\n",
+                                          "0 0.05 0 0.01\n0.1 0.05 0 0.01\n\n0 0.05 0 0.0501\n0.1 0.05 0 0.0501\n"};
     assert_int_equal(durable_make_folder(scratch_path(state, "wide/input"), NULL), STATUS_OK);
     scratch_write(scratch_path(state, "wide/job.json"), document, sizeof document - 1);
     scratch_write(scratch_path(state, "wide/input/a.csv"), rows, sizeof rows - 1);
@@ -224,8 +224,9 @@ static void test_fibers_wider_than_the_tile(void **state)
         assert_int_equal(stage_fibers(&c, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
         if (i == 1) {
             assert_string_equal(err.field, OPTION_FIBER_FILE);
-            assert_non_null(strstr(
-                err.text, "'a.txt': fiber 1 has a radius of 0.501 mm, the tile is 1 x 2 mm: the unit may be wrong"));
+            assert_non_null(
+                strstr(err.text,
+                       "'a.txt': fiber 1 has a radius of 0.0501 mm, the tile is 0.1 x 0.2 mm: the unit may be wrong"));
         }
         pipeline_context_release(&c);
         worker_folder_close(&f);
