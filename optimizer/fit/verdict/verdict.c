@@ -107,7 +107,7 @@ static void reserve_error(const struct verdict_facts *f, struct verdict *v)
     const double error = sure_error(f), percent = 100.0;
     if (above(error, VERDICT_NEAR * f->allowed))
         reserve(v, "error_beyond_noise",
-                "The error over %s is %.3g %%, %.2g times what the measurements allow (%.2g %%).", rows_words(f->rows),
+                "The error over %s is %.3g %%, %.3g times what the measurements allow (%.2g %%).", rows_words(f->rows),
                 percent * f->error, f->error / f->allowed, percent * f->allowed);
     if (isfinite(f->one_color_error) && above(error, f->one_color_error))
         reserve(v, "worse_than_one_color", "One color for all rows predicts %s better (%.3g %%) than this fit.",

@@ -46,9 +46,9 @@ static void open_chart(const struct axes *a, const char *x_label, const char *y_
         char text[24];
         double x = a->log_x ? a->x0 * pow(a->x1 / a->x0, k / 4.0) : a->x0 + (a->x1 - a->x0) * k / 4.0;
         double y = a->log_y ? a->y0 * pow(a->y1 / a->y0, k / 4.0) : a->y0 + (a->y1 - a->y0) * k / 4.0;
-        snprintf(text, sizeof text, "%.2g", x);
+        snprintf(text, sizeof text, "%.3g", x);
         text_at(out, x_of(a, x), HEIGHT - BOTTOM + 16, "middle", text);
-        snprintf(text, sizeof text, "%.2g", y);
+        snprintf(text, sizeof text, "%.3g", y);
         text_at(out, LEFT - 6, y_of(a, y) + 4, "end", text);
     }
     text_at(out, (LEFT + WIDTH - RIGHT) / 2.0, HEIGHT - 8, "middle", x_label);

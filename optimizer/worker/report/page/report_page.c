@@ -90,13 +90,22 @@ static void print_errors(const json_t *result, FILE *out)
 
 static void print_flags(const json_t *p, FILE *out)
 {
-    if (json_is_true(json_object_get(p, "fixed"))) fputs("fixed ", out);
-    if (json_is_string(json_object_get(p, "at_bound"))) fprintf(out, "at its %s bound ", page_string(p, "at_bound"));
-    if (json_is_false(json_object_get(p, "determined"))) fputs("not determined ", out);
-    if (json_is_string(json_object_get(p, "tied_to"))) {
-        fputs("tied to ", out);
-        page_escaped(page_string(p, "tied_to"), out);
+    const char *between = "";
+    if (json_is_true(json_object_get(p, "fixed"))) {
+        fputs("fixed", out);
+        between = ", ";
     }
+    if (json_is_string(json_object_get(p, "at_bound"))) {
+        fprintf(out, "%sat its %s bound", between, page_string(p, "at_bound"));
+        between = ", ";
+    }
+    if (json_is_false(json_object_get(p, "determined"))) {
+        fprintf(out, "%snot determined", between);
+        between = ", ";
+    }
+    if (!json_is_string(json_object_get(p, "tied_to"))) return;
+    fprintf(out, "%stied to ", between);
+    page_escaped(page_string(p, "tied_to"), out);
 }
 
 static void print_parameters(const char *title, const json_t *list, FILE *out)

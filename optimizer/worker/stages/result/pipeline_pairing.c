@@ -115,7 +115,7 @@ status pipeline_warn_pairing(struct pipeline_context *c, struct error *err)
                     fmin(contrast_error(c, b, false, 1), contrast_error(c, b, false, largest - 1)));
     if (best <= better_share * given)
         worker_status_warn(c->status,
-                           "between rows of one lamp and camera the fit is off by %.2g %% as given, and by %.2g %% in "
+                           "between rows of one lamp and camera the fit is off by %.3g %% as given, and by %.3g %% in "
                            "another order of the cloth's rotations: are rotations or files exchanged?",
                            100.0 * given, 100.0 * best);
     free(b);

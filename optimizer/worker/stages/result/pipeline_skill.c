@@ -14,7 +14,7 @@ static void warn_without_skill(struct pipeline_context *c)
     if (!isfinite(plain) || !(twin->rel_rms - skill_standard_errors * twin->rel_rms_se > plain)) return;
     worker_status_warn(c->status,
                        "a plain BRDF that knows nothing of the cloth, fitted to the same rows, predicts the held-out "
-                       "rows better (%.2g %%) than this fit (%.2g %%): %s",
+                       "rows better (%.3g %%) than this fit (%.3g %%): %s",
                        100.0 * plain, 100.0 * twin->rel_rms,
                        best->fit.converged ? "the model of the fibers or the cloth does not describe this fabric"
                                            : "the fit has not converged; if more paths do not help, the model of the "
