@@ -2,6 +2,7 @@
  * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints what it says. */
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_text.h"
+#include "clients/cli/tools/cli_sibling.h"
 
 #include <errno.h>
 #include <jansson.h>
@@ -12,26 +13,12 @@
 
 enum { PATH_ROOM = 4096, EXIT_NO_PROGRAM = 127 };
 
-/* The worker beside this program; else the one that PATH finds. */
-static void find_worker(char path[PATH_ROOM])
-{
-    static const char name[] = "selvedge-worker";
-    ssize_t n = readlink("/proc/self/exe", path, PATH_ROOM - sizeof name - 1);
-    char *slash = NULL;
-    if (n > 0) {
-        path[n] = '\0';
-        slash = strrchr(path, '/');
-    }
-    if (slash != NULL) memcpy(slash + 1, name, sizeof name);
-    if (slash == NULL || access(path, X_OK) != 0) memcpy(path, name, sizeof name);
-}
-
 /* Runs the worker's check and reads what it prints. */
 static status run_worker(const char *document, const char *folder, json_t **report, struct error *err)
 {
-    char worker[PATH_ROOM];
+    char worker[CLI_SIBLING_BYTES];
     int end[2], how = 0;
-    find_worker(worker);
+    cli_sibling("selvedge-worker", worker);
     if (pipe(end) != 0) return error_set_errno(err, "cannot start '%s'", worker);
     pid_t pid = fork();
     if (pid == 0) {

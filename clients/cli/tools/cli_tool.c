@@ -1,7 +1,7 @@
 #include "clients/cli/tools/cli_tool.h"
 
-#include <limits.h>
-#include <stdio.h>
+#include "clients/cli/tools/cli_sibling.h"
+
 #include <string.h>
 #include <unistd.h>
 
@@ -23,16 +23,9 @@ const char *cli_tool_help(void)
 
 status cli_tool_run(char **argv, struct error *err)
 {
-    char own[PATH_MAX], path[PATH_MAX + sizeof program];
-    ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
-    if (n > 0) {
-        own[n] = '\0';
-        char *slash = strrchr(own, '/');
-        if (slash != NULL) slash[1] = '\0';
-        snprintf(path, sizeof path, "%s%s", own, program);
-        execv(path, argv);
-    }
-    execvp(program, argv);
+    char path[CLI_SIBLING_BYTES];
+    cli_sibling(program, path);
+    execvp(path, argv);
     return error_set(err, STATUS_NOT_FOUND,
                      "cannot run `selvedge %s`: the program '%s' is neither beside this one nor in PATH", argv[1],
                      program);
