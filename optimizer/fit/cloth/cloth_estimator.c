@@ -4,11 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Share of the range by which a number moves for its derivative. Radiance bends slowly with the numbers of a cloth and
- * changes by a few percent over their whole range, less than the noise of a step. So a wide difference is the better
- * one: its noise falls with the width, and a noisy column damps the steps of its number. The central difference of a
- * wide move is off by its square only. */
-static const double difference_share = 0.3;
+/* Share of the range by which a number moves for its derivative. The noise of a difference falls with its width, but a
+ * wide one is off by the square of the width: optimizer/fit/NOTES.md has figures of both. */
+static const double difference_share = 0.15;
 
 status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source *source, size_t n_scattering,
                             size_t n_configuration, const struct param_info *info,
