@@ -8,9 +8,11 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import real_jobs  # noqa: E402
 
 # Largest relative RMS errors over the fitted and the held-out rows, and the least factor by which the objective falls. The scanned cloth
-# is not the measured one, so neither error is small; with the budget below they are 0.356, 0.296 and 74 (fiber_ct) and 0.260, 0.256 and 17
-# (weave_ct; 0.379, 0.372 and 8.5 with one radius for all fibers and without `h`). An error far below those would be as wrong as one above.
-BAR = {"fiber_ct": (0.38, 0.32, 50), "weave_ct": (0.29, 0.29, 14)}
+# is not the measured one, so neither error is small; with the budget below they are 0.356, 0.296 and 74 (fiber_ct) and 0.409, 0.330 and 8.3
+# (weave_ct). The fibers of the weave are not resolved, so its error follows from small changes of the reconstruction and does not tell which
+# is right: it was 0.379 with one radius for all fibers, 0.260 with 763 fibers that pass through each other, and is 0.409 with 729 that do
+# not. An error far below those would be as wrong as one above.
+BAR = {"fiber_ct": (0.38, 0.32, 50), "weave_ct": (0.44, 0.36, 7)}
 
 
 @pytest.mark.parametrize("name", sorted(real_jobs.JOBS))
