@@ -44,6 +44,12 @@ def test_a_scene_for_mitsuba(real, tmp_path):
     assert all(x > 0 for x in map(float, done.stdout.strip("[]\n").split(",")))
 
 
+def test_what_the_scene_lacks_is_said(real):
+    """A square of 40 cm shows more of this small tile than is written."""
+    result = real.wait_state(start_small_job(real, {**document(), "camera": {"crop_cm": 40}}), "succeeded", timeout_s=120)["result"]
+    assert [w for w in result["warnings"] if "repeats of the tile" in w] and len(result["exports"]) == 1
+
+
 def test_a_volume_model_is_not_exported(real):
     result = real.wait_state(start_small_job(real, document(model="microflake.v1")), "succeeded", timeout_s=120)["result"]
     assert result["exports"] == []

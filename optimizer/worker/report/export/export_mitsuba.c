@@ -196,11 +196,23 @@ static double half_width_mm(const struct mitsuba_export *e)
     return mm * (0.5 * crop / cos(most) * 1.1 + reach_thickness * (e->z_high_m - e->z_low_m));
 }
 
+/* Repeats of the tile along x and y. False: they do not cover what all rows together see. */
+static bool count_repeats(const struct mitsuba_export *e, int n[2])
+{
+    bool enough = true;
+    for (int a = 0; a < 2; a++) {
+        double wanted = ceil(2.0 * half_width_mm(e) / (mm * e->c->fiber.tile_size_m[a])) + 1.0;
+        enough = enough && wanted <= MAX_REPEAT;
+        n[a] = (int)fmin(wanted, MAX_REPEAT);
+    }
+    return enough;
+}
+
 static void print_repeats(FILE *text, const struct mitsuba_export *e)
 {
-    const double *tile = e->c->fiber.tile_size_m, half = half_width_mm(e);
+    const double *tile = e->c->fiber.tile_size_m;
     int n[2];
-    for (int a = 0; a < 2; a++) n[a] = (int)fmin(ceil(2.0 * half / (mm * tile[a])) + 1.0, MAX_REPEAT);
+    count_repeats(e, n);
     for (int i = 0; i < n[0]; i++)
         for (int j = 0; j < n[1]; j++)
             fprintf(text,
@@ -336,6 +348,19 @@ static status fit_materials(struct mitsuba_export *e, struct error *err)
     return s;
 }
 
+static void warn_of_rest(const struct mitsuba_export *e)
+{
+    int n[2];
+    if (!count_repeats(e, n))
+        worker_status_warn(e->c->status,
+                           "the scene for Mitsuba has %d x %d repeats of the tile, the most that are written: the "
+                           "widest view sees beyond them",
+                           n[0], n[1]);
+    if (e->c->environment != NULL)
+        worker_status_warn(e->c->status, "the scene for Mitsuba has no image of the surroundings: add '%s' to it",
+                           e->c->doc->environment_file);
+}
+
 status export_mitsuba_write(struct pipeline_context *c, json_t **json, struct error *err)
 {
     struct mitsuba_export e = {.c = c, .model = &c->model[pipeline_best_model(c)]};
@@ -348,6 +373,8 @@ status export_mitsuba_write(struct pipeline_context *c, json_t **json, struct er
     if (s == STATUS_OK) s = write_volumes(&e, err);
     if (s == STATUS_OK) s = write_rows(&e, err);
     if (s == STATUS_OK) s = write_scene(&e, err);
-    if (s == STATUS_OK) *json = export_json(&e);
-    return s;
+    if (s != STATUS_OK) return s;
+    warn_of_rest(&e);
+    *json = export_json(&e);
+    return STATUS_OK;
 }
