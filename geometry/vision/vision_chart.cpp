@@ -10,6 +10,20 @@ namespace
 /* The search takes pictures of this edge at most: larger ones take minutes, and patches stay large enough. */
 constexpr double largest_edge_px = 1500.0;
 
+/* OpenCV's search collects its candidates in the order in which its threads end, and the chart that it reports depends
+ * on that order (corners differ by up to 2 % of the chart). One thread gives the same chart every time. */
+class OneThread
+{
+  public:
+    OneThread() : threads(cv::getNumThreads()) { cv::setNumThreads(1); }
+    ~OneThread() { cv::setNumThreads(threads); }
+    OneThread(const OneThread &) = delete;
+    OneThread &operator=(const OneThread &) = delete;
+
+  private:
+    int threads;
+};
+
 } // namespace
 
 status vision_find_chart(const unsigned char *rgb, size_t width, size_t height, double corner_px[8], struct error *err)
@@ -23,7 +37,7 @@ status vision_find_chart(const unsigned char *rgb, size_t width, size_t height, 
         cv::cvtColor(picture, small, cv::COLOR_RGB2BGR);
         double factor = std::min(1.0, largest_edge_px / static_cast<double>(std::max(width, height)));
         if (factor < 1.0) cv::resize(small, small, cv::Size(), factor, factor, cv::INTER_AREA);
-        cv::theRNG().state = 1;
+        OneThread one_thread;
         cv::setRNGSeed(1);
         cv::Ptr<cv::mcc::CCheckerDetector> detector = cv::mcc::CCheckerDetector::create();
         if (!detector->process(small, cv::mcc::MCC24, 1) || detector->getBestColorChecker().empty())

@@ -115,6 +115,25 @@ static void test_drawn_charts(void **state)
     }
 }
 
+/* The same picture gives the same corners, to the last bit, however the machine shares its cores. */
+static void test_same_chart_again(void **state)
+{
+    static const double corner[8] = {150, 120, 650, 120, 650, 450, 150, 450};
+    double first[8] = {NAN};
+    struct image im;
+    bool found;
+    (void)state;
+    assert_int_equal(image_init(&im, 800, 600, 3, NULL), STATUS_OK);
+    draw_chart(&im, corner, camera, 300.0, 0.0);
+    assert_int_equal(color_chart_find(&im, first, &found, NULL), STATUS_OK);
+    for (int i = 0; i < 10; i++) {
+        double again[8] = {NAN};
+        assert_int_equal(color_chart_find(&im, again, &found, NULL), STATUS_OK);
+        assert_memory_equal(again, first, sizeof first);
+    }
+    image_release(&im);
+}
+
 static void test_refused_charts(void **state)
 {
     const double corner[8] = {150, 120, 650, 120, 650, 450, 150, 450};
@@ -188,8 +207,10 @@ static void test_real_chart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matrix),       cmocka_unit_test(test_reference),      cmocka_unit_test(test_delta_e),
-        cmocka_unit_test(test_drawn_charts), cmocka_unit_test(test_refused_charts), cmocka_unit_test(test_real_chart),
+        cmocka_unit_test(test_matrix),           cmocka_unit_test(test_reference),
+        cmocka_unit_test(test_delta_e),          cmocka_unit_test(test_drawn_charts),
+        cmocka_unit_test(test_same_chart_again), cmocka_unit_test(test_refused_charts),
+        cmocka_unit_test(test_real_chart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
