@@ -74,7 +74,7 @@ static void shared_paths_agree_with_separate_ones(void **state)
 static void shared_paths_state_their_correlation(void **state)
 {
     (void)state;
-    enum { N = 3, REPEAT = 400 };
+    enum { N = 3, REPEAT = 200 };
     const size_t n_path[N] = {256, 256, 256};
     for (uint32_t n_rotation = 1; n_rotation <= 2; n_rotation++) {
         struct configuration c[N] = {fixture.configuration[1], fixture.configuration[4], fixture.configuration[1]};
