@@ -107,6 +107,7 @@ struct pipeline_skill {
     bool measured; /* false where a row is lit by an environment too */
     struct plain_brdf brdf;
     double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
+    double left_out_rel_rms;             /* fitted rows by cross-validation; NaN with too few of them */
 };
 
 /* What the photograph of the cloth's texture shows (pipeline_texture.h). */

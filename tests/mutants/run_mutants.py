@@ -28,7 +28,7 @@ SANDBOX = ROOT / "tests" / "mutants" / "sandbox.sh"
 PARTS = {"base": 8, "geometry": 24, "renderer": 24, "optimizer": 26, "server": 12, "clients/cli": 6, "clients/dashboard": 4, "clients/python": 2}
 LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
 COMPILE = "WERROR=-Werror=incompatible-pointer-types -Werror=int-conversion -Werror=array-bounds"
-PROGRAMS = ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom"]
+PROGRAMS = ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom", "selvedge-camera"]
 LINK_S = 2.0  # what building one test costs beside running it
 SLOW_FACTOR, SLOW_S = 8.0, 20.0  # a test that takes SLOW_S seconds and SLOW_FACTOR times as long as usual hangs
 

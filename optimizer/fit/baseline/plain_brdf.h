@@ -39,6 +39,11 @@ void plain_brdf_radiance(const struct plain_brdf *b, const struct configuration 
  * left out. Takes milliseconds. STATUS_INVALID when no row is left, STATUS_NO_MEMORY. */
 status plain_brdf_fit(const struct observation_set *rows, struct plain_brdf *b, struct error *err);
 
+/* Relative RMS error by cross-validation over `rows`: fitted anew without the rows of each fold (folds.h), which it
+ * then predicts. The counterpart of cross_validation.h, by the same folds. NaN with fewer than FOLDS_LEAST folds. Takes
+ * FOLDS_MAX times as long as plain_brdf_fit at most. The errors of plain_brdf_fit. */
+status plain_brdf_left_out(const struct observation_set *rows, double *rel_rms, struct error *err);
+
 /* Relative RMS error over the rows of one set (objective.h); NaN when the set has none. */
 double plain_brdf_rel_rms(const struct plain_brdf *b, const struct observation_set *rows, enum job_set set);
 

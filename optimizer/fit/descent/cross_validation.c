@@ -1,5 +1,6 @@
 #include "optimizer/fit/descent/cross_validation.h"
 #include "optimizer/fit/descent/descent_methods.h"
+#include "optimizer/fit/objective/folds.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,28 +10,6 @@ enum { N = FIT_MAX_PARAM };
 
 /* Largest move of a parameter when a fold is left out, in step limits: within it the linear model means something. */
 static const double reach = 4.0;
-static const double same_angle_rad = 1e-6;
-
-static bool same_angle(double a, double b) { return fabs(a - b) < same_angle_rad; }
-
-static bool same_directions(const struct configuration *a, const struct configuration *b)
-{
-    return same_angle(a->light_theta_rad, b->light_theta_rad) && same_angle(a->light_phi_rad, b->light_phi_rad) &&
-           same_angle(a->camera_theta_rad, b->camera_theta_rad) && same_angle(a->camera_phi_rad, b->camera_phi_rad);
-}
-
-/* Writes the fold of each observation and returns the number of folds. */
-static size_t deal_folds(const struct observation_set *o, size_t *fold)
-{
-    size_t n_group = 0;
-    for (size_t i = 0; i < o->n; i++) {
-        size_t j = 0;
-        while (j < i && !same_directions(&o->item[j].configuration, &o->item[i].configuration)) j++;
-        fold[i] = j < i ? fold[j] : n_group++ % CROSS_VALIDATION_MAX_FOLD;
-    }
-    return n_group < CROSS_VALIDATION_MAX_FOLD ? n_group : CROSS_VALIDATION_MAX_FOLD;
-}
-
 static bool scored(const struct linear_model *m, size_t i)
 {
     return m->extra[3 * i] > 0.0 && !(m->contrast[3 * i] > 0.0);
@@ -120,14 +99,14 @@ static void summarise(size_t n_fold, struct cross_validation *out)
 /* Whether the rows outside each fold have more numbers than there are free parameters. */
 static bool enough_rows(const struct linear_model *m, const size_t *fold, size_t n_fold, size_t n_free)
 {
-    size_t all = 0, largest = 0, in_fold[CROSS_VALIDATION_MAX_FOLD] = {0};
+    size_t all = 0, largest = 0, in_fold[FOLDS_MAX] = {0};
     for (size_t i = 0; i < m->n_row / 3; i++) {
         if (!scored(m, i)) continue;
         all += 3;
         in_fold[fold[i]] += 3;
     }
     for (size_t f = 0; f < n_fold; f++) largest = in_fold[f] > largest ? in_fold[f] : largest;
-    return n_fold >= CROSS_VALIDATION_LEAST_FOLD && all - largest > n_free;
+    return n_fold >= FOLDS_LEAST && all - largest > n_free;
 }
 
 status cross_validation_compute(const struct linear_model *m, const struct observation_set *o,
@@ -146,7 +125,7 @@ status cross_validation_compute(const struct linear_model *m, const struct obser
     f.part.weight = weight;
     for (size_t p = 0; p < m->n_param; p++)
         if (!fixed[p]) f.index[f.n++] = p;
-    const size_t n_fold = deal_folds(o, fold);
+    const size_t n_fold = folds_deal(o, fold);
     if (!enough_rows(m, fold, n_fold, f.n)) goto out;
     for (size_t i = 0; i < n_fold && s == STATUS_OK; i++) s = leave_out(m, k, fold, i, &f, out, err);
     if (s == STATUS_OK) summarise(n_fold, out);
@@ -158,7 +137,7 @@ out:
 
 double cross_validation_difference(const struct cross_validation *a, const struct cross_validation *b, double *se)
 {
-    double square[CROSS_VALIDATION_MAX_FOLD];
+    double square[FOLDS_MAX];
     for (size_t f = 0; f < a->n_fold; f++) square[f] = b->fold_square[f] - a->fold_square[f];
     *se = scatter_of_mean(square, a->fold_count, a->n_fold, b->rel_square - a->rel_square);
     return b->rel_square - a->rel_square;

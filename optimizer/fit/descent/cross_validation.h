@@ -1,13 +1,11 @@
 /* Cross-validation inside the fitted rows: how well a fit predicts rows that it has not seen. Models of one job are
  * compared by it, so the held-out rows have no part in the choice.
  *
- * Rows with the same directions of light and camera, whatever the cloth's rotation, stay together as a group. Groups
- * are dealt to at most CROSS_VALIDATION_MAX_FOLD folds in the order of the rows; up to that number of groups each is a
- * fold of its own (leave one out). The fit without a fold is not repeated with new paths. The pooled linear model at
- * the result is minimised anew without the fold's rows: weights, priors and bounds are those of the fit, the allowed
- * range of each parameter is a weak prior about the result (as in uncertainty.h), and no parameter moves by more than
- * a few step limits. The fold's residuals then follow from the same linear model. The two replicas have independent
- * noise, so the product of their predicted residuals is an unbiased square, as in objective.h.
+ * Folds: optimizer/fit/objective/folds.h. The fit without a fold is not repeated with new paths. The pooled linear
+ * model at the result is minimised anew without the fold's rows: weights, priors and bounds are those of the fit, the
+ * allowed range of each parameter is a weak prior about the result (as in uncertainty.h), and no parameter moves by
+ * more than a few step limits. The fold's residuals then follow from the same linear model. The two replicas have
+ * independent noise, so the product of their predicted residuals is an unbiased square, as in objective.h.
  *
  * Errors are relative to the brightness of the row (objective.h, relative RMS error). Contrasts and rows of weight 0
  * are fitted like the others but not scored. With one gain for each photograph the residuals are without these gains
@@ -20,23 +18,22 @@
 #define SELVEDGE_OPTIMIZER_CROSS_VALIDATION_H
 
 #include "optimizer/fit/linear/linear_model.h"
+#include "optimizer/fit/objective/folds.h"
 
 #include <stdbool.h>
 
-enum { CROSS_VALIDATION_MAX_FOLD = 16, CROSS_VALIDATION_LEAST_FOLD = 4 };
-
 struct cross_validation {
-    size_t n_fold;     /* 0: there are too few rows, and all that follows is not set */
-    size_t n_row;      /* rows that were left out and predicted, each once */
-    double rel_square; /* mean square of the relative errors; may be below 0 by noise */
-    double rel_rms;    /* sqrt(max(0, rel_square)) */
-    double rel_rms_se; /* by the scatter between folds, which contains that of the model's misfit */
-    double fold_square[CROSS_VALIDATION_MAX_FOLD]; /* sum of the squares of a fold */
-    double fold_count[CROSS_VALIDATION_MAX_FOLD];  /* numbers (three for each row) in that sum */
+    size_t n_fold;                 /* 0: there are too few rows, and all that follows is not set */
+    size_t n_row;                  /* rows that were left out and predicted, each once */
+    double rel_square;             /* mean square of the relative errors; may be below 0 by noise */
+    double rel_rms;                /* sqrt(max(0, rel_square)) */
+    double rel_rms_se;             /* by the scatter between folds, which contains that of the model's misfit */
+    double fold_square[FOLDS_MAX]; /* sum of the squares of a fold */
+    double fold_count[FOLDS_MAX];  /* numbers (three for each row) in that sum */
 };
 
 /* m: pooled at the result, with the weights of the fit. o: its observations. k, fixed: n_param each. There are too few
- * rows when there are fewer than CROSS_VALIDATION_LEAST_FOLD folds, or when the rows outside a fold have no more
+ * rows when there are fewer than FOLDS_LEAST folds, or when the rows outside a fold have no more
  * numbers than there are free parameters. STATUS_NO_MEMORY, and the errors of bounded_quadratic. */
 status cross_validation_compute(const struct linear_model *m, const struct observation_set *o,
                                 const struct coordinate *k, const bool *fixed, struct cross_validation *out,

@@ -41,7 +41,7 @@ struct verdict_facts {
     double error, error_se;  /* relative RMS error over these rows */
     double allowed;          /* verdict_allowed_error */
     double one_color_error;  /* of one color for all rows; NaN: not known */
-    double plain_brdf_error; /* over the same rows, left-out ones as fitted ones; NaN: not known */
+    double plain_brdf_error; /* over the same rows, left out in the same way; NaN: not known */
     bool converged, derivatives_right, several_solutions;
     const char *not_determined, *at_bound;
     enum verdict_scan scan;

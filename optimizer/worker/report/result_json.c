@@ -272,9 +272,10 @@ static json_t *skill_json(const struct pipeline_context *c)
     double twin = c->model[pipeline_best_model(c)].validation.held_out.rel_rms;
     if (!c->skill.measured) return json_null();
     json_t *plain = json_pack(
-        "{s:o, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f, s:s}", "fit_rel_rms", json_number(c->skill.fit_rel_rms),
-        "heldout_rel_rms", json_number(c->skill.heldout_rel_rms), "diffuse", json_number_list(b->diffuse_rgb, 3, 1.0),
-        "f0", json_number_list(b->f0_rgb, 3, 1.0), "sheen", json_number_list(b->sheen_rgb, 3, 1.0), "transmission",
+        "{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f, s:s}", "fit_rel_rms", json_number(c->skill.fit_rel_rms),
+        "heldout_rel_rms", json_number(c->skill.heldout_rel_rms), "left_out_rel_rms",
+        json_number(c->skill.left_out_rel_rms), "diffuse", json_number_list(b->diffuse_rgb, 3, 1.0), "f0",
+        json_number_list(b->f0_rgb, 3, 1.0), "sheen", json_number_list(b->sheen_rgb, 3, 1.0), "transmission",
         json_number_list(b->transmission_rgb, 3, 1.0), "retro", b->retro, "roughness", b->roughness, "sheen_roughness",
         b->sheen_roughness, "masking", b->separable_masking ? "separable" : "correlated");
     return json_pack("{s:o, s:o}", "plain_brdf", plain, "heldout_ratio", json_number(twin / c->skill.heldout_rel_rms));

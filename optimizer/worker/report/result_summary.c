@@ -123,6 +123,8 @@ static void print_skill(const struct pipeline_context *c, FILE *out)
 {
     if (!c->skill.measured) return;
     fprintf(out, "a plain BRDF fitted to the same rows       %.3g %% fitted", 100.0 * c->skill.fit_rel_rms);
+    if (isfinite(c->skill.left_out_rel_rms))
+        fprintf(out, ", %.3g %% by cross-validation", 100.0 * c->skill.left_out_rel_rms);
     if (isfinite(c->skill.heldout_rel_rms)) fprintf(out, ", %.3g %% held out", 100.0 * c->skill.heldout_rel_rms);
     fprintf(out, "\n");
 }

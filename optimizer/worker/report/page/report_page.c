@@ -80,6 +80,7 @@ static void print_errors(const json_t *result, FILE *out)
     error_row(result, "held-out rows", "heldout_rel_rms", out);
     error_row(json_object_get(result, "cross_validation"), "fitted rows left out in turn", "rel_rms", out);
     error_row(plain, "a plain BRDF, held-out rows", "heldout_rel_rms", out);
+    error_row(plain, "a plain BRDF, fitted rows left out in turn", "left_out_rel_rms", out);
     error_row(json_object_get(result, "verdict"), "what the measurements allow", "allowed_rel_rms", out);
     fputs("<tr><td>objective, fitted rows</td><td>", out);
     page_with_error(json_object_get(result, "objective"), json_object_get(result, "objective_se"), 1.0, "", out);

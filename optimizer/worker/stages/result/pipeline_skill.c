@@ -24,12 +24,13 @@ static void warn_without_skill(struct pipeline_context *c)
 status pipeline_measure_skill(struct pipeline_context *c, struct error *err)
 {
     struct observation_set fitted;
-    c->skill = (struct pipeline_skill){.fit_rel_rms = NAN, .heldout_rel_rms = NAN};
+    c->skill = (struct pipeline_skill){.fit_rel_rms = NAN, .heldout_rel_rms = NAN, .left_out_rel_rms = NAN};
     for (size_t i = 0; i < c->observation.n; i++)
         if (!plain_brdf_applies(&c->observation.item[i].configuration)) return STATUS_OK;
     observation_set_init(&fitted);
     status s = observation_set_select(&c->observation, JOB_SET_FIT, &fitted, err);
     if (s == STATUS_OK) s = plain_brdf_fit(&fitted, &c->skill.brdf, err);
+    if (s == STATUS_OK) s = plain_brdf_left_out(&fitted, &c->skill.left_out_rel_rms, err);
     observation_set_release(&fitted);
     if (s != STATUS_OK) return s;
     c->skill.measured = true;

@@ -63,6 +63,15 @@ static bool has_other_solution(const struct pipeline_model *m)
     return elsewhere;
 }
 
+/* The error of the plain BRDF over the same rows, left out in the same way. */
+static double plain_brdf_error(const struct pipeline_skill *skill, enum verdict_rows rows)
+{
+    const double error[] = {[VERDICT_HELD_OUT] = skill->heldout_rel_rms,
+                            [VERDICT_LEFT_OUT] = skill->left_out_rel_rms,
+                            [VERDICT_FITTED] = skill->fit_rel_rms};
+    return skill->measured ? error[rows] : NAN;
+}
+
 static void add_fit(const struct pipeline_context *c, const struct pipeline_model *m, struct verdict_facts *f)
 {
     judge_rows(m, f);
@@ -70,9 +79,7 @@ static void add_fit(const struct pipeline_context *c, const struct pipeline_mode
     f->has_fit = true;
     f->allowed = verdict_allowed_error(&c->observation, set);
     f->one_color_error = verdict_one_color_error(&c->observation, set);
-    f->plain_brdf_error = !c->skill.measured            ? NAN
-                          : f->rows == VERDICT_HELD_OUT ? c->skill.heldout_rel_rms
-                                                        : c->skill.fit_rel_rms;
+    f->plain_brdf_error = plain_brdf_error(&c->skill, f->rows);
     f->converged = m->fit.converged;
     f->derivatives_right = pipeline_certificate_passed(m);
     f->several_solutions = has_other_solution(m);

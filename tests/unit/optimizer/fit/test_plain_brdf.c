@@ -126,6 +126,31 @@ static void test_weights(void **state)
     observation_set_release(&rows);
 }
 
+/* Rows of such a surface are predicted without having been fitted; a wrong row is predicted as the others want it,
+ * which makes its error larger than the fitted one; and fewer than four directions are too few. */
+static void test_left_out(void **state)
+{
+    (void)state;
+    struct observation_set rows, few;
+    struct plain_brdf b;
+    double left_out, moved;
+    make_rows(&rows, false);
+    fill_means(&rows, &truth[0]);
+    assert_int_equal(plain_brdf_left_out(&rows, &left_out, NULL), STATUS_OK);
+    assert_true(left_out < 5e-3);
+    rows.item[7].mean_rgb[1] *= 1.5;
+    assert_int_equal(plain_brdf_left_out(&rows, &moved, NULL), STATUS_OK);
+    assert_int_equal(plain_brdf_fit(&rows, &b, NULL), STATUS_OK);
+    for (size_t i = 0; i < rows.n; i++) rows.item[i].set = JOB_SET_FIT;
+    assert_true(moved > 1.02 * plain_brdf_rel_rms(&b, &rows, JOB_SET_FIT));
+    observation_set_init(&few);
+    for (size_t i = 0; i < 6; i++) assert_int_equal(observation_set_append(&few, &rows.item[i % 3], NULL), STATUS_OK);
+    assert_int_equal(plain_brdf_left_out(&few, &left_out, NULL), STATUS_OK);
+    assert_true(isnan(left_out));
+    observation_set_release(&few);
+    observation_set_release(&rows);
+}
+
 static bool load_table(const char *name, struct observation_set *o)
 {
     static const char document[] =
@@ -187,9 +212,8 @@ static void test_measured_fabrics(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_known_answers),    cmocka_unit_test(test_unit),
-        cmocka_unit_test(test_reciprocal),       cmocka_unit_test(test_weights),
-        cmocka_unit_test(test_measured_fabrics),
+        cmocka_unit_test(test_known_answers), cmocka_unit_test(test_unit),     cmocka_unit_test(test_reciprocal),
+        cmocka_unit_test(test_weights),       cmocka_unit_test(test_left_out), cmocka_unit_test(test_measured_fabrics),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
