@@ -122,7 +122,8 @@ def test_from_submit_to_results(daemon, sample, tmp_path):
     assert "held out: 3.00 %" in done.stdout
     assert "\x1b" not in done.stderr  # no escape sequences outside a terminal
     out = tmp_path / "results"
-    run(daemon.url, "results", job_id, "--out", out)
+    told = run(daemon.url, "results", job_id, "--out", out).stderr
+    assert f"{len([f for f in out.rglob('*') if f.is_file()])} of them new" in told
     assert (out / "renderings" / "fit-00.bin").read_bytes() == bytes(range(256)) * 400
     assert json.loads((out / "result.json").read_text())["converged"] is True
     assert "0 of them new" in run(daemon.url, "results", job_id, "--out", out).stderr

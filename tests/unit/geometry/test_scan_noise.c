@@ -51,6 +51,24 @@ static void test_correlation_of_known_noise(void **state)
     }
 }
 
+/* White noise of a known standard deviation, in void that is clamped at 0 and in material that is clamped at 1. The
+ * median of n half-normal values has a relative standard error of 1.17 / sqrt(n). */
+static void test_known_standard_deviation(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        const double sd = i == 0 ? 0.05 : 0.12;
+        struct volume v;
+        make_scan(1.0 / sd, 0.0, &v);
+        if (i == 1)
+            for (size_t k = 0; k < 48 * 48 * 48; k++) v.density[k] = 1.0f - v.density[k];
+        double found = density_noise_sd(&v);
+        print_message("noise of %.3f: %.4f\n", sd, found);
+        assert_true(fabs(found / sd - 1.0) < 4.0 * 1.17 / sqrt(20000.0));
+        volume_release(&v);
+    }
+}
+
 /* Without noise, and without void, there is nothing to measure. */
 static void test_nothing_to_measure(void **state)
 {
@@ -66,7 +84,8 @@ static void test_nothing_to_measure(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_correlation_of_known_noise),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_standard_deviation),
+                                       cmocka_unit_test(test_correlation_of_known_noise),
                                        cmocka_unit_test(test_nothing_to_measure)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
