@@ -312,6 +312,9 @@ def test_python_client(daemon, sample, tmp_path):
     with pytest.raises(selvedge.Problem) as problem:
         server.create({"sample": ""})
     assert problem.value.status == 422 and problem.value.field == "sample"
+    with pytest.raises(selvedge.Problem) as problem:  # the least status that is an error
+        server.request("POST", "/v1/jobs", data="{", headers={"Content-Type": "application/json"})
+    assert problem.value.status == 400
     job.delete()
     with pytest.raises(selvedge.Problem):
         job.state()
