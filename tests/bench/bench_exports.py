@@ -1,5 +1,6 @@
 """How near a scene that a job exports comes to the job's own renderings, when another program renders it: two described cloths with two models,
-every row rendered by Mitsuba 3. Figures are relative RMS errors over the rows, in the same measure as those of fits."""
+every row rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats). Figures are relative RMS errors over the rows, in the same
+measure as those of fits."""
 import argparse
 import csv
 import json
@@ -13,6 +14,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 ROWS = [(30, 0, 0, 0, 0), (30, 180, 30, 0, 0), (45, 180, 45, 0, 0), (60, 180, 45, 0, 0), (45, 90, 45, 0, 0), (60, 90, 30, 0, 0), (20, 0, 60, 0, 0),
         (60, 0, 60, 180, 90), (45, 0, 45, 180, 90)]
 FIT = {"path_budget": 100000, "render_px": 16, "render_samples": 4, "seed": 5}
+FORMATS = ["mitsuba", "pbrt"]
 # Narrow bounds: the fit ends at these parameters, whatever the rows are.
 TWO_LOBE = {"C_R": [0.045, 0.055], "C_TT": [0.55, 0.65], "beta_R": [7.5, 8.5], "beta_TT": [19, 21], "gamma_TT": [29, 31]}
 TEXTILE = dict(TWO_LOBE, w=[0.28, 0.32], s=[0.48, 0.52], f=[0.93, 0.95], h=[0.48, 0.52])
@@ -22,40 +24,41 @@ JOBS = {".two_lobe": ("twill", dict(FIT, model="two_lobe.v1", bounds=TWO_LOBE, s
 
 
 def run_job(build, folder, weave, fit):
-    """The folder of the exported scene, and result.json."""
+    """The folder of the exported scenes, and result.json."""
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(os.path.join(folder, "input"))
     with open(os.path.join(folder, "input", "rows.csv"), "w", encoding="utf-8") as f:
         f.write("set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n")
         for row in ROWS:
             f.write(",".join(map(str, ("fit", *row, 0.2, 0.15, 0.1))) + "\n")
-    document = {"sample": "export", "cloth": {"weave": weave, "seed": 3}, "measurements": {"file": "rows.csv"}, "fit": fit, "export": {"mitsuba": True}}
+    document = {"sample": "export", "cloth": {"weave": weave, "seed": 3}, "measurements": {"file": "rows.csv"}, "fit": fit,
+                "export": {name: True for name in FORMATS}}
     with open(os.path.join(folder, "job.json"), "w", encoding="utf-8") as f:
         json.dump(document, f)
     subprocess.run([os.path.join(build, "bin", "selvedge-worker"), "--quiet", folder], check=True, stdout=sys.stderr)
     with open(os.path.join(folder, "results", "result.json"), encoding="utf-8") as f:
-        return os.path.join(folder, "results", "export", "mitsuba"), json.load(f)
+        return os.path.join(folder, "results", "export"), json.load(f)
 
 
-def rendered_by_mitsuba(python, folder, row, px, spp):
+def rendered_by_mitsuba(python, form, folder, row, px, spp):
     """Mean radiance of a row, or None when Mitsuba fails."""
-    command = [python, os.path.join(ROOT, "tests", "bench", "mitsuba_row.py"), folder, str(row), str(px), str(spp)]
+    command = [python, os.path.join(ROOT, "tests", "bench", "mitsuba_row.py"), form, folder, str(row), str(px), str(spp)]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=sys.stderr, check=False)
     return json.loads(done.stdout) if done.returncode == 0 else None
 
 
-def compare(python, folder, px=16, spp=64):
+def compare(python, form, folder, px=16, spp=64):
     """Relative RMS error over the rows, as in fits: squares over the square of a row's brightest channel. And rows that Mitsuba rendered."""
     with open(os.path.join(folder, "rows.csv"), encoding="utf-8") as f:
         rows = list(csv.DictReader(f))
     square, n = 0.0, 0
     for i, row in enumerate(rows):
         ours = [float(row["rendered_" + c]) for c in "rgb"]
-        theirs = rendered_by_mitsuba(python, folder, i, px, spp)
+        theirs = rendered_by_mitsuba(python, form, folder, i, px, spp)
         if theirs is None:
             print(f"row {i}: Mitsuba failed", file=sys.stderr)
             continue
-        print(f"row {i}: rendered {ours}, by Mitsuba {theirs}", file=sys.stderr)
+        print(f"{form}, row {i}: rendered {ours}, by Mitsuba {theirs}", file=sys.stderr)
         square += sum((a - b) ** 2 for a, b in zip(ours, theirs)) / max(ours) ** 2 / 3
         n += 1
     return (square / n) ** 0.5 if n > 0 else float("nan"), n, len(rows)
@@ -69,11 +72,12 @@ def main():
     whole = True
     for name, (weave, fit) in JOBS.items():
         folder, result = run_job(arguments.build, os.path.join(arguments.build, "bench-exports", weave), weave, fit)
-        error, n, n_row = compare(arguments.python, folder)
-        whole = whole and n == n_row
-        material = result["exports"][0]["materials"][0]
-        for key, value in ((f"exports.mitsuba{name}.rel_rms", error), (f"exports.mitsuba{name}.material_rel_rms", material["rel_rms"])):
-            print(json.dumps({"name": key, "value": value, "unit": "1", "better": "lower"}), flush=True)
+        for export in result["exports"]:
+            form = export["format"]
+            error, n, n_row = compare(arguments.python, form, os.path.join(folder, form))
+            whole = whole and n == n_row
+            for key, value in (("rel_rms", error), ("material_rel_rms", export["materials"][0]["rel_rms"])):
+                print(json.dumps({"name": f"exports.{form}{name}.{key}", "value": value, "unit": "1", "better": "lower"}), flush=True)
     sys.exit(0 if whole else 1)
 
 

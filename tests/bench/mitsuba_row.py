@@ -1,5 +1,9 @@
-"""Renders one row of an exported scene with Mitsuba 3, and prints its mean radiance: mitsuba_row.py FOLDER ROW PX SPP. Run by a Python that has
-Mitsuba (pip install mitsuba), in a process of its own, because Mitsuba may end the process on an error."""
+"""Renders one row of an exported scene with Mitsuba 3, and prints its mean radiance: mitsuba_row.py FORMAT FOLDER ROW PX SPP. Run by a Python that
+has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
+
+FORMAT mitsuba: the scene as it is. pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the
+same as pbrt's. usd: what the USD library finds in the stage, with a diffuse material of the colour of its preview surface; lamp and camera are those
+of the row in rows.csv, which the stage has for the first row only."""
 import csv
 import json
 import os
@@ -8,14 +12,96 @@ import sys
 import mitsuba
 import numpy
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
+import pbrt_file  # noqa: E402  pylint: disable=wrong-import-position
 
-def main():
-    folder, row, px, spp = sys.argv[1], int(sys.argv[2]), sys.argv[3], sys.argv[4]
-    mitsuba.set_variant("scalar_rgb")
+
+def place_of(folder, row):
     with open(os.path.join(folder, "rows.csv"), encoding="utf-8") as f:
         wanted = list(csv.DictReader(f))[row]
-    place = {key.replace("_mm", ""): value for key, value in wanted.items() if key.startswith(("lamp_", "camera_", "up_"))}
-    scene = mitsuba.load_file(os.path.join(folder, "scene.xml"), px=px, spp=spp, **place)
+    return {key.replace("_mm", ""): value for key, value in wanted.items() if key.startswith(("lamp_", "camera_", "up_"))}
+
+
+def mitsuba_scene(folder, row, px, spp):
+    return mitsuba.load_file(os.path.join(folder, "scene.xml"), px=px, spp=spp, **place_of(folder, row))
+
+
+def curves(folder, name, fibers, bsdf):
+    """A shape of B-splines from (points, radius) of each fiber."""
+    path = os.path.join(folder, f"curves-{name}.txt")
+    with open(path, "w", encoding="utf-8") as f:
+        for points, radius in fibers:
+            f.writelines(f"{x} {y} {z} {radius}\n" for x, y, z in points)
+            f.write("\n")
+    return {"type": "bsplinecurve", "filename": path, "bsdf": bsdf}
+
+
+def rgb(value):
+    return {"type": "rgb", "value": list(value)}
+
+
+def square(corners, **more):
+    """A shape of two triangles over corners a, a + u, a + v, a + u + v."""
+    a, u, v = (numpy.array(corners[k]) for k in range(3))
+    middle, n = (u + v) / 2, numpy.cross(u - a, v - a)
+    turn = numpy.eye(4)
+    turn[:3, 0], turn[:3, 1], turn[:3, 2], turn[:3, 3] = (u - a) / 2, (v - a) / 2, n / numpy.linalg.norm(n), middle
+    return {"type": "rectangle", "to_world": mitsuba.ScalarTransform4f(turn), **more}
+
+
+def sensor(camera, target, up, kind, px, spp, near=1.0):
+    """kind: (half width of an orthographic camera, None) or (None, angle of view in degrees)."""
+    half, fov = kind
+    place = mitsuba.ScalarTransform4f().look_at(origin=camera, target=target, up=up)
+    film = {"type": "hdrfilm", "width": px, "height": px, "rfilter": {"type": "box"}}
+    more = {"type": "perspective", "fov": fov} if half is None else {"type": "orthographic"}
+    if half is not None:
+        place = place @ mitsuba.ScalarTransform4f().scale([half, half, 1])
+    return {**more, "to_world": place, "film": film, "near_clip": near, "sampler": {"type": "independent", "sample_count": spp}}
+
+
+def assemble(shapes, at, others):
+    scene = {"type": "scene", "integrator": {"type": "path", "max_depth": -1}, **others}
+    scene["tile"] = {"type": "shapegroup", **{f"s{i}": s for i, s in enumerate(shapes)}}
+    for i, where in enumerate(at):
+        scene[f"i{i}"] = {"type": "instance", "shapegroup": {"type": "ref", "id": "tile"}, "to_world": mitsuba.ScalarTransform4f().translate(list(where))}
+    return mitsuba.load_dict(scene)
+
+
+def threes(flat):
+    return [flat[i:i + 3] for i in range(0, len(flat), 3)]
+
+
+def pbrt_scene(folder, row, px, spp):
+    found = pbrt_file.read_scene(os.path.join(folder, f"view-{row}.pbrt"))
+    fibers = {}
+    for shape, (_, m) in found["objects"]["tile"]:
+        fibers.setdefault(json.dumps(m), []).append((threes(shape["P"]), shape["width"][0] / 2))
+    shapes = []
+    for i, (m, of_material) in enumerate(fibers.items()):
+        m = json.loads(m)
+        shapes.append(curves(folder, i, of_material, {
+            "type": "hair", "longitudinal_roughness": m["beta_m"][0], "azimuthal_roughness": m["beta_n"][0], "scale_tilt": m["alpha"][0],
+            "int_ior": m["eta"][0], "sigma_a": rgb(m["sigma_a"])}))
+    others = {}
+    for i, (mesh, _, light) in enumerate(found["meshes"]):
+        more = {"emitter": {"type": "area", "radiance": rgb(light["L"])}} if light else {}
+        others[f"m{i}"] = square(threes(mesh["P"]), bsdf={"type": "diffuse", "reflectance": rgb((0, 0, 0))}, **more)
+    for i, (kind, light) in enumerate(found["lights"]):
+        others[f"l{i}"] = {"type": "constant", "radiance": rgb(light["L"])} if kind == "infinite" else {
+            "type": "directional", "direction": [b - a for a, b in zip(light["from"], light["to"])], "irradiance": rgb(light["L"])}
+    at = found["view"]["LookAt"][1]
+    plugin, p = found["view"]["Camera"]
+    kind = (p["screenwindow"][1], None) if plugin == "orthographic" else (None, p["fov"][0])
+    near = 0.9 * float(numpy.linalg.norm(at[:3]))
+    others["sensor"] = sensor(at[:3], at[3:6], at[6:], kind, px, spp, near)
+    return assemble(shapes, [where for _, where in found["instances"]], others)
+
+
+def main():
+    form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
+    mitsuba.set_variant("scalar_rgb")
+    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene}[form](folder, row, px, spp)
     picture = numpy.array(mitsuba.render(scene))
     print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))
 

@@ -98,9 +98,10 @@ static status make_grid(struct job_document *doc, struct error *err)
 
 status job_check_export(const struct option_value *v, struct error *err)
 {
-    if (!v->doc->export_mitsuba || v->doc->n_photograph > 0 || v->doc->measurement_file[0] != '\0') return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "export.mitsuba",
-                           "'export.mitsuba' needs a fitted model: give 'photographs' or 'measurements'");
+    const bool *wanted = v->target;
+    if (!*wanted || v->doc->n_photograph > 0 || v->doc->measurement_file[0] != '\0') return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
 }
 
 status job_check_candidates(const struct option_value *v, struct error *err)

@@ -273,15 +273,20 @@ const struct job_option option_rows_fit[] = {
      .meaning = "Samples of the renderings in the result."},
     {.path = "export",
      .kind = OPTION_SECTION,
-     .check = job_check_export,
      .left_out = "none",
-     .meaning = "Files for other programs, in the folder `export` of the results."},
+     .meaning = "Files for other programs, in the folder `export` of the results (docs/exports.md). They show the best "
+                "model, which must be a surface model; the result states how near its materials come."},
     {.path = "export.mitsuba",
      .kind = OPTION_BOOL,
      INTO(export_mitsuba),
+     .check = job_check_export,
      .standard = "false",
-     .meaning =
-         "A scene for Mitsuba 3: fibers, lamp, camera, and hair lobes that come nearest to the fitted scattering "
-         "of the best model, which must be a surface model. The result states how near."},
+     .meaning = "A scene for Mitsuba 3: fibers, lamp, camera, and hair lobes near to the fitted scattering."},
+    {.path = "export.pbrt",
+     .kind = OPTION_BOOL,
+     INTO(export_pbrt),
+     .check = job_check_export,
+     .standard = "false",
+     .meaning = "The same scene for pbrt-v4, with one file for each row."},
     {.path = NULL},
 };

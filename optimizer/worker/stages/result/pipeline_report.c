@@ -4,7 +4,7 @@
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/cloth/quality.h"
-#include "optimizer/worker/report/export/export_mitsuba.h"
+#include "optimizer/worker/report/export/exports.h"
 #include "optimizer/worker/report/page/report_page.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
@@ -41,20 +41,6 @@ static status report_geometry(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? report_write(c, err) : s;
 }
 
-/* An export that the best model does not allow is a warning: the fit is the result. */
-static status write_exports(struct pipeline_context *c, struct error *err)
-{
-    json_t *json = NULL;
-    if (!c->doc->export_mitsuba) return STATUS_OK;
-    status s = export_mitsuba_write(c, &json, err);
-    if (s == STATUS_UNSUPPORTED) {
-        worker_status_warn(c->status, "nothing was exported to Mitsuba: %s", err->text);
-        return STATUS_OK;
-    }
-    if (s == STATUS_OK) json_array_append_new(c->exports, json);
-    return s;
-}
-
 status stage_report(struct pipeline_context *c, struct error *err)
 {
     if (job_document_geometry_only(c->doc)) return report_geometry(c, err);
@@ -70,7 +56,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = result_geometry_write(c, err);
     if (s == STATUS_OK) s = quality_write(c, err);
     if (s == STATUS_OK) s = result_renderings_write(c, 0.1, err);
-    if (s == STATUS_OK) s = write_exports(c, err);
+    if (s == STATUS_OK) s = exports_write(c, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
     return s == STATUS_OK ? report_write(c, err) : s;
 }

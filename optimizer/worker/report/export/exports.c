@@ -1,0 +1,98 @@
+#include "optimizer/worker/report/export/exports.h"
+
+#include "base/files/durable.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/export/export_formats.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt};
+enum { N_FORMAT = sizeof format / sizeof format[0] };
+static const double percent = 100.0;
+
+static bool wanted(const struct pipeline_context *c, const struct export_format *f)
+{
+    return *(const bool *)((const char *)c->doc + f->wanted_at);
+}
+
+static status fit_materials(struct export_scene *e, struct error *err)
+{
+    const struct appearance *a = &e->model->appearance;
+    status s = STATUS_OK;
+    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++) {
+        s = hair_fit_run(a->surface, e->model->fit.param + g * e->model->sets.n_own, &e->hair[g], err);
+        if (s != STATUS_OK) break;
+        log_info(e->c->log, "exports: hair lobes differ from the fitted scattering by %.0f %%",
+                 percent * e->hair[g].rel_rms);
+    }
+    return s;
+}
+
+/* conversion.json */
+static status write_conversion(const struct export_scene *e, const json_t *json, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], *text = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot export a scene: out of memory");
+    export_path(e, "conversion.json", path);
+    status s = worker_folder_replace(e->c->folder, path, text, strlen(text), err);
+    free(text);
+    return s;
+}
+
+static status write_format(struct export_scene *e, const struct export_format *f, struct error *err)
+{
+    char folder[64], path[WORKER_PATH_BYTES];
+    json_t *materials = NULL;
+    snprintf(folder, sizeof folder, "export/%s", f->name);
+    e->folder = folder;
+    worker_folder_path(e->c->folder, JOB_FOLDER_RESULTS, folder, path);
+    status s = durable_make_folder(path, err);
+    if (s == STATUS_OK) s = f->write(e, &materials, err);
+    if (s != STATUS_OK) return s;
+    json_t *json = json_pack("{s:s, s:s, s:o}", "format", f->name, "folder", folder, "materials", materials);
+    s = write_conversion(e, json, err);
+    if (s == STATUS_OK)
+        json_array_append_new(e->c->exports, json);
+    else
+        json_decref(json);
+    return s;
+}
+
+static void warn_of_rest(const struct export_scene *e)
+{
+    int n[2];
+    if (!export_repeats(e, n))
+        worker_status_warn(e->c->status,
+                           "the exported scenes have %d x %d repeats of the tile, the most that are written: the "
+                           "widest view sees beyond them",
+                           n[0], n[1]);
+    if (e->c->environment != NULL)
+        worker_status_warn(e->c->status, "the exported scenes have no image of the surroundings: add '%s' to them",
+                           e->c->doc->environment_file);
+}
+
+static bool any_wanted(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < N_FORMAT; i++)
+        if (wanted(c, format[i])) return true;
+    return false;
+}
+
+status exports_write(struct pipeline_context *c, struct error *err)
+{
+    struct export_scene e = {.c = c, .model = &c->model[pipeline_best_model(c)]};
+    if (!any_wanted(c)) return STATUS_OK;
+    if (e.model->appearance.kind != MODEL_SURFACE) {
+        worker_status_warn(c->status, "nothing was exported: the model '%s' sees no fibers, which an export needs",
+                           e.model->appearance.id);
+        return STATUS_OK;
+    }
+    fiber_set_z_range_m(&c->fiber, &e.z_low_m, &e.z_high_m);
+    status s = fit_materials(&e, err);
+    for (size_t i = 0; i < N_FORMAT && s == STATUS_OK; i++)
+        if (wanted(c, format[i])) s = write_format(&e, format[i], err);
+    if (s == STATUS_OK) warn_of_rest(&e);
+    return s;
+}
