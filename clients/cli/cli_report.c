@@ -26,7 +26,7 @@ static long member_count(const json_t *object, const char *key)
 
 void report_view(const json_t *job, struct job_view *view)
 {
-    *view = (struct job_view){.rel_rms = NAN};
+    *view = (struct job_view){.state = ""};
     text_clean(member_text(job, "state"), view->state, sizeof view->state);
     if (strcmp(view->state, "running") == 0) text_clean(member_text(job, "stage"), view->stage, sizeof view->stage);
     text_clean(member_text(job, "message"), view->message, sizeof view->message);

@@ -100,10 +100,10 @@ static void fit_part(const struct job_view *v, char *out, size_t n_out)
     out[0] = '\0';
     if (isnan(v->objective)) return;
     text_with_error(v->objective, v->objective_se, objective);
-    int n = v->step >= 0 ? snprintf(out, n_out, "  step %ld  objective %s", v->step, objective)
-                         : snprintf(out, n_out, "  objective %s", objective);
-    if (n > 0 && (size_t)n < n_out && !isnan(v->rel_rms))
-        snprintf(out + n, n_out - (size_t)n, "  rel.RMS %.2f %%", 100.0 * v->rel_rms);
+    if (v->step >= 0)
+        snprintf(out, n_out, "  step %ld  objective %s", v->step, objective);
+    else
+        snprintf(out, n_out, "  objective %s", objective);
 }
 
 static void stage_part(const struct job_view *v, char *out, size_t n_out)

@@ -24,7 +24,7 @@ void text_clean(const char *in, char *out, size_t n_out);
 struct job_view {
     char state[24], stage[40], message[200];
     double fraction, eta_s, eta_low_s, eta_high_s; /* low, high: NaN where the remaining time is known well */
-    double objective, objective_se, rel_rms;
+    double objective, objective_se;
     long step, i_stage, n_stage;
 };
 /* Writes one line of at most n_column columns: bar, percentage, stage, ETA, step and objective. */

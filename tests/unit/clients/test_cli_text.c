@@ -104,7 +104,6 @@ static void test_progress_line(void **state)
                          .eta_high_s = (double)NAN,
                          .objective = 0.0236,
                          .objective_se = 0.0008,
-                         .rel_rms = (double)NAN,
                          .step = 7,
                          .i_stage = 5,
                          .n_stage = 8};
