@@ -14,7 +14,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 ROWS = [(30, 0, 0, 0, 0), (30, 180, 30, 0, 0), (45, 180, 45, 0, 0), (60, 180, 45, 0, 0), (45, 90, 45, 0, 0), (60, 90, 30, 0, 0), (20, 0, 60, 0, 0),
         (60, 0, 60, 180, 90), (45, 0, 45, 180, 90)]
 FIT = {"path_budget": 100000, "render_px": 16, "render_samples": 4, "seed": 5}
-FORMATS = ["mitsuba", "pbrt"]
+FORMATS = ["mitsuba", "pbrt", "usd"]
 # Narrow bounds: the fit ends at these parameters, whatever the rows are.
 TWO_LOBE = {"C_R": [0.045, 0.055], "C_TT": [0.55, 0.65], "beta_R": [7.5, 8.5], "beta_TT": [19, 21], "gamma_TT": [29, 31]}
 TEXTILE = dict(TWO_LOBE, w=[0.28, 0.32], s=[0.48, 0.52], f=[0.93, 0.95], h=[0.48, 0.52])

@@ -7,12 +7,14 @@ of the row in rows.csv, which the stage has for the first row only."""
 import csv
 import json
 import os
+import subprocess
 import sys
 
 import mitsuba
 import numpy
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
+SUPPORT = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python")
+sys.path.insert(0, SUPPORT)
 import pbrt_file  # noqa: E402  pylint: disable=wrong-import-position
 
 
@@ -98,10 +100,28 @@ def pbrt_scene(folder, row, px, spp):
     return assemble(shapes, [where for _, where in found["instances"]], others)
 
 
+def usd_scene(folder, row, px, spp):
+    # a process of its own: Mitsuba and the USD library in one process end it
+    done = subprocess.run([sys.executable, os.path.join(SUPPORT, "usd_stage.py"), os.path.join(folder, "cloth.usda")], stdout=subprocess.PIPE, check=True)
+    found = json.loads(done.stdout)
+    place = place_of(folder, row)
+    lamp, camera, up = ([float(place[f"{name}_{a}"]) for a in "xyz"] for name in ("lamp", "camera", "up"))
+    shapes = [curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]], {"type": "diffuse", "reflectance": rgb(group["color"])})
+              for i, group in enumerate(found["curves"])]
+    turn = mitsuba.ScalarTransform4f().look_at(origin=lamp, target=[0, 0, 0], up=[0, 0.1, 1])
+    half = found["lamp"]["side"] / 2
+    others = {
+        "lamp": {"type": "rectangle", "to_world": turn @ mitsuba.ScalarTransform4f().scale([half, half, 1]),
+                 "emitter": {"type": "area", "radiance": rgb([found["lamp"]["radiance"]] * 3)}},
+        "sheet": square([found["sheet"][k] for k in (0, 1, 3)], bsdf={"type": "diffuse", "reflectance": rgb(found["sheet_color"])}),
+        "sensor": sensor(camera, [0, 0, 0], up, (None, found["camera"]["fov_deg"]), px, spp, 0.9 * float(numpy.linalg.norm(camera)))}
+    return assemble(shapes, found["instances"], others)
+
+
 def main():
     form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
     mitsuba.set_variant("scalar_rgb")
-    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene}[form](folder, row, px, spp)
+    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene}[form](folder, row, px, spp)
     picture = numpy.array(mitsuba.render(scene))
     print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))
 

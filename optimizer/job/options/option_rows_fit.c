@@ -288,5 +288,12 @@ const struct job_option option_rows_fit[] = {
      .check = job_check_export,
      .standard = "false",
      .meaning = "The same scene for pbrt-v4, with one file for each row."},
+    {.path = "export.usd",
+     .kind = OPTION_BOOL,
+     INTO(export_usd),
+     .check = job_check_export,
+     .standard = "false",
+     .meaning = "The same scene as Universal Scene Description: curves with a diffuse preview surface of which cloth "
+                "is as bright."},
     {.path = NULL},
 };

@@ -4,16 +4,18 @@ import csv
 import json
 import math
 import os
+import struct
 import subprocess
 
 import pbrt_file
 import pytest
-from daemon_under_test import program
+from daemon_under_test import ROOT, program
 from small_cloth import TABLE, hair
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1, "model": "isotropic.v1"}
-FORMATS = ["pbrt"]
+FORMATS = ["pbrt", "usd"]
+PYTHON = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-python", "bin", "python")
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +36,15 @@ def conversion_of(results, name):
     (export,) = [e for e in json.loads((results / "result.json").read_text())["exports"] if e["format"] == name]
     assert json.loads((results / "export" / name / "conversion.json").read_text()) == export
     return export
+
+
+def by_python(module, script, *arguments):
+    """What a script prints, run by the Python of `make bench-exports`; the test is skipped where this Python has no such module."""
+    if not os.access(PYTHON, os.X_OK) or subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False).returncode != 0:
+        pytest.skip(f"the files are right so far; no Python with {module} to open them with (make bench-exports installs it)")
+    done = subprocess.run([PYTHON, script, *map(str, arguments)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def hair_shares(material, channel, n_theta=16, n_phi=10):
@@ -92,3 +103,85 @@ def test_lamp_and_camera_of_pbrt(results):
         lit = sum(distance ** 2 / (distance ** 2 + x * x + y * y) ** 2 for x in steps for y in steps) * (side / n) ** 2 / math.pi
         assert light["L"][0] * lit == pytest.approx(1, rel=1e-3)
         assert scene["view"]["LookAt"][1][:3] == pytest.approx([float(row[f"camera_{a}_mm"]) for a in "xyz"], abs=1e-3)
+
+
+def test_a_stage_for_usd(results):
+    """Opened by the USD library."""
+    export, folder = conversion_of(results, "usd"), results / "export" / "usd"
+    assert sorted(p.name for p in folder.iterdir()) == ["cloth.usda", "conversion.json", "rows.csv"]
+    text = (folder / "cloth.usda").read_text()
+    assert text.startswith("#usda 1.0\n") and all(text.count(a) == text.count(b) for a, b in ("{}", "()", "[]"))
+    found = json.loads(by_python("pxr", os.path.join(ROOT, "tests", "support", "python", "usd_stage.py"), folder / "cloth.usda"))
+    assert found["unit_m"] == 0.001 and found["up"] == "Z" and len(found["instances"]) >= 4 and found["sheet_color"] == [0, 0, 0]
+    (group,), (material,) = found["curves"], export["materials"]
+    assert len(group["fibers"]) == json.loads((results / "result.json").read_text())["geometry"]["n_fiber"]
+    assert all(f["radius"] == pytest.approx(0.008, rel=1e-3) for f in group["fibers"])
+    assert group["color"] == pytest.approx(material["diffuse_color"], rel=1e-5) and group["display"] == pytest.approx(group["color"])
+    for mine, library in zip(group["extent"], group["library_extent"]):
+        assert mine == pytest.approx(library, abs=1e-3)
+    row = next(csv.DictReader((folder / "rows.csv").open()))
+    for name in ("camera", "lamp"):
+        at = [float(row[f"{name}_{a}_mm"]) for a in "xyz"]
+        assert found[name]["at"] == pytest.approx(at, abs=1e-3)
+        assert found[name]["look"] == pytest.approx([-x / math.dist(at, (0, 0, 0)) for x in at], abs=1e-5)
+    assert found["lamp"]["side"] == pytest.approx(100) and 100 < found["lamp"]["radiance"] < 1000
+    assert found["camera"]["fov_deg"] == pytest.approx(math.degrees(2 * math.atan(0.5 * 0.01 / 1.0)), rel=0.1)
+
+
+def test_the_diffuse_fiber_of_usd(results):
+    """Its own light, and the colour by Kubelka and Munk's ratio; and how near it comes to a fiber that scatters evenly, all computed a second time."""
+    (material,) = conversion_of(results, "usd")["materials"]
+    color, even = material["diffuse_color"][1], material["fitted_albedo"][1]
+    n, back, all_light, difference, whole = 40, 0.0, 0.0, 0.0, 0.0
+    for o in range(6):
+        cos_o = math.cos(math.asin((o + 0.5) / 6))
+        for i in range(n):
+            cos_i = math.cos(math.asin(-1 + (2 * i + 1) / n))
+            for k in range(n):
+                phi = math.pi * (k + 0.5) / n
+                # over the width: normals at angle a that see both directions
+                steps = [-math.pi / 2 + phi + (math.pi - phi) * (m + 0.5) / 50 for m in range(50)]
+                lit = sum(math.cos(a) * math.cos(a - phi) for a in steps) * (math.pi - phi) / 50
+                value = color / math.pi * cos_i * lit / 2
+                all_light += value * 4 * math.pi / n / n / 6
+                back += value * 4 * math.pi / n / n / 6 if phi < math.pi / 2 else 0
+                difference += cos_o * (value - even * cos_i / math.pi ** 2) ** 2
+                whole += cos_o * (even * cos_i / math.pi ** 2) ** 2
+    assert all_light == pytest.approx(material["albedo"][1], rel=0.01)
+    assert back == pytest.approx(material["turned_back"][1], rel=0.01)
+    assert (1 - color) / back == pytest.approx((1 - even) / material["fitted_turned_back"][1], rel=0.02)
+    assert (difference / whole) ** 0.5 == pytest.approx(material["rel_rms"], rel=0.03)
+
+
+def read_vol(path):
+    """Size, channels, box and samples of a grid volume with float32 samples, as Mitsuba's gridvolume reads them."""
+    data = path.read_bytes()
+    assert data[:4] == b"VOL\x03"
+    kind, nx, ny, nz, n_channel, *box = struct.unpack("<5i6f", data[4:48])
+    assert kind == 1 and len(data) == 48 + 4 * nx * ny * nz * n_channel
+    return (nx, ny, nz), n_channel, box, struct.unpack(f"<{nx * ny * nz * n_channel}f", data[48:])
+
+
+def test_volumes_of_a_scan(tmp_path):
+    folder = tmp_path / "job"
+    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--out", tmp_path / "phantom"], check=True,
+                   capture_output=True)
+    (folder / "input").mkdir(parents=True)
+    (tmp_path / "phantom" / "scan.tif").rename(folder / "input" / "scan.tif")
+    (folder / "input" / "rows.csv").write_text(TABLE)
+    (folder / "job.json").write_text(json.dumps({
+        "sample": "scan", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}, "fit": FIT,
+        "export": {"mitsuba": True}}))
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True)
+    made = folder / "results" / "export" / "mitsuba"
+    size, n_channel, box, density = read_vol(made / "density.vol")
+    assert n_channel == 1 and 0 <= min(density) < 0.05 and 0.5 < max(density) <= 1
+    assert [(b - a) / n for a, b, n in zip(box, box[3:], size)] == pytest.approx([0.002] * 3, rel=1e-4)
+    same_size, n_channel, same_box, direction = read_vol(made / "direction.vol")
+    lengths = [math.hypot(*direction[i:i + 3]) for i in range(0, len(direction), 3)]
+    assert (same_size, n_channel, same_box) == (size, 3, box) and all(x == 0 or x == pytest.approx(1, abs=1e-5) for x in lengths)
+    inside = [d for d, x in zip(density, lengths) if x > 0]
+    outside = [d for d, x in zip(density, lengths) if x == 0]
+    assert len(inside) > 1000 and sum(inside) / len(inside) > 2 * sum(outside) / len(outside)
+    seen = by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), made / "density.vol", made / "direction.vol")
+    assert json.loads(seen) == pytest.approx([max(density), max(direction)])

@@ -113,12 +113,12 @@ struct export_view export_view_of(const struct export_scene *e, const struct con
     return v;
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+void export_cross(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-static void make_unit(double v[3])
+void export_make_unit(double v[3])
 {
     double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     for (int i = 0; i < 3; i++) v[i] /= length;
@@ -127,11 +127,11 @@ static void make_unit(double v[3])
 void export_lamp_corners(const struct export_view *v, double side_mm, double corner[4][3])
 {
     double n[3] = {-v->lamp_mm[0], -v->lamp_mm[1], -v->lamp_mm[2]}, h[3], w[3];
-    make_unit(n);
-    cross((const double[3]){0, 0, 1}, n, h);
+    export_make_unit(n);
+    export_cross((const double[3]){0, 0, 1}, n, h);
     if (h[0] * h[0] + h[1] * h[1] < 1e-12) h[0] = 1.0;
-    make_unit(h);
-    cross(n, h, w);
+    export_make_unit(h);
+    export_cross(n, h, w);
     for (int k = 0; k < 4; k++)
         for (int a = 0; a < 3; a++)
             corner[k][a] =

@@ -64,6 +64,8 @@ struct export_view {
 struct export_view export_view_of(const struct export_scene *e, const struct configuration *k);
 /* Corners of a square lamp: a, a + u, a + v with u x v towards the origin. */
 void export_lamp_corners(const struct export_view *v, double side_mm, double corner[4][3]);
+void export_cross(const double a[3], const double b[3], double out[3]);
+void export_make_unit(double v[3]);
 
 /* Repeats of the tile along x and y, and where repeat (i, j) stands. False: they do not cover what all rows see. */
 bool export_repeats(const struct export_scene *e, int n[2]);

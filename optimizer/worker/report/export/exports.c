@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt};
+static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt, &export_usd};
 enum { N_FORMAT = sizeof format / sizeof format[0] };
 static const double percent = 100.0;
 

@@ -167,6 +167,28 @@ static void mean_share(const struct target *t, double share[N_THETA_O][N_SIDE][3
     }
 }
 
+/* Density of a diffuse cylinder's light: the mean over its width of cos / pi, towards both directions. */
+static void fill_cylinder(const double colour[3], struct target *t)
+{
+    double *at = t->lobes;
+    for (int o = 0; o < N_THETA_O; o++)
+        for (int i = 0; i < N_THETA_I; i++)
+            for (int k = 0; k < N_PHI; k++, at += 3) {
+                double lit = 0.5 * ((M_PI - t->phi[k]) * cos(t->phi[k]) + sin(t->phi[k]));
+                for (int c = 0; c < 3; c++) at[c] = colour[c] * cos(t->theta_i[i]) * lit / (2.0 * M_PI);
+            }
+}
+
+static void fit_cylinder(struct target *t, struct hair_fit *fit)
+{
+    for (int c = 0; c < 3; c++) {
+        double lost = fmax(1.0 - fit->albedo[c], 0.0) / fmax(fit->turned[c], 1e-6);
+        fit->diffuse[c] = 1.0 / (1.0 + HAIR_FIT_DIFFUSE_TURNED * lost);
+    }
+    fill_cylinder(fit->diffuse, t);
+    fit->diffuse_rel_rms = sqrt(shape_square(t));
+}
+
 static status fit_target(struct target *t, struct hair_fit *fit, struct error *err)
 {
     double x[N_UNKNOWN] = {0}, share[N_THETA_O][N_SIDE][3];
@@ -178,6 +200,7 @@ static status fit_target(struct target *t, struct hair_fit *fit, struct error *e
     add_shares(t, t->lobes, share);
     mean_share(t, t->share, fit->turned, fit->albedo);
     mean_share(t, share, fit->lobes_turned, fit->lobes_albedo);
+    fit_cylinder(t, fit);
     return STATUS_OK;
 }
 

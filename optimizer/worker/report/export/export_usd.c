@@ -1,0 +1,233 @@
+/* results/export/usd/: the fitted cloth as Universal Scene Description, cloth.usda: the fibers of each group as
+ * BasisCurves (cubic B-splines) with widths and a display colour, a PointInstancer that repeats their tile, the black
+ * sheet as a Mesh, camera and lamp of the first row. Millimetres, z is up.
+ *
+ * A UsdPreviewSurface has no light that goes through a fiber. Its colour is that of an opaque diffuse fiber of which
+ * cloth is as bright (hair_fit.h); it has no highlight. */
+#include "optimizer/worker/report/export/export_formats.h"
+#include "optimizer/worker/report/json_number.h"
+
+#include <math.h>
+#include <stddef.h>
+
+static const double mm = 1e3;
+
+static void print_counts(FILE *text, const struct export_scene *e, size_t group)
+{
+    const char *comma = "";
+    fprintf(text, "                int[] curveVertexCounts = [");
+    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
+        if (export_fiber_in(e, i, group)) {
+            fprintf(text, "%s%zu", comma, export_n_point(e, i));
+            comma = ", ";
+        }
+    fprintf(text, "]\n");
+}
+
+static void print_widths(FILE *text, const struct export_scene *e, size_t group)
+{
+    const char *comma = "";
+    fprintf(text, "                float[] widths = [");
+    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
+        if (export_fiber_in(e, i, group)) {
+            fprintf(text, "%s%.6f", comma, 2.0 * export_radius_mm(e, i));
+            comma = ", ";
+        }
+    fprintf(text, "] (\n                    interpolation = \"uniform\"\n                )\n");
+}
+
+/* Also the box of the points, wider by the radius. */
+static void print_points(FILE *text, const struct export_scene *e, size_t group)
+{
+    const char *comma = "";
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, p[3];
+    fprintf(text, "                point3f[] points = [");
+    for (size_t i = 0; i < e->c->fiber.n_fiber; i++) {
+        if (!export_fiber_in(e, i, group)) continue;
+        for (size_t k = 0; k < export_n_point(e, i); k++, comma = ", ") {
+            export_point(e, i, k, p);
+            fprintf(text, "%s(%.6f, %.6f, %.6f)", comma, p[0], p[1], p[2]);
+            for (int a = 0; a < 3; a++) {
+                low[a] = fmin(low[a], p[a] - export_radius_mm(e, i));
+                high[a] = fmax(high[a], p[a] + export_radius_mm(e, i));
+            }
+        }
+    }
+    fprintf(text,
+            "]\n                float3[] extent = "
+            "[(%.6f, %.6f, %.6f), (%.6f, %.6f, %.6f)]\n",
+            low[0], low[1], low[2], high[0], high[1], high[2]);
+}
+
+static void print_curves(FILE *text, const struct export_scene *e, size_t group)
+{
+    const double *c = e->hair[group].diffuse;
+    fprintf(text,
+            "            def BasisCurves \"fibers_%zu\" (\n"
+            "                prepend apiSchemas = [\"MaterialBindingAPI\"]\n            )\n            {\n"
+            "                uniform token type = \"cubic\"\n                uniform token basis = \"bspline\"\n"
+            "                uniform token wrap = \"nonperiodic\"\n",
+            group);
+    print_counts(text, e, group);
+    print_points(text, e, group);
+    print_widths(text, e, group);
+    fprintf(text,
+            "                color3f[] primvars:displayColor = [(%.6g, %.6g, %.6g)]\n"
+            "                rel material:binding = </Cloth/Materials/fiber_%zu>\n            }\n",
+            c[0], c[1], c[2], group);
+}
+
+static void print_tiles(FILE *text, const struct export_scene *e)
+{
+    int n[2];
+    double at[2];
+    export_repeats(e, n);
+    fprintf(text, "    def PointInstancer \"Tiles\"\n    {\n        rel prototypes = </Cloth/Tiles/Tile>\n"
+                  "        int[] protoIndices = [");
+    for (int i = 0; i < n[0] * n[1]; i++) fprintf(text, "%s0", i == 0 ? "" : ", ");
+    fprintf(text, "]\n        point3f[] positions = [");
+    for (int i = 0; i < n[0] * n[1]; i++) {
+        export_repeat_at(e, n, i / n[1], i % n[1], at);
+        fprintf(text, "%s(%.9g, %.9g, 0)", i == 0 ? "" : ", ", at[0], at[1]);
+    }
+    fprintf(text, "]\n        def Xform \"Tile\"\n        {\n");
+    for (size_t g = 0; g < e->model->sets.n_set; g++) print_curves(text, e, g);
+    fprintf(text, "        }\n    }\n");
+}
+
+static void print_material(FILE *text, const char *name, const double rgb[3])
+{
+    fprintf(text,
+            "        def Material \"%s\"\n        {\n"
+            "            token outputs:surface.connect = </Cloth/Materials/%s/surface.outputs:surface>\n"
+            "            def Shader \"surface\"\n            {\n"
+            "                uniform token info:id = \"UsdPreviewSurface\"\n"
+            "                color3f inputs:diffuseColor = (%.6g, %.6g, %.6g)\n"
+            "                int inputs:useSpecularWorkflow = 1\n"
+            "                color3f inputs:specularColor = (0, 0, 0)\n"
+            "                float inputs:roughness = 1\n                token outputs:surface\n"
+            "            }\n        }\n",
+            name, name, rgb[0], rgb[1], rgb[2]);
+}
+
+static void print_materials(FILE *text, const struct export_scene *e)
+{
+    char name[32];
+    fprintf(text, "    def Scope \"Materials\"\n    {\n");
+    for (size_t g = 0; g < e->model->sets.n_set; g++) {
+        snprintf(name, sizeof name, "fiber_%zu", g);
+        print_material(text, name, e->hair[g].diffuse);
+    }
+    print_material(text, "sheet", (const double[3]){0, 0, 0});
+    fprintf(text, "    }\n");
+}
+
+static void print_sheet(FILE *text, const struct export_scene *e)
+{
+    double h[2], z;
+    if (!export_sheet(e, h, &z)) return;
+    fprintf(text,
+            "    def Mesh \"Sheet\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {\n"
+            "        int[] faceVertexCounts = [4]\n        int[] faceVertexIndices = [0, 1, 2, 3]\n"
+            "        point3f[] points = "
+            "[(%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g)]\n"
+            "        float3[] extent = [(%.9g, %.9g, %.9g), (%.9g, %.9g, %.9g)]\n"
+            "        uniform token subdivisionScheme = \"none\"\n        uniform bool doubleSided = 1\n"
+            "        color3f[] primvars:displayColor = [(0, 0, 0)]\n"
+            "        rel material:binding = </Cloth/Materials/sheet>\n    }\n",
+            -h[0], -h[1], z, h[0], -h[1], z, h[0], h[1], z, -h[0], h[1], z, -h[0], -h[1], z, h[0], h[1], z);
+}
+
+/* Rows of the matrix: the object's axes and its place. Cameras and lights look along -z. */
+static void print_place(FILE *text, const double at[3], const double up[3])
+{
+    double x[3], y[3], z[3] = {at[0], at[1], at[2]};
+    export_make_unit(z);
+    export_cross(up, z, x);
+    export_make_unit(x);
+    export_cross(z, x, y);
+    fprintf(text, "        matrix4d xformOp:transform = (");
+    fprintf(text, " (%.9g, %.9g, %.9g, 0), (%.9g, %.9g, %.9g, 0),", x[0], x[1], x[2], y[0], y[1], y[2]);
+    fprintf(text, " (%.9g, %.9g, %.9g, 0), (%.9g, %.9g, %.9g, 1) )\n", z[0], z[1], z[2], at[0], at[1], at[2]);
+    fprintf(text, "        uniform token[] xformOpOrder = [\"xformOp:transform\"]\n    }\n");
+}
+
+/* Apertures are tenths of a scene unit in USD. A focal length of 50 tenths. */
+static void print_camera(FILE *text, const struct configuration *k, const struct export_view *v)
+{
+    const bool far = k->camera == CAMERA_FAR_FIELD;
+    const double focal = 50.0, aperture = far ? 10.0 * v->width_mm : 2.0 * focal * tan(0.5 * v->fov_deg * M_PI / 180.0);
+    fprintf(text,
+            "    def Camera \"Camera\"\n    {\n        token projection = \"%s\"\n"
+            "        float focalLength = %.9g\n        float horizontalAperture = %.9g\n"
+            "        float verticalAperture = %.9g\n        float2 clippingRange = (%.9g, %.9g)\n",
+            far ? "orthographic" : "perspective", focal, aperture, aperture, v->near_mm, 10.0 * v->near_mm);
+    print_place(text, v->camera_mm, v->up);
+}
+
+static void print_lights(FILE *text, const struct configuration *k, const struct export_view *v)
+{
+    static const double up[3] = {0, 0.1, 1};
+    const double *sky = k->environment_rgb;
+    if (k->light == LIGHT_DIRECTIONAL) {
+        fprintf(text,
+                "    def DistantLight \"Lamp\"\n    {\n        float inputs:angle = 0\n"
+                "        bool inputs:normalize = 1\n        float inputs:intensity = %.9g\n",
+                v->irradiance);
+        print_place(text, v->lamp_mm, up);
+    } else if (k->light == LIGHT_SQUARE_LAMP) {
+        fprintf(text,
+                "    def RectLight \"Lamp\"\n    {\n        float inputs:width = %.9g\n"
+                "        float inputs:height = %.9g\n        float inputs:intensity = %.9g\n",
+                mm * k->lamp_side_m, mm * k->lamp_side_m, v->radiance);
+        print_place(text, v->lamp_mm, up);
+    }
+    if (sky[0] + sky[1] + sky[2] > 0.0)
+        fprintf(text,
+                "    def DomeLight \"Sky\"\n    {\n        float inputs:intensity = 1\n"
+                "        color3f inputs:color = (%.9g, %.9g, %.9g)\n    }\n",
+                sky[0], sky[1], sky[2]);
+}
+
+static status write_stage(const struct export_scene *e, struct error *err)
+{
+    const struct configuration *k = &e->c->observation.item[0].configuration;
+    const struct export_view v = export_view_of(e, k);
+    struct export_text t;
+    status s = export_text_open(&t, err);
+    if (s != STATUS_OK) return s;
+    fprintf(t.file, "#usda 1.0\n(\n    defaultPrim = \"Cloth\"\n    doc = \"Made by Selvedge.\"\n"
+                    "    metersPerUnit = 0.001\n    upAxis = \"Z\"\n)\n\n"
+                    "def Xform \"Cloth\" (\n    kind = \"component\"\n)\n{\n");
+    print_tiles(t.file, e);
+    print_sheet(t.file, e);
+    print_materials(t.file, e);
+    fprintf(t.file, "}\n\ndef Xform \"View\"\n{\n");
+    print_camera(t.file, k, &v);
+    print_lights(t.file, k, &v);
+    fprintf(t.file, "}\n");
+    return export_text_close(e, &t, "cloth.usda", err);
+}
+
+static json_t *material_json(const struct hair_fit *h)
+{
+    double turned[3];
+    for (int c = 0; c < 3; c++) turned[c] = HAIR_FIT_DIFFUSE_TURNED * h->diffuse[c];
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "diffuse_color", json_number_list(h->diffuse, 3, 1.0), "rel_rms",
+                     json_number(h->diffuse_rel_rms), "fitted_albedo", json_number_list(h->albedo, 3, 1.0), "albedo",
+                     json_number_list(h->diffuse, 3, 1.0), "fitted_turned_back", json_number_list(h->turned, 3, 1.0),
+                     "turned_back", json_number_list(turned, 3, 1.0));
+}
+
+static status write_usd(struct export_scene *e, json_t **materials, struct error *err)
+{
+    status s = export_rows_write(e, err);
+    if (s == STATUS_OK) s = write_stage(e, err);
+    if (s != STATUS_OK) return s;
+    *materials = json_array();
+    for (size_t g = 0; g < e->model->sets.n_set; g++)
+        json_array_append_new(*materials, export_material_json(e, g, material_json(&e->hair[g])));
+    return STATUS_OK;
+}
+
+const struct export_format export_usd = {"usd", offsetof(struct job_document, export_usd), write_usd};
