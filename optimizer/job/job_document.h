@@ -37,6 +37,8 @@ struct job_model {
 };
 
 enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
+/* Of a measured BRDF: as its file says, or as the job says. */
+enum job_symmetry { JOB_SYMMETRY_FILE, JOB_SYMMETRY_ISOTROPIC, JOB_SYMMETRY_ANISOTROPIC };
 /* How integer samples of a picture stand for light. */
 enum job_transfer { JOB_TRANSFER_UNDECLARED, JOB_TRANSFER_LINEAR, JOB_TRANSFER_SRGB };
 
@@ -148,6 +150,7 @@ struct job_document {
     char measurement_file[JOB_MAX_NAME_BYTES]; /* "" when photographs are given */
     size_t n_measured_row;                     /* 0: the default ones; of files of measured BRDFs */
     struct job_measured_row *measured_row;
+    enum job_symmetry measurement_symmetry;
     size_t n_photograph;
     struct job_photograph *photograph;
     /* fit */

@@ -24,10 +24,12 @@ static status load_table(const struct job_document *doc, const char *folder, con
     const brdf_reader *reader = brdf_reader_of_name(doc->measurement_file);
     snprintf(path, sizeof path, "%s/%s", folder, doc->measurement_file);
     if (reader != NULL) return brdf_file_read(reader, path, doc, warn, o, err);
-    if (doc->n_measured_row > 0)
-        return error_set_field(err, STATUS_INVALID, OPTION_MEASURED_ROWS,
-                               "configurations are chosen for a measured BRDF, but '%s' is a table: its rows say which",
-                               doc->measurement_file);
+    if (doc->n_measured_row > 0 || doc->measurement_symmetry != JOB_SYMMETRY_FILE)
+        return error_set_field(
+            err, STATUS_INVALID, OPTION_MEASURED_ROWS,
+            "configurations and symmetry are those of a measured BRDF, but '%s' is a table: its rows "
+            "say which",
+            doc->measurement_file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);

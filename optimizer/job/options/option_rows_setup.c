@@ -2,6 +2,10 @@
 #include "optimizer/job/options/option_rows.h"
 
 static const char *const set_name[] = {[JOB_SET_FIT] = "fit", [JOB_SET_HELD_OUT] = "held-out", NULL};
+static const char *const symmetry_name[] = {[JOB_SYMMETRY_FILE] = "of_the_file",
+                                            [JOB_SYMMETRY_ISOTROPIC] = "isotropic",
+                                            [JOB_SYMMETRY_ANISOTROPIC] = "anisotropic",
+                                            NULL};
 static const char *const lamp_kind[] = {"square", "directional", NULL};
 #define INTO_PHOTOGRAPH(member) INTO_OF(struct job_photograph, member)
 
@@ -134,15 +138,23 @@ const struct job_option option_rows_setup[] = {
      .id = OPTION_MEASUREMENT_FILE,
      INTO(measurement_file),
      .required = true,
-     .allowed = "CSV, or MERL (`.binary`)",
+     .allowed = "CSV, MERL (`.binary`), RGL (`.bsdf`), ASTM E1392 (`.astm`)",
      .meaning = "The table of section 3, or a measured BRDF."},
+    {.path = "measurements.symmetry",
+     .kind = OPTION_CHOICE,
+     INTO(measurement_symmetry),
+     .choice = symmetry_name,
+     .standard = "\"of_the_file\"",
+     .meaning = "Of a measured BRDF. `.astm` files do not say which they are: light from one azimuth counts as "
+                "isotropic, light from several as anisotropic. Say `anisotropic` for cloth that was measured in one "
+                "plane only."},
     {.path = "measurements.configurations",
      .kind = OPTION_LIST,
      .id = OPTION_MEASURED_ROWS,
      LIST_INTO(measured_row, n_measured_row),
      .upper = JOB_MAX_MEASURED_ROW,
      .check = job_check_measured_rows,
-     .left_out = "16 to fit and 24 held out, spread over lamp, camera and azimuth",
+     .left_out = "16 to fit and 24 held out, spread over lamp, camera and azimuth; of `.astm` files measured ones",
      .items = "configurations",
      .meaning =
          "The configurations that are taken from a measured BRDF; not for a table. The rotation of the cloth counts "

@@ -7,6 +7,7 @@
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/fit/photographs/table/brdf_file.h"
 #include "optimizer/worker/check/input_check.h"
 
 #include <stdio.h>
@@ -116,6 +117,7 @@ static bool check_table(struct input_check *c)
     struct observation_set rows;
     struct error fault = {0};
     if (!input_check_has(c, c->doc->measurement_file)) return false;
+    if (brdf_reader_of_name(c->doc->measurement_file) != NULL) return true; /* judge_rows reads it */
     input_check_path(c, c->doc->measurement_file, path);
     observation_set_init(&rows);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, &fault);

@@ -98,8 +98,8 @@ static status add_row(const brdf_reader *r, const void *handle, const char *name
     item.configuration = observation_configuration(doc, row->light_theta_deg, row->light_phi_deg, row->camera_theta_deg,
                                                    row->camera_phi_deg, row->cloth_rotation_deg);
     if (radiance(r, handle, &item.configuration, item.mean_rgb)) {
-        item.configuration.n_rotation = r->isotropic ? CONFIGURATION_ALL_ROTATIONS : 0;
-        if (r->isotropic) item.configuration.cloth_rotation_rad = 0.0;
+        item.configuration.n_rotation = r->isotropic(handle) ? CONFIGURATION_ALL_ROTATIONS : 0;
+        if (r->isotropic(handle)) item.configuration.cloth_rotation_rad = 0.0;
         snprintf(item.name, sizeof item.name, "%s-%02zu", row->set == JOB_SET_FIT ? "fit" : "held-out",
                  observation_set_count(o, row->set));
         return observation_set_append(o, &item, err);
@@ -108,8 +108,10 @@ static status add_row(const brdf_reader *r, const void *handle, const char *name
     snprintf(text, sizeof text,
              "measured BRDF '%s' has no value for the lamp at (%g, %g) and the camera at (%g, %g) degrees", name,
              row->light_theta_deg, row->light_phi_deg, row->camera_theta_deg, row->camera_phi_deg);
-    if (row->set == JOB_SET_FIT) return error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE, "%s", text);
-    warning_send(warn, OPTION_MEASUREMENT_FILE, "%s: the held-out row is left out", text);
+    if (row->set == JOB_SET_FIT && doc->n_measured_row > 0)
+        return error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE, "%s", text);
+    warning_send(warn, OPTION_MEASUREMENT_FILE, "%s: the %s row is left out", text,
+                 row->set == JOB_SET_FIT ? "fitted" : "held-out");
     return STATUS_OK;
 }
 
@@ -137,19 +139,44 @@ static status add_default_rows(const brdf_reader *r, const void *handle, const c
     return s;
 }
 
+static status add_measured_rows(const brdf_reader *r, const void *handle, const char *name,
+                                const struct job_document *doc, const struct warning_sink *warn,
+                                struct observation_set *o, struct error *err)
+{
+    status s = STATUS_OK;
+    struct job_measured_row row = {.set = JOB_SET_FIT};
+    for (size_t i = 0; s == STATUS_OK && r->measured(handle, i, &row); i++) {
+        row.set = i % 5 == 0 || i % 5 == 2 ? JOB_SET_FIT : JOB_SET_HELD_OUT;
+        s = add_row(r, handle, name, doc, &row, warn, o, err);
+    }
+    return s;
+}
+
+static status add_rows(const brdf_reader *r, const void *handle, const char *name, const struct job_document *doc,
+                       const struct warning_sink *warn, struct observation_set *o, struct error *err)
+{
+    status s = STATUS_OK;
+    if (doc->n_measured_row == 0 && r->measured != NULL) return add_measured_rows(r, handle, name, doc, warn, o, err);
+    if (doc->n_measured_row == 0) return add_default_rows(r, handle, name, doc, warn, o, err);
+    for (size_t i = 0; i < doc->n_measured_row && s == STATUS_OK; i++)
+        s = add_row(r, handle, name, doc, &doc->measured_row[i], warn, o, err);
+    return s;
+}
+
 status brdf_file_read(const brdf_reader *r, const char *path, const struct job_document *doc,
                       const struct warning_sink *warn, struct observation_set *o, struct error *err)
 {
     void *handle = NULL;
     const char *name = path_file_name(path);
-    status s = r->open(path, &handle, err);
+    status s = r->open(path, doc->measurement_symmetry, &handle, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;
     }
-    if (doc->n_measured_row == 0) s = add_default_rows(r, handle, name, doc, warn, o, err);
-    for (size_t i = 0; i < doc->n_measured_row && s == STATUS_OK; i++)
-        s = add_row(r, handle, name, doc, &doc->measured_row[i], warn, o, err);
+    s = add_rows(r, handle, name, doc, warn, o, err);
     r->close(handle);
+    if (s == STATUS_OK && observation_set_count(o, JOB_SET_FIT) == 0)
+        return error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE,
+                               "measured BRDF '%s' has no value for any row to fit", name);
     return s;
 }

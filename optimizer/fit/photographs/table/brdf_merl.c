@@ -19,7 +19,7 @@ struct merl {
     char *bytes; /* the file; the samples begin after the header and are not aligned */
 };
 
-static status open_merl(const char *path, void **handle, struct error *err)
+static status open_merl(const char *path, enum job_symmetry symmetry, void **handle, struct error *err)
 {
     const char *name = path_file_name(path);
     size_t n = 0;
@@ -32,6 +32,9 @@ static status open_merl(const char *path, void **handle, struct error *err)
         s = error_set(err, STATUS_FORMAT,
                       "cannot read measured BRDF '%s': it does not begin as a MERL file of 90 x 90 x 180 samples",
                       name);
+    if (s == STATUS_OK && symmetry == JOB_SYMMETRY_ANISOTROPIC)
+        s = error_set(err, STATUS_INVALID,
+                      "cannot read measured BRDF '%s': MERL files are isotropic; leave out 'symmetry'", name);
     if (s == STATUS_OK && n != FILE_BYTES)
         s = error_set(err, STATUS_FORMAT, "cannot read measured BRDF '%s': it has %zu bytes, a MERL file has %d", name,
                       n, FILE_BYTES);
@@ -117,4 +120,12 @@ static bool eval_merl(const void *handle, const double light[3], const double ca
     return true;
 }
 
-const brdf_reader merl_brdf_reader = {"merl.v1", "MERL", ".binary", true, open_merl, eval_merl, close_merl};
+static bool isotropic_merl(const void *handle) { return handle != NULL; }
+
+const brdf_reader merl_brdf_reader = {.id = "merl.v1",
+                                      .title = "MERL",
+                                      .suffix = ".binary",
+                                      .open = open_merl,
+                                      .isotropic = isotropic_merl,
+                                      .eval = eval_merl,
+                                      .close = close_merl};

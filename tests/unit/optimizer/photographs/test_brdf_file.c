@@ -104,7 +104,8 @@ static void test_eval(void **state)
     void *handle;
     struct error err = {0};
     write_merl(scratch_path(state, "lobe.binary"), lobe);
-    assert_int_equal(merl_brdf_reader.open(scratch_path(state, "lobe.binary"), &handle, &err), STATUS_OK);
+    assert_int_equal(merl_brdf_reader.open(scratch_path(state, "lobe.binary"), JOB_SYMMETRY_FILE, &handle, &err),
+                     STATUS_OK);
     for (size_t i = 0; i < 4; i++) {
         double a = deg[i][0] * M_PI / 180, b = deg[i][1] * M_PI / 180, phi = deg[i][2] * M_PI / 180, f[3], g[3];
         const double light[3] = {sin(a), 0, cos(a)}, camera[3] = {sin(b) * cos(phi), sin(b) * sin(phi), cos(b)};
