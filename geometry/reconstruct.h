@@ -81,6 +81,8 @@ struct reconstruct_report {
     double profile_blur_m;     /* standard deviation of the blur that the profile has: of the scan and of its voxels */
     double radius_spread;      /* standard deviation of the radii of single fibers over their mean, without errors */
     double single_radius_se_m; /* typical standard error of the radius of one fiber */
+    double axis_ratio;         /* mean ratio of the axes of the sections, and its standard deviation between fibers */
+    double axis_ratio_spread;
     /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
     double axis_position_se_m, axis_direction_se_rad;
     bool radius_per_axis;          /* each class has a radius of its own */

@@ -9,7 +9,8 @@
 #include "geometry/fibers/lines/kinks.h"
 #include "geometry/fibers/lines/line_ends.h"
 #include "geometry/fibers/lines/linking.h"
-#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
+#include "geometry/fibers/shape/axes/flat_fit.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/fibers/shape/smoothing.h"
 #include "geometry/fibers/slices/centers.h"
@@ -166,11 +167,13 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool l
     profile.measured_curvature = last;
     if (last) profile.independent = job->independent;
     const double voxel_m = job->v->voxel_size_m[0];
+    struct section_ratio ratio;
     struct polyline_set even, inside;
     polyline_set_init(&even);
     polyline_set_init(&inside);
     status s = polylines_resample(lines, &even, err);
-    if (s == STATUS_OK) s = polylines_fit(&even, job->v, job->diameter, N_FIT, &profile, job->pool, &job->inner, err);
+    const struct flat_fit fit = {job->v, job->diameter, N_FIT, MIN_PIECE, job->pool, &job->inner};
+    if (s == STATUS_OK) s = polylines_fit_flat(&even, &fit, &profile, &ratio, err);
     if (s == STATUS_OK)
         s = polylines_keep_inside(&even, job->v->n, job->o->min_vertex, &inside, job->report->n_short_dropped, err);
     if (s == STATUS_OK) {
@@ -179,6 +182,8 @@ static status fit_axes(struct fiber_job *job, struct polyline_set *lines, bool l
         job->report->profile_radius_m = profile.radius * voxel_m;
         job->report->profile_blur_m = profile.blur * voxel_m;
         job->report->radius_spread = profile.radius_spread;
+        job->report->axis_ratio = ratio.mean;
+        job->report->axis_ratio_spread = ratio.sd;
         job->report->single_radius_se_m = profile.radius_se * profile.radius * voxel_m;
         polyline_set_release(lines);
         *lines = inside;

@@ -80,27 +80,31 @@ static bool is_duplicate(const struct duplicate_search *s, size_t line, size_t i
     return false;
 }
 
-status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                   double touching, size_t min_vertex, struct polyline_set *result,
-                                   struct join_counts *counts, struct error *err)
+status polylines_mark_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
+                                 double touching, bool *mark, struct error *err)
 {
     struct duplicate_search search = {.p = lines, .usual = (float)(0.5 * diameter_voxel), .touching = (float)touching};
     search.most = fmaxf(1.0f, search.usual);
     for (size_t l = 0; l < lines->n_line; l++) search.most = fmaxf(search.most, lines->radius[l]);
     search.most *= fmaxf(1.0f, 2.0f * search.touching);
     status s = vertex_grid_init(&search.grid, lines, n_voxel, (float)fmax(3.0, diameter_voxel), err);
-    counts->n_duplicate = 0;
-    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
-        size_t run = lines->first[l];
-        for (size_t i = lines->first[l]; i <= lines->first[l + 1] && s == STATUS_OK; i++) {
-            bool cut = i == lines->first[l + 1] || is_duplicate(&search, l, i);
-            if (!cut) continue;
-            if (i - run >= min_vertex) s = polyline_add_part(result, lines, l, run, i, err);
-            counts->n_duplicate += i < lines->first[l + 1];
-            run = i + 1;
-        }
-    }
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++)
+        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) mark[i] = is_duplicate(&search, l, i);
     vertex_grid_release(&search.grid);
+    return s;
+}
+
+status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
+                                   double touching, size_t min_vertex, struct polyline_set *result,
+                                   struct join_counts *counts, struct error *err)
+{
+    bool *mark = malloc((lines->n_vertex + 1) * sizeof *mark);
+    if (mark == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for duplicates of fibers: out of memory");
+    status s = polylines_mark_duplicates(lines, n_voxel, diameter_voxel, touching, mark, err);
+    if (s == STATUS_OK) s = polylines_without(lines, mark, min_vertex, result, err);
+    counts->n_duplicate = 0;
+    for (size_t i = 0; i < lines->n_vertex && s == STATUS_OK; i++) counts->n_duplicate += mark[i];
+    free(mark);
     return s;
 }
 

@@ -19,10 +19,13 @@ struct join_counts {
     size_t n_gap_bridged, n_joined; /* summed over calls, so they must start at zero */
 };
 
-/* Both steps write to result (initialised, empty). eps_d: density that counts as material. touching: distance of the
+/* Both steps write to result (initialised, empty); polylines_mark_duplicates marks the vertices that the first removes.
+ * eps_d: density that counts as material. touching: distance of the
  * axes of two fibers that run beside each other, over the sum of their radii, below which they are one; 0 while radii
  * are not known well. min_vertex: pieces that are shorter after the removal of duplicates are dropped.
  * STATUS_NO_MEMORY. */
+status polylines_mark_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
+                                 double touching, bool *mark, struct error *err);
 status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
                                    double touching, size_t min_vertex, struct polyline_set *result,
                                    struct join_counts *counts, struct error *err);

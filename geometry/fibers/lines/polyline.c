@@ -71,6 +71,21 @@ status polyline_add_part(struct polyline_set *p, const struct polyline_set *from
     return s;
 }
 
+status polylines_without(const struct polyline_set *from, const bool *mark, size_t min_vertex, struct polyline_set *p,
+                         struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t l = 0; l < from->n_line && s == STATUS_OK; l++) {
+        size_t run = from->first[l], end = from->first[l + 1];
+        for (size_t i = run; i <= end && s == STATUS_OK; i++) {
+            if (i < end && !mark[i]) continue;
+            if (i - run >= min_vertex) s = polyline_add_part(p, from, l, run, i, err);
+            run = i + 1;
+        }
+    }
+    return s;
+}
+
 static size_t cell_index(const struct vertex_grid *g, const float x[3])
 {
     size_t c[3];

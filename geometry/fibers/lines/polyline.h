@@ -5,6 +5,7 @@
 
 #include "base/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct polyline_set {
@@ -24,6 +25,9 @@ status polyline_begin_like(struct polyline_set *p, const struct polyline_set *fr
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
 /* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line. */
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
+                         struct error *err);
+/* Adds the lines of `from` to p without the marked vertices (one mark for each), in pieces of at least min_vertex. */
+status polylines_without(const struct polyline_set *from, const bool *mark, size_t min_vertex, struct polyline_set *p,
                          struct error *err);
 static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
 

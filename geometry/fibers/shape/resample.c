@@ -1,4 +1,4 @@
-#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
 
 #include <math.h>
 

@@ -133,6 +133,8 @@ static void set_radii(json_t *json, const struct reconstruct_report *g)
     json_object_set_new(json, "radius_profile_um", json_number(g->profile_radius_m * um));
     json_object_set_new(json, "radius_spread", json_number(g->radius_spread));
     json_object_set_new(json, "radius_error_um", json_number(g->single_radius_se_m * um));
+    json_object_set_new(json, "section_axis_ratio", json_number(g->axis_ratio));
+    json_object_set_new(json, "section_axis_ratio_spread", json_number(g->axis_ratio_spread));
 }
 
 json_t *result_geometry_json(const struct pipeline_context *c)

@@ -2,7 +2,7 @@
  * Ends that do not follow the measured directions are trimmed. */
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/kinks.h"
-#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -4,7 +4,7 @@
 #include "base/rng.h"
 #include "geometry/fibers/lines/joining.h"
 #include "geometry/fibers/lines/linking.h"
-#include "geometry/fibers/shape/axis_fit.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/fibers/shape/smoothing.h"
 #include "geometry/volume/volume_align.h"

@@ -1,4 +1,4 @@
-#include "geometry/fibers/shape/axis_solve.h"
+#include "geometry/fibers/shape/axes/axis_solve.h"
 #include "base/small_matrix.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "geometry/fibers/shape/axis_brick.h"
+#include "geometry/fibers/shape/axes/axis_brick.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +13,11 @@ void axis_scratch_init(struct axis_scratch *s)
     for (size_t i = 0; i < AXIS_N_CELL; i++) s->own[i] = UINT32_MAX;
 }
 
-void axis_scratch_release(struct axis_scratch *s) { free(s->claim); }
+void axis_scratch_release(struct axis_scratch *s)
+{
+    free(s->claim);
+    free(s->place);
+}
 
 /* A segment with what the rows of voxels near it share. */
 struct stamp {
@@ -23,9 +27,11 @@ struct stamp {
 };
 
 /* Returns false if the segment reaches no voxel of the brick. */
-static bool stamp_init(struct stamp *w, const struct segment *g, float tail, const size_t from[3], const size_t n[3])
+static bool stamp_init(struct stamp *w, const struct axis_model *m, uint32_t segment, const size_t from[3],
+                       const size_t n[3])
 {
-    const float reach = g->radius + tail;
+    const struct segment *g = &m->bricks->segment[segment];
+    const float reach = (m->section != NULL ? m->section[segment].stretch : 1.0f) * g->radius + m->tail;
     w->length2 = 0.0f;
     for (int a = 0; a < 3; a++) {
         float low = g->a[a] < g->b[a] ? g->a[a] : g->b[a], high = g->a[a] < g->b[a] ? g->b[a] : g->a[a];
@@ -86,7 +92,7 @@ static size_t stamp(const struct axis_model *m, struct axis_scratch *s, const si
                     uint32_t segment, size_t n_touched)
 {
     struct stamp w;
-    if (!stamp_init(&w, &m->bricks->segment[segment], m->tail, from, n)) return n_touched;
+    if (!stamp_init(&w, m, segment, from, n)) return n_touched;
     for (size_t k = w.lo[2]; k < w.hi[2]; k++)
         for (size_t j = w.lo[1]; j < w.hi[1]; j++) {
             size_t i0, i1;
@@ -130,17 +136,69 @@ static bool keep_claims(struct axis_scratch *s, size_t n_touched)
     return fits;
 }
 
+/* Finds the point of the segment nearest to p (relative to its begin): *t is its position along the segment in
+ * [0, 1]. */
+static void foot_of(const struct segment *g, const float p[3], float *t, float offset[3])
+{
+    float u[3], along = 0.0f, length2 = 0.0f;
+    for (int a = 0; a < 3; a++) {
+        u[a] = g->b[a] - g->a[a];
+        along += u[a] * p[a];
+        length2 += u[a] * u[a];
+    }
+    *t = length2 > 0.0f ? along / length2 : 0.0f;
+    /* comparisons, because fminf would be a function call */
+    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t;
+    for (int a = 0; a < 3; a++) offset[a] = p[a] - *t * u[a];
+}
+
+/* The place of a claimed voxel in the section of its line. */
+static struct section_place place_of(const struct axis_model *m, const size_t from[3], const struct axis_claim *c)
+{
+    const struct segment *g = &m->bricks->segment[c->segment];
+    uint32_t at = c->cell;
+    float p[3] = {(float)(from[0] + at % BRICK) + 0.5f - g->a[0],
+                  (float)(from[1] + at / BRICK % BRICK) + 0.5f - g->a[1],
+                  (float)(from[2] + at / (BRICK * BRICK)) + 0.5f - g->a[2]};
+    float offset[3], t, d = sqrtf(c->distance2);
+    foot_of(g, p, &t, offset);
+    struct section_place place = {.depth = d - g->radius, .by_radius = -1.0f};
+    if (m->section != NULL && d > 1e-3f) {
+        place = fiber_section_place(&m->section[c->segment], g->radius, offset);
+    } else {
+        for (int a = 0; a < 3 && d > 0.0f; a++) place.normal[a] = offset[a] / d;
+    }
+    place.along = t;
+    return place;
+}
+
+/* Makes room for the places of all claims. */
+static bool fit_places(struct axis_scratch *s)
+{
+    if (s->n_claim <= s->place_capacity) return true;
+    struct section_place *bigger = realloc(s->place, s->capacity * sizeof *bigger);
+    if (bigger == NULL) return false;
+    s->place = bigger;
+    s->place_capacity = s->capacity;
+    return true;
+}
+
 /* Adds the claims of a line from number `first` on to the model. */
-static void add_to_model(const struct axis_model *m, struct axis_scratch *s, size_t first)
+static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const size_t from[3], size_t first)
 {
     for (size_t i = first; i < s->n_claim; i++) {
         const struct axis_claim *c = &s->claim[i];
-        float radius = m->bricks->segment[c->segment].radius;
-        float depth = (sqrtf(c->distance2) - radius) * m->inverse_blur;
+        float depth = sqrtf(c->distance2) - m->bricks->segment[c->segment].radius, by_radius = -1.0f;
+        if (m->section != NULL) {
+            s->place[i] = place_of(m, from, c);
+            depth = s->place[i].depth;
+            by_radius = s->place[i].by_radius;
+        }
+        depth *= m->inverse_blur;
         float at = axis_table_place(&m->table, depth);
         s->model[c->cell] += axis_table_look_up(m->table.share, at);
         float slope = axis_table_look_up(m->table.slope, at) * m->inverse_blur;
-        s->by_radius[c->cell] -= slope;
+        s->by_radius[c->cell] += slope * by_radius;
         s->by_blur[c->cell] -= slope * depth;
     }
 }
@@ -170,47 +228,33 @@ static void add_radius(const struct axis_scratch *s, uint32_t at, float amplitud
     q->radius_cross[3] += weight * by * share;
 }
 
-/* Finds the point of the segment nearest to p (relative to its begin): *t is its position along the segment in
- * [0, 1]. */
-static void foot_of(const struct segment *g, const float p[3], float *t, float offset[3])
-{
-    float u[3], along = 0.0f, length2 = 0.0f;
-    for (int a = 0; a < 3; a++) {
-        u[a] = g->b[a] - g->a[a];
-        along += u[a] * p[a];
-        length2 += u[a] * u[a];
-    }
-    *t = length2 > 0.0f ? along / length2 : 0.0f;
-    /* comparisons, because fminf would be a function call */
-    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t;
-    for (int a = 0; a < 3; a++) offset[a] = p[a] - *t * u[a];
-}
-
-/* Adds a claimed voxel to the normal equations of its segment's ends and of the radius. */
-static void add_pull(const struct axis_model *m, const struct axis_scratch *s, const size_t from[3],
-                     const struct axis_claim *c, struct axis_pull *pull)
+/* Adds a claimed voxel to the normal equations of its segment's ends, of the radius and of the section. */
+static void add_pull(const struct axis_model *m, const struct axis_scratch *s, const size_t from[3], size_t i_claim,
+                     struct axis_pull *pull, struct section_pull *section)
 {
     const float amplitude = (float)(m->profile.high - m->profile.low);
-    const struct segment *g = &m->bricks->segment[c->segment];
-    uint32_t at = c->cell;
-    float p[3] = {(float)(from[0] + at % BRICK) + 0.5f - g->a[0],
-                  (float)(from[1] + at / BRICK % BRICK) + 0.5f - g->a[1],
-                  (float)(from[2] + at / (BRICK * BRICK)) + 0.5f - g->a[2]};
-    float t, offset[3], weight;
+    const struct axis_claim *c = &s->claim[i_claim];
+    float weight;
     if (!(c->distance2 > 1e-6f)) return;
-    foot_of(g, p, &t, offset);
-    float d = sqrtf(c->distance2), e = residual(m, s, from, at, &weight);
-    float place = axis_table_place(&m->table, (d - g->radius) * m->inverse_blur);
-    float slope = -amplitude * m->inverse_blur * axis_table_look_up(m->table.slope, place);
-    add_radius(s, at, amplitude, slope, e, weight, pull);
+    const struct section_place place = m->section != NULL ? s->place[i_claim] : place_of(m, from, c);
+    float e = residual(m, s, from, c->cell, &weight), at = axis_table_place(&m->table, place.depth * m->inverse_blur);
+    float slope = -amplitude * m->inverse_blur * axis_table_look_up(m->table.slope, at);
+    add_radius(s, c->cell, amplitude, -slope * place.by_radius, e, weight, pull);
     for (int end = 0; end < 2; end++) {
         struct axis_pull *q = pull + end;
-        float w = weight * (end == 0 ? 1.0f - t : t) * slope / d;
+        float w = weight * (end == 0 ? 1.0f - place.along : place.along) * slope;
         for (int a = 0, i = 0; a < 3; a++) {
-            q->gradient[a] += w * e * offset[a];
-            for (int b = 0; b <= a; b++, i++) q->normal[i] += w * slope / d * offset[a] * offset[b];
+            q->gradient[a] += w * e * place.normal[a];
+            for (int b = 0; b <= a; b++, i++) q->normal[i] += w * slope * place.normal[a] * place.normal[b];
         }
     }
+    if (section == NULL) return;
+    float by_c = -slope * place.by_c, by_s = -slope * place.by_s;
+    section->gradient[0] += weight * e * by_c;
+    section->gradient[1] += weight * e * by_s;
+    section->normal[0] += weight * by_c * by_c;
+    section->normal[1] += weight * by_c * by_s;
+    section->normal[2] += weight * by_s * by_s;
 }
 
 /* Finds the voxels near every line of a brick and adds their densities to the model. */
@@ -225,8 +269,8 @@ static bool claim_voxels(const struct axis_model *m, struct axis_scratch *s, siz
         size_t n_touched = 0, first = s->n_claim;
         for (end = e; end < b->first[i_brick + 1] && b->segment[b->index[end]].line == line; end++)
             n_touched = stamp(m, s, from, n, b->index[end], n_touched);
-        fits = keep_claims(s, n_touched) && fits;
-        add_to_model(m, s, first);
+        fits = keep_claims(s, n_touched) && fits && (m->section == NULL || fit_places(s));
+        if (fits) add_to_model(m, s, from, first);
     }
     return fits;
 }
@@ -234,7 +278,7 @@ static bool claim_voxels(const struct axis_model *m, struct axis_scratch *s, siz
 /* Adds the claimed voxels to the normal equations of the segments. The list of a brick is in ascending order, and the
  * segments of a line follow each other in it. */
 static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, size_t i_brick, const size_t from[3],
-                      struct axis_pull *pull)
+                      const struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = m->bricks;
     const size_t begin = b->first[i_brick], end = b->first[i_brick + 1];
@@ -243,7 +287,7 @@ static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, 
         uint32_t segment = s->claim[i].segment;
         while (e > begin && b->index[e] > segment) e--;
         while (e + 1 < end && b->index[e] < segment) e++;
-        add_pull(m, s, from, &s->claim[i], &pull[2 * (e - begin)]);
+        add_pull(m, s, from, i, &sum->pull[2 * (e - begin)], sum->section != NULL ? &sum->section[e - begin] : NULL);
     }
 }
 
@@ -276,11 +320,13 @@ bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_
     size_t n_segment = b->first[i_brick + 1] - b->first[i_brick], from[3], n[3];
     if (n_segment == 0) return true;
     sum->pull = calloc(2 * n_segment, sizeof *sum->pull);
+    if (model->section != NULL) sum->section = calloc(n_segment, sizeof *sum->section);
     segment_brick_box(b, i_brick, from, n);
-    bool fits = claim_voxels(model, s, i_brick, from, n) && sum->pull != NULL;
+    bool fits = claim_voxels(model, s, i_brick, from, n) && sum->pull != NULL &&
+                (model->section == NULL || sum->section != NULL);
     if (fits) {
         for (size_t e = 0; e < 2 * n_segment; e++) sum->pull[e].segment = b->index[b->first[i_brick] + e / 2];
-        add_pulls(model, s, i_brick, from, sum->pull);
+        add_pulls(model, s, i_brick, from, sum);
         add_shared(model, s, from, n, &sum->shared);
     }
     for (size_t i = 0; i < s->n_claim; i++)

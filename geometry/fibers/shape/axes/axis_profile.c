@@ -1,4 +1,4 @@
-#include "geometry/fibers/shape/axis_profile.h"
+#include "geometry/fibers/shape/axes/axis_profile.h"
 #include "base/small_matrix.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_GEOMETRY_AXIS_PROFILE_H
 #define SELVEDGE_GEOMETRY_AXIS_PROFILE_H
 
-#include "base/status.h"
+#include "geometry/fibers/shape/axes/fiber_section.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -13,6 +13,7 @@ struct axis_profile {
     /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
+    struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
     double independent; /* share of the voxels that have values of their own; below 1 where they are interpolated */
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
      * errors by white noise (relative), root mean square of the errors of single fibers (relative). */

@@ -19,7 +19,7 @@
 
 #include "base/thread_pool.h"
 #include "geometry/fibers/lines/polyline.h"
-#include "geometry/fibers/shape/axis_profile.h"
+#include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/volume/volume.h"
 
 /* Moves `lines`, which have about one vertex per voxel (polylines_resample), and refines their radii; lines of unknown

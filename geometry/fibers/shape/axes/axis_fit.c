@@ -1,12 +1,15 @@
-#include "geometry/fibers/shape/axis_fit.h"
-#include "geometry/fibers/shape/axis_brick.h"
-#include "geometry/fibers/shape/axis_solve.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
+#include "geometry/fibers/shape/axes/axis_brick.h"
+#include "geometry/fibers/shape/axes/axis_solve.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_BATCH = 1 << 20 };              /* segments, of 128 bytes each */
+enum { MAX_BATCH = 1 << 20 };                /* segments, of 128 bytes each */
+static const double SECTION_DIAMETERS = 1.0; /* length over which sections are smoothed */
+/* Standard deviation of the flatness of fibers (fiber_section.h) that holds sections to discs. */
+static const double FLATNESS_SD = 0.3;
 static const double PIECE_DIAMETERS = 2.0; /* length of the pieces that show the error of a radius */
 
 struct fit_job {
@@ -45,9 +48,11 @@ static void state_error(double information, double variance, double stiffness, s
 
 /* What a fit keeps from round to round. */
 struct fit_work {
-    uint32_t *first_vertex_of; /* per segment */
-    struct axis_pull *total;   /* per vertex */
-    struct radius_sum *radius; /* per line */
+    uint32_t *first_vertex_of;    /* per segment */
+    struct axis_pull *total;      /* per vertex */
+    struct section_view *view;    /* per segment; NULL for discs, as the next */
+    struct section_pull *section; /* per vertex */
+    struct radius_sum *radius;    /* per line */
     double *length;
     struct shared_sum shared;
 };
@@ -56,11 +61,13 @@ static void release_work(struct fit_work *w)
 {
     free(w->first_vertex_of);
     free(w->total);
+    free(w->view);
+    free(w->section);
     free(w->radius);
     free(w->length);
 }
 
-static bool init_work(struct fit_work *w, const struct polyline_set *lines)
+static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool with_sections)
 {
     size_t n_segment = 0;
     *w = (struct fit_work){.first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *w->first_vertex_of),
@@ -68,12 +75,26 @@ static bool init_work(struct fit_work *w, const struct polyline_set *lines)
                            .radius = malloc((lines->n_line + 1) * sizeof *w->radius),
                            .length = malloc((lines->n_line + 1) * sizeof *w->length)};
     if (w->first_vertex_of == NULL || w->total == NULL || w->radius == NULL || w->length == NULL) return false;
+    if (with_sections) {
+        w->view = malloc((lines->n_vertex + 1) * sizeof *w->view);
+        w->section = malloc((lines->n_vertex + 1) * sizeof *w->section);
+        if (w->view == NULL || w->section == NULL) return false;
+    }
     for (size_t l = 0; l < lines->n_line; l++) {
         for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
             w->first_vertex_of[n_segment++] = (uint32_t)i;
         w->length[l] = (double)polyline_length(lines, l);
     }
     return true;
+}
+
+/* Adds the terms of a segment to the sections at its ends. */
+static void add_section(struct section_pull *ends, const struct section_pull *q)
+{
+    for (int end = 0; end < 2; end++) {
+        for (int i = 0; i < 3; i++) ends[end].normal[i] += 0.5f * q->normal[i];
+        for (int i = 0; i < 2; i++) ends[end].gradient[i] += 0.5f * q->gradient[i];
+    }
 }
 
 /* Adds the bricks of a batch in order, so that sums do not depend on the number of threads. */
@@ -91,6 +112,8 @@ static void add_batch(const struct fit_job *job, size_t n_brick, struct fit_work
             r->gradient += (double)q->radius_gradient;
             for (int a = 0; a < 4; a++) r->cross[a] += (double)q->radius_cross[a];
         }
+        for (size_t e = 0; sum->section != NULL && e < first[1] - first[0]; e++)
+            add_section(&w->section[w->first_vertex_of[sum->pull[2 * e].segment]], &sum->section[e]);
         add_shared(&w->shared, &sum->shared);
     }
 }
@@ -110,14 +133,33 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
     double sd = profile->measured_curvature ? axis_curvature_sd(lines, diameter) : AXIS_CURVATURE_MOST / diameter;
     double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0, stiffness = variance / (sd * sd);
     state_error(axis_information(w->total, lines->n_vertex), variance, stiffness, profile);
-    return axis_solve_lines(lines, w->total, stiffness, pool, err);
+    status s = STATUS_OK;
+    if (w->section != NULL)
+        s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter,
+                                 variance / (FLATNESS_SD * FLATNESS_SD), profile->section, err);
+    return s == STATUS_OK ? axis_solve_lines(lines, w->total, stiffness, pool, err) : s;
 }
 
-static float largest_radius(const struct polyline_set *lines)
+/* Longest distance of an outline from its axis. */
+static float largest_reach(const struct polyline_set *lines, const struct fiber_section *section)
 {
     float most = 0.0f;
-    for (size_t l = 0; l < lines->n_line; l++) most = fmaxf(most, lines->radius[l]);
+    for (size_t l = 0; l < lines->n_line; l++) {
+        float ratio = 1.0f;
+        for (size_t i = lines->first[l]; section != NULL && i < lines->first[l + 1]; i++)
+            ratio = fmaxf(ratio, fiber_section_ratio(&section[i]));
+        most = fmaxf(most, sqrtf(ratio) * lines->radius[l]);
+    }
     return most;
+}
+
+/* Prepares the sections of all segments. */
+static void view_sections(const struct polyline_set *lines, struct fiber_section *section, struct section_view *view)
+{
+    fiber_sections_turn(lines, section);
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
+            *view++ = fiber_section_view(&section[i], &section[i + 1], lines->vertex[i], lines->vertex[i + 1]);
 }
 
 /* Number of bricks from job->first_brick on that are fitted before their sums are added: at least one layer of bricks,
@@ -145,7 +187,10 @@ static status fit_batch(struct fit_job *job, size_t n_brick, struct fit_work *w,
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     else
         add_batch(job, n_brick, w);
-    for (size_t b = 0; job->sum != NULL && b < n_brick; b++) free(job->sum[b].pull);
+    for (size_t b = 0; job->sum != NULL && b < n_brick; b++) {
+        free(job->sum[b].pull);
+        free(job->sum[b].section);
+    }
     free(job->sum);
     job->sum = NULL;
     return s;
@@ -158,7 +203,13 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, struct 
     struct axis_model *m = &job->model;
     m->tail = (float)(AXIS_TAIL * m->profile.blur);
     m->inverse_blur = (float)(1.0 / m->profile.blur);
-    status s = segment_bricks_init(&bricks, lines, m->v->n, AXIS_BRICK, largest_radius(lines) + m->tail + 1.0f, err);
+    if (w->view != NULL) {
+        view_sections(lines, m->profile.section, w->view);
+        memset(w->section, 0, lines->n_vertex * sizeof *w->section);
+    }
+    m->section = w->view;
+    const float reach = largest_reach(lines, m->profile.section) + m->tail + 1.0f;
+    status s = segment_bricks_init(&bricks, lines, m->v->n, AXIS_BRICK, reach, err);
     if (s != STATUS_OK) return s;
     size_t n_brick = segment_n_brick(&bricks), n_batch;
     m->bricks = &bricks;
@@ -206,7 +257,8 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
     struct fit_job *job = new_job(v, profile, n_thread);
     struct fit_work work = {0};
     status s = STATUS_OK;
-    if (job == NULL || job->scratch == NULL || job->failed == NULL || !init_work(&work, lines))
+    if (job == NULL || job->scratch == NULL || job->failed == NULL ||
+        !init_work(&work, lines, profile->section != NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
         if (!(lines->radius[l] > 0.0f)) lines->radius[l] = (float)(0.5 * diameter_voxel);

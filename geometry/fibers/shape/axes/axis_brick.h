@@ -4,8 +4,9 @@
 #define SELVEDGE_GEOMETRY_AXIS_BRICK_H
 
 #include "geometry/fibers/lines/segment_bricks.h"
-#include "geometry/fibers/shape/axis_profile.h"
-#include "geometry/fibers/shape/axis_solve.h"
+#include "geometry/fibers/shape/axes/axis_profile.h"
+#include "geometry/fibers/shape/axes/axis_solve.h"
+#include "geometry/fibers/shape/axes/fiber_section.h"
 #include "geometry/volume/volume.h"
 
 #include <stdbool.h>
@@ -16,6 +17,7 @@ enum { AXIS_BRICK = 32, AXIS_N_CELL = AXIS_BRICK * AXIS_BRICK * AXIS_BRICK };
 struct axis_model {
     const struct volume *v;
     const struct segment_bricks *bricks; /* with edge AXIS_BRICK */
+    const struct section_view *section;  /* of each segment; NULL: discs */
     struct axis_profile profile;
     struct axis_table table;
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
@@ -31,8 +33,9 @@ struct axis_claim {
 struct axis_scratch {
     float model[AXIS_N_CELL], by_radius[AXIS_N_CELL], by_blur[AXIS_N_CELL], own2[AXIS_N_CELL];
     uint32_t own[AXIS_N_CELL], touched[AXIS_N_CELL];
-    struct axis_claim *claim; /* of all lines of the brick, in their order */
-    size_t n_claim, capacity;
+    struct axis_claim *claim;    /* of all lines of the brick, in their order */
+    struct section_place *place; /* of each claim, where sections are not discs */
+    size_t n_claim, capacity, place_capacity;
 };
 
 void axis_scratch_init(struct axis_scratch *s);
@@ -40,11 +43,12 @@ void axis_scratch_release(struct axis_scratch *s);
 
 /* For the vertices of the brick's segments, and for the profile. */
 struct axis_brick_sum {
-    struct axis_pull *pull; /* two for each segment of the brick, in the order of its list */
+    struct axis_pull *pull;       /* two for each segment of the brick, in the order of its list */
+    struct section_pull *section; /* one for each segment; NULL for discs */
     struct shared_sum shared;
 };
 
-/* The caller frees sum->pull. Returns false when memory is out. */
+/* The caller frees the arrays of the sum. Returns false when memory is out. */
 bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_scratch *s, struct axis_brick_sum *sum);
 
 #endif
