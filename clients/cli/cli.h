@@ -47,6 +47,8 @@ status cli_results_of(struct cli *cli, const char *id, struct error *err);
 /* Follows job `id` until it ends, and prints the fitted parameters. */
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
 /* Writes "/v1/jobs/ID" + tail to path. STATUS_INVALID when the id has characters that no id has. */
+/* Adds members "result" and "parameters" to a job as the server gives it: its result by "result_url", or null. */
+status cli_add_result(struct cli *cli, json_t *job, struct error *err);
 status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err);
 /* The folder of a path: "." if it has none. */
 void cli_folder_of(const char *path, char *folder, size_t n_bytes);

@@ -32,11 +32,24 @@ static void print_json(const json_t *value, FILE *out)
     fputc('\n', out);
 }
 
+status cli_add_result(struct cli *cli, json_t *job, struct error *err)
+{
+    json_t *result = NULL;
+    const char *url = json_string_value(json_object_get(job, "result_url"));
+    status s = url == NULL || url[0] != '/' ? STATUS_OK : http_json(cli->http, "GET", url, NULL, NULL, &result, err);
+    if (s != STATUS_OK) return error_prefix(err, s, "cannot read the result");
+    json_t *parameters = json_object_get(result, "parameters");
+    json_object_set_new(job, "parameters", parameters == NULL ? json_null() : json_incref(parameters));
+    json_object_set_new(job, "result", result == NULL ? json_null() : result);
+    return STATUS_OK;
+}
+
 status cli_status(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
     json_t *job = NULL;
     status s = job_call(cli, "GET", "", &job, err);
+    if (s == STATUS_OK) s = cli_add_result(cli, job, err);
     if (s == STATUS_OK && cli->args->json) print_json(job, cli->out);
     if (s == STATUS_OK && !cli->args->json) report_job(job, cli->out);
     json_decref(job);

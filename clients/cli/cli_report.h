@@ -10,7 +10,8 @@
 
 /* Extracts the members of a job that progress lines show. */
 void report_view(const json_t *job, struct job_view *view);
-/* Prints several lines: sample, state, stage, times, files, warnings and error, then the result if there is one. */
+/* Prints several lines of a job, to which cli_add_result has added its result: sample, state, stage, times, files,
+ * warnings and error, then the result if there is one. */
 void report_job(const json_t *job, FILE *out);
 /* Prints the fitted parameters with standard errors and remarks, and the residuals. */
 void report_result(const json_t *job, FILE *out);

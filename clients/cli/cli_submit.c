@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { DECLARE_AT_ONCE = 2000 /* files in a request: 300 bytes each leave them below its limit of 1 MiB */ };
+
 struct submit {
     struct cli *cli;
     json_t *document, *job;
@@ -169,13 +171,18 @@ static status open_job(struct submit *u, struct error *err)
     return s == STATUS_OK ? s : error_prefix(err, s, "the changed job document was refused");
 }
 
+static json_t *declaration(const struct cli_file *file)
+{
+    return json_pack("{s:s, s:s, s:I, s:s}", "name", file->name, "role", file->role, "size", (json_int_t)file->n_bytes,
+                     "sha256", file->sha256);
+}
+
 static status declare(struct submit *u, const struct cli_file *file, json_t **answer, struct error *err)
 {
     char path[256];
     status s = cli_job_path(u->id, "/files", path, sizeof path, err);
     if (s != STATUS_OK) return s;
-    json_t *body = json_pack("{s:s, s:s, s:I, s:s}", "name", file->name, "role", file->role, "size",
-                             (json_int_t)file->n_bytes, "sha256", file->sha256);
+    json_t *body = declaration(file);
     if (body == NULL) return error_set(err, STATUS_INVALID, "file name '%s' is not UTF-8", file->name);
     s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
     if (s == STATUS_CONFLICT && u->cli->args->resume_id != NULL) { /* the file has changed: replace the earlier one */
@@ -189,6 +196,23 @@ static status declare(struct submit *u, const struct cli_file *file, json_t **an
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot declare '%s'", file->name);
 }
 
+/* Declares all files in few requests, because one after the other takes minutes for the slices of a scan. What a
+ * refusal is about is found when the files are declared one by one next; the server knows the others then. */
+static void declare_all(struct submit *u)
+{
+    char path[256];
+    if (cli_job_path(u->id, "/files", path, sizeof path, NULL) != STATUS_OK) return;
+    for (size_t i = 0; u->list.n_file > 1 && i < u->list.n_file; i += DECLARE_AT_ONCE) {
+        json_t *list = json_array(), *answer = NULL;
+        for (size_t k = i; k < u->list.n_file && k < i + DECLARE_AT_ONCE; k++)
+            json_array_append_new(list, declaration(&u->list.file[k]));
+        bool taken = http_json(u->cli->http, "POST", path, NULL, list, &answer, NULL) == STATUS_OK;
+        json_decref(answer);
+        json_decref(list);
+        if (!taken) return;
+    }
+}
+
 static status send_files(struct submit *u, struct error *err)
 {
     status s = STATUS_OK;
@@ -197,6 +221,7 @@ static status send_files(struct submit *u, struct error *err)
     u->verb = "uploading";
     u->started_s = clock_monotonic_s();
     u->n_before = u->n_now = 0;
+    declare_all(u);
     for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) {
         const struct cli_file *file = &u->list.file[i];
         json_t *answer = NULL;

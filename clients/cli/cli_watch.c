@@ -146,6 +146,8 @@ static status report_outcome(struct watch *w, int *exit_code, struct error *err)
     const char *text = json_string_value(json_object_get(problem, "text")),
                *field = json_string_value(json_object_get(problem, "field"));
     if (strcmp(state, "succeeded") == 0) {
+        status s = cli_add_result(w->cli, w->job, err);
+        if (s != STATUS_OK) return s;
         report_result(w->job, w->cli->out);
         fprintf(w->cli->note, "results: selvedge results %s, or %s/#%s\n", w->id, http_server(w->cli->http), w->id);
         return STATUS_OK;

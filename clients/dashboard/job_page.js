@@ -158,7 +158,9 @@ export function jobPage(page, id) {
 
   const poller = poll(async () => {
     about ??= await getJson("/v1/about");
-    const job = await getJson(`/v1/jobs/${id}`);
+    const job = { ...await getJson(`/v1/jobs/${id}`) };
+    job.result = job.result_url ? await getJson(job.result_url) : null; // answered with 304 while it is the same
+    job.parameters = job.result?.parameters ?? null;
     if (gone) return 5;
     document.title = `${job.state === "running" ? `${Math.round(100 * job.fraction)} % ` : ""}${job.sample} – Selvedge`;
     if (job.generation !== generation) { generation = job.generation; log.reset(); results.replaceChildren(); closeFibers?.(); closeFibers = null; }

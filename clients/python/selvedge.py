@@ -20,6 +20,7 @@ import requests
 
 __version__ = "0.1.0"
 PIECE = 16 << 20
+DECLARE_AT_ONCE = 2000  # files in a request, which may have 1 MiB
 ENDED = ("succeeded", "failed", "cancelled")
 
 
@@ -57,6 +58,15 @@ def files_of(document):
     for p in document.get("photographs", []):
         names += [(q["file"], "photograph") for q in (p, *p.get("more_exposures", []))]
     return list(dict.fromkeys(names))
+
+
+def declaration(path, role, name=None):
+    """Return what declares a file to the server: its name, size and SHA-256."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as f:
+        while chunk := f.read(1 << 20):
+            digest.update(chunk)
+        return {"name": name or os.path.basename(path), "role": role, "size": f.tell(), "sha256": digest.hexdigest()}
 
 
 class Server:
@@ -117,8 +127,7 @@ class Server:
             with open(document, encoding="utf-8") as f:
                 document = json.load(f)
         job = self.create(document)
-        for name, role in files_of(document):
-            job.upload(os.path.join(folder or ".", name), role)
+        job.upload_all((os.path.join(folder or ".", name), role) for name, role in files_of(document))
         job.start()
         return job
 
@@ -136,15 +145,22 @@ class Job:
 
     def upload(self, path, role, name=None):
         """Declare a file and send it by tus; continues an earlier upload. The server checks the SHA-256 at the end."""
-        digest = hashlib.sha256()
-        with open(path, "rb") as f:
-            while chunk := f.read(1 << 20):
-                digest.update(chunk)
-            size = f.tell()
-            declared = {"name": name or os.path.basename(path), "role": role, "size": size, "sha256": digest.hexdigest()}
-            state = self.server.request("POST", self.path + "/files", json=declared).json()
-            if state["state"] != "complete":
-                self._send(f, size, state["upload_url"])
+        self._send_declared(path, self.server.request("POST", self.path + "/files", json=declaration(path, role, name)).json())
+
+    def upload_all(self, files):
+        """The same with many files [(path, role), ...]: they are declared in few requests, each of them wholly or not at all."""
+        files = list(files)
+        for i in range(0, len(files), DECLARE_AT_ONCE):
+            some = files[i:i + DECLARE_AT_ONCE]
+            declared = [declaration(path, role) for path, role in some]
+            states = self.server.request("POST", self.path + "/files", json=declared).json()["files"]
+            for (path, _), state in zip(some, states):
+                self._send_declared(path, state)
+
+    def _send_declared(self, path, state):
+        if state["state"] != "complete":
+            with open(path, "rb") as f:
+                self._send(f, state["size"], state["upload_url"])
 
     def _send(self, f, size, url):
         tus, failures, offset = {"Tus-Resumable": "1.0.0"}, 0, None
@@ -201,15 +217,21 @@ class Job:
                 return job
             time.sleep(interval_s)
 
+    def result(self):
+        """Return the result (docs/file-formats.md, result.json), or None before the end."""
+        url = self.state()["result_url"]
+        return url and self.server.request("GET", url).json()
+
     def parameters(self):
         """Return the fitted parameters: dicts with name, set (the group of fibers, or None), unit, value, standard_error,
         lower, upper, determined ... None before the end."""
-        return self.state()["parameters"]
+        result = self.result()
+        return result and result.get("parameters")
 
     def models(self):
         """Return all models of the job in order: dicts with id, best, fit_rel_rms, heldout_rel_rms, parameters ... None
         before the end."""
-        result = self.state()["result"]
+        result = self.result()
         return result and result.get("models")
 
     def series(self):

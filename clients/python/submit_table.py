@@ -16,7 +16,8 @@ def main(scan, voxel_um, *tables):
         job.upload(scan, "volume")
         job.upload(table, "measurements")
         job.start()
-        result = job.wait()["result"]
+        job.wait()
+        result = job.result()
         print(f"{os.path.basename(table)}: fitted {100 * result['fit_rel_rms']:.1f} %, held out {100 * result['heldout_rel_rms']:.1f} %")
 
 

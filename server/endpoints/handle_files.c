@@ -14,13 +14,19 @@ void handle_list_files(struct http_request *r)
     struct job_row row;
     struct error err = {0};
     json_t *view = NULL;
+    char tag[JOB_TAG_BYTES] = "";
     status s = job_get(r->service, r->param[0], &row, &err);
-    if (s == STATUS_OK) s = job_view_files(r->service, &row, &view, &err);
+    if (s == STATUS_OK) job_view_files_tag(r->service, &row, tag);
+    bool known = s == STATUS_OK && reply_not_modified(r, tag);
+    if (s == STATUS_OK && !known) s = job_view_files(r->service, &row, &view, &err);
     job_row_release(&row);
-    if (s != STATUS_OK)
+    if (known) return;
+    if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
-    else
-        reply_json_tagged(r, view);
+        return;
+    }
+    reply_json(r, MHD_HTTP_OK, view);
+    reply_header(r, "ETag", tag);
 }
 
 static status member_text(const json_t *j, const char *name, char *out, size_t n_out, bool optional, struct error *err)
@@ -59,14 +65,76 @@ static status read_declaration(const json_t *j, struct file_row *row, struct err
     return s == STATUS_OK ? member_text(j, "sha256", row->sha256, sizeof row->sha256, true, err) : s;
 }
 
-void handle_declare_file(struct http_request *r)
+/* Puts the place in the list before the name of the field: "[3].name". */
+static void name_place(struct error *err, size_t i)
+{
+    char field[sizeof err->field];
+    snprintf(field, sizeof field, "[%zu]%s%.100s", i, err->field[0] != '\0' ? "." : "", err->field);
+    snprintf(err->field, sizeof err->field, "%s", field);
+}
+
+static status read_declarations(const json_t *list, struct job_declaration *file, size_t *i_fault, struct error *err)
+{
+    status s = STATUS_OK;
+    const json_t *one;
+    size_t i;
+    json_array_foreach(list, i, one)
+    {
+        s = read_declaration(one, &file[i].row, err);
+        *i_fault = i;
+        if (s != STATUS_OK) break;
+    }
+    return s;
+}
+
+static void reply_declared(struct http_request *r, bool in_list, const struct job_declaration *file, size_t n)
+{
+    char upload[80];
+    bool existed = true;
+    json_t *list = json_array();
+    for (size_t i = 0; i < n; i++) {
+        struct file_row row = file[i].row;
+        upload_refresh(r->service->upload, &row);
+        json_array_append_new(list, file_view(&row));
+        existed = existed && file[i].existed;
+    }
+    json_t *body = in_list ? json_pack("{s:O}", "files", list) : json_incref(json_array_get(list, 0));
+    json_decref(list);
+    reply_json(r, existed ? MHD_HTTP_OK : MHD_HTTP_CREATED, body);
+    snprintf(upload, sizeof upload, "/v1/uploads/%s", file[0].row.id);
+    if (!in_list) reply_header(r, "Location", upload);
+}
+
+/* One declaration, or a list of them of which all or none are made. */
+static void declare(struct http_request *r, const json_t *list, bool in_list)
 {
     struct error err = {0};
-    struct file_row row = {0};
     struct job_refusal refusal = {0};
-    bool existed = false;
+    size_t n = json_array_size(list), i_fault = 0;
+    struct job_declaration *file = calloc(n > 0 ? n : 1, sizeof *file);
+    status s = STATUS_OK;
+    if (file == NULL)
+        s = error_set(&err, STATUS_NO_MEMORY, "cannot declare files: out of memory");
+    else if (n == 0)
+        s = error_set(&err, STATUS_INVALID, "a list of declarations must not be empty");
+    else
+        s = read_declarations(list, file, &i_fault, &err);
+    if (s != STATUS_OK && n > 0 && in_list) name_place(&err, i_fault);
+    if (s == STATUS_OK) {
+        s = job_declare_files(r->service, r->param[0], file, n, &i_fault, &refusal, &err);
+        if (s != STATUS_OK && i_fault < n && in_list) name_place(&err, i_fault);
+    }
+    if (s != STATUS_OK)
+        reply_problem(r, refusal.code, &err, NULL);
+    else
+        reply_declared(r, in_list, file, n);
+    free(file);
+}
+
+void handle_declare_files(struct http_request *r)
+{
     json_error_t where;
-    char upload[80], text[256];
+    char text[256];
     json_t *j = json_loadb(r->body, r->n_body, JSON_REJECT_DUPLICATES, &where);
     if (j == NULL) {
         snprintf(text, sizeof text, "the body is not JSON: line %d, column %d: %s", where.line, where.column,
@@ -74,17 +142,11 @@ void handle_declare_file(struct http_request *r)
         reply_code(r, "malformed", "", text);
         return;
     }
-    status s = read_declaration(j, &row, &err);
+    bool in_list = json_is_array(j);
+    json_t *list = in_list ? json_incref(j) : json_pack("[O]", j);
+    declare(r, list, in_list);
+    json_decref(list);
     json_decref(j);
-    if (s == STATUS_OK) s = job_declare_file(r->service, r->param[0], &row, &existed, &refusal, &err);
-    if (s != STATUS_OK) {
-        reply_problem(r, refusal.code, &err, NULL);
-        return;
-    }
-    upload_refresh(r->service->upload, &row);
-    reply_json(r, existed ? MHD_HTTP_OK : MHD_HTTP_CREATED, file_view(&row));
-    snprintf(upload, sizeof upload, "/v1/uploads/%s", row.id);
-    reply_header(r, "Location", upload);
 }
 
 void handle_get_file(struct http_request *r)

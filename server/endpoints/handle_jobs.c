@@ -11,27 +11,34 @@
 
 enum { LIST_MOST = 500, LIST_USUAL = 50 };
 
+/* Decides a 304 when the client has the present job. The document is not even read for it. */
+static bool job_not_modified(struct http_request *r)
+{
+    struct job_row row;
+    char tag[JOB_TAG_BYTES];
+    if (request_header(r, "If-None-Match") == NULL) return false;
+    status s = job_look(r->service, r->param[0], &row, NULL);
+    if (s == STATUS_OK) s = job_view_tag(r->service, &row, tag, NULL);
+    return s == STATUS_OK && reply_not_modified(r, tag);
+}
+
 static void reply_job(struct http_request *r, const char *id, unsigned status_code, bool created, bool replayed)
 {
     struct job_row row;
     struct error err = {0};
     json_t *view = NULL;
-    char tag[40], location[80];
+    char tag[JOB_TAG_BYTES], location[80];
     status s = job_get(r->service, id, &row, &err);
+    if (s == STATUS_OK)
+        s = job_view_tag(r->service, &row, tag, &err); /* first: what changes now changes the next tag */
     if (s == STATUS_OK) s = job_view(r->service, &row, true, &view, &err);
     if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
         job_row_release(&row);
         return;
     }
-    json_tag(view, tag);
-    if (status_code == 0 && tag_matches(request_header(r, "If-None-Match"), tag)) {
-        reply_empty(r, MHD_HTTP_NOT_MODIFIED);
-        json_decref(view);
-    } else {
-        json_object_set_new(view, "heartbeat_age_s", job_view_heartbeat_age(r->service, &row));
-        reply_json(r, status_code == 0 ? MHD_HTTP_OK : status_code, view);
-    }
+    json_object_set_new(view, "heartbeat_age_s", job_view_heartbeat_age(r->service, &row));
+    reply_json(r, status_code, view);
     reply_header(r, "ETag", tag);
     snprintf(location, sizeof location, "/v1/jobs/%s", row.id);
     if (created) reply_header(r, "Location", location);
@@ -100,7 +107,10 @@ void handle_create_job(struct http_request *r)
         reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
 }
 
-void handle_get_job(struct http_request *r) { reply_job(r, r->param[0], 0, false, false); }
+void handle_get_job(struct http_request *r)
+{
+    if (!job_not_modified(r)) reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
+}
 
 struct precondition {
     struct http_request *request;
@@ -111,12 +121,9 @@ struct precondition {
 static status check_tag(void *context, const struct job_row *row, struct error *err)
 {
     struct precondition *p = context;
-    json_t *view = NULL;
-    char tag[40];
-    status s = job_view(p->request->service, row, true, &view, err);
+    char tag[JOB_TAG_BYTES];
+    status s = job_view_tag(p->request->service, row, tag, err);
     if (s != STATUS_OK) return s;
-    json_tag(view, tag);
-    json_decref(view);
     p->failed = !tag_matches(p->wanted, tag);
     return p->failed ? error_set_field(err, STATUS_CONFLICT, "If-Match",
                                        "the job has changed since it was read; get it again")

@@ -15,7 +15,7 @@ void handle_cancel_job(struct http_request *r);
 void handle_retry_job(struct http_request *r);
 /* handle_files.c */
 void handle_list_files(struct http_request *r);
-void handle_declare_file(struct http_request *r);
+void handle_declare_files(struct http_request *r);
 void handle_get_file(struct http_request *r);
 void handle_delete_file(struct http_request *r);
 /* handle_uploads.c */

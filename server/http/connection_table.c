@@ -1,12 +1,16 @@
 #include "server/http/connection_table.h"
 #include "base/clock.h"
 
+#include <linux/sockios.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 enum { RATE_GRACE_S = 10, GONE_GRACE_S = 2 };
@@ -14,7 +18,7 @@ static const char too_slow_body[] =
     "{\"type\":\"urn:selvedge:problem:too_slow\",\"title\":\"The request came too slowly\",\"status\":408,"
     "\"code\":\"too_slow\",\"detail\":\"the head or the body of the request came too slowly\"}";
 
-enum phase { PHASE_HEAD, PHASE_BODY, PHASE_REPLY };
+enum phase { PHASE_HEAD, PHASE_BODY, PHASE_WORK, PHASE_SEND };
 
 struct connection_entry {
     struct connection_entry *next, *before;
@@ -24,6 +28,8 @@ struct connection_entry {
     bool served; /* a request was answered on this connection, so a 408 could be taken for the answer to the next one */
     bool ended;
     atomic_uint_least64_t n_received; /* bytes of the present body */
+    double window_s;                  /* begin of the present window of RATE_GRACE_S of an answer */
+    uint64_t window_acknowledged;     /* bytes that the client had acknowledged then */
 };
 
 struct connection_table {
@@ -92,6 +98,14 @@ void connection_closed(struct connection_table *t, struct connection_entry *e)
     free(e);
 }
 
+/* Bytes that the client's machine has acknowledged since the connection began; 0 where the socket counts none. */
+static uint64_t acknowledged_bytes(int fd)
+{
+    struct tcp_info info = {0};
+    socklen_t n = sizeof info;
+    return getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &n) == 0 ? info.tcpi_bytes_acked : 0;
+}
+
 static void enter(struct connection_table *t, struct connection_entry *e, enum phase phase)
 {
     if (e == NULL) return;
@@ -99,12 +113,17 @@ static void enter(struct connection_table *t, struct connection_entry *e, enum p
     e->phase = phase;
     e->since_s = clock_monotonic_s();
     if (phase == PHASE_BODY) atomic_store(&e->n_received, 0);
-    if (phase == PHASE_REPLY) e->served = true;
+    if (phase == PHASE_SEND) {
+        e->served = true;
+        e->window_s = e->since_s;
+        e->window_acknowledged = acknowledged_bytes(e->fd);
+    }
     pthread_mutex_unlock(&t->lock);
 }
 
 void connection_body_begins(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_BODY); }
-void connection_replying(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_REPLY); }
+void connection_working(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_WORK); }
+void connection_sending(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_SEND); }
 void connection_idle(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_HEAD); }
 
 void connection_received(struct connection_entry *e, size_t n_bytes)
@@ -112,13 +131,27 @@ void connection_received(struct connection_entry *e, size_t n_bytes)
     if (e != NULL) atomic_fetch_add(&e->n_received, n_bytes);
 }
 
-static bool too_slow(const struct connection_table *t, const struct connection_entry *e, double now)
+/* Whether the client reads its answer too slowly: for a whole window bytes have waited for it, and few have gone. */
+static bool reads_slowly(const struct connection_table *t, struct connection_entry *e, double now)
+{
+    double window_s = now - e->window_s;
+    int n_waiting = 0;
+    if (window_s < RATE_GRACE_S) return false;
+    uint64_t n = acknowledged_bytes(e->fd);
+    bool few = (double)(n - e->window_acknowledged) < t->min_rate_bytes_per_s * window_s;
+    e->window_s = now;
+    e->window_acknowledged = n;
+    return few && ioctl(e->fd, SIOCOUTQ, &n_waiting) == 0 && n_waiting > 0;
+}
+
+static bool too_slow(const struct connection_table *t, struct connection_entry *e, double now)
 {
     double age_s = now - e->since_s;
     /* an idle connection of a client's pool may stay open three times as long */
     if (e->phase == PHASE_HEAD) return age_s > t->header_deadline_s * (e->served ? 3 : 1);
     if (e->phase == PHASE_BODY)
         return age_s > RATE_GRACE_S && (double)atomic_load(&e->n_received) < t->min_rate_bytes_per_s * age_s;
+    if (e->phase == PHASE_SEND) return reads_slowly(t, e, now);
     return false;
 }
 
@@ -146,7 +179,7 @@ void connection_table_reap(struct connection_table *t)
         e->ended = true;
         if (gone) {
             /* the client has gone, so no answer is sent */
-        } else if (e->phase == PHASE_BODY || !e->served) {
+        } else if (e->phase == PHASE_BODY || (e->phase == PHASE_HEAD && !e->served)) {
             ssize_t n = send(e->fd, answer, (size_t)n_answer, MSG_DONTWAIT | MSG_NOSIGNAL);
             (void)n; /* the connection ends whether or not the answer arrives */
         }

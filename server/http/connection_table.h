@@ -1,6 +1,7 @@
 /* Table of the open connections, which ends those that are too slow. The library's timeout only detects silence;
- * this table also limits clients that send a byte now and then: the head of a request has a deadline and a body has
- * a minimum rate. All functions are thread-safe and accept entry == NULL. */
+ * this table also limits clients that send or read a byte now and then: the head of a request has a deadline, and a
+ * body and an answer have a minimum rate. That of an answer is measured over TCP by what the client's machine
+ * acknowledges. All functions are thread-safe and accept entry == NULL. */
 #ifndef SELVEDGE_SERVER_CONNECTION_TABLE_H
 #define SELVEDGE_SERVER_CONNECTION_TABLE_H
 
@@ -20,12 +21,14 @@ size_t connection_table_count(struct connection_table *table);
 void connection_table_reap(struct connection_table *table);
 
 /* A connection calls these in order: opened; then for each request body_begins, received for each piece of the body,
- * replying, and idle until the next request; at last closed. connection_opened returns NULL when memory is out. */
+ * working, sending once the answer is decided, and idle until the next request; at last closed. connection_opened
+ * returns NULL when memory is out. */
 struct connection_entry *connection_opened(struct connection_table *table, int fd);
 void connection_closed(struct connection_table *table, struct connection_entry *entry);
 void connection_body_begins(struct connection_table *table, struct connection_entry *entry);
 void connection_received(struct connection_entry *entry, size_t n_bytes);
-void connection_replying(struct connection_table *table, struct connection_entry *entry);
+void connection_working(struct connection_table *table, struct connection_entry *entry);
+void connection_sending(struct connection_table *table, struct connection_entry *entry);
 void connection_idle(struct connection_table *table, struct connection_entry *entry);
 
 #endif

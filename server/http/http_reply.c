@@ -68,7 +68,7 @@ void reply_json(struct http_request *r, unsigned status_code, json_t *body)
     reply_header(r, "Cache-Control", "no-cache");
 }
 
-void json_tag(const json_t *body, char out[40])
+static void json_tag(const json_t *body, char out[40])
 {
     unsigned char sum[16] = {0};
     char hex[33], *text = json_dumps(body, JSON_COMPACT);
@@ -88,7 +88,7 @@ bool tag_matches(const char *header, const char *tag)
     return false;
 }
 
-static bool not_modified(struct http_request *r, const char *tag)
+bool reply_not_modified(struct http_request *r, const char *tag)
 {
     if (!tag_matches(request_header(r, "If-None-Match"), tag)) return false;
     reply_empty(r, MHD_HTTP_NOT_MODIFIED);
@@ -101,7 +101,7 @@ void reply_json_tagged(struct http_request *r, json_t *body)
 {
     char tag[40];
     json_tag(body, tag);
-    if (not_modified(r, tag)) {
+    if (reply_not_modified(r, tag)) {
         json_decref(body);
         return;
     }
@@ -208,7 +208,7 @@ void reply_file(struct http_request *r, int fd, const char *content_type)
     snprintf(tag, sizeof tag, "\"%llx-%llx-%llx\"", (unsigned long long)st.st_ino, (unsigned long long)size,
              (unsigned long long)st.st_mtim.tv_sec * 1000000000ULL + (unsigned long long)st.st_mtim.tv_nsec);
     const char *if_range = request_header(r, "If-Range");
-    if (not_modified(r, tag)) {
+    if (reply_not_modified(r, tag)) {
         close(fd);
         return;
     }

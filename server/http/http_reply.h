@@ -14,8 +14,8 @@ void reply_text(struct http_request *request, unsigned status_code, const char *
 void reply_json(struct http_request *request, unsigned status_code, json_t *body);
 /* The same with a strong ETag of the body. Replies 304 if If-None-Match contains that tag. */
 void reply_json_tagged(struct http_request *request, json_t *body);
-/* Writes the ETag of the text that reply_json would send, with its quotes: "\"0123...\"". */
-void json_tag(const json_t *body, char out[40]);
+/* Decides a 304 and returns true if If-None-Match contains the tag (with its quotes). */
+bool reply_not_modified(struct http_request *request, const char *tag);
 /* Returns whether the header, a list of tags or "*", contains the tag. */
 bool tag_matches(const char *header, const char *tag);
 

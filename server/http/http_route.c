@@ -13,7 +13,7 @@ static const struct http_route route[] = {
     {"POST", "/v1/jobs/{id}/cancel", HTTP_BODY_NONE, handle_cancel_job, NULL},
     {"POST", "/v1/jobs/{id}/retry", HTTP_BODY_NONE, handle_retry_job, NULL},
     {"GET", "/v1/jobs/{id}/files", HTTP_BODY_NONE, handle_list_files, NULL},
-    {"POST", "/v1/jobs/{id}/files", HTTP_BODY_JSON, handle_declare_file, NULL},
+    {"POST", "/v1/jobs/{id}/files", HTTP_BODY_JSON, handle_declare_files, NULL},
     {"GET", "/v1/jobs/{id}/files/{name}", HTTP_BODY_NONE, handle_get_file, NULL},
     {"DELETE", "/v1/jobs/{id}/files/{name}", HTTP_BODY_NONE, handle_delete_file, NULL},
     {"HEAD", "/v1/uploads/{upload}", HTTP_BODY_NONE, handle_upload_offset, NULL},

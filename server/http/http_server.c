@@ -12,7 +12,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { CONNECTION_POOL_BYTES = 256 * 1024, DRAIN_LIMIT_BYTES = 64 << 20, LISTEN_BACKLOG = 1024 };
+enum {
+    CONNECTION_POOL_BYTES = 256 * 1024,
+    THREAD_STACK_BYTES = 512 * 1024,
+    DRAIN_LIMIT_BYTES = 64 << 20,
+    LISTEN_BACKLOG = 1024
+};
 
 struct http_server {
     struct job_service *service;
@@ -36,7 +41,7 @@ static enum MHD_Result queue_reply(struct http_request *r)
 {
     if (r->reply == NULL) reply_code(r, "internal", "", "the request has no reply");
     if (r->reply == NULL) return MHD_NO; /* out of memory: close the connection */
-    connection_replying(r->server->connection, r->entry);
+    connection_sending(r->server->connection, r->entry);
     r->queued = true;
     if (r->reply_status < HTTP_MAX_STATUS) atomic_fetch_add(&r->server->n_reply[r->reply_status], 1);
     return MHD_queue_response(r->connection, r->reply_status, r->reply);
@@ -120,7 +125,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *c, const
         return go_on ? MHD_YES : MHD_NO;
     }
     if (r->queued) return MHD_YES;
-    connection_replying(r->server->connection, r->entry);
+    connection_working(r->server->connection, r->entry);
     if (r->reply == NULL) r->route->handle(r);
     return queue_reply(r);
 }
@@ -250,13 +255,13 @@ status http_server_start(struct job_service *service, http_route_finder *find_ro
     if (result != STATUS_OK) goto out;
     MHD_set_panic_func(on_panic, service->log);
     s->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC, 0, NULL, NULL, on_request, s,
-        MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s, MHD_OPTION_LISTEN_SOCKET, fd, MHD_OPTION_THREAD_POOL_SIZE,
-        (unsigned)settings->threads, MHD_OPTION_CONNECTION_LIMIT, (unsigned)settings->max_connections,
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-        (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s, MHD_OPTION_NOTIFY_CONNECTION,
-        on_connection, s, MHD_OPTION_UNESCAPE_CALLBACK, unescape, s, MHD_OPTION_STRICT_FOR_CLIENT, 1,
-        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+        MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC, 0, NULL, NULL,
+        on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s, MHD_OPTION_LISTEN_SOCKET, fd,
+        MHD_OPTION_THREAD_STACK_SIZE, (size_t)THREAD_STACK_BYTES, MHD_OPTION_CONNECTION_LIMIT,
+        (unsigned)settings->max_connections, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s,
+        MHD_OPTION_NOTIFY_CONNECTION, on_connection, s, MHD_OPTION_UNESCAPE_CALLBACK, unescape, s,
+        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (s->daemon == NULL) {
         close(fd);
         result = error_set_errno(err, "cannot start the HTTP server");

@@ -32,14 +32,24 @@ status job_update_surely(struct job_service *v, struct job_row *row, struct erro
     return s == STATUS_DISK_FULL && ballast_release(v->settings->data) ? store_job_update(v->store, row, err) : s;
 }
 
-status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err)
+static status find(struct job_service *v, const char *id, bool document, struct job_row *row, struct error *err)
 {
     memset(row, 0, sizeof *row);
     if (!id_valid(id)) return error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id);
-    status s = store_job_get(v->store, id, row, err);
+    status s = document ? store_job_get(v->store, id, row, err) : store_job_look(v->store, id, row, err);
     if (s != STATUS_OK || !row->deleted) return s;
     job_row_release(row);
     return error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id);
+}
+
+status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err)
+{
+    return find(v, id, true, row, err);
+}
+
+status job_look(struct job_service *v, const char *id, struct job_row *row, struct error *err)
+{
+    return find(v, id, false, row, err);
 }
 
 bool job_active(const struct job_row *row)

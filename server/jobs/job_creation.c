@@ -3,6 +3,7 @@
 #include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
+#include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 
@@ -122,7 +123,8 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     free(row.document);
     row.document = text;
     job_mark_edited(&row);
-    s = job_update_surely(v, &row, err);
+    s = store_job_replace(v->store, &row, err);
+    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_job_replace(v->store, &row, err);
 out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);

@@ -3,6 +3,7 @@
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
+#include "server/jobs/upload_file.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -82,60 +83,119 @@ static status check_declaration(struct job_service *v, struct file_row *row, str
     return STATUS_OK;
 }
 
-static status declare_locked(struct job_service *v, const char *id, struct file_row *row, bool *existed,
-                             struct job_refusal *refusal, struct error *err)
+/* Whether a file is declared already: *existed. STATUS_EXISTS if it is declared differently. */
+static status find_declared(struct job_service *v, struct job_declaration *d, struct error *err)
 {
-    struct job_row job;
-    struct file_row before, *all = NULL;
-    size_t n = 0;
-    status s = job_get(v, id, &job, err);
-    if (s != STATUS_OK) goto out;
-    snprintf(row->job_id, sizeof row->job_id, "%s", id);
-    s = store_file_find(v->store, id, row->name, &before, NULL);
+    struct file_row before, *row = &d->row;
+    status s = store_file_find(v->store, row->job_id, row->name, &before, err);
+    d->existed = s == STATUS_OK;
+    if (s == STATUS_NOT_FOUND) return STATUS_OK;
+    if (s != STATUS_OK) return s;
+    bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
+                (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
+    if (!same)
+        return error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently; delete it first",
+                               row->name);
+    if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
+        return upload_set_checksum(v->upload, before.id, row->sha256, row, err);
+    *row = before;
+    return STATUS_OK;
+}
+
+/* Reserves and inserts the files that are new, n_new of them. */
+static status insert_new(struct job_service *v, struct job_row *job, struct job_declaration *file, size_t n,
+                         size_t n_new, struct error *err)
+{
+    size_t k = 0;
+    struct file_row *row = calloc(n_new, sizeof *row);
+    if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot declare files: out of memory");
+    for (size_t i = 0; i < n; i++) {
+        if (file[i].existed) continue;
+        job_new_id(file[i].row.id);
+        row[k++] = file[i].row;
+    }
+    status s = upload_reserve(v->settings->data, row, n_new, err);
     if (s == STATUS_OK) {
-        bool same = before.size_bytes == row->size_bytes && strcmp(before.role, row->role) == 0 &&
-                    (row->sha256[0] == '\0' || before.sha256[0] == '\0' || strcmp(before.sha256, row->sha256) == 0);
-        if (!same)
-            s = error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently; delete it first",
-                                row->name);
-        else if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
-            s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
-        else
-            *row = before;
-        *existed = true;
-        goto out;
+        job_mark_edited(job);
+        s = store_file_insert(v->store, row, n_new, job, err);
+        for (k = 0; s != STATUS_OK && k < n_new; k++) upload_discard(v->upload, &row[k]);
     }
-    s = store_file_list(v->store, id, &all, &n, err);
-    if (s != STATUS_OK) goto out;
-    if ((int64_t)n >= v->settings->max_files_per_job) {
-        refusal->code = "too_many";
-        s = error_set(err, STATUS_TOO_LARGE, "a job may have at most %lld files",
-                      (long long)v->settings->max_files_per_job);
-        goto out;
-    }
-    s = job_check_editable(&job, err);
-    if (s == STATUS_OK) s = job_disk_check(v, row->size_bytes, err);
-    if (s != STATUS_OK) goto out;
-    job_new_id(row->id);
-    s = upload_reserve(v->upload, row, err);
-    if (s != STATUS_OK) goto out;
-    job_mark_edited(&job);
-    s = store_file_insert(v->store, row, &job, err);
-    if (s != STATUS_OK) upload_discard(v->upload, row);
-out:
-    free(all);
-    job_row_release(&job);
+    for (size_t i = 0, j = 0; s == STATUS_OK && i < n; i++)
+        if (!file[i].existed) file[i].row = row[j++];
+    free(row);
     return s;
 }
 
-status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed,
-                        struct job_refusal *refusal, struct error *err)
+static status check_room(struct job_service *v, const struct job_row *job, size_t n_new, int64_t n_bytes,
+                         struct job_refusal *refusal, struct error *err)
 {
-    *existed = false;
-    status s = check_declaration(v, row, err);
+    int64_t n_before = 0;
+    status s = store_file_count(v->store, job->id, &n_before, err);
+    if (s != STATUS_OK) return s;
+    if (n_before + (int64_t)n_new > v->settings->max_files_per_job) {
+        refusal->code = "too_many";
+        return error_set(err, STATUS_TOO_LARGE, "a job may have at most %lld files",
+                         (long long)v->settings->max_files_per_job);
+    }
+    s = job_check_editable(job, err);
+    return s == STATUS_OK ? job_disk_check(v, n_bytes, err) : s;
+}
+
+static status declare_locked(struct job_service *v, const char *id, struct job_declaration *file, size_t n,
+                             size_t *i_fault, struct job_refusal *refusal, struct error *err)
+{
+    struct job_row job;
+    size_t n_new = 0;
+    int64_t n_bytes = 0;
+    status s = job_look(v, id, &job, err);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        snprintf(file[i].row.job_id, sizeof file[i].row.job_id, "%s", id);
+        s = find_declared(v, &file[i], err);
+        if (s != STATUS_OK) *i_fault = i;
+        if (file[i].existed) continue;
+        n_new++;
+        n_bytes += file[i].row.size_bytes; /* at most max_file_bytes each, of at most a megabyte of declarations */
+    }
+    if (s == STATUS_OK && n_new > 0) s = check_room(v, &job, n_new, n_bytes, refusal, err);
+    return s == STATUS_OK && n_new > 0 ? insert_new(v, &job, file, n, n_new, err) : s;
+}
+
+static int by_name(const void *a, const void *b)
+{
+    const struct job_declaration *const *x = a, *const *y = b;
+    return strcmp((*x)->row.name, (*y)->row.name);
+}
+
+/* A name may appear once in a request. */
+static status check_names(const struct job_declaration *file, size_t n, size_t *i_fault, struct error *err)
+{
+    status s = STATUS_OK;
+    const struct job_declaration **sorted = calloc(n, sizeof *sorted);
+    if (sorted == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot declare files: out of memory");
+    for (size_t i = 0; i < n; i++) sorted[i] = &file[i];
+    qsort(sorted, n, sizeof *sorted, by_name);
+    for (size_t i = 1; s == STATUS_OK && i < n; i++)
+        if (by_name(&sorted[i - 1], &sorted[i]) == 0) {
+            *i_fault = (size_t)(sorted[i] - file);
+            s = error_set_field(err, STATUS_INVALID, "name", "file '%s' is declared twice", sorted[i]->row.name);
+        }
+    free(sorted);
+    return s;
+}
+
+status job_declare_files(struct job_service *v, const char *id, struct job_declaration *file, size_t n, size_t *i_fault,
+                         struct job_refusal *refusal, struct error *err)
+{
+    *i_fault = n;
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        s = check_declaration(v, &file[i].row, err);
+        if (s != STATUS_OK) *i_fault = i;
+    }
+    if (s == STATUS_OK) s = check_names(file, n, i_fault, err);
     if (s != STATUS_OK) return s;
     pthread_mutex_lock(&v->change);
-    s = declare_locked(v, id, row, existed, refusal, err);
+    s = declare_locked(v, id, file, n, i_fault, refusal, err);
     pthread_mutex_unlock(&v->change);
     return s;
 }
@@ -145,7 +205,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     struct job_row job;
     struct file_row file;
     pthread_mutex_lock(&v->change);
-    status s = job_get(v, id, &job, err);
+    status s = job_look(v, id, &job, err);
     if (s == STATUS_OK) s = store_file_find(v->store, id, name, &file, err);
     if (s == STATUS_OK) s = job_check_editable(&job, err);
     if (s != STATUS_OK) goto out;
@@ -156,7 +216,6 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     if (s == STATUS_OK) upload_discard(v->upload, &file);
 out:
     pthread_mutex_unlock(&v->change);
-    job_row_release(&job);
     return s;
 }
 

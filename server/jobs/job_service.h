@@ -62,9 +62,16 @@ status job_delete(struct job_service *v, const char *id, struct error *err);
 /* Reads a job that exists and is not a tombstone. The caller releases the row. STATUS_NOT_FOUND. */
 status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err);
 
-/* row has name, role, size and sha256, which are checked here. *existed: the same declaration was made before. */
-status job_declare_file(struct job_service *v, const char *id, struct file_row *row, bool *existed,
-                        struct job_refusal *refusal, struct error *err);
+/* The same without the document; there is nothing to release. */
+status job_look(struct job_service *v, const char *id, struct job_row *row, struct error *err);
+
+struct job_declaration {
+    struct file_row row; /* name, role, size and sha256, which are checked; the whole row afterwards */
+    bool existed;        /* the same declaration was made before */
+};
+/* Declares n >= 1 files, all or none, in one transaction. *i_fault: the declaration that an error is about, or n. */
+status job_declare_files(struct job_service *v, const char *id, struct job_declaration *file, size_t n, size_t *i_fault,
+                         struct job_refusal *refusal, struct error *err);
 status job_delete_file(struct job_service *v, const char *id, const char *name, struct error *err);
 status job_delete_upload(struct job_service *v, const char *upload_id, struct error *err);
 

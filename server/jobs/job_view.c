@@ -1,16 +1,16 @@
 #include "server/jobs/job_view.h"
 #include "base/clock.h"
-#include "base/files/durable.h"
+#include "base/version.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/attempt.h"
 
+#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { RESULT_JSON_LIMIT_BYTES = 32 << 20 /* 4096 rows in 8 models: 14 MB */ };
+#include <sys/stat.h>
 
 static json_t *time_or_null(double t) { return t > 0 ? json_real(t) : json_null(); }
 
@@ -74,15 +74,18 @@ json_t *job_view_heartbeat_age(struct job_service *v, const struct job_row *row)
     return age;
 }
 
-static json_t *read_result(struct job_service *v, const struct job_row *row)
+/* The address of the result, or null; *identity tells two contents of the file apart. */
+static json_t *result_url(struct job_service *v, const struct job_row *row, char *identity, size_t n_identity)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
+    char path[PATH_BYTES], url[128];
+    struct stat st;
+    identity[0] = '\0';
     path_join(path, v->settings->data, "jobs", row->id, JOB_FOLDER_RESULTS, "result.json", NULL);
-    if (!has_run(row) || file_read_all(path, RESULT_JSON_LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return json_null();
-    json_t *j = json_loadb(text, n, 0, NULL);
-    free(text);
-    return j != NULL ? j : json_null();
+    if (!has_run(row) || stat(path, &st) != 0 || !S_ISREG(st.st_mode)) return json_null();
+    snprintf(identity, n_identity, "%llu %lld %lld.%09ld", (unsigned long long)st.st_ino, (long long)st.st_size,
+             (long long)st.st_mtim.tv_sec, st.st_mtim.tv_nsec);
+    snprintf(url, sizeof url, "/v1/jobs/%s/results/result.json", row->id);
+    return json_string(url);
 }
 
 json_t *file_view(const struct file_row *f)
@@ -124,17 +127,15 @@ out:
 
 static status put_details(struct job_service *v, const struct job_row *row, json_t *out, struct error *err)
 {
-    json_t *files = NULL, *result;
+    json_t *files = NULL;
     status s = job_view_files(v, row, &files, err);
     if (s != STATUS_OK) return s;
     json_t *document = json_loads(row->document, JSON_REJECT_DUPLICATES, NULL);
     json_object_set_new(out, "document", document != NULL ? document : json_object());
     json_object_update(out, files);
     json_decref(files);
-    result = read_result(v, row);
-    json_t *parameters = json_object_get(result, "parameters");
-    json_object_set(out, "parameters", parameters != NULL ? parameters : json_null());
-    json_object_set_new(out, "result", result);
+    char identity[80];
+    json_object_set_new(out, "result_url", result_url(v, row, identity, sizeof identity));
     return STATUS_OK;
 }
 
@@ -156,4 +157,39 @@ status job_view(struct job_service *v, const struct job_row *row, bool full, jso
     else
         *view = out;
     return s;
+}
+
+static void tag_of(char out[JOB_TAG_BYTES], const char *text)
+{
+    unsigned char sum[16];
+    char hex[33];
+    crypto_generichash(sum, sizeof sum, (const unsigned char *)text, strlen(text), NULL, 0);
+    sodium_bin2hex(hex, sizeof hex, sum, sizeof sum);
+    snprintf(out, JOB_TAG_BYTES, "\"%s\"", hex);
+}
+
+void job_view_files_tag(struct job_service *v, const struct job_row *row, char tag[JOB_TAG_BYTES])
+{
+    char text[160];
+    snprintf(text, sizeof text, "%s %s %lld %llx", SELVEDGE_VERSION, row->id, (long long)row->revision,
+             (unsigned long long)upload_progress(v->upload, row->id));
+    tag_of(tag, text);
+}
+
+status job_view_tag(struct job_service *v, const struct job_row *row, char tag[JOB_TAG_BYTES], struct error *err)
+{
+    char files[JOB_TAG_BYTES], identity[80];
+    json_t *summary = NULL;
+    status s = job_view(v, row, false, &summary, err);
+    if (s != STATUS_OK) return s;
+    job_view_files_tag(v, row, files);
+    json_object_set_new(summary, "files", json_string(files));
+    json_object_set_new(summary, "result_url", result_url(v, row, identity, sizeof identity));
+    json_object_set_new(summary, "result", json_string(identity));
+    char *text = json_dumps(summary, JSON_COMPACT);
+    json_decref(summary);
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot describe the job: out of memory");
+    tag_of(tag, text);
+    free(text);
+    return STATUS_OK;
 }

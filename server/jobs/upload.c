@@ -1,11 +1,11 @@
 #include "server/jobs/upload.h"
-#include "base/files/durable.h"
-#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
+#include "server/jobs/upload_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
+#include <semaphore.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,19 +13,18 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-_Static_assert(sizeof(crypto_hash_sha256_state) <= STORE_HASH_STATE_BYTES, "the hash state fits its column");
-
 struct upload {
     struct upload_set *set;
     struct upload *next;
-    size_t n_holder; /* guarded by set->lock */
-    pthread_mutex_t lock;
-    struct file_row row; /* as in the database */
+    size_t n_holder;                                 /* guarded by set->lock */
+    char id[STORE_ID_BYTES], job_id[STORE_ID_BYTES]; /* never change */
+    pthread_mutex_t lock; /* of what follows but for the atomic members; held during writes and syncs */
+    struct file_row row;  /* as in the database */
     int64_t offset_bytes;
     crypto_hash_sha256_state hash;
     atomic_int_least64_t offset_seen; /* copy of offset_bytes for readers without the lock */
-    uint64_t ticket;
-    bool discarded;
+    atomic_uint_least64_t ticket;     /* raised under the lock, and without it by a discard, which waits for no sync */
+    atomic_bool discarded;
     int fd;
 };
 
@@ -37,6 +36,9 @@ struct upload_set {
     pthread_mutex_t lock;
     struct upload *first;
     atomic_uint_least64_t n_bytes_total;
+    /* uploads that may write and hash a piece at the same time: half of the processors, so that many uploads do not keep
+     * other requests from theirs. No one waits for a sync while it has a place. */
+    sem_t place;
 };
 
 status upload_set_new(struct store *store, const char *data_folder, int64_t commit_bytes, struct log *log,
@@ -49,6 +51,8 @@ status upload_set_new(struct store *store, const char *data_folder, int64_t comm
     set->commit_bytes = commit_bytes;
     set->log = log;
     pthread_mutex_init(&set->lock, NULL);
+    long n_processor = sysconf(_SC_NPROCESSORS_ONLN);
+    sem_init(&set->place, 0, n_processor > 2 ? (unsigned)n_processor / 2 : 1);
     *out = set;
     return STATUS_OK;
 }
@@ -57,78 +61,36 @@ void upload_set_free(struct upload_set *set)
 {
     if (set == NULL) return;
     pthread_mutex_destroy(&set->lock);
+    sem_destroy(&set->place);
     free(set);
-}
-
-static void part_path(const struct upload_set *set, const struct file_row *row, char out[PATH_BYTES])
-{
-    path_join(out, set->data, "jobs", row->job_id, "upload", row->id, NULL);
-}
-
-static void input_path(const struct upload_set *set, const struct file_row *row, char out[PATH_BYTES])
-{
-    path_join(out, set->data, "jobs", row->job_id, JOB_FOLDER_INPUT, row->name, NULL);
-}
-
-static void hash_restart(struct file_row *row)
-{
-    crypto_hash_sha256_state state;
-    memset(&state, 0, sizeof state);
-    crypto_hash_sha256_init(&state);
-    memset(row->hash_state, 0, sizeof row->hash_state);
-    memcpy(row->hash_state, &state, sizeof state);
-}
-
-status upload_reserve(struct upload_set *set, struct file_row *row, struct error *err)
-{
-    char path[PATH_BYTES];
-    part_path(set, row, path);
-    status s = STATUS_OK;
-    int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (fd < 0) return error_set_errno(err, "cannot make room for '%s'", row->name);
-    /* not posix_fallocate(), which writes every block of a file on file systems that cannot reserve space */
-    if (fallocate(fd, 0, 0, (off_t)row->size_bytes) != 0 && errno != EOPNOTSUPP) {
-        s = errno == EFBIG
-                ? error_set(err, STATUS_DISK_FULL,
-                            "cannot make room for '%s': the file system does not support files of %lld bytes",
-                            row->name, (long long)row->size_bytes)
-                : error_set_errno(err, "cannot make room for the %lld bytes of '%s'", (long long)row->size_bytes,
-                                  row->name);
-        goto out;
-    }
-    if (fsync(fd) != 0) s = error_set_errno(err, "cannot make room for '%s'", row->name);
-    if (s == STATUS_OK) s = durable_sync_folder_of(path, err);
-    row->offset_bytes = 0;
-    row->state = FILE_UPLOADING;
-    hash_restart(row);
-out:
-    close(fd);
-    if (s != STATUS_OK) unlink(path);
-    return s;
 }
 
 static struct upload *find(struct upload_set *set, const char *id)
 {
     struct upload *u = set->first;
-    while (u != NULL && strcmp(u->row.id, id) != 0) u = u->next;
+    while (u != NULL && strcmp(u->id, id) != 0) u = u->next;
     return u;
 }
 
+/* A writer that is in the middle of a piece may finish it, into a file that no longer has a name. */
+static void end_writers(struct upload *u)
+{
+    atomic_store(&u->discarded, true);
+    atomic_fetch_add(&u->ticket, 1);
+}
+
+/* The part goes before the input: a writer that moves the one to the other meanwhile either finds no part, or has moved
+ * it to where it is removed next. */
 void upload_discard(struct upload_set *set, const struct file_row *row)
 {
     char path[PATH_BYTES];
     pthread_mutex_lock(&set->lock);
     struct upload *u = find(set, row->id);
-    if (u != NULL) {
-        pthread_mutex_lock(&u->lock);
-        u->discarded = true;
-        u->ticket++;
-        pthread_mutex_unlock(&u->lock);
-    }
+    if (u != NULL) end_writers(u);
     pthread_mutex_unlock(&set->lock);
-    part_path(set, row, path);
+    upload_part_path(set->data, row, path);
     unlink(path);
-    input_path(set, row, path);
+    upload_input_path(set->data, row, path);
     unlink(path);
 }
 
@@ -136,11 +98,8 @@ void upload_discard_job(struct upload_set *set, const char *job_id)
 {
     pthread_mutex_lock(&set->lock);
     for (struct upload *u = set->first; u != NULL; u = u->next) {
-        if (strcmp(u->row.job_id, job_id) != 0) continue;
-        pthread_mutex_lock(&u->lock);
-        u->discarded = true;
-        u->ticket++;
-        pthread_mutex_unlock(&u->lock);
+        if (strcmp(u->job_id, job_id) != 0) continue;
+        end_writers(u);
     }
     pthread_mutex_unlock(&set->lock);
 }
@@ -162,6 +121,8 @@ status upload_hold(struct upload_set *set, const char *id, struct upload **out, 
             goto out;
         }
         u->set = set;
+        snprintf(u->id, sizeof u->id, "%s", u->row.id);
+        snprintf(u->job_id, sizeof u->job_id, "%s", u->row.job_id);
         u->fd = -1;
         u->offset_bytes = u->row.offset_bytes;
         atomic_store(&u->offset_seen, u->offset_bytes);
@@ -191,26 +152,11 @@ void upload_release(struct upload_set *set, struct upload *u)
     pthread_mutex_unlock(&set->lock);
 }
 
-/* Moves a verified file to its final name. May be repeated after a crash. */
-static status move_to_place(struct upload_set *set, struct file_row *row, struct error *err)
-{
-    char from[PATH_BYTES], to[PATH_BYTES];
-    part_path(set, row, from);
-    input_path(set, row, to);
-    if (rename(from, to) != 0 && !(errno == ENOENT && access(to, R_OK) == 0))
-        return error_set_errno(err, "cannot move '%s' to its place", row->name);
-    status s = durable_sync_folder_of(to, err);
-    if (s == STATUS_OK) s = durable_sync_folder_of(from, err);
-    if (s != STATUS_OK) return s;
-    row->state = FILE_COMPLETE;
-    return store_file_update(set->store, row, err);
-}
-
 static status start_again(struct upload *u, const char *computed, struct error *err)
 {
     char declared[STORE_HASH_TEXT_BYTES];
     snprintf(declared, sizeof declared, "%s", u->row.sha256);
-    hash_restart(&u->row);
+    upload_hash_restart(&u->row);
     memcpy(&u->hash, u->row.hash_state, sizeof u->hash);
     u->offset_bytes = u->row.offset_bytes = 0;
     atomic_store(&u->offset_seen, 0);
@@ -234,7 +180,7 @@ static status finish(struct upload *u, struct error *err)
     snprintf(u->row.sha256, sizeof u->row.sha256, "%s", text);
     u->row.state = FILE_VERIFIED;
     status s = store_file_update(u->set->store, &u->row, err);
-    if (s == STATUS_OK) s = move_to_place(u->set, &u->row, err);
+    if (s == STATUS_OK) s = upload_move_to_place(u->set->store, u->set->data, &u->row, err);
     if (s == STATUS_OK)
         log_info(u->set->log, "file '%s' of job %s is complete, %lld bytes", u->row.name, u->row.job_id,
                  (long long)u->row.size_bytes);
@@ -257,7 +203,7 @@ static status roll_back(struct upload *u, struct error *err)
 /* Writes the received bytes to disk, then their offset to the database. u->lock is held. */
 static status commit(struct upload *u, struct error *err)
 {
-    if (u->discarded) return error_set(err, STATUS_NOT_FOUND, "file '%s' was removed", u->row.name);
+    if (atomic_load(&u->discarded)) return error_set(err, STATUS_NOT_FOUND, "file '%s' was removed", u->row.name);
     if (u->row.state == FILE_COMPLETE) return STATUS_OK;
     if (u->offset_bytes != u->row.offset_bytes) {
         if (u->fd >= 0 && fdatasync(u->fd) != 0) return roll_back(u, err);
@@ -274,8 +220,7 @@ static status commit(struct upload *u, struct error *err)
 status upload_take(struct upload *u, uint64_t *ticket, struct file_row *row, struct error *err)
 {
     pthread_mutex_lock(&u->lock);
-    u->ticket++;
-    *ticket = u->ticket;
+    *ticket = atomic_fetch_add(&u->ticket, 1) + 1;
     status s = commit(u, err);
     *row = u->row;
     pthread_mutex_unlock(&u->lock);
@@ -286,21 +231,17 @@ static status open_part(struct upload *u, struct error *err)
 {
     if (u->fd >= 0) return STATUS_OK;
     char path[PATH_BYTES];
-    part_path(u->set, &u->row, path);
+    upload_part_path(u->set->data, &u->row, path);
     u->fd = open(path, O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
     return u->fd >= 0 ? STATUS_OK : error_set_errno(err, "cannot write file '%s'", u->row.name);
 }
 
-status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t n_bytes, struct error *err)
+/* u->lock is held. */
+static status write_piece(struct upload *u, const unsigned char *next, size_t n_bytes, struct error *err)
 {
-    const unsigned char *next = data;
     status s = STATUS_OK;
-    pthread_mutex_lock(&u->lock);
-    if (u->ticket != ticket || u->discarded)
-        s = error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name);
-    else if (u->row.state != FILE_UPLOADING || (int64_t)n_bytes > u->row.size_bytes - u->offset_bytes)
-        s = error_set(err, STATUS_INVALID, "file '%s' has more bytes than declared", u->row.name);
-    if (s == STATUS_OK) s = open_part(u, err);
+    while (sem_wait(&u->set->place) != 0) {
+    }
     while (s == STATUS_OK && n_bytes > 0) {
         ssize_t n = pwrite(u->fd, next, n_bytes, (off_t)u->offset_bytes);
         if (n < 0 && errno == EINTR) continue;
@@ -315,6 +256,20 @@ status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t 
         n_bytes -= (size_t)n;
         atomic_fetch_add(&u->set->n_bytes_total, (uint64_t)n);
     }
+    sem_post(&u->set->place);
+    return s;
+}
+
+status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t n_bytes, struct error *err)
+{
+    status s = STATUS_OK;
+    pthread_mutex_lock(&u->lock);
+    if (atomic_load(&u->ticket) != ticket || atomic_load(&u->discarded))
+        s = error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name);
+    else if (u->row.state != FILE_UPLOADING || (int64_t)n_bytes > u->row.size_bytes - u->offset_bytes)
+        s = error_set(err, STATUS_INVALID, "file '%s' has more bytes than declared", u->row.name);
+    if (s == STATUS_OK) s = open_part(u, err);
+    if (s == STATUS_OK) s = write_piece(u, data, n_bytes, err);
     if (s == STATUS_OK && u->offset_bytes - u->row.offset_bytes >= u->set->commit_bytes &&
         u->offset_bytes < u->row.size_bytes)
         s = commit(u, err);
@@ -325,7 +280,7 @@ status upload_write(struct upload *u, uint64_t ticket, const void *data, size_t 
 status upload_commit(struct upload *u, uint64_t ticket, struct file_row *row, struct error *err)
 {
     pthread_mutex_lock(&u->lock);
-    status s = u->ticket != ticket
+    status s = atomic_load(&u->ticket) != ticket
                    ? error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", u->row.name)
                    : commit(u, err);
     if (row != NULL) *row = u->row;
@@ -361,6 +316,23 @@ void upload_refresh(struct upload_set *set, struct file_row *row)
     pthread_mutex_unlock(&set->lock);
 }
 
+uint64_t upload_progress(struct upload_set *set, const char *job_id)
+{
+    uint64_t sum = 0;
+    pthread_mutex_lock(&set->lock);
+    for (const struct upload *u = set->first; u != NULL; u = u->next) {
+        unsigned char text[80], hash[crypto_generichash_BYTES_MIN];
+        uint64_t part;
+        if (strcmp(u->job_id, job_id) != 0) continue;
+        int n = snprintf((char *)text, sizeof text, "%s %lld", u->id, (long long)atomic_load(&u->offset_seen));
+        crypto_generichash(hash, sizeof hash, text, (unsigned long long)n, NULL, 0);
+        memcpy(&part, hash, sizeof part);
+        sum += part;
+    }
+    pthread_mutex_unlock(&set->lock);
+    return sum;
+}
+
 uint64_t upload_bytes_total(const struct upload_set *set) { return atomic_load(&set->n_bytes_total); }
 
 static status recover_one(struct upload_set *set, struct file_row *row, struct error *err)
@@ -368,9 +340,9 @@ static status recover_one(struct upload_set *set, struct file_row *row, struct e
     char part[PATH_BYTES], input[PATH_BYTES];
     struct stat st;
     bool verified = row->state == FILE_VERIFIED;
-    status s = verified ? move_to_place(set, row, err) : STATUS_OK;
-    part_path(set, row, part);
-    input_path(set, row, input);
+    status s = verified ? upload_move_to_place(set->store, set->data, row, err) : STATUS_OK;
+    upload_part_path(set->data, row, part);
+    upload_input_path(set->data, row, input);
     if (verified && s == STATUS_OK) return s;
     /* only an upload whose bytes are missing starts again: a new empty file could later replace an existing one with
      * zeros */
@@ -378,7 +350,7 @@ static status recover_one(struct upload_set *set, struct file_row *row, struct e
     if (errno != ENOENT) return error_set_errno(err, "cannot examine its upload");
     if (verified && (stat(input, &st) == 0 || errno != ENOENT)) return s;
     log_warning(set->log, "file '%s' of job %s has lost its bytes and must be sent again", row->name, row->job_id);
-    s = upload_reserve(set, row, err);
+    s = upload_reserve(set->data, row, 1, err);
     if (s == STATUS_OK) s = store_file_update(set->store, row, err);
     return s;
 }

@@ -18,10 +18,8 @@ status upload_set_new(struct store *store, const char *data_folder, int64_t comm
                       struct upload_set **set, struct error *err);
 void upload_set_free(struct upload_set *set);
 
-/* Reserves the space of a declared file, whose row is not yet in the database, and writes the first hash state to
- * the row. After STATUS_DISK_FULL nothing is left behind. */
-status upload_reserve(struct upload_set *set, struct file_row *row, struct error *err);
-/* Removes the bytes of a file, complete or not, and ends its writers. The caller removes the row. */
+/* Removes the bytes of a file, complete or not, and ends its writers, without waiting for their syncs. The caller
+ * removes the row first. */
 void upload_discard(struct upload_set *set, const struct file_row *row);
 /* Ends the writers of all files of a job. */
 void upload_discard_job(struct upload_set *set, const char *job_id);
@@ -51,6 +49,8 @@ status upload_recover(struct upload_set *set, struct error *err);
 
 /* Updates a row from the database to the present offset, without taking the upload over. */
 void upload_refresh(struct upload_set *set, struct file_row *row);
+/* A number that differs, but for a chance of 2^-64, when an upload of the job that a connection works on has got further. */
+uint64_t upload_progress(struct upload_set *set, const char *job_id);
 uint64_t upload_bytes_total(const struct upload_set *set);
 
 #endif

@@ -11,28 +11,6 @@
 static const char *const state_name[JOB_N_STATE] = {"draft",     "queued", "running",  "paused",
                                                     "succeeded", "failed", "cancelled"};
 
-/* Entry i changes the schema from version i to version i + 1. */
-static const char *const migration[] = {
-    "CREATE TABLE job (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, sample TEXT NOT NULL, "
-    "document TEXT NOT NULL,"
-    " state INTEGER NOT NULL, cancel_requested INTEGER NOT NULL, dirty INTEGER NOT NULL, deleted INTEGER NOT NULL,"
-    " attempt INTEGER NOT NULL, lost_attempts INTEGER NOT NULL, generation INTEGER NOT NULL, token TEXT NOT NULL,"
-    " created REAL NOT NULL, updated REAL NOT NULL, queued REAL NOT NULL, started REAL NOT NULL, finished REAL NOT "
-    "NULL,"
-    " error_code TEXT NOT NULL, error_field TEXT NOT NULL, error_text TEXT NOT NULL, peak_rss INTEGER NOT NULL);"
-    "CREATE INDEX job_state ON job (deleted, state, serial);"
-    "CREATE TABLE file (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, job_id TEXT NOT NULL, name "
-    "TEXT NOT NULL,"
-    " role TEXT NOT NULL, size INTEGER NOT NULL, offset INTEGER NOT NULL, sha256 TEXT NOT NULL, state INTEGER NOT "
-    "NULL, hash_state BLOB NOT NULL,"
-    " UNIQUE (job_id, name));"
-    "CREATE TABLE idempotency (key TEXT PRIMARY KEY, job_id TEXT NOT NULL, body_hash TEXT NOT NULL, created REAL NOT "
-    "NULL);"
-    "CREATE INDEX idempotency_job ON idempotency (job_id);"
-    "CREATE TABLE probe (one INTEGER PRIMARY KEY, at REAL NOT NULL);",
-};
-enum { N_MIGRATION = sizeof migration / sizeof migration[0] };
-
 const char *job_state_name(enum job_state state) { return state_name[state]; }
 
 bool job_state_parse(const char *name, enum job_state *state)
@@ -45,16 +23,16 @@ bool job_state_parse(const char *name, enum job_state *state)
     return false;
 }
 
-status store_error(struct store *store, const char *what, struct error *err)
+status store_error(struct store_link *link, const char *what, struct error *err)
 {
-    int code = sqlite3_errcode(store->db);
-    status s = code == SQLITE_FULL                                                 ? STATUS_DISK_FULL
-               : (sqlite3_extended_errcode(store->db) & 0xff) == SQLITE_CONSTRAINT ? STATUS_EXISTS
-                                                                                   : STATUS_IO;
-    return error_set(err, s, "%s: database says '%s'", what, sqlite3_errmsg(store->db));
+    int code = sqlite3_errcode(link->db);
+    status s = code == SQLITE_FULL                                                ? STATUS_DISK_FULL
+               : (sqlite3_extended_errcode(link->db) & 0xff) == SQLITE_CONSTRAINT ? STATUS_EXISTS
+                                                                                  : STATUS_IO;
+    return error_set(err, s, "%s: database says '%s'", what, sqlite3_errmsg(link->db));
 }
 
-static status bind_all(struct store *store, sqlite3_stmt *statement, struct error *err, const char *format,
+static status bind_all(struct store_link *link, sqlite3_stmt *statement, struct error *err, const char *format,
                        va_list args)
 {
     int rc = SQLITE_OK;
@@ -71,15 +49,15 @@ static status bind_all(struct store *store, sqlite3_stmt *statement, struct erro
             rc = sqlite3_bind_blob(statement, i, blob, n, SQLITE_TRANSIENT);
         }
     }
-    return rc == SQLITE_OK ? STATUS_OK : store_error(store, "cannot bind a value", err);
+    return rc == SQLITE_OK ? STATUS_OK : store_error(link, "cannot bind a value", err);
 }
 
-static status prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql,
+static status prepare(struct store_link *link, sqlite3_stmt **statement, struct error *err, const char *sql,
                       const char *format, va_list args)
 {
-    if (sqlite3_prepare_v2(store->db, sql, -1, statement, NULL) != SQLITE_OK)
-        return store_error(store, "cannot prepare a query", err);
-    status s = bind_all(store, *statement, err, format, args);
+    if (sqlite3_prepare_v2(link->db, sql, -1, statement, NULL) != SQLITE_OK)
+        return store_error(link, "cannot prepare a query", err);
+    status s = bind_all(link, *statement, err, format, args);
     if (s != STATUS_OK) {
         sqlite3_finalize(*statement);
         *statement = NULL;
@@ -87,42 +65,42 @@ static status prepare(struct store *store, sqlite3_stmt **statement, struct erro
     return s;
 }
 
-status store_prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql,
+status store_prepare(struct store_link *link, sqlite3_stmt **statement, struct error *err, const char *sql,
                      const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    status s = prepare(store, statement, err, sql, format, args);
+    status s = prepare(link, statement, err, sql, format, args);
     va_end(args);
     return s;
 }
 
-status store_run(struct store *store, int *n_changed, struct error *err, const char *sql, const char *format, ...)
+status store_run(struct store_link *link, int *n_changed, struct error *err, const char *sql, const char *format, ...)
 {
     sqlite3_stmt *statement = NULL;
     va_list args;
     va_start(args, format);
-    status s = prepare(store, &statement, err, sql, format, args);
+    status s = prepare(link, &statement, err, sql, format, args);
     va_end(args);
     if (s != STATUS_OK) return s;
     int rc;
     while ((rc = sqlite3_step(statement)) == SQLITE_ROW) {
     }
-    if (rc != SQLITE_DONE) s = store_error(store, "cannot write to the database", err);
-    if (n_changed != NULL) *n_changed = sqlite3_changes(store->db);
+    if (rc != SQLITE_DONE) s = store_error(link, "cannot write to the database", err);
+    if (n_changed != NULL) *n_changed = sqlite3_changes(link->db);
     sqlite3_finalize(statement);
     return s;
 }
 
-status store_begin(struct store *store, struct error *err)
+status store_begin(struct store_link *link, struct error *err)
 {
-    return store_run(store, NULL, err, "BEGIN IMMEDIATE", "");
+    return store_run(link, NULL, err, "BEGIN IMMEDIATE", "");
 }
 
-status store_end(struct store *store, status so_far, struct error *err)
+status store_end(struct store_link *link, status so_far, struct error *err)
 {
-    if (so_far == STATUS_OK) so_far = store_run(store, NULL, err, "COMMIT", "");
-    if (so_far != STATUS_OK) sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
+    if (so_far == STATUS_OK) so_far = store_run(link, NULL, err, "COMMIT", "");
+    if (so_far != STATUS_OK) sqlite3_exec(link->db, "ROLLBACK", NULL, NULL, NULL);
     return so_far;
 }
 
@@ -148,46 +126,57 @@ static status refuse_network(const char *path, struct error *err)
     return STATUS_OK;
 }
 
-static status read_version(struct store *store, int *version, struct error *err)
+static status read_version(struct store_link *link, int *version, struct error *err)
 {
     sqlite3_stmt *statement;
-    status s = store_prepare(store, &statement, err, "PRAGMA user_version", "");
+    status s = store_prepare(link, &statement, err, "PRAGMA user_version", "");
     if (s != STATUS_OK) return s;
     if (sqlite3_step(statement) == SQLITE_ROW)
         *version = sqlite3_column_int(statement, 0);
     else
-        s = store_error(store, "cannot read the database's version", err);
+        s = store_error(link, "cannot read the database's version", err);
     sqlite3_finalize(statement);
     return s;
 }
 
-static status migrate(struct store *store, const char *path, struct error *err)
+static status migrate(struct store_link *link, const char *path, struct error *err)
 {
-    int version = 0;
-    status s = read_version(store, &version, err);
-    if (s != STATUS_OK || version == N_MIGRATION) return s;
-    if (version > N_MIGRATION)
+    int version = 0, n_migration;
+    const char *const *migration = store_migrations(&n_migration);
+    status s = read_version(link, &version, err);
+    if (s != STATUS_OK || version == n_migration) return s;
+    if (version > n_migration)
         return error_set(err, STATUS_UNSUPPORTED,
                          "cannot open database '%s': its version is %d, but this program supports versions up to %d",
-                         path, version, N_MIGRATION);
+                         path, version, n_migration);
     if (version > 0) {
         char backup[4096 + 32];
         snprintf(backup, sizeof backup, "%s.v%d", path, version);
-        s = store_run(store, NULL, err, "VACUUM INTO ?", "s", backup);
+        s = store_run(link, NULL, err, "VACUUM INTO ?", "s", backup);
         if (s != STATUS_OK) return error_prefix(err, s, "cannot back up the database before its migration");
     }
-    for (; version < N_MIGRATION; version++) {
+    for (; version < n_migration; version++) {
         char done[64];
         snprintf(done, sizeof done, "PRAGMA user_version=%d; COMMIT", version + 1);
-        if (sqlite3_exec(store->db, "BEGIN IMMEDIATE", NULL, NULL, NULL) != SQLITE_OK ||
-            sqlite3_exec(store->db, migration[version], NULL, NULL, NULL) != SQLITE_OK ||
-            sqlite3_exec(store->db, done, NULL, NULL, NULL) != SQLITE_OK) {
-            s = store_error(store, "cannot migrate the database", err);
-            sqlite3_exec(store->db, "ROLLBACK", NULL, NULL, NULL);
+        if (sqlite3_exec(link->db, "BEGIN IMMEDIATE", NULL, NULL, NULL) != SQLITE_OK ||
+            sqlite3_exec(link->db, migration[version], NULL, NULL, NULL) != SQLITE_OK ||
+            sqlite3_exec(link->db, done, NULL, NULL, NULL) != SQLITE_OK) {
+            s = store_error(link, "cannot migrate the database", err);
+            sqlite3_exec(link->db, "ROLLBACK", NULL, NULL, NULL);
             return s;
         }
     }
     return STATUS_OK;
+}
+
+/* Opens one connection. The second one of a file may only read: in WAL mode it waits neither for a change nor for the
+ * sync that ends it, and sees every change whose call has returned. */
+static status open_link(struct store_link *link, const char *path, int flags, const char *pragma, struct error *err)
+{
+    int rc = sqlite3_open_v2(path, &link->db, flags | SQLITE_OPEN_FULLMUTEX, NULL);
+    if (rc == SQLITE_OK) sqlite3_busy_timeout(link->db, 5000);
+    if (rc == SQLITE_OK) rc = sqlite3_exec(link->db, pragma, NULL, NULL, NULL);
+    return rc == SQLITE_OK ? STATUS_OK : store_error(link, "cannot open the database", err);
 }
 
 status store_open(const char *path, struct store **out, struct error *err)
@@ -196,42 +185,35 @@ status store_open(const char *path, struct store **out, struct error *err)
     if (s != STATUS_OK) return s;
     struct store *store = calloc(1, sizeof *store);
     if (store == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot open the database: out of memory");
-    pthread_mutex_init(&store->lock, NULL);
-    if (sqlite3_open_v2(path, &store->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, NULL) !=
-        SQLITE_OK) {
-        s = store_error(store, "cannot open the database", err);
-        goto out;
-    }
-    sqlite3_busy_timeout(store->db, 5000);
-    if (sqlite3_exec(
-            store->db,
-            "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA trusted_schema=OFF", NULL,
-            NULL, NULL) != SQLITE_OK) {
-        s = store_error(store, "cannot set up the database", err);
-        goto out;
-    }
-    s = migrate(store, path, err);
-out:
-    if (s != STATUS_OK) {
+    pthread_mutex_init(&store->write.lock, NULL);
+    pthread_mutex_init(&store->read.lock, NULL);
+    s = open_link(&store->write, path, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
+                  "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA trusted_schema=OFF",
+                  err);
+    if (s == STATUS_OK) s = migrate(&store->write, path, err);
+    if (s == STATUS_OK) s = open_link(&store->read, path, SQLITE_OPEN_READONLY, "PRAGMA trusted_schema=OFF", err);
+    if (s != STATUS_OK)
         store_close(store);
-        return s;
-    }
-    *out = store;
-    return STATUS_OK;
+    else
+        *out = store;
+    return s;
 }
 
 void store_close(struct store *store)
 {
     if (store == NULL) return;
-    sqlite3_close_v2(store->db);
-    pthread_mutex_destroy(&store->lock);
+    sqlite3_close_v2(store->read.db); /* first, so that the last connection can write and remove the WAL */
+    sqlite3_close_v2(store->write.db);
+    pthread_mutex_destroy(&store->read.lock);
+    pthread_mutex_destroy(&store->write.lock);
     free(store);
 }
 
 status store_probe(struct store *store, struct error *err)
 {
-    pthread_mutex_lock(&store->lock);
-    status s = store_run(store, NULL, err, "INSERT OR REPLACE INTO probe (one, at) VALUES (1, ?)", "d", clock_wall_s());
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
+    status s = store_run(&store->write, NULL, err, "INSERT OR REPLACE INTO probe (one, at) VALUES (1, ?)", "d",
+                         clock_wall_s());
+    pthread_mutex_unlock(&store->write.lock);
     return s;
 }

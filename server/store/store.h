@@ -1,5 +1,6 @@
-/* The database of jobs, in SQLite: one connection guarded by one mutex, with WAL and synchronous=FULL, so the
- * changes of a call that returned STATUS_OK survive power loss. The version of the schema is PRAGMA user_version; an
+/* The database of jobs, in SQLite with WAL and synchronous=FULL, so the changes of a call that returned STATUS_OK
+ * survive power loss. One connection writes, a second one reads, each guarded by a mutex: reading waits for no sync. A
+ * call reads what every call that has returned before has written. The version of the schema is PRAGMA user_version; an
  * older file is copied to <path>.v<old> and migrated, a newer one is refused. All functions may be called from any
  * thread; all may fail with STATUS_IO, STATUS_DISK_FULL or STATUS_NO_MEMORY. */
 #ifndef SELVEDGE_SERVER_STORE_H
@@ -30,7 +31,8 @@ struct job_row {
     int64_t serial; /* assigned by the store; rises with every job */
     char id[STORE_ID_BYTES];
     char sample[256];
-    char *document; /* JSON text, owned (job_row_release); NULL where it was not read */
+    char *document;   /* JSON text, owned (job_row_release); NULL where it was not read */
+    int64_t revision; /* rises with every change of the job, its document and its files */
     enum job_state state;
     bool cancel_requested;
     bool dirty;   /* edited after an attempt, so the next start discards earlier progress */
@@ -72,9 +74,10 @@ status store_idempotency_find(struct store *store, const char *key, char job_id[
 status store_job_get(struct store *store, const char *id, struct job_row *row, struct error *err);
 /* The same without the document, which may be large. */
 status store_job_look(struct store *store, const char *id, struct job_row *row, struct error *err);
-/* Writes all columns except serial, id and created, and sets updated. A document that was not read stays unchanged.
- * STATUS_NOT_FOUND. */
+/* Writes all columns except serial, id, created and the document, and sets updated. STATUS_NOT_FOUND. */
 status store_job_update(struct store *store, struct job_row *row, struct error *err);
+/* The same with the document, in one transaction. */
+status store_job_replace(struct store *store, struct job_row *row, struct error *err);
 /* Removes the row, its files and its idempotency keys. */
 status store_job_erase(struct store *store, const char *id, struct error *err);
 
@@ -82,7 +85,7 @@ struct job_query {
     int state;             /* -1: all */
     int64_t before_serial; /* 0: from the newest */
     bool deleted;          /* tombstones instead of jobs */
-    bool queue_order;      /* by queued_unix_s, oldest first */
+    bool queue_order;      /* by queued_unix_s, oldest first; with a state only */
     size_t limit;
 };
 /* *row is an array of *n rows without their documents; the caller calls job_rows_free. */
@@ -92,8 +95,9 @@ void job_rows_free(struct job_row *row, size_t n);
 /* Counts the jobs in each state, without tombstones. */
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err);
 
-/* Inserts a file and updates its job's row (NULL: no job), as store_job_update does, in one transaction. */
-status store_file_insert(struct store *store, const struct file_row *row, struct job_row *job, struct error *err);
+/* Inserts n files and updates their job's row (NULL: no job), as store_job_update does, in one transaction. */
+status store_file_insert(struct store *store, const struct file_row *row, size_t n, struct job_row *job,
+                         struct error *err);
 /* By the id of its upload, and by job and name. STATUS_NOT_FOUND. */
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err);
 status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row,
@@ -102,6 +106,7 @@ status store_file_find(struct store *store, const char *job_id, const char *name
 status store_file_update(struct store *store, const struct file_row *row, struct error *err);
 /* Removes a file and updates its job's row (NULL: no job) in one transaction. */
 status store_file_erase(struct store *store, const char *id, struct job_row *job, struct error *err);
+status store_file_count(struct store *store, const char *job_id, int64_t *n, struct error *err);
 /* Lists files in the order of declaration; the caller frees *row. job_id NULL: the incomplete files of all jobs. */
 status store_file_list(struct store *store, const char *job_id, struct file_row **row, size_t *n, struct error *err);
 

@@ -21,22 +21,26 @@ static void read_row(sqlite3_stmt *q, struct file_row *row)
     if (blob != NULL && n == STORE_HASH_STATE_BYTES) memcpy(row->hash_state, blob, STORE_HASH_STATE_BYTES);
 }
 
-static status insert(struct store *store, const struct file_row *r, struct job_row *job, struct error *err)
+static status insert(struct store *store, const struct file_row *row, size_t n, struct job_row *job, struct error *err)
 {
-    status s = store_begin(store, err);
+    status s = store_begin(&store->write, err);
     if (s != STATUS_OK) return s;
-    s = store_run(store, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)", "ssssiisib", r->id,
-                  r->job_id, r->name, r->role, r->size_bytes, r->offset_bytes, r->sha256, (int64_t)r->state,
-                  r->hash_state, (int)STORE_HASH_STATE_BYTES);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        const struct file_row *r = &row[i];
+        s = store_run(&store->write, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)",
+                      "ssssiisib", r->id, r->job_id, r->name, r->role, r->size_bytes, r->offset_bytes, r->sha256,
+                      (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES);
+    }
     if (s == STATUS_OK && job != NULL) s = store_job_write(store, job, err);
-    return store_end(store, s, err);
+    return store_end(&store->write, s, err);
 }
 
-status store_file_insert(struct store *store, const struct file_row *row, struct job_row *job, struct error *err)
+status store_file_insert(struct store *store, const struct file_row *row, size_t n, struct job_row *job,
+                         struct error *err)
 {
-    pthread_mutex_lock(&store->lock);
-    status s = insert(store, row, job, err);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
+    status s = insert(store, row, n, job, err);
+    pthread_mutex_unlock(&store->write.lock);
     return s;
 }
 
@@ -48,17 +52,17 @@ static status get_one(struct store *store, sqlite3_stmt *q, const char *what, st
         return STATUS_OK;
     }
     return rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "file '%.127s' does not exist", what)
-                             : store_error(store, "cannot read file", err);
+                             : store_error(&store->read, "cannot read file", err);
 }
 
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err)
 {
     sqlite3_stmt *q = NULL;
-    pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE id = ?", "s", id);
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE id = ?", "s", id);
     if (s == STATUS_OK) s = get_one(store, q, id, row, err);
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
@@ -66,41 +70,53 @@ status store_file_find(struct store *store, const char *job_id, const char *name
                        struct error *err)
 {
     sqlite3_stmt *q = NULL;
-    pthread_mutex_lock(&store->lock);
-    status s =
-        store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? AND name = ?", "ss", job_id, name);
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? AND name = ?", "ss",
+                             job_id, name);
     if (s == STATUS_OK) s = get_one(store, q, name, row, err);
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
 status store_file_update(struct store *store, const struct file_row *r, struct error *err)
 {
     int n = 0;
-    pthread_mutex_lock(&store->lock);
-    status s =
-        store_run(store, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs",
-                  r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
+    status s = store_run(&store->write, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?",
+                         "isibs", r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state,
+                         (int)STORE_HASH_STATE_BYTES, r->id);
+    pthread_mutex_unlock(&store->write.lock);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' no longer exists", r->name);
     return s;
 }
 
 static status erase(struct store *store, const char *id, struct job_row *job, struct error *err)
 {
-    status s = store_begin(store, err);
+    status s = store_begin(&store->write, err);
     if (s != STATUS_OK) return s;
-    s = store_run(store, NULL, err, "DELETE FROM file WHERE id = ?", "s", id);
+    s = store_run(&store->write, NULL, err, "DELETE FROM file WHERE id = ?", "s", id);
     if (s == STATUS_OK && job != NULL) s = store_job_write(store, job, err);
-    return store_end(store, s, err);
+    return store_end(&store->write, s, err);
 }
 
 status store_file_erase(struct store *store, const char *id, struct job_row *job, struct error *err)
 {
-    pthread_mutex_lock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
     status s = erase(store, id, job, err);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->write.lock);
+    return s;
+}
+
+status store_file_count(struct store *store, const char *job_id, int64_t *n, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, "SELECT count(*) FROM file WHERE job_id = ?", "s", job_id);
+    if (s == STATUS_OK && sqlite3_step(q) != SQLITE_ROW) s = store_error(&store->read, "cannot count files", err);
+    if (s == STATUS_OK) *n = sqlite3_column_int64(q, 0);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
@@ -110,11 +126,12 @@ status store_file_list(struct store *store, const char *job_id, struct file_row 
     struct file_row *row = NULL;
     size_t n = 0, capacity = 0;
     int rc = SQLITE_DONE;
-    pthread_mutex_lock(&store->lock);
-    status s = job_id != NULL
-                   ? store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? ORDER BY serial", "s",
-                                   job_id)
-                   : store_prepare(store, &q, err, "SELECT " COLUMNS " FROM file WHERE state <> 2 ORDER BY serial", "");
+    pthread_mutex_lock(&store->read.lock);
+    status s =
+        job_id != NULL
+            ? store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? ORDER BY serial", "s",
+                            job_id)
+            : store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE state <> 2 ORDER BY serial", "");
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         if (n == capacity) {
             capacity = capacity == 0 ? 64 : capacity * 2;
@@ -127,9 +144,9 @@ status store_file_list(struct store *store, const char *job_id, struct file_row 
         }
         read_row(q, &row[n++]);
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(store, "cannot list files", err);
+    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot list files", err);
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         free(row);
         return s;

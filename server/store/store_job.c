@@ -4,9 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* document: "document", or "NULL" to leave it out where it is not needed, because it may have a megabyte. */
+/* document: DOCUMENT, or "NULL" to leave it out where it is not needed, because it may have a megabyte. */
+#define DOCUMENT "(SELECT text FROM document WHERE job_id = job.id)"
 #define COLUMNS(document)                                                                                              \
-    "serial, id, sample, " document ", state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "  \
+    "serial, id, sample, " document                                                                                    \
+    ", revision, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "                        \
     "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss"
 
 void job_row_release(struct job_row *row)
@@ -31,50 +33,54 @@ static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
     if (document != NULL) row->document = strdup(document);
     if (row->document == NULL && sqlite3_column_type(q, 3) != SQLITE_NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read job: out of memory");
-    row->state = (enum job_state)sqlite3_column_int(q, 4);
-    row->cancel_requested = sqlite3_column_int(q, 5) != 0;
-    row->dirty = sqlite3_column_int(q, 6) != 0;
-    row->deleted = sqlite3_column_int(q, 7) != 0;
-    row->attempt = sqlite3_column_int64(q, 8);
-    row->lost_attempts = sqlite3_column_int64(q, 9);
-    row->generation = sqlite3_column_int64(q, 10);
-    store_text(q, 11, row->token, sizeof row->token);
-    row->created_unix_s = sqlite3_column_double(q, 12);
-    row->updated_unix_s = sqlite3_column_double(q, 13);
-    row->queued_unix_s = sqlite3_column_double(q, 14);
-    row->started_unix_s = sqlite3_column_double(q, 15);
-    row->finished_unix_s = sqlite3_column_double(q, 16);
-    store_text(q, 17, row->error_code, sizeof row->error_code);
-    store_text(q, 18, row->error_field, sizeof row->error_field);
-    store_text(q, 19, row->error_text, sizeof row->error_text);
-    row->peak_rss_bytes = sqlite3_column_int64(q, 20);
+    row->revision = sqlite3_column_int64(q, 4);
+    row->state = (enum job_state)sqlite3_column_int(q, 5);
+    row->cancel_requested = sqlite3_column_int(q, 6) != 0;
+    row->dirty = sqlite3_column_int(q, 7) != 0;
+    row->deleted = sqlite3_column_int(q, 8) != 0;
+    row->attempt = sqlite3_column_int64(q, 9);
+    row->lost_attempts = sqlite3_column_int64(q, 10);
+    row->generation = sqlite3_column_int64(q, 11);
+    store_text(q, 12, row->token, sizeof row->token);
+    row->created_unix_s = sqlite3_column_double(q, 13);
+    row->updated_unix_s = sqlite3_column_double(q, 14);
+    row->queued_unix_s = sqlite3_column_double(q, 15);
+    row->started_unix_s = sqlite3_column_double(q, 16);
+    row->finished_unix_s = sqlite3_column_double(q, 17);
+    store_text(q, 18, row->error_code, sizeof row->error_code);
+    store_text(q, 19, row->error_field, sizeof row->error_field);
+    store_text(q, 20, row->error_text, sizeof row->error_text);
+    row->peak_rss_bytes = sqlite3_column_int64(q, 21);
     return STATUS_OK;
 }
 
 static status insert(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
 {
-    status s = store_begin(store, err);
+    status s = store_begin(&store->write, err);
     if (s != STATUS_OK) return s;
-    s = store_run(store, NULL, err,
-                  "INSERT INTO job (id, sample, document, state, cancel_requested, dirty, deleted, attempt, "
+    s = store_run(&store->write, NULL, err,
+                  "INSERT INTO job (id, sample, state, cancel_requested, dirty, deleted, attempt, "
                   "lost_attempts, generation, token, created, "
                   "updated, queued, started, finished, error_code, error_field, error_text, peak_rss) VALUES "
-                  "(?,?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0)",
-                  "sssidd", r->id, r->sample, r->document, (int64_t)r->state, r->created_unix_s, r->created_unix_s);
-    if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->db);
+                  "(?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0)",
+                  "ssidd", r->id, r->sample, (int64_t)r->state, r->created_unix_s, r->created_unix_s);
+    if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->write.db);
+    if (s == STATUS_OK)
+        s = store_run(&store->write, NULL, err, "INSERT INTO document (job_id, text) VALUES (?,?)", "ss", r->id,
+                      r->document);
     if (s == STATUS_OK && key != NULL)
-        s = store_run(store, NULL, err,
+        s = store_run(&store->write, NULL, err,
                       "INSERT OR REPLACE INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd",
                       key, r->id, body_hash, r->created_unix_s);
-    return store_end(store, s, err);
+    return store_end(&store->write, s, err);
 }
 
 status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash,
                         struct error *err)
 {
-    pthread_mutex_lock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
     status s = insert(store, row, idempotency_key, body_hash, err);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->write.lock);
     return s;
 }
 
@@ -82,8 +88,8 @@ status store_idempotency_find(struct store *store, const char *key, char job_id[
                               char body_hash[STORE_HASH_TEXT_BYTES], struct error *err)
 {
     sqlite3_stmt *q = NULL;
-    pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err,
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err,
                              "SELECT i.job_id, i.body_hash FROM idempotency i JOIN job j ON j.id = i.job_id WHERE "
                              "i.key = ? AND j.deleted = 0",
                              "s", key);
@@ -94,10 +100,10 @@ status store_idempotency_find(struct store *store, const char *key, char job_id[
         store_text(q, 1, body_hash, STORE_HASH_TEXT_BYTES);
     } else
         s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "key is new")
-                              : store_error(store, "cannot look up a key", err);
+                              : store_error(&store->read, "cannot look up a key", err);
 out:
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
@@ -105,24 +111,24 @@ static status get(struct store *store, const char *sql, const char *id, struct j
 {
     sqlite3_stmt *q = NULL;
     memset(row, 0, sizeof *row);
-    pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, sql, "s", id);
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, sql, "s", id);
     if (s != STATUS_OK) goto out;
     int rc = sqlite3_step(q);
     if (rc == SQLITE_ROW)
         s = read_row(q, row, err);
     else
         s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id)
-                              : store_error(store, "cannot read job", err);
+                              : store_error(&store->read, "cannot read job", err);
 out:
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
 status store_job_get(struct store *store, const char *id, struct job_row *row, struct error *err)
 {
-    return get(store, "SELECT " COLUMNS("document") " FROM job WHERE id = ?", id, row, err);
+    return get(store, "SELECT " COLUMNS(DOCUMENT) " FROM job WHERE id = ?", id, row, err);
 }
 
 status store_job_look(struct store *store, const char *id, struct job_row *row, struct error *err)
@@ -134,42 +140,61 @@ status store_job_write(struct store *store, struct job_row *r, struct error *err
 {
     int n = 0;
     r->updated_unix_s = clock_wall_s();
-    status s =
-        store_run(store, &n, err,
-                  "UPDATE job SET sample=?, document=coalesce(?, document), state=?, cancel_requested=?, dirty=?, "
-                  "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
-                  "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
-                  "ssiiiiiiisddddsssis", r->sample, r->document, (int64_t)r->state, (int64_t)r->cancel_requested,
-                  (int64_t)r->dirty, (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token,
-                  r->updated_unix_s, r->queued_unix_s, r->started_unix_s, r->finished_unix_s, r->error_code,
-                  r->error_field, r->error_text, r->peak_rss_bytes, r->id);
+    status s = store_run(
+        &store->write, &n, err,
+        "UPDATE job SET revision=revision+1, sample=?, state=?, cancel_requested=?, dirty=?, "
+        "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
+        "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
+        "siiiiiiisddddsssis", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
+        (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
+        r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes, r->id);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
     return s;
 }
 
 status store_job_update(struct store *store, struct job_row *row, struct error *err)
 {
-    pthread_mutex_lock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
     status s = store_job_write(store, row, err);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->write.lock);
+    return s;
+}
+
+static status replace(struct store *store, struct job_row *row, struct error *err)
+{
+    status s = store_begin(&store->write, err);
+    if (s != STATUS_OK) return s;
+    s = store_job_write(store, row, err);
+    if (s == STATUS_OK)
+        s = store_run(&store->write, NULL, err, "UPDATE document SET text = ? WHERE job_id = ?", "ss", row->document,
+                      row->id);
+    return store_end(&store->write, s, err);
+}
+
+status store_job_replace(struct store *store, struct job_row *row, struct error *err)
+{
+    pthread_mutex_lock(&store->write.lock);
+    status s = replace(store, row, err);
+    pthread_mutex_unlock(&store->write.lock);
     return s;
 }
 
 static status erase(struct store *store, const char *id, struct error *err)
 {
-    status s = store_begin(store, err);
+    status s = store_begin(&store->write, err);
     if (s != STATUS_OK) return s;
-    s = store_run(store, NULL, err, "DELETE FROM file WHERE job_id = ?", "s", id);
-    if (s == STATUS_OK) s = store_run(store, NULL, err, "DELETE FROM idempotency WHERE job_id = ?", "s", id);
-    if (s == STATUS_OK) s = store_run(store, NULL, err, "DELETE FROM job WHERE id = ?", "s", id);
-    return store_end(store, s, err);
+    s = store_run(&store->write, NULL, err, "DELETE FROM file WHERE job_id = ?", "s", id);
+    if (s == STATUS_OK) s = store_run(&store->write, NULL, err, "DELETE FROM idempotency WHERE job_id = ?", "s", id);
+    if (s == STATUS_OK) s = store_run(&store->write, NULL, err, "DELETE FROM document WHERE job_id = ?", "s", id);
+    if (s == STATUS_OK) s = store_run(&store->write, NULL, err, "DELETE FROM job WHERE id = ?", "s", id);
+    return store_end(&store->write, s, err);
 }
 
 status store_job_erase(struct store *store, const char *id, struct error *err)
 {
-    pthread_mutex_lock(&store->lock);
+    pthread_mutex_lock(&store->write.lock);
     status s = erase(store, id, err);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->write.lock);
     return s;
 }
 
@@ -187,26 +212,27 @@ static status grow(struct job_row **row, size_t n, size_t *capacity, struct erro
 status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out,
                       struct error *err)
 {
-#define WANTED                                                                                                         \
-    "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND (?2 < 0 OR state = ?2) AND (?3 = 0 OR serial < ?3) "
-    const char *sql =
-        query->queue_order ? WANTED "ORDER BY queued, serial LIMIT ?4" : WANTED "ORDER BY serial DESC LIMIT ?4";
+#define WANTED "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND serial < ?3 "
+    /* one statement for each index: with "?2 < 0 OR state = ?2" no index would find the rows */
+    const char *sql = query->state < 0     ? WANTED "AND ?2 < 0 ORDER BY serial DESC LIMIT ?4"
+                      : query->queue_order ? WANTED "AND state = ?2 ORDER BY queued, serial LIMIT ?4"
+                                           : WANTED "AND state = ?2 ORDER BY serial DESC LIMIT ?4";
 #undef WANTED
     sqlite3_stmt *q = NULL;
     struct job_row *row = NULL;
     size_t n = 0, capacity = 0;
-    pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, sql, "iiii", (int64_t)query->deleted, (int64_t)query->state,
-                             query->before_serial, (int64_t)query->limit);
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, sql, "iiii", (int64_t)query->deleted, (int64_t)query->state,
+                             query->before_serial > 0 ? query->before_serial : INT64_MAX, (int64_t)query->limit);
     int rc = SQLITE_DONE;
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         s = grow(&row, n, &capacity, err);
         if (s == STATUS_OK) s = read_row(q, &row[n], err);
         if (s == STATUS_OK) n++;
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(store, "cannot list jobs", err);
+    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot list jobs", err);
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         job_rows_free(row, n);
         return s;
@@ -220,15 +246,15 @@ status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error
 {
     sqlite3_stmt *q = NULL;
     for (int i = 0; i < JOB_N_STATE; i++) n[i] = 0;
-    pthread_mutex_lock(&store->lock);
-    status s = store_prepare(store, &q, err, "SELECT state, count(*) FROM job WHERE deleted = 0 GROUP BY state", "");
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, "SELECT state, n FROM job_count", "");
     int rc = SQLITE_DONE;
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         int state = sqlite3_column_int(q, 0);
         if (state >= 0 && state < JOB_N_STATE) n[state] = sqlite3_column_int64(q, 1);
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(store, "cannot count jobs", err);
+    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot count jobs", err);
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->lock);
+    pthread_mutex_unlock(&store->read.lock);
     return s;
 }

@@ -1,4 +1,4 @@
-/* Internals of the store: the connection, and helpers around SQLite statements. */
+/* Internals of the store: its two connections, and helpers around SQLite statements. */
 #ifndef SELVEDGE_SERVER_STORE_SQL_H
 #define SELVEDGE_SERVER_STORE_SQL_H
 
@@ -7,24 +7,30 @@
 #include <pthread.h>
 #include <sqlite3.h>
 
-struct store {
+struct store_link {
     sqlite3 *db;
     pthread_mutex_t lock;
 };
 
+struct store {
+    struct store_link write, read; /* no function holds both locks */
+};
+
 /* Sets err from SQLite's last result; what is for example "cannot write job". */
-status store_error(struct store *store, const char *what, struct error *err);
+status store_error(struct store_link *link, const char *what, struct error *err);
 /* Prepares a statement and binds the values by format: s text, i int64_t, d double, b blob (pointer and int size). */
-status store_prepare(struct store *store, sqlite3_stmt **statement, struct error *err, const char *sql,
+status store_prepare(struct store_link *link, sqlite3_stmt **statement, struct error *err, const char *sql,
                      const char *format, ...);
 /* Prepares a statement, binds its values and runs it to the end. *n_changed may be NULL. */
-status store_run(struct store *store, int *n_changed, struct error *err, const char *sql, const char *format, ...);
-/* A transaction, while store->lock is held. store_end commits it, or rolls it back when so_far is an error or the
+status store_run(struct store_link *link, int *n_changed, struct error *err, const char *sql, const char *format, ...);
+/* A transaction, while link->lock is held. store_end commits it, or rolls it back when so_far is an error or the
  * commit fails. */
-status store_begin(struct store *store, struct error *err);
-status store_end(struct store *store, status so_far, struct error *err);
-/* store_job_update for callers that hold store->lock. */
+status store_begin(struct store_link *link, struct error *err);
+status store_end(struct store_link *link, status so_far, struct error *err);
+/* store_job_update for callers that hold store->write.lock. */
 status store_job_write(struct store *store, struct job_row *row, struct error *err);
+/* Statements of which entry i changes the schema from version i to version i + 1. */
+const char *const *store_migrations(int *n);
 /* Copies a text column into a buffer; NULL becomes "". */
 void store_text(sqlite3_stmt *statement, int column, char *out, size_t n_out);
 

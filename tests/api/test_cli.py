@@ -132,7 +132,11 @@ def test_from_submit_to_results(daemon, sample, tmp_path):
     assert run(daemon.url, "log", job_id).stdout.count("stage ") == 8
     assert run(daemon.url, "log", job_id, "-f").stdout.count("stage ") == 8
     with urllib.request.urlopen(f"{daemon.url}/v1/jobs/{job_id}") as answer:
-        assert json.loads(run(daemon.url, "status", job_id, "--json").stdout) == json.load(answer), "digits are lost"
+        job = json.load(answer)
+    with urllib.request.urlopen(daemon.url + job["result_url"]) as answer:
+        result = json.load(answer)
+    shown = json.loads(run(daemon.url, "status", job_id, "--json").stdout)
+    assert shown == {**job, "result": result, "parameters": result["parameters"]}, "digits are lost"
     rows = run(daemon.url, "series", job_id).stdout.splitlines()
     assert len(rows) == 11 and rows[0].startswith("step\t")
     assert len(json.loads(run(daemon.url, "series", job_id, "--json").stdout)) == 10

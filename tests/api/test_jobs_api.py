@@ -16,8 +16,8 @@ def test_create_answers_with_the_job(daemon):
     assert r.headers["Location"] == f"/v1/jobs/{job['id']}"
     assert job["state"] == "draft" and job["document"] == DOCUMENT and job["fraction"] == 0
     assert job["missing_files"] == ["scan.tif", "rows.csv"] and job["files"] == []
-    assert job["result"] is None and job["parameters"] is None and job["error"] is None
-    assert daemon.job(job["id"]) == job
+    assert job["result_url"] is None and job["error"] is None
+    assert daemon.get(f"/v1/jobs/{job['id']}").json() == job
 
 
 @pytest.mark.parametrize("change, field", [
@@ -259,7 +259,7 @@ def test_a_stored_document_that_is_refused_today_can_still_be_read(daemon_maker)
     d.stop()
     old = {**DOCUMENT, "fit": {"fixed": {"beta_Q": 1}}}
     with sqlite3.connect(os.path.join(d.data, "selvedge.db")) as db:
-        assert db.execute("UPDATE job SET document = ?", [json.dumps(old)]).rowcount == 2
+        assert db.execute("UPDATE document SET text = ?", [json.dumps(old)]).rowcount == 2
     db.close()
     d.start()
     for job in (done, draft):
@@ -294,7 +294,7 @@ def test_lists_and_the_start_do_without_documents(daemon_maker):
     d.wait_state(running, "running")
     d.kill()
     with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db, db:
-        db.execute("UPDATE job SET document = document || ?", [" " * 1_000_000])
+        db.execute("UPDATE document SET text = text || ?", [" " * 1_000_000])
     d.start()
     assert len(d.get("/v1/jobs?limit=500").json()["jobs"]) == 61
     d.wait_state(running, "succeeded")
@@ -302,5 +302,5 @@ def test_lists_and_the_start_do_without_documents(daemon_maker):
         peak_kib = next(int(line.split()[1]) for line in f if line.startswith("VmHWM"))
     assert d.wrapper or peak_kib < 45_000
     with contextlib.closing(sqlite3.connect(os.path.join(d.data, "selvedge.db"))) as db:
-        assert {n for n, in db.execute("SELECT length(document) > 1000000 FROM job")} == {1}
+        assert {n for n, in db.execute("SELECT length(text) > 1000000 FROM document")} == {1}
     assert d.job(jobs[0])["document"] == DOCUMENT

@@ -135,7 +135,7 @@ def test_every_operation_answers_as_documented(daemon):
     call("listFiles", "GET", f"/v1/jobs/{draft}/files")
     call("getFile", "GET", f"/v1/jobs/{draft}/files/scan.tif")
     call("deleteFile", "DELETE", f"/v1/jobs/{draft}/files/scan.tif")
-    call("declareFile", "POST", f"/v1/jobs/{draft}/files", json={"name": "a.tif", "role": "volume", "size": 4})
+    call("declareFiles", "POST", f"/v1/jobs/{draft}/files", json={"name": "a.tif", "role": "volume", "size": 4})
     upload = daemon.job(draft)["files"][0]["upload_url"]
     call("terminateUpload", "DELETE", upload, headers=TUS)
     call("replaceDocument", "PUT", f"/v1/jobs/{draft}/document", json=DOCUMENT)

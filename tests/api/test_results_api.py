@@ -132,7 +132,7 @@ def test_long_series_costs_what_it_answers(daemon_maker):
     assert [m["id"] for m in ask("")[0]["models"]] == []  # the search's second model is not listed as the first
 
 
-def test_the_result_of_a_large_job_is_in_its_view(daemon):
+def test_the_result_of_a_large_job_is_apart_from_its_view(daemon):
     """A table of thousands of rows in several models makes a result of about 14 MB."""
     job = daemon.start_job("succeed")
     daemon.wait_state(job, "succeeded")
@@ -143,7 +143,13 @@ def test_the_result_of_a_large_job_is_in_its_view(daemon):
     with open(path, "w") as f:
         json.dump(result, f)
     view = daemon.job(job)
+    assert view["result_url"] == f"/v1/jobs/{job}/results/result.json"
     assert view["result"] == result and view["parameters"] == result["parameters"]
+    polled = daemon.get(f"/v1/jobs/{job}")
+    assert len(polled.content) < 20_000
+    assert daemon.get(f"/v1/jobs/{job}", headers={"If-None-Match": polled.headers["ETag"]}).status_code == 304
+    os.utime(path)
+    assert daemon.get(f"/v1/jobs/{job}", headers={"If-None-Match": polled.headers["ETag"]}).status_code == 200, "the result has changed"
 
 
 def test_a_job_without_output_has_empty_answers(daemon):

@@ -48,10 +48,14 @@ def bench_programs(build):
             subprocess.run([os.path.join(folder, name)], check=True)
 
 
+def bench_service(build):
+    subprocess.run([sys.executable, os.path.join(ROOT, "tests", "bench", "service", "bench_service.py"), "--build", build], check=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", default="build")
-    parser.add_argument("--only", choices=["demo", "real", "programs"])
+    parser.add_argument("--only", choices=["demo", "real", "programs", "service"])
     arguments = parser.parse_args()
     build = os.path.join(ROOT, arguments.build)
     os.environ["SELVEDGE_BUILD"] = build
@@ -59,6 +63,8 @@ def main():
         bench_demo()
     if arguments.only in (None, "real"):
         bench_real()
+    if arguments.only in (None, "service"):
+        bench_service(build)
     if arguments.only in (None, "programs"):
         bench_programs(build)
 

@@ -2,6 +2,8 @@
  * Environment of a fault: FAULT_CALL (write, sync, fallocate), FAULT_AT (number of the matching call that fails,
  * from 1), FAULT_ERRNO (0: a short write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file
  * made when the fault occurs).
+ * FAULT_SLOW_SYNC_S: seconds that every sync takes longer.
+ * FAULT_HOLD_SYNC: while this file exists, every sync waits.
  * FAULT_TRACE: file to which every successful write and sync appends a line "write PATH" or "sync PATH". */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -99,14 +101,24 @@ ssize_t write(int fd, const void *data, size_t n)
     return recorded("write", fd, REAL(ssize_t, "write", int, const void *, size_t)(fd, data, n));
 }
 
+static void be_slow(void)
+{
+    const char *seconds = getenv("FAULT_SLOW_SYNC_S");
+    const char *hold = getenv("FAULT_HOLD_SYNC");
+    while (hold != NULL && access(hold, F_OK) == 0) usleep(5000);
+    if (seconds != NULL) usleep((useconds_t)(strtod(seconds, NULL) * 1e6));
+}
+
 int fsync(int fd)
 {
+    be_slow();
     if (fires("sync", fd)) return errno = wanted_errno(), -1;
     return (int)recorded("sync", fd, REAL(int, "fsync", int)(fd));
 }
 
 int fdatasync(int fd)
 {
+    be_slow();
     if (fires("sync", fd)) return errno = wanted_errno(), -1;
     return (int)recorded("sync", fd, REAL(int, "fdatasync", int)(fd));
 }

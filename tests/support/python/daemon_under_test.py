@@ -175,9 +175,13 @@ class Daemon:
         return job
 
     def job(self, job):
+        """The job, with its result and parameters as clients join them."""
         r = self.get(f"/v1/jobs/{job}")
         assert r.status_code == 200, r.text
-        return r.json()
+        j = r.json()
+        j["result"] = self.get(j["result_url"]).json() if j["result_url"] else None
+        j["parameters"] = j["result"] and j["result"].get("parameters")
+        return j
 
     def wait_state(self, job, *states, timeout_s=20):
         return wait_until(lambda: (lambda j: j if j["state"] in states else None)(self.job(job)), timeout_s,
