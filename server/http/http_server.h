@@ -1,8 +1,8 @@
-/* The HTTP server, built on libmicrohttpd, with a thread for each connection: one that waits for the disk or computes an
- * answer keeps no other waiting. It adds what version 0.9.75 lacks: requests with ambiguous framing are
- * refused in the first callback, requests have deadlines and a minimum rate, and after an early reply a body of
- * moderate size is read to its end so that the client can receive the reply. A reply may be decided before or after
- * the body; it is queued once. */
+/* The HTTP server, built on libmicrohttpd, with a thread for each connection: one that waits for the disk or computes
+ * an answer keeps no other waiting. It adds what version 0.9.75 lacks: requests with ambiguous framing are refused in
+ * the first callback, requests have deadlines and a minimum rate, and after an early reply a body of moderate size is
+ * read to its end so that the client can receive the reply. A reply may be decided before or after the body; it is
+ * queued once. */
 #ifndef SELVEDGE_SERVER_HTTP_SERVER_H
 #define SELVEDGE_SERVER_HTTP_SERVER_H
 

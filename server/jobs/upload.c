@@ -36,8 +36,8 @@ struct upload_set {
     pthread_mutex_t lock;
     struct upload *first;
     atomic_uint_least64_t n_bytes_total;
-    /* uploads that may write and hash a piece at the same time: half of the processors, so that many uploads do not keep
-     * other requests from theirs. No one waits for a sync while it has a place. */
+    /* uploads that may write and hash a piece at the same time: half of the processors, so that many uploads do not
+     * keep other requests from theirs. No one waits for a sync while it has a place. */
     sem_t place;
 };
 

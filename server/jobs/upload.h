@@ -49,7 +49,8 @@ status upload_recover(struct upload_set *set, struct error *err);
 
 /* Updates a row from the database to the present offset, without taking the upload over. */
 void upload_refresh(struct upload_set *set, struct file_row *row);
-/* A number that differs, but for a chance of 2^-64, when an upload of the job that a connection works on has got further. */
+/* A number that differs, but for a chance of 2^-64, when an upload of the job that a connection works on has got
+ * further. */
 uint64_t upload_progress(struct upload_set *set, const char *job_id);
 uint64_t upload_bytes_total(const struct upload_set *set);
 

@@ -55,6 +55,11 @@ status cli_job_path(const char *id, const char *tail, char *path, size_t n_path,
     snprintf(path, n_path, "/v1/jobs/%s%s", id, tail);
     return STATUS_OK;
 }
+status cli_add_result(struct cli *cli, json_t *job, struct error *err)
+{
+    (void)cli, (void)job, (void)err;
+    return STATUS_OK;
+}
 void report_view(const json_t *job, struct job_view *view)
 {
     *view = (struct job_view){0};
