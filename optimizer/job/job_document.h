@@ -141,6 +141,7 @@ struct job_document {
     bool has_color, has_chart, has_white;
     struct job_photograph chart, white;
     double chart_corner_px[8]; /* NaN: found in the picture */
+    bool chart_from_2014;      /* made in November 2014 or later */
     double white_reflectance[3];
     double environment_rgb[3];
     char environment_file[JOB_MAX_NAME_BYTES]; /* "" when none is given */

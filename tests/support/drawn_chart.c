@@ -11,7 +11,7 @@ void draw_chart(struct image *im, const double corner_px[8], const double camera
 {
     const double margin = 0.045, width = 6 * 2.5 + 5 * 0.25, height = 4 * 2.5 + 3 * 0.25;
     double wanted[24][3];
-    for (size_t i = 0; i < 24; i++) color_chart_reference(i, wanted[i]);
+    for (size_t i = 0; i < 24; i++) color_chart_reference(false, i, wanted[i]);
     for (size_t i = 0; i < im->width * im->height; i++)
         for (size_t c = 0; c < 3; c++) im->pixel[3 * i + c] = (float)(0.35 * gain);
     for (int step = 0; step < 2; step++) /* the board, then the patches */

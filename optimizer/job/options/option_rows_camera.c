@@ -4,6 +4,7 @@
 const char *const job_transfer_names[] = {
     [JOB_TRANSFER_UNDECLARED] = "undeclared", [JOB_TRANSFER_LINEAR] = "linear", [JOB_TRANSFER_SRGB] = "srgb", NULL};
 
+static const char *const chart_edition[] = {"before_2014", "from_2014", NULL};
 #define INTO_CHART(member) INTO(chart.member)
 #define INTO_WHITE(member) INTO(white.member)
 
@@ -30,6 +31,13 @@ const struct job_option option_rows_camera[] = {
      .allowed = "as `photographs[].file`",
      .meaning = "The picture. Upload it with the role `chart`."},
     PICTURE("color.chart", INTO_CHART, job_transfer_names),
+    {.path = "color.chart.edition",
+     .kind = OPTION_SWITCH,
+     INTO(chart_from_2014),
+     .choice = chart_edition,
+     .meaning =
+         "When the chart was made: before November 2014, or then and later (X-Rite changed its colors; the year is "
+         "on its back). The white patches differ by 4 %, and so does the scale."},
     {.path = "color.chart.light_theta_deg",
      .kind = OPTION_NUMBER,
      INTO(chart.light_theta_deg),

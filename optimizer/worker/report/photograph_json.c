@@ -48,6 +48,7 @@ json_t *photograph_color_json(const struct photograph_process *k, const struct j
     if (!doc->has_chart) return json;
     json_t *patches = json_array();
     for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) json_array_append_new(patches, patch_json(&k->chart, i));
+    json_object_set_new(json, "edition", json_string(doc->chart_from_2014 ? "from_2014" : "before_2014"));
     json_object_set_new(json, "found_automatically", json_boolean(k->chart.found_automatically));
     json_object_set_new(json, "corners_px", json_number_list(k->chart.corner_px, 8, 1.0));
     json_object_set_new(json, "delta_e_2000_before", mean_and_largest(k->chart.delta_e_before));

@@ -271,6 +271,7 @@ static status load_chart(struct photograph_process *k, const struct job_document
     status s = photograph_develop(k, folder, &doc->chart, &im, &r, err);
     if (s != STATUS_OK) return s;
     memcpy(k->chart.corner_px, doc->chart_corner_px, sizeof k->chart.corner_px);
+    k->chart.from_2014 = doc->chart_from_2014;
     s = color_chart_find(&im, k->chart.corner_px, &k->chart.found_automatically, err);
     if (s == STATUS_NOT_FOUND)
         s = error_set(err, STATUS_INVALID, "no chart was found: give the corners of its patches ('corners_px')");

@@ -1,9 +1,11 @@
 /* A photographed ColorChecker Classic: where its patches are, their mean colors, and the matrix that follows.
  *
- * Reference: the CIE L*a*b* values (D50, 2 degrees) that X-Rite stated for the 24 patches (charts before November 2014;
- * later charts differ by about one unit), adapted to D65 by Bradford and expressed as linear sRGB reflectances, 1 for a
- * perfect white. A chart that lies flat under a lamp at theta has the radiance reflectance times cos theta.
- */
+ * Reference: the CIE L*a*b* values (D50, 2 degrees, M0) that X-Rite published in 2016 ("New color specifications
+ * for ColorChecker SG and Classic charts") for charts made before and from November 2014, adapted to D65 by
+ * Bradford and expressed as linear sRGB reflectances, 1 for a perfect white. The same numbers are in colour-
+ * science 0.4.7 ("ColorChecker24 - Before / After November 2014"), except b* of the earlier blue sky, -21.905
+ * there. The white patches of the editions differ by 4 % in luminance, and so does the scale that follows. A chart
+ * that lies flat under a lamp at theta has the radiance reflectance times cos theta. */
 #ifndef SELVEDGE_OPTIMIZER_COLOR_CHART_H
 #define SELVEDGE_OPTIMIZER_COLOR_CHART_H
 
@@ -15,6 +17,7 @@
 enum { COLOR_CHART_PATCHES = 24, COLOR_CHART_ROWS = 4, COLOR_CHART_COLUMNS = 6, COLOR_CHART_WHITE = 18 };
 
 struct color_chart {
+    bool from_2014; /* in: the chart was made in November 2014 or later */
     bool found_automatically;
     double corner_px[8]; /* x, y: outer corners of the patches dark skin, bluish green, black, white */
     double measured_rgb[COLOR_CHART_PATCHES][3]; /* means over the middle of each patch */
@@ -26,7 +29,7 @@ struct color_chart {
 };
 
 /* Linear sRGB reflectance of patch i. */
-void color_chart_reference(size_t i, double rgb[3]);
+void color_chart_reference(bool from_2014, size_t i, double rgb[3]);
 /* Finds the chart in a picture of linear values, unless corner_px[0] is a number. STATUS_NOT_FOUND. */
 status color_chart_find(const struct image *im, double corner_px[8], bool *found, struct error *err);
 /* Measures the patches inside the corners and fits the matrix. full_scale_is: values from which on a sample is
