@@ -3,6 +3,7 @@
 #include <cstring>
 #include <opencv2/aruco.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace
 {
@@ -37,8 +38,8 @@ status unknown_dictionary(const char *name, struct error *err)
     catch (const std::exception &e) { return error_set(err, STATUS_INTERNAL, "cannot use markers: %s", e.what()); }    \
     catch (...) { return error_set(err, STATUS_INTERNAL, "cannot use markers: unknown exception"); }
 
-status vision_find_markers(const unsigned char *grey, const size_t size[2], const char *dictionary, size_t most,
-                           struct vision_marker *marker, size_t *n, struct error *err)
+status vision_find_markers(const unsigned char *grey, const size_t size[2], const char *dictionary, bool alone,
+                           size_t most, struct vision_marker *marker, size_t *n, struct error *err)
 {
     const size_t width = size[0], height = size[1];
     *n = 0;
@@ -50,7 +51,7 @@ status vision_find_markers(const unsigned char *grey, const size_t size[2], cons
         if (!dictionary_of(dictionary, words)) return unknown_dictionary(dictionary, err);
         cv::Mat picture(static_cast<int>(height), static_cast<int>(width), CV_8U, const_cast<unsigned char *>(grey));
         cv::Ptr<cv::aruco::DetectorParameters> how = cv::aruco::DetectorParameters::create();
-        how->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+        how->cornerRefinementMethod = alone ? cv::aruco::CORNER_REFINE_SUBPIX : cv::aruco::CORNER_REFINE_NONE;
         std::vector<std::vector<cv::Point2f>> corner;
         std::vector<int> found;
         cv::aruco::detectMarkers(picture, words, corner, found, how);
@@ -60,6 +61,27 @@ status vision_find_markers(const unsigned char *grey, const size_t size[2], cons
                 marker[*n].corner_px[2 * k] = static_cast<double>(corner[i][k].x) + 0.5;
                 marker[*n].corner_px[2 * k + 1] = static_cast<double>(corner[i][k].y) + 0.5;
             }
+        }
+        return STATUS_OK;
+    }
+    CATCH
+}
+
+status vision_refine_corners(const unsigned char *grey, const size_t size[2], size_t half_window_px, size_t n,
+                             double (*at_px)[2], struct error *err)
+{
+    if (n == 0) return STATUS_OK;
+    try {
+        cv::Mat picture(static_cast<int>(size[1]), static_cast<int>(size[0]), CV_8U, const_cast<unsigned char *>(grey));
+        std::vector<cv::Point2f> corner(n);
+        for (size_t i = 0; i < n; i++)
+            corner[i] = cv::Point2f(static_cast<float>(at_px[i][0] - 0.5), static_cast<float>(at_px[i][1] - 0.5));
+        int half = static_cast<int>(half_window_px);
+        cv::cornerSubPix(picture, corner, cv::Size(half, half), cv::Size(-1, -1),
+                         cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 40, 0.005));
+        for (size_t i = 0; i < n; i++) {
+            at_px[i][0] = static_cast<double>(corner[i].x) + 0.5;
+            at_px[i][1] = static_cast<double>(corner[i].y) + 0.5;
         }
         return STATUS_OK;
     }

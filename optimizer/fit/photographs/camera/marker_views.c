@@ -12,6 +12,7 @@
 #include <string.h>
 
 static const double largest_misfit = 0.1; /* of a marker's edge */
+enum { ENOUGH_CORNERS = 8 };              /* of a chessboard: the rougher corners of its markers then do not count */
 
 static int compare_float(const void *a, const void *b)
 {
@@ -47,53 +48,107 @@ static void undistort(const struct lens *l, const double real[2], double ideal[2
     }
 }
 
+/* Points that are known on the plane and in the picture. */
+struct point_list {
+    size_t n, n_marker;
+    bool seen[MARKER_MAX];
+    double plane[4 * MARKER_MAX + MARKER_MAX_CORNER][2], pixel[4 * MARKER_MAX + MARKER_MAX_CORNER][2];
+};
+
 /* Adds the four corners of a found marker, if the board has it. */
-static size_t add_corners(const struct marker_board *b, const struct lens *lens, const struct vision_marker *found,
-                          double (*plane)[2], double (*pixel)[2])
+static void add_marker(const struct marker_board *b, const struct lens *lens, const struct vision_marker *found,
+                       struct point_list *list)
 {
     static const double side[4][2] = {{-0.5, 0.5}, {0.5, 0.5}, {0.5, -0.5}, {-0.5, -0.5}};
     size_t m = 0;
     while (m < b->n && b->id[m] != found->id) m++;
-    for (size_t k = 0; k < 4 && m < b->n; k++) {
-        for (size_t c = 0; c < 2; c++) plane[k][c] = b->center_mm[m][c] + side[k][c] * b->side_mm;
-        undistort(lens, found->corner_px + 2 * k, pixel[k]);
+    if (m == b->n || list->seen[m]) return;
+    list->seen[m] = true;
+    list->n_marker++;
+    for (size_t k = 0; k < 4; k++, list->n++) {
+        for (size_t c = 0; c < 2; c++) list->plane[list->n][c] = b->center_mm[m][c] + side[k][c] * b->side_mm;
+        undistort(lens, found->corner_px + 2 * k, list->pixel[list->n]);
     }
-    return m < b->n ? 4 : 0;
 }
 
-static status find_points(const struct marker_board *b, const struct lens *lens, const struct image *im,
-                          double (*plane)[2], double (*pixel)[2], size_t *n_point, struct error *err)
+/* Adds the corners of the chessboard between found markers. map: from the markers. */
+static status add_board_corners(const struct marker_board *b, const struct lens *lens, const uint8_t *grey,
+                                const size_t size[2], const double map[9], struct point_list *list, struct error *err)
+{
+    double at[MARKER_MAX_CORNER][2], promised[MARKER_MAX_CORNER][2];
+    size_t which[MARKER_MAX_CORNER], n = 0;
+    const double origin[2] = {0, 0};
+    double px_per_square = b->square_mm * plane_map_scale(map, origin), half = floor(0.1 * px_per_square);
+    if (half < 2.0) return STATUS_OK;
+    for (size_t i = 0; i < b->n_corner; i++) {
+        double ideal[2];
+        if (!list->seen[b->corner_marker[i][0]] || !list->seen[b->corner_marker[i][1]]) continue;
+        plane_map_apply(map, b->corner_mm[i], ideal);
+        memcpy(at[n], ideal, sizeof ideal);
+        if (lens->has_distortion) lens_distort(lens, ideal, at[n]);
+        memcpy(promised[n], at[n], sizeof at[n]);
+        if (at[n][0] > 2.0 * half && at[n][1] > 2.0 * half && at[n][0] < (double)size[0] - 2.0 * half &&
+            at[n][1] < (double)size[1] - 2.0 * half)
+            which[n++] = i;
+    }
+    status s = vision_refine_corners(grey, size, (size_t)fmin(half, 20.0), n, at, err);
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        double moved = hypot(at[i][0] - promised[i][0], at[i][1] - promised[i][1]);
+        if (!(moved < 0.1 * px_per_square) || !(moved > 0.0)) continue; /* another edge, or none */
+        memcpy(list->plane[list->n], b->corner_mm[which[i]], sizeof *list->plane);
+        undistort(lens, at[i], list->pixel[list->n++]);
+    }
+    return s;
+}
+
+static status fit_map(const struct point_list *list, double map[9], double *rms_px, struct error *err)
+{
+    return plane_map_fit(list->n, (const double(*)[2])list->plane, (const double(*)[2])list->pixel, map, rms_px, err);
+}
+
+static status find_points(const struct marker_board *b, const struct lens *lens, const uint8_t *grey,
+                          const size_t size[2], struct point_list *list, struct error *err)
 {
     struct vision_marker found[MARKER_MAX];
     size_t n = 0;
-    *n_point = 0;
-    uint8_t *grey = grey_of(im);
-    if (grey == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for markers: out of memory");
-    status s = vision_find_markers(grey, (size_t[2]){im->width, im->height}, b->dictionary, MARKER_MAX, found, &n, err);
-    free(grey);
-    for (size_t i = 0; i < n && s == STATUS_OK; i++)
-        *n_point += add_corners(b, lens, &found[i], plane + *n_point, pixel + *n_point);
-    if (s == STATUS_OK && *n_point < 8)
-        s = error_set(
+    double map[9], rms_px;
+    status s = vision_find_markers(grey, size, b->dictionary, b->n_corner == 0, MARKER_MAX, found, &n, err);
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) add_marker(b, lens, &found[i], list);
+    if (s == STATUS_OK && list->n_marker < 2)
+        return error_set(
             err, STATUS_INVALID,
             "it shows %zu of the %zu markers of the rig, at least two are needed: give 'crop_px' and the place "
             "of the camera, or markers that are sharp and not covered",
-            *n_point / 4, b->n);
-    return s;
+            list->n_marker, b->n);
+    if (s != STATUS_OK || b->n_corner == 0) return s;
+    s = fit_map(list, map, &rms_px, err);
+    return s == STATUS_OK ? add_board_corners(b, lens, grey, size, map, list, err) : s;
+}
+
+static void keep_board_corners(struct point_list *list)
+{
+    size_t first = 4 * list->n_marker;
+    list->n -= first;
+    memmove(list->plane, list->plane + first, list->n * sizeof *list->plane);
+    memmove(list->pixel, list->pixel + first, list->n * sizeof *list->pixel);
 }
 
 status marker_view_find(const struct marker_board *board, const struct lens *lens, const struct image *im,
                         struct marker_view *v, struct error *err)
 {
-    double plane[4 * MARKER_MAX][2], pixel[4 * MARKER_MAX][2], map[9];
+    struct point_list list = {0};
+    double map[9];
     const double origin[2] = {0, 0};
-    size_t n = 0;
     *v = (struct marker_view){0};
-    status s = find_points(board, lens, im, plane, pixel, &n, err);
-    if (s == STATUS_OK)
-        s = plane_map_fit(n, (const double(*)[2])plane, (const double(*)[2])pixel, map, &v->rms_px, err);
+    uint8_t *grey = grey_of(im);
+    if (grey == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for markers: out of memory");
+    status s = find_points(board, lens, grey, (size_t[2]){im->width, im->height}, &list, err);
+    free(grey);
+    v->n_marker = list.n_marker;
+    v->n_corner = list.n - 4 * list.n_marker;
+    if (v->n_corner >= ENOUGH_CORNERS) keep_board_corners(&list);
+    if (s == STATUS_OK) s = fit_map(&list, map, &v->rms_px, err);
     if (s != STATUS_OK) return s;
-    v->n_marker = n / 4;
     plane_map_apply(map, origin, v->center_px);
     v->px_per_mm = plane_map_scale(map, origin);
     if (v->rms_px > largest_misfit * board->side_mm * v->px_per_mm)

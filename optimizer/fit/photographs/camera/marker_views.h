@@ -9,16 +9,18 @@
 
 /* Where the camera of a picture was, and where the orbit center is in it. */
 struct marker_view {
-    size_t n_marker;
-    double rms_px;       /* what is left between markers and map */
-    double center_px[2]; /* of the orbit, in the picture without distortion */
-    double px_per_mm;    /* at the orbit center, perpendicular to the view */
-    bool has_camera;     /* the lens' focal lengths are known */
-    double camera_mm[3]; /* in the frame of the cloth */
+    size_t n_marker, n_corner; /* of those of a chessboard */
+    double rms_px;             /* what is left between markers and map */
+    double center_px[2];       /* of the orbit, in the picture without distortion */
+    double px_per_mm;          /* at the orbit center, perpendicular to the view */
+    bool has_camera;           /* the lens' focal lengths are known */
+    double camera_mm[3];       /* in the frame of the cloth */
 };
 
-/* Finds the board in a picture. STATUS_INVALID: fewer than two of its markers, or places that contradict the picture by
- * more than a tenth of a marker. */
+/* Finds the board in a picture. The corners of a chessboard are looked for where the found markers promise them,
+ * and count only between two markers that were found, so that cloth on the board does no harm; eight of them
+ * replace the corners of the markers. STATUS_INVALID: fewer than two of its markers, or places that contradict the
+ * picture by more than a tenth of a marker. */
 status marker_view_find(const struct marker_board *board, const struct lens *lens, const struct image *im,
                         struct marker_view *view, struct error *err);
 /* Fills in what photograph p leaves out: the crop of crop_cm about the orbit center, and the place of the camera. */

@@ -129,17 +129,11 @@ static status read_distortion(const struct json_field *lens, struct lens *l, str
     return s;
 }
 
-static status read_board(const struct json_field *rig, struct marker_board *b, struct error *err)
+static status read_centers(const struct json_field *markers, struct marker_board *b, struct error *err)
 {
-    static const char *const key[] = {"dictionary", "side_mm", "center_mm", NULL};
-    struct json_field f, centers;
+    struct json_field centers;
     bool present;
-    status s = json_field_object(rig, "markers", &f, &present, err);
-    if (s != STATUS_OK || !present) return s;
-    s = json_field_check_keys(&f, key, err);
-    if (s == STATUS_OK) s = json_field_text(&f, "dictionary", true, b->dictionary, sizeof b->dictionary, err);
-    if (s == STATUS_OK) s = json_field_required_number(&f, "side_mm", 0.1, 10000.0, &b->side_mm, err);
-    if (s == STATUS_OK) s = json_field_object(&f, "center_mm", &centers, &present, err);
+    status s = json_field_object(markers, "center_mm", &centers, &present, err);
     size_t n = s == STATUS_OK ? json_object_size(centers.object) : 0;
     if (s == STATUS_OK && (n < 2 || n > MARKER_MAX))
         s = error_set(err, STATUS_INVALID, "'markers.center_mm' must name 2 to %d markers", MARKER_MAX);
@@ -155,6 +149,48 @@ static status read_board(const struct json_field *rig, struct marker_board *b, s
         s = required_numbers(&centers, name, 2, 1e5, b->center_mm[b->n++], err);
     }
     return s;
+}
+
+static status read_charuco(const struct json_field *f, struct marker_board *b, struct error *err)
+{
+    static const char *const key[] = {"squares", "square_mm", "upper_left_mm", "first_square", NULL};
+    double squares[2], upper_left_mm[2];
+    char first[64] = "black";
+    status s = json_field_check_keys(f, key, err);
+    if (s == STATUS_OK) s = required_numbers(f, "squares", 2, 1000.0, squares, err);
+    if (s == STATUS_OK) s = required_numbers(f, "upper_left_mm", 2, 1e5, upper_left_mm, err);
+    if (s == STATUS_OK) s = json_field_required_number(f, "square_mm", 0.1, 10000.0, &b->square_mm, err);
+    if (s == STATUS_OK) s = json_field_text(f, "first_square", false, first, sizeof first, err);
+    if (s != STATUS_OK) return s;
+    if (strcmp(first, "black") != 0 && strcmp(first, "white") != 0)
+        return error_set(err, STATUS_INVALID, "'%s.first_square' must be \"black\" or \"white\"", f->path);
+    if (!(b->side_mm < b->square_mm))
+        return error_set(err, STATUS_INVALID, "'%s.square_mm' must be larger than the markers in the squares (%g mm)",
+                         f->path, b->side_mm);
+    size_t n[2];
+    for (size_t i = 0; i < 2; i++) n[i] = squares[i] >= 3.0 && squares[i] == rint(squares[i]) ? (size_t)squares[i] : 0;
+    if (!marker_board_fill(b, n, upper_left_mm, strcmp(first, "black") == 0))
+        return error_set(err, STATUS_INVALID,
+                         "'%s.squares' must be two whole numbers from 3 on, with at most %d inner corners", f->path,
+                         MARKER_MAX_CORNER);
+    return STATUS_OK;
+}
+
+static status read_board(const struct json_field *rig, struct marker_board *b, struct error *err)
+{
+    static const char *const key[] = {"dictionary", "side_mm", "center_mm", "charuco", NULL};
+    struct json_field f, charuco;
+    bool present, is_charuco = false;
+    status s = json_field_object(rig, "markers", &f, &present, err);
+    if (s != STATUS_OK || !present) return s;
+    s = json_field_check_keys(&f, key, err);
+    if (s == STATUS_OK) s = json_field_text(&f, "dictionary", true, b->dictionary, sizeof b->dictionary, err);
+    if (s == STATUS_OK) s = json_field_required_number(&f, "side_mm", 0.1, 10000.0, &b->side_mm, err);
+    if (s == STATUS_OK) s = json_field_object(&f, "charuco", &charuco, &is_charuco, err);
+    if (s == STATUS_OK && is_charuco && json_object_get(f.object, "center_mm") != NULL)
+        s = error_set(err, STATUS_INVALID, "'markers' has both 'center_mm' and 'charuco': give one of them");
+    if (s != STATUS_OK) return s;
+    return is_charuco ? read_charuco(&charuco, b, err) : read_centers(&f, b, err);
 }
 
 static status apply(const json_t *json, struct job_document *doc, struct lens *lens, struct marker_board *board,

@@ -12,6 +12,11 @@
  *
  *    "markers": {"dictionary": "4x4_50", "side_mm": 10, "center_mm": {"0": [-30, 30], "1": [30, 30]}}
  *
+ * or, for a ChArUco board,
+ *
+ *    "markers": {"dictionary": "4x4_50", "side_mm": 8, "charuco": {"squares": [9, 7], "square_mm": 11,
+ *                "upper_left_mm": [-49.5, 38.5], "first_square": "black"}}
+ *
  * (marker_board.h). With markers a view may leave out its camera, whose place then follows from them.
  */
 #ifndef SELVEDGE_OPTIMIZER_RIG_H

@@ -161,11 +161,103 @@ static void test_job_with_markers(void **state)
     job_document_free(doc);
 }
 
+/* ---- a ChArUco board ---- */
+
+enum { COLUMNS = 9, ROWS = 7, N_SQUARE = COLUMNS * ROWS };
+static const double square_mm = 11.0, small_mm = 8.0, upper_left_mm[2] = {-49.5, 38.5};
+
+/* Brightness of the board, whose upper left square is black; a dark patch of covered_mm lies on its middle. */
+static double board_brightness(uint8_t (*marker)[BITS * BITS], double covered_mm, double x, double y)
+{
+    double u = (x - upper_left_mm[0]) / square_mm, v = (upper_left_mm[1] - y) / square_mm;
+    if (fabs(x) < 0.5 * covered_mm && fabs(y) < 0.5 * covered_mm)
+        return 0.3 + 0.2 * sin(x * 9.0) * sin(y * 7.0); /* cloth */
+    if (u < 0.0 || v < 0.0 || u >= COLUMNS || v >= ROWS) return 0.8;
+    size_t i = (size_t)u, j = (size_t)v;
+    if ((i + j) % 2 == 0) return 0.03;
+    double a = (u - (double)i - 0.5) * square_mm / small_mm + 0.5,
+           b = (v - (double)j - 0.5) * square_mm / small_mm + 0.5;
+    if (a < 0.0 || b < 0.0 || a >= 1.0 || b >= 1.0) return 0.8;
+    return marker[(j * COLUMNS + i) / 2][(size_t)(b * BITS) * BITS + (size_t)(a * BITS)] > 127 ? 0.8 : 0.03;
+}
+
+/* Draws it through a lens with distortion. */
+static void draw_board(struct image *im, const double camera[3], const struct lens *lens, double covered_mm)
+{
+    static uint8_t marker[N_SQUARE / 2][BITS * BITS];
+    const double up[3] = {0, 0, 1};
+    double forward[3], right[3], down[3], length = sqrt(dot(camera, camera));
+    for (int m = 0; m < N_SQUARE / 2; m++)
+        assert_int_equal(vision_draw_marker("4x4_50", m, BITS, marker[m], NULL), STATUS_OK);
+    for (int k = 0; k < 3; k++) forward[k] = -camera[k] / length;
+    cross(forward, up, right);
+    cross(forward, right, down);
+    assert_int_equal(image_init(im, WIDTH, HEIGHT, 3, NULL), STATUS_OK);
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 4; i++) {
+        size_t p = i / 4;
+        const double real[2] = {(double)(p % WIDTH) + 0.25 + 0.5 * (double)(i % 2),
+                                (double)(p / WIDTH) + 0.25 + 0.5 * (double)(i / 2 % 2)};
+        double ideal[2] = {real[0], real[1]}, back[2], ray[3];
+        for (int n = 0; n < 4; n++) {
+            lens_distort(lens, ideal, back);
+            for (int k = 0; k < 2; k++) ideal[k] += real[k] - back[k];
+        }
+        double u = (ideal[0] - center_px[0]) / focal_px, v = (ideal[1] - center_px[1]) / focal_px;
+        for (int k = 0; k < 3; k++) ray[k] = forward[k] + u * right[k] + v * down[k];
+        double t = -camera[2] / ray[2];
+        double b = board_brightness(marker, covered_mm, camera[0] + t * ray[0], camera[1] + t * ray[1]);
+        for (size_t c = 0; c < 3; c++) im->pixel[3 * p + c] += (float)(0.25 * b);
+    }
+}
+
+static void test_charuco_board(void **state)
+{
+    static const double place[3][2] = {{35, 200}, {55, -30}, {8, 90}};
+    const struct lens lens = {.has_distortion = true,
+                              .focal_px = {focal_px, focal_px},
+                              .center_px = {center_px[0], center_px[1]},
+                              .k = {-0.12, 0.05, 0}};
+    struct marker_board b = {.dictionary = "4x4_50", .side_mm = small_mm, .square_mm = square_mm};
+    (void)state;
+    assert_true(marker_board_fill(&b, (size_t[2]){COLUMNS, ROWS}, upper_left_mm, true));
+    assert_true(b.n == N_SQUARE / 2 && b.n_corner == (COLUMNS - 1) * (ROWS - 1));
+    for (size_t i = 0; i < 3; i++) {
+        double camera[3], off = 0.0;
+        struct image im;
+        struct marker_view view;
+        struct error err = {0};
+        camera_at(place[i][0], place[i][1], camera);
+        draw_board(&im, camera, &lens, 20.0 + 5.0 * (double)i);
+        if (marker_view_find(&b, &lens, &im, &view, &err) != STATUS_OK) fail_msg("%zu: %s", i, err.text);
+        image_release(&im);
+        for (int k = 0; k < 3; k++) off += (view.camera_mm[k] - camera[k]) * (view.camera_mm[k] - camera[k]);
+        /* from straight above a tilt hardly shows */
+        if (!(sqrt(off) < (i == 2 ? 10.0 : 2.5) && view.rms_px < 0.5 && view.n_marker >= 20 && view.n_corner >= 16))
+            fail_msg("%zu: %g mm off, %g px, %zu markers, %zu corners", i, sqrt(off), view.rms_px, view.n_marker,
+                     view.n_corner);
+        assert_true(hypot(view.center_px[0] - center_px[0], view.center_px[1] - center_px[1]) < 0.3);
+    }
+}
+
+static void test_layout_of_boards(void **state)
+{
+    struct marker_board b = {.side_mm = 1, .square_mm = 2};
+    const double corner[2] = {10, 20};
+    (void)state;
+    assert_true(marker_board_fill(&b, (size_t[2]){3, 4}, corner, false)); /* the first square has marker 0 */
+    assert_true(b.n == 6 && b.n_corner == 6 && b.id[5] == 5);
+    assert_true(b.center_mm[0][0] == 11 && b.center_mm[0][1] == 19 && b.center_mm[1][0] == 15);
+    assert_true(b.corner_mm[0][0] == 12 && b.corner_mm[0][1] == 18);
+    assert_true(b.corner_marker[0][0] + b.corner_marker[0][1] == 2); /* markers 0 and 2 meet there */
+    assert_false(marker_board_fill(&b, (size_t[2]){2, 9}, corner, true));
+    assert_false(marker_board_fill(&b, (size_t[2]){20, 20}, corner, true));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_plane_map),
-        cmocka_unit_test(test_camera_from_markers),
+        cmocka_unit_test(test_charuco_board),    cmocka_unit_test(test_layout_of_boards),
+        cmocka_unit_test(test_plane_map),        cmocka_unit_test(test_camera_from_markers),
         cmocka_unit_test(test_job_with_markers),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);

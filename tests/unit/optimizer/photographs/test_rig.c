@@ -78,6 +78,14 @@ static void test_bad_rigs(void **state)
         {"{\"selvedge_rig\":1,\"views\":{\"v1\":{\"camera\":\"a\"}}}", "views.v1.lamp"},
         {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"center_mm\":{\"1\":[1,2]}}}",
          "2 to 64 markers"},
+        {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"center_mm\":{},\"charuco\":{}}}",
+         "both 'center_mm' and 'charuco'"},
+        {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"charuco\":{\"squares\":[5,2],"
+         "\"square_mm\":12,\"upper_left_mm\":[0,0]}}}",
+         "two whole numbers from 3 on"},
+        {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"charuco\":{\"squares\":[5,5],"
+         "\"square_mm\":8,\"upper_left_mm\":[0,0]}}}",
+         "must be larger than the markers"},
         {"{\"selvedge_rig\":1,\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":9,\"center_mm\":{\"1\":[1,2],\"a\":[1,"
          "2]}}}",
          "the number of a marker"},
