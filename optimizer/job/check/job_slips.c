@@ -22,7 +22,7 @@ bool angle_span_in_radians(const struct angle_span *span)
 
 /* ---- kinds of files by the ending of their names ---- */
 
-enum file_kind { KIND_UNKNOWN, KIND_PICTURE, KIND_TIFF, KIND_VOLUME, KIND_FIBERS, KIND_TABLE, KIND_OTHER };
+enum file_kind { KIND_UNKNOWN, KIND_PICTURE, KIND_TIFF, KIND_VOLUME, KIND_FIBERS, KIND_TABLE, KIND_JSON, KIND_OTHER };
 
 static enum file_kind kind_of(const char *name)
 {
@@ -37,7 +37,7 @@ static enum file_kind kind_of(const char *name)
                  {".csv", KIND_TABLE},   {".binary", KIND_TABLE}, {".bsdf", KIND_TABLE},  {".astm", KIND_TABLE},
                  {".pdf", KIND_OTHER},   {".doc", KIND_OTHER},    {".docx", KIND_OTHER},  {".xls", KIND_OTHER},
                  {".xlsx", KIND_OTHER},  {".ods", KIND_OTHER},    {".zip", KIND_OTHER},   {".gz", KIND_OTHER},
-                 {".7z", KIND_OTHER},    {".json", KIND_OTHER},   {".html", KIND_OTHER},  {".heic", KIND_OTHER},
+                 {".7z", KIND_OTHER},    {".json", KIND_JSON},    {".html", KIND_OTHER},  {".heic", KIND_OTHER},
                  {".gif", KIND_OTHER},   {".bmp", KIND_OTHER},    {".webp", KIND_OTHER},  {".mp4", KIND_OTHER},
                  {".dcm", KIND_OTHER},   {".hdf5", KIND_OTHER},   {".h5", KIND_OTHER},    {".npy", KIND_OTHER},
                  {".mat", KIND_OTHER},   {".psd", KIND_OTHER}};
@@ -52,6 +52,7 @@ struct role_rule {
     bool kind[KIND_OTHER + 1]; /* allowed; an unknown ending is allowed everywhere, because the content decides */
 };
 
+#define ANY_PHOTOGRAPH [KIND_UNKNOWN] = true, [KIND_PICTURE] = true, [KIND_TIFF] = true
 static const struct role_rule role_rule[] = {
     {"volume",
      "volume.files",
@@ -66,13 +67,19 @@ static const struct role_rule role_rule[] = {
      "environment.file",
      "an image of the surroundings: .exr",
      {[KIND_UNKNOWN] = true, [KIND_PICTURE] = true}},
-    {"photograph",
-     "photographs",
-     "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG",
-     {[KIND_UNKNOWN] = true, [KIND_PICTURE] = true, [KIND_TIFF] = true}},
+    {"photograph", "photographs", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"chart", "color.chart.file", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"white_reference", "color.white.file", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"dark_frame", "camera.dark_frames", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"camera_noise",
+     "camera.noise_file",
+     "a record of `selvedge calibrate-camera`: .json",
+     {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
+    {"rig", "rig.file", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 
 struct slip_search {
+    const struct job_document *doc;
     void (*found)(void *context, const struct error *slip);
     void *context;
 };
@@ -84,7 +91,9 @@ static void check_ending(void *context, const char *name, const char *role)
     for (size_t i = 0; i < sizeof role_rule / sizeof role_rule[0]; i++) {
         const struct role_rule *r = &role_rule[i];
         if (strcmp(role, r->role) != 0 || r->kind[kind_of(name)]) continue;
-        error_set_field(&slip, STATUS_INVALID, r->field, "'%s' is '%s', which by its ending is not %s", r->field, name,
+        bool is_texture = strcmp(search->doc->cloth_texture, name) == 0; /* it has the role of a photograph, too */
+        const char *field = is_texture ? "cloth.texture" : r->field;
+        error_set_field(&slip, STATUS_INVALID, field, "'%s' is '%s', which by its ending is not %s", field, name,
                         r->wanted);
         search->found(search->context, &slip);
     }
@@ -117,7 +126,7 @@ static void check_radians(const struct job_document *doc, const struct slip_sear
 void job_find_slips(const struct job_document *doc, void (*found)(void *context, const struct error *slip),
                     void *context)
 {
-    struct slip_search search = {found, context};
+    struct slip_search search = {doc, found, context};
     job_document_visit_files(doc, check_ending, &search);
     check_radians(doc, &search);
 }

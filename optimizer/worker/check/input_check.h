@@ -25,7 +25,7 @@ void input_check_warn(void *context, const char *option, const char *text);
 bool input_check_has(const struct input_check *c, const char *name);
 void input_check_path(const struct input_check *c, const char *name, char path[INPUT_PATH_BYTES]);
 
-/* The scan, the fiber file, the image of the surroundings. */
+/* The scan, the fiber file, the image of the surroundings, the photograph of the weave. */
 void input_check_cloth(struct input_check *c);
 /* Every photograph, or every line of the table; then all rows together. */
 void input_check_rows(struct input_check *c);

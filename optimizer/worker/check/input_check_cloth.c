@@ -2,6 +2,8 @@
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/volume/volume_source.h"
+#include "geometry/weave/weave_detect.h"
+#include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/check/input_check.h"
 #include "optimizer/worker/fiber_file.h"
@@ -121,9 +123,35 @@ static void check_environment(struct input_check *c)
     environment_free(environment);
 }
 
+/* The photograph that shows the weave: as the job will read it. */
+static void check_texture(struct input_check *c)
+{
+    char path[INPUT_PATH_BYTES];
+    struct image im;
+    struct weave_guess guess;
+    struct error fault = {0};
+    const struct job_photograph photograph = photograph_plain(JOB_TRANSFER_SRGB);
+    if (!input_check_has(c, c->doc->cloth_texture)) return;
+    input_check_path(c, c->doc->cloth_texture, path);
+    status s = photograph_read(path, &photograph, &im, NULL, &fault);
+    if (s == STATUS_OK) {
+        s = weave_detect(&(struct weave_picture){im.pixel, im.width, im.height}, &guess, &fault);
+        image_release(&im);
+    }
+    if (s == STATUS_NOT_FOUND && !c->doc->cloth_draft_from_texture) {
+        input_check_warn(c, OPTION_CLOTH_TEXTURE, fault.text);
+        return;
+    }
+    if (s == STATUS_OK) return;
+    if (s == STATUS_NOT_FOUND) fault.code = STATUS_INVALID;
+    snprintf(fault.field, sizeof fault.field, OPTION_CLOTH_TEXTURE);
+    input_check_fault(c, &fault);
+}
+
 void input_check_cloth(struct input_check *c)
 {
     if (c->doc->n_volume_file > 0) check_volume(c);
     check_fibers(c);
     check_environment(c);
+    check_texture(c);
 }

@@ -28,6 +28,11 @@ def photo_job():
     return {"sample": "bad", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "photographs": views, "fit": dict(FIT)}
 
 
+def weave_job():
+    cloth = {"weave": "plain", "texture": "w.png", "yarns": [{"fibers": 7}]}
+    return {"sample": "bad", "cloth": cloth, "measurements": {"file": "rows.csv"}, "fit": dict(FIT)}
+
+
 def files_of(document):
     files = {"cloth.hair": hair()}
     if "measurements" in document:
@@ -103,7 +108,7 @@ def radians(document, files):
                 p[key] = round(math.radians(p[key]), 4)
 
 
-TAB, PHO = table_job, photo_job
+TAB, PHO, WEAVE = table_job, photo_job, weave_job
 # (case, document, change, "fault" or "warning", part of the message)
 CASES = [
     ("no sample", TAB, put("sample", None), "fault", "sample"),
@@ -138,6 +143,24 @@ CASES = [
      "fault", "which by its ending is not fibers"),
     ("a document in the place of a photograph", PHO, both(put("photographs.0.file", "p0.pdf"), file("p0.pdf", b"%PDF-1.4")),
      "fault", "which by its ending is not a photograph"),
+    ("a chart of another kind", PHO, both(put("color", {"chart": {"file": "chart.pdf"}}), file("chart.pdf", b"%PDF-1.4")),
+     "fault", "'color.chart.file' is 'chart.pdf', which by its ending is not a photograph"),
+    ("a white reference of another kind", PHO, both(put("color", {"white": {"file": "white.csv", "reflectance": 0.9}}), file("white.csv", b"a")),
+     "fault", "'color.white.file' is 'white.csv', which by its ending is not a photograph"),
+    ("a dark frame of another kind", PHO, both(put("camera", {"dark_frames": ["dark.json"]}), file("dark.json", b"{}")),
+     "fault", "'camera.dark_frames' is 'dark.json', which by its ending is not a photograph"),
+    ("a record of noise of another kind", PHO, both(put("camera", {"noise_file": "noise.png"}), file("noise.png", b"x")),
+     "fault", "'camera.noise_file' is 'noise.png', which by its ending is not a record"),
+    ("a weave on a table", WEAVE, both(put("cloth.texture", "weave.csv"), file("weave.csv", b"a")),
+     "fault", "'cloth.texture' is 'weave.csv', which by its ending is not a photograph"),
+    ("a photograph without a weave", WEAVE, both(put("cloth.texture", "w.png"), file("w.png", png_rgb(128, lambda x, y: (90, 80, 70)))),
+     "warning", "no texture that repeats"),
+    ("a photograph of the weave that is none", WEAVE, both(put("cloth.texture", "w.png"), file("w.png", b"not a picture, but longer than sixteen bytes")),
+     "fault", "w.png"),
+    ("a goniometer's file without columns", TAB, both(put("measurements.file", "g.astm"), file("g.astm", b"NUM_POINTS 3\n1,2,3\n")),
+     "fault", 'no line "VARS'),
+    ("a BSDF of another program", TAB, both(put("measurements.file", "g.bsdf"), file("g.bsdf", b"Source  Measured\nSymmetry  PlaneSymmetrical\n")),
+     "fault", "does not begin as an RGL file"),
     ("fibers that are none", TAB, file("cloth.hair", b"HARE" + bytes(124)), "fault", "cloth.hair"),
     ("truncated fibers", TAB, file("cloth.hair", hair()[:400]), "fault", "cloth.hair"),
     ("fibers in metres", TAB, file("cloth.hair", hair(tile_mm=2e-4, radius_mm=8e-6)), "warning", "wrong unit"),
