@@ -44,10 +44,10 @@ asan-physics: | deps-test ## the renderer's physics tests under the same sanitiz
 	@for t in $(patsubst $(BUILD)/%,build/asan/%,$(PHYSICS_RENDERER)); do \
 		echo "$$t"; UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 $$t || exit 1; done
 
-# one libFuzzer program per file tests/fuzz/fuzz_*.c (fuzz_input.c is what they share)
+# one libFuzzer program per file fuzz_*.c of tests/fuzz and its folders (fuzz_input.c is what they share)
 FUZZ_SECONDS ?= 600
 FUZZ ?=
-FUZZ_C := $(filter-out tests/fuzz/fuzz_input.c,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_C := $(filter-out tests/fuzz/fuzz_input.c,$(wildcard tests/fuzz/fuzz_*.c tests/fuzz/*/fuzz_*.c))
 FUZZ_BINS := $(patsubst %.c,$(BUILD)/%,$(FUZZ_C))
 FUZZ_LIBS := $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 $(FUZZ_BINS): $(BUILD)/%: $(BUILD)/obj/%.c.o $(BUILD)/obj/tests/fuzz/fuzz_input.c.o $(FUZZ_LIBS)

@@ -5,6 +5,7 @@
 #include "geometry/volume/format/vol_file.h"
 #include "renderer/image/image.h"
 #include "tests/support/camera_files.h"
+#include "tests/support/rgl_bytes.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -145,7 +146,12 @@ static void rig_seeds(void)
         "\"radius_px\":4,\"a\":[0,0,0]}},\"markers\":{\"dictionary\":\"4x4_50\",\"side_mm\":22,\"center_mm\":{\"3\":[-"
         "40,"
         "40],\"7\":[42,38]}}}";
+    static const char charuco[] =
+        "{\"selvedge_rig\":1,\"lamps\":{\"a\":{\"theta_deg\":20,\"phi_deg\":0}},\"views\":{\"v\":{\"lamp\":\"a\"}},"
+        "\"markers\":{\"dictionary\":\"5x5_100\",\"side_mm\":8,\"charuco\":{\"squares\":[9,7],\"square_mm\":11,"
+        "\"upper_left_mm\":[-49.5,38.5],\"first_square\":\"white\"}}}";
     put("rig", "all.json", rig, "", 0);
+    put("rig", "charuco.json", charuco, "", 0);
 }
 
 static void camera_seeds(void)
@@ -164,6 +170,32 @@ static void camera_seeds(void)
     camera_write_dng(seed_path("camera_raw", "bayer.dng"), &(struct camera_dng){32, 32, 512, 16383, 0.5, 100, 4}, word);
 }
 
+static void brdf_seeds(void)
+{
+    static struct rgl_bytes rgl[4] = {{.n_phi = 1},
+                                      {.n_phi = 5, .turn_rad = 3.14159265, .some_not_measured = true},
+                                      {.n_phi = 3, .turn_rad = 1.57079633},
+                                      {.n_phi = 1, .n_wavelength = 8, .first_nm = 380, .step_nm = 45}};
+    static const char *const name[4] = {"iso.bsdf", "half.bsdf", "quarter.bsdf", "spectra.bsdf"};
+    static const double sample[8] = {1500, 700, 30, -1500, 0, 1e9, 12, 5};
+    for (size_t i = 0; i < 4; i++) {
+        rgl_bytes_make(&rgl[i]);
+        put("brdf_rgl", name[i], "", rgl[i].bytes, rgl[i].n);
+    }
+    put("brdf_merl", "samples.binary", "", sample, sizeof sample);
+    put("brdf_astm", "rgb.astm",
+        "ASTM\nNUM_POINTS 4\nVARS "
+        "theta_i,phi_i,theta_s,phi_s,R,G,B\n0.2,0,0.3,3.1,0.5,0.4,0.3\n0.4,0,0.3,3.1,0.6,0.4,0.3\n"
+        "0.4,1,0.3,2.1,0.6,0.4,0.3\n1.4,2,1.3,2.1,0.6,0.4,-0.3\n",
+        "", 0);
+    put("brdf_astm", "spectra.astm",
+        "VARS "
+        "theta_i,phi_i,theta_s,phi_s,400nm,440nm,480nm,520nm,560nm,600nm,640nm,680nm\n20,0,30,180,1,2,3,4,5,6,7,8\n",
+        "", 0);
+    put("brdf_astm", "grey.astm", "VARS theta_i,phi_i,theta_s,phi_s,BRDF\r\n20,0,30,180,1\r\n100,0,30,180,1\r\n", "",
+        0);
+}
+
 int main(int argc, char **argv)
 {
     if (argc != 2) return 2;
@@ -175,5 +207,6 @@ int main(int argc, char **argv)
     photograph_seeds();
     camera_seeds();
     rig_seeds();
+    brdf_seeds();
     return 0;
 }

@@ -12,14 +12,15 @@ mkdir -p "$work/findings" "$work/corpus"
 mkdir -p "$work/seeds/job_document"
 cp config/examples/*.json "$work/seeds/job_document/"
 if [ $# -eq 0 ]; then
-    for program in "$build"/tests/fuzz/fuzz_*; do set -- "$@" "${program##*/fuzz_}"; done
+    for program in "$build"/tests/fuzz/fuzz_* "$build"/tests/fuzz/*/fuzz_*; do set -- "$@" "${program##*/fuzz_}"; done
 fi
 bad=0
 for parser; do
     mkdir -p "$work/corpus/$parser" "$work/seeds/$parser" # a parser may have no seeds
     dictionary=()
     [ ! -f "tests/fuzz/$parser.dict" ] || dictionary=("-dict=tests/fuzz/$parser.dict")
-    if nice "$build/tests/fuzz/fuzz_$parser" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1500 -malloc_limit_mb=512 -max_len=16384 \
+    program=$(find "$build/tests/fuzz" -type f -name "fuzz_$parser")
+    if nice "$program" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=1500 -malloc_limit_mb=512 -max_len=16384 \
         -artifact_prefix="$work/findings/$parser-" -print_final_stats=1 "${dictionary[@]}" \
         "$work/corpus/$parser" "$work/seeds/$parser" >"$work/$parser.log" 2>&1; then
         echo "fuzz $parser: ok, $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/$parser.log") inputs in $seconds s"

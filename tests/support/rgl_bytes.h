@@ -5,6 +5,7 @@
 #define SELVEDGE_TESTS_RGL_BYTES_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 
