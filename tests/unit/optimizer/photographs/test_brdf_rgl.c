@@ -1,5 +1,5 @@
 /* Files of RGL's database: values that are known in closed form, symmetries, spectra, samples that were not measured,
- * damaged files. tests/api/worker/test_measured_brdf.py compares with another writer, and with Mitsuba. */
+ * damaged files. tests/api/photographs/test_measured_brdf.py compares with another writer, and with Mitsuba. */
 #include "optimizer/fit/photographs/table/brdf_file.h"
 #include "optimizer/fit/photographs/table/brdf_spectrum.h"
 #include "tests/support/rgl_bytes.h"
