@@ -32,6 +32,8 @@ static const char usage[] = "usage: selvedged [options]\n"
                             "  --print-config    print every setting with its default and an explanation\n"
                             "  --version, --help\n";
 
+enum { LOCK_TRIES = 40, LOCK_PAUSE_US = 50000 };
+
 static const struct {
     const char *option, *key;
 } option_key[] = {{"data", "server.data"},
@@ -93,15 +95,36 @@ static void worker_path(const struct settings *s, char out[PATH_BYTES])
         path_join(out, program, "selvedge-worker", NULL);
 }
 
+/* Whoever may write into the folder could replace the database, or the files of jobs that others submit. */
+static status check_owner(const struct settings *s, struct error *err)
+{
+    struct stat st;
+    if (stat(s->data, &st) != 0) return error_set_errno(err, "cannot examine data folder '%s'", s->data);
+    if ((st.st_mode & (S_IWGRP | S_IWOTH)) != 0)
+        return error_set(err, STATUS_INVALID,
+                         "cannot use data folder '%s': other users may write into it; forbid it with: chmod go-w '%s'",
+                         s->data, s->data);
+    if (st.st_uid != geteuid() && st.st_uid != 0)
+        return error_set(err, STATUS_INVALID,
+                         "cannot use data folder '%s': it belongs to another user (number %u), who may write into it",
+                         s->data, (unsigned)st.st_uid);
+    return STATUS_OK;
+}
+
 static status lock_data(const struct settings *s, int *fd, struct error *err)
 {
     char path[PATH_BYTES];
     status r = durable_make_folder(s->data, err);
+    if (r == STATUS_OK) r = check_owner(s, err);
     if (r != STATUS_OK) return r;
     path_join(path, s->data, "lock", NULL);
     *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (*fd < 0) return error_set_errno(err, "cannot open '%s'", path);
-    if (flock(*fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
+    /* a process that a killed daemon was starting holds the lock until it becomes a worker, or ends */
+    for (int i = 0; i <= LOCK_TRIES; i++) {
+        if (flock(*fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
+        usleep(LOCK_PAUSE_US);
+    }
     return error_set(err, STATUS_CONFLICT, "cannot use data folder '%s': another selvedged is using it", s->data);
 }
 

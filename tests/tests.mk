@@ -1,5 +1,5 @@
 # Tests: their programs, and the targets that run them. tests/README.md says what each one is.
-.PHONY: deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+.PHONY: tsan deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -26,8 +26,8 @@ test: | deps-test  ## everything that continuous integration runs; ends with "N 
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
 
 # What takes too long for every commit. One part that fails does not keep the next from running.
-NIGHTLY := asan fuzz-smoke coverage test-long mutants
-nightly:           ## asan, fuzz-smoke, coverage, test-long and mutants: too long for every commit
+NIGHTLY := asan tsan fuzz-smoke coverage test-long mutants
+nightly:           ## asan, tsan, fuzz-smoke, coverage, test-long and mutants: too long for every commit
 	@failed=""; for part in $(NIGHTLY); do \
 		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
 	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }
@@ -37,6 +37,13 @@ asan: | deps-test  ## unit and quick API tests under the address and undefined-b
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O1 all build-tests
 	@ASAN_OPTIONS=allocator_may_return_null=1 SELVEDGE_SANITIZED=1 \
 		/usr/bin/python3 tests/run_tests.py --quick --programs --build build/asan
+
+# the requests of these tests come from many threads; a report ends the daemon with a code that no test accepts
+THREADED_TESTS := api/service api/test_jobs_api api/test_uploads_api api/test_results_api api/test_supervision api/test_durable_replies
+tsan: | deps-test  ## tests of the daemon under the thread sanitizer (three minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/tsan SANITIZE=thread OPTIMIZE=-O1 build/tsan/bin/selvedged
+	@for t in $(THREADED_TESTS); do TSAN_OPTIONS="suppressions=$(CURDIR)/config/tsan.txt" SELVEDGE_SANITIZED=1 \
+		/usr/bin/python3 tests/run_tests.py --quick --programs --only $$t --build build/tsan || exit 1; done
 
 asan-physics: | deps-test ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \

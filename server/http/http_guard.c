@@ -11,20 +11,52 @@ static const char *const single[] = {"Content-Length", "Host",          "Transfe
                                      "If-Match",       "Range"};
 enum { N_SINGLE = sizeof single / sizeof single[0] };
 
-static enum MHD_Result count_header(void *context, enum MHD_ValueKind kind, const char *name, const char *value)
+struct headers_seen {
+    unsigned n[N_SINGLE];
+    const char *fault; /* what is wrong with a header, or NULL */
+};
+
+static bool name_valid(const char *name, size_t n)
 {
-    unsigned *n = context;
+    for (size_t i = 0; i < n; i++) {
+        unsigned char c = (unsigned char)name[i];
+        if (c <= ' ' || c >= 127 || strchr("\"(),/:;<=>?@[\\]{}", c) != NULL) return false;
+    }
+    return n > 0;
+}
+
+/* The library ends a value at its first NUL, and puts the continuation of a folded line behind the header's name. After
+ * the NUL that it writes over the line's CR follows the one that it writes over the LF; each line is followed by
+ * another one in the same buffer, so this byte can be read. */
+static enum MHD_Result examine_header(void *context, enum MHD_ValueKind kind, const char *name, size_t n_name,
+                                      const char *value, size_t n_value)
+{
+    struct headers_seen *seen = context;
     (void)kind;
-    (void)value;
-    for (size_t i = 0; i < N_SINGLE; i++)
-        if (strcasecmp(name, single[i]) == 0) n[i]++;
-    return MHD_YES;
+    if (!name_valid(name, n_name))
+        seen->fault = "the name of a header has characters that are not allowed";
+    else if (value == NULL || memchr(value, '\r', n_value) != NULL || value[n_value + 1] != '\0')
+        seen->fault = "the value of a header has a CR or NUL, or its line does not end with CR LF";
+    for (size_t i = 0; i < N_SINGLE; i++) {
+        size_t n = strlen(single[i]);
+        if (n_name < n || strncasecmp(name, single[i], n) != 0) continue;
+        if (n_name == n)
+            seen->n[i]++;
+        else if (i == 0 || i == 2)
+            seen->fault = "a header that delimits the body is folded";
+    }
+    return seen->fault == NULL ? MHD_YES : MHD_NO;
 }
 
 bool guard_framing(struct http_request *r)
 {
-    unsigned n[N_SINGLE] = {0};
-    MHD_get_connection_values(r->connection, MHD_HEADER_KIND, count_header, n);
+    struct headers_seen seen = {0};
+    const unsigned *n = seen.n;
+    MHD_get_connection_values_n(r->connection, MHD_HEADER_KIND, examine_header, &seen);
+    if (seen.fault != NULL) {
+        reply_code(r, "malformed", "", seen.fault);
+        return false;
+    }
     if (n[0] > 0 && n[2] > 0) {
         reply_code(r, "length_and_chunked", "Content-Length",
                    "Content-Length and Transfer-Encoding together make the end of the body ambiguous");

@@ -14,9 +14,11 @@
 
 enum {
     CONNECTION_POOL_BYTES = 256 * 1024,
-    THREAD_STACK_BYTES = 512 * 1024,
+    THREAD_STACK_BYTES = 2 << 20, /* the JSON parser goes 2,048 levels deep */
     DRAIN_LIMIT_BYTES = 64 << 20,
-    LISTEN_BACKLOG = 1024
+    LISTEN_BACKLOG = 1024,
+    BIND_TRIES = 40,
+    BIND_PAUSE_US = 50000
 };
 
 struct http_server {
@@ -68,7 +70,8 @@ static bool examine(struct http_request *r, const char *method)
         reply_header(r, "Allow", allow);
     } else if (guard_body(r) && r->route->begin != NULL)
         r->route->begin(r);
-    return r->reply != NULL && skip_body;
+    /* without a length nobody knows where the next request begins */
+    return r->reply != NULL && (skip_body || r->reply_status == MHD_HTTP_LENGTH_REQUIRED);
 }
 
 static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *c, const char *url, const char *method,
@@ -199,6 +202,17 @@ static void on_panic(void *context, const char *file, unsigned line, const char 
     abort();
 }
 
+/* A process that a killed daemon was starting may hold its socket for a moment. */
+static int bind_patiently(int fd, const struct sockaddr *address, socklen_t n)
+{
+    int result = bind(fd, address, n);
+    for (int i = 0; result != 0 && errno == EADDRINUSE && i < BIND_TRIES; i++) {
+        usleep(BIND_PAUSE_US);
+        result = bind(fd, address, n);
+    }
+    return result;
+}
+
 static status open_socket(const struct settings *settings, int *out, unsigned *port, struct error *err)
 {
     struct sockaddr_storage address = {0};
@@ -227,7 +241,7 @@ static status open_socket(const struct settings *settings, int *out, unsigned *p
     int on = 1, fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return error_set_errno(err, "cannot open a socket");
     setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(fd, (struct sockaddr *)&address, n) != 0 || listen(fd, LISTEN_BACKLOG) != 0 ||
+    if (bind_patiently(fd, (struct sockaddr *)&address, n) != 0 || listen(fd, LISTEN_BACKLOG) != 0 ||
         getsockname(fd, (struct sockaddr *)&address, &n) != 0) {
         status s =
             error_set_errno(err, "cannot listen on '%s', port %lld", settings->listen, (long long)settings->port);

@@ -78,7 +78,12 @@ static status create_locked(struct job_service *v, struct job_row *row, const ch
     s = store_job_insert(v->store, row, key, body_hash, err);
     if (s != STATUS_OK) return s;
     s = make_folders(v, row->id, err);
-    if (s != STATUS_OK) store_job_erase(v->store, row->id, NULL);
+    if (s != STATUS_OK) {
+        char path[PATH_BYTES];
+        path_join(path, v->settings->data, "jobs", row->id, NULL);
+        path_remove_tree(path, NULL);
+        store_job_erase(v->store, row->id, NULL);
+    }
     return s;
 }
 

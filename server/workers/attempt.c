@@ -4,6 +4,7 @@
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
+#include "server/workers/console.h"
 
 #include <signal.h>
 #include <sodium.h>
@@ -12,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { STATUS_FILE_LIMIT_BYTES = 1 << 20, CONSOLE_LIMIT_BYTES = 1 << 24 };
+enum { STATUS_FILE_LIMIT_BYTES = 1 << 20 };
 
 json_t *attempt_read_status(const struct job_service *v, const char *job_id)
 {
@@ -106,20 +107,12 @@ static void set_error(struct job_row *row, const char *code, const char *field, 
     snprintf(row->error_text, sizeof row->error_text, "%s", text);
 }
 
-/* Copies the end of the console output of a worker that died without an error in status.json. */
-static void console_tail(struct job_service *v, const char *job_id, char *out, size_t n_out)
+/* The last words of a worker that died without an error in status.json. */
+static void last_words(struct job_service *v, const char *job_id, char *out, size_t n_out)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0, keep = n_out - 1;
-    out[0] = '\0';
+    char path[PATH_BYTES];
     path_join(path, v->settings->data, "jobs", job_id, "console.txt", NULL);
-    if (file_read_all(path, CONSOLE_LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return;
-    while (n > 0 && (text[n - 1] == '\n' || text[n - 1] == ' ')) n--;
-    const char *from = n > keep ? text + n - keep : text;
-    snprintf(out, n_out, "%.*s", (int)(n > keep ? keep : n), from);
-    for (char *c = out; *c != '\0'; c++)
-        if ((unsigned char)*c < 32 || (unsigned char)*c > 126) *c = ' ';
-    free(text);
+    console_tail(path, out, n_out);
 }
 
 static void failed(struct job_service *v, struct job_row *row)
@@ -134,7 +127,7 @@ static void failed(struct job_service *v, struct job_row *row)
     if (text != NULL && json_integer_value(json_object_get(j, "attempt")) == row->attempt)
         set_error(row, code == NULL ? "internal" : code, field == NULL ? "" : field, text);
     else {
-        console_tail(v, row->id, tail, sizeof tail);
+        last_words(v, row->id, tail, sizeof tail);
         snprintf(made, sizeof made, "the worker failed without an error message%s%s",
                  tail[0] ? "; its last output: " : "", tail);
         set_error(row, "internal", "", made);
@@ -146,7 +139,7 @@ static void describe_end(struct job_service *v, const struct job_row *row, const
                          enum attempt_stop stop, char *out, size_t n_out)
 {
     char tail[300], how[120];
-    console_tail(v, row->id, tail, sizeof tail);
+    last_words(v, row->id, tail, sizeof tail);
     if (stop == STOP_SILENT)
         snprintf(how, sizeof how, "the worker sent no heartbeat and was killed");
     else if (end->by_signal && end->code == SIGKILL)

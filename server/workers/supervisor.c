@@ -3,6 +3,7 @@
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/attempt.h"
+#include "server/workers/console.h"
 #include "server/workers/worker_process.h"
 
 #include <errno.h>
@@ -101,9 +102,17 @@ static void record_end(struct supervisor *u, struct slot *slot)
     }
 }
 
+static void trim_console(struct supervisor *u, const struct slot *slot)
+{
+    char path[PATH_BYTES];
+    path_join(path, u->v->settings->data, "jobs", slot->job_id, "console.txt", NULL);
+    console_trim(path);
+}
+
 static void watch(struct supervisor *u, struct slot *slot)
 {
     if (!slot->ended) slot->ended = worker_ended(slot->pid, &slot->end);
+    trim_console(u, slot);
     double now = clock_monotonic_s();
     if (slot->ended) {
         if (now >= slot->retry_s) record_end(u, slot);

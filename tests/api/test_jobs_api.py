@@ -285,7 +285,7 @@ def test_a_daemon_that_cannot_announce_itself_runs(daemon_maker):
     assert d.get("/livez").status_code == 200 and "daemon.json" in d.log_text()
 
 
-@pytest.mark.skipif("asan" in BUILD, reason="the sanitizer keeps what was freed")
+@pytest.mark.skipif("asan" in BUILD or "tsan" in BUILD, reason="the sanitizer keeps what was freed")
 def test_lists_and_the_start_do_without_documents(daemon_maker):
     """Documents may have a megabyte each. Lists of jobs do not read them, and updates of such rows leave them
     unchanged."""

@@ -93,6 +93,14 @@ elif behaviour == "mute":  # fails and reports it only on stderr
     os.remove(os.path.join(job, "status.json"))
     print("something terrible happened", file=sys.stderr)
     sys.exit(1)
+elif behaviour == "chatter":  # writes to the console without end, and dies
+    for i in range(int(argument)):
+        print(f"line {i} " + "x" * 1000, flush=i % 1000 == 0)
+        if i % 1000 == 0:
+            say("running", 0.5)
+            time.sleep(0.02)
+    print("these are my last words", flush=True)
+    sys.exit(1) if os.remove(os.path.join(job, "status.json")) is None else None
 elif behaviour == "work":
     work(float(argument or 3600))
     finish()
