@@ -295,5 +295,18 @@ const struct job_option option_rows_fit[] = {
      .standard = "false",
      .meaning = "The same scene as Universal Scene Description: curves with a diffuse preview surface of which cloth "
                 "is as bright."},
+    {.path = "export.blender",
+     .kind = OPTION_BOOL,
+     INTO(export_blender),
+     .check = job_check_export,
+     .standard = "false",
+     .meaning = "The same scene as a script that builds it in Blender, with hair curves and Blender's hair material."},
+    {.path = "export.textures",
+     .kind = OPTION_BOOL,
+     INTO(export_textures),
+     .check = job_check_export,
+     .standard = "false",
+     .meaning = "Textures of one tile with a MaterialX document (OpenPBR) and a U3M 1.1 material. Their pixels follow "
+                "from `fit.render_px`."},
     {.path = NULL},
 };

@@ -1,20 +1,27 @@
 """The formats of exports, of one job: each folder is opened by the program or the library that it is for where Python has it, and otherwise by a
 reader of its published grammar."""
 import csv
+import datetime
 import json
 import math
 import os
+import re
+import shutil
 import struct
 import subprocess
+import sys
 
 import pbrt_file
 import pytest
 from daemon_under_test import ROOT, program
 from small_cloth import TABLE, hair
 
+sys.path.insert(0, os.path.join(ROOT, "tests", "bench"))
+from png_picture import read_png  # noqa: E402
+
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1, "model": "isotropic.v1"}
-FORMATS = ["pbrt", "usd"]
+FORMATS = ["pbrt", "usd", "blender", "textures"]
 PYTHON = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-python", "bin", "python")
 
 
@@ -185,3 +192,92 @@ def test_volumes_of_a_scan(tmp_path):
     assert len(inside) > 1000 and sum(inside) / len(inside) > 2 * sum(outside) / len(outside)
     seen = by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), made / "density.vol", made / "direction.vol")
     assert json.loads(seen) == pytest.approx([max(density), max(direction)])
+
+
+def test_a_scene_for_blender(results, tmp_path):
+    export, folder = conversion_of(results, "blender"), results / "export" / "blender"
+    assert sorted(p.name for p in folder.iterdir()) == ["cloth.py", "conversion.json", "fibers-0.txt", "rows.csv", "scene.json"]
+    scene, n_fiber = json.loads((folder / "scene.json").read_text()), json.loads((results / "result.json").read_text())["geometry"]["n_fiber"]
+    compile((folder / "cloth.py").read_text(), "cloth.py", "exec")
+    if shutil.which("blender") is None:
+        pytest.skip("the files are right so far; there is no Blender to open them with (Debian package blender)")
+    done = subprocess.run(
+        ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", folder / "cloth.py", "--python",
+         os.path.join(ROOT, "tests", "support", "python", "blender_scene.py"), "--", tmp_path / "picture.exr", "64", "16"],
+        capture_output=True, text=True, check=False, env={**os.environ, "HOME": str(tmp_path)})
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    found = json.loads(next(line for line in done.stdout.split("\n") if line.startswith("found "))[6:])
+    assert (found["n_object"], found["shared"], found["n_curve"]) == (len(scene["repeats"]), 1, n_fiber)
+    assert found["n_point"] == len([x for x in (folder / "fibers-0.txt").read_text().split("\n") if x])
+    (material,) = export["materials"]
+    assert found["radius"] == pytest.approx(0.008, rel=1e-3) and found["engine"] == "CYCLES"
+    for key, name in (("absorption", "absorption"), ("roughness", "longitudinal_roughness"), ("radial", "azimuthal_roughness"), ("index", "index")):
+        assert found[key] == pytest.approx(material[name], rel=1e-5)
+    row = next(csv.DictReader((folder / "rows.csv").open()))
+    assert found["mean"] == pytest.approx([float(row[f"rendered_{c}"]) for c in "rgb"], rel=0.4)
+
+
+U3M_NUMBERS = ["alpha", "anisotropy_value", "anisotropy_rotation", "clearcoat_value", "clearcoat_roughness", "ior", "metalness", "displacement",
+               "roughness", "sheen_value", "sheen_tint", "specular_value", "specular_tint", "subsurface_radius", "subsurface_value", "transmission"]
+LIMITED = ["alpha", "anisotropy_rotation", "metalness", "transmission"]
+
+
+def check_image(image, folder):
+    """The image of a U3M map: its file is there, and the size on the cloth fits its dots per inch."""
+    assert set(image) == {"width", "height", "dpi", "path", "repeat"} and set(image["repeat"]) == {"rotation", "mode"}
+    assert image["repeat"]["mode"] == "normal" and "/" not in image["path"]
+    rows = read_png(folder / image["path"])
+    width, height = len(rows[0]) / 3, len(rows)
+    assert image["width"] / 25.4 * image["dpi"]["x"] == pytest.approx(width) and image["height"] / 25.4 * image["dpi"]["y"] == pytest.approx(height)
+
+
+def test_a_u3m_material(results):
+    """The keys, types and ranges that version 1.1 of the public schema (github.com/vizoogmbh/u3m) requires and allows."""
+    folder = results / "export" / "textures"
+    u3m = json.loads((folder / "cloth.u3m").read_text())
+    assert set(u3m) == {"schema", "material", "custom"} and u3m["schema"] == "1.1" and u3m["custom"] is None
+    m = u3m["material"]
+    assert set(m) == {"name", "id", "created", "modified", "front", "back", "side", "physics", "metadata", "description"} and m["name"] == "exports"
+    assert re.fullmatch(r"[0-9a-f]{8}-[0-9a-f]{4}-4[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}", m["id"])
+    assert all(datetime.datetime.strptime(m[k], "%Y-%m-%dT%H:%M:%SZ") for k in ("created", "modified"))
+    assert set(m["physics"]) == {"thickness", "weight", "composition", "devices", "material_type", "construction"} and m["physics"]["thickness"] > 0
+    assert m["physics"]["devices"] == {"fab": "null"} and m["back"] is m["side"] is None
+    front = m["front"]
+    assert set(front) == {*U3M_NUMBERS, "clearcoat_normal", "normal", "basecolor", "subsurface_color", "shader", "preview"}
+    assert front["shader"] == "principled" and front["preview"] is None
+    for key in U3M_NUMBERS:
+        assert set(front[key]) == {"constant", "texture"} and (key not in LIMITED or 0 <= front[key]["constant"] <= 1)
+        assert front[key]["texture"] is None or set(front[key]["texture"]) == {"factor", "offset", "image"}
+    for key in ("basecolor", "subsurface_color"):
+        assert set(front[key]["constant"]) == set("rgb") and all(0 <= x <= 1 for x in front[key]["constant"].values())
+    for key in ("normal", "clearcoat_normal"):
+        assert set(front[key]["constant"]) == set("xyz")
+    assert set(front["normal"]["texture"]) == {"scale", "image"} and set(front["basecolor"]["texture"]) == {"mode", "factor", "image"}
+    maps = [v["texture"]["image"] for v in front.values() if isinstance(v, dict) and v["texture"]]
+    assert len(maps) == 6
+    for image in maps:
+        check_image(image, folder)
+
+
+def test_textures_of_a_tile(results):
+    export, folder = conversion_of(results, "textures"), results / "export" / "textures"
+    (material,) = export["materials"]
+    assert sorted(p.name for p in folder.iterdir()) == sorted([
+        "conversion.json", "cloth.mtlx", "cloth.u3m", "maps.exr", *(f"{n}.png" for n in (
+            "base_color", "transmission", "normal", "roughness", "anisotropy", "anisotropy_rotation"))])
+    assert 0 < material["rel_rms"] < 0.5 and 0 < material["heldout_rel_rms"] < 0.6 and 0 < material["pixel_rel_se"] < 0.5
+    # a fiber that scatters less than all its light makes a cloth that does so, too
+    both = [a + b for a, b in zip(material["albedo"], material["transmission"])]
+    assert all(0 < x < 1 for x in both)
+    normal = read_png(folder / "normal.png")
+    lengths = [math.hypot(*(2 * x / 255 - 1 for x in row[i:i + 3])) for row in normal for i in range(0, len(row), 3)]
+    assert all(x == pytest.approx(1, abs=0.02) for x in lengths) and len({bytes(row) for row in normal}) > 4
+    # the highest layer of this cloth runs along x: the surface is rougher along y, a quarter of a turn
+    rotation = read_png(folder / "anisotropy_rotation.png")
+    turns = sorted(x / 255 for row in rotation for x in row[::3])
+    assert turns[len(turns) // 2] == pytest.approx(0.25, abs=0.02)
+    found = json.loads(by_python("MaterialX", os.path.join(ROOT, "tests", "support", "python", "materialx_document.py"), folder / "cloth.mtlx"))
+    assert found["valid"], found["why"]
+    assert found["surface"] == "ND_open_pbr_surface_surfaceshader" and found["unknown"] == found["undefined"] == [] and found["materials"] == ["cloth"]
+    assert all((folder / f).exists() for f in found["files"]) and len(found["files"]) == 6
+    assert found["weight"] == pytest.approx(material["specular_weight"], rel=1e-5)

@@ -4,6 +4,6 @@
 
 #include "optimizer/worker/report/export/export_scene.h"
 
-extern const struct export_format export_mitsuba, export_pbrt, export_usd;
+extern const struct export_format export_mitsuba, export_pbrt, export_usd, export_textures, export_blender;
 
 #endif

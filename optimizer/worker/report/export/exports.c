@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt, &export_usd};
+static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt, &export_usd, &export_blender,
+                                                     &export_textures};
 enum { N_FORMAT = sizeof format / sizeof format[0] };
 static const double percent = 100.0;
 
