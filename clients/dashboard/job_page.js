@@ -93,15 +93,15 @@ function parameterTable(list, id) {
     el("th", { class: "number" }, "Allowed"), el("th", {}, "Remarks"))), el("tbody", {}, rows));
 }
 
-// The link to the report, when the job has one.
-function report(list) {
-  const page = list.files.find((f) => f.path === "report.html");
-  return page ? el("a", { class: "button main", href: page.url, target: "_blank" }, "Report") : "";
+// The link to the report as a page or as PDF, when the job has one.
+function report(list, path, text) {
+  const page = list.files.find((f) => f.path === path);
+  return page ? el("a", { class: "button main", href: page.url, target: "_blank" }, text) : "";
 }
 
 function downloads(job, list) {
   const rows = list.files.map((f) => el("tr", {}, el("td", {}, el("a", { href: f.url, class: "mono", download: f.path.split("/").pop() }, f.path)), el("td", { class: "number" }, size(f.size))));
-  return [el("p", {}, report(list), el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
+  return [el("p", {}, report(list, "report.html", "Report"), report(list, "report.pdf", "Report as PDF"), el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
 }
 
 export function jobPage(page, id) {

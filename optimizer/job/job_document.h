@@ -173,7 +173,7 @@ struct job_document {
     bool candidate_grid;                     /* true: the candidates are the built-in ones */
     struct job_candidate *candidate;
     size_t render_px, render_sample; /* render_sample 0: chosen from the paths of the fit */
-    bool export_mitsuba, export_pbrt, export_usd, export_blender, export_textures;
+    bool export_mitsuba, export_pbrt, export_usd, export_blender, export_textures, export_pdf;
 };
 
 /* Parses and checks n_bytes of text, which need not be NUL-terminated. On success the caller frees *doc with

@@ -3,7 +3,8 @@ has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mit
 
 FORMAT mitsuba: the scene as it is. pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the
 same as pbrt's. usd: what the USD library finds in the stage, with a diffuse material of the colour of its preview surface; lamp and camera are those
-of the row in rows.csv, which the stage has for the first row only."""
+of the row in rows.csv, which the stage has for the first row only. textures: a plane with the maps of the U3M material, which has no rotation of the
+anisotropy here."""
 import csv
 import json
 import os
@@ -74,17 +75,8 @@ def threes(flat):
     return [flat[i:i + 3] for i in range(0, len(flat), 3)]
 
 
-def pbrt_scene(folder, row, px, spp):
-    found = pbrt_file.read_scene(os.path.join(folder, f"view-{row}.pbrt"))
-    fibers = {}
-    for shape, (_, m) in found["objects"]["tile"]:
-        fibers.setdefault(json.dumps(m), []).append((threes(shape["P"]), shape["width"][0] / 2))
-    shapes = []
-    for i, (m, of_material) in enumerate(fibers.items()):
-        m = json.loads(m)
-        shapes.append(curves(folder, i, of_material, {
-            "type": "hair", "longitudinal_roughness": m["beta_m"][0], "azimuthal_roughness": m["beta_n"][0], "scale_tilt": m["alpha"][0],
-            "int_ior": m["eta"][0], "sigma_a": rgb(m["sigma_a"])}))
+def pbrt_surroundings(found, px, spp):
+    """Lamps, sheet and camera of a view."""
     others = {}
     for i, (mesh, _, light) in enumerate(found["meshes"]):
         more = {"emitter": {"type": "area", "radiance": rgb(light["L"])}} if light else {}
@@ -97,7 +89,43 @@ def pbrt_scene(folder, row, px, spp):
     kind = (p["screenwindow"][1], None) if plugin == "orthographic" else (None, p["fov"][0])
     near = 0.9 * float(numpy.linalg.norm(at[:3]))
     others["sensor"] = sensor(at[:3], at[3:6], at[6:], kind, px, spp, near)
+    return others
+
+
+def pbrt_scene(folder, row, px, spp):
+    found = pbrt_file.read_scene(os.path.join(folder, f"view-{row}.pbrt"))
+    fibers = {}
+    for shape, (_, m) in found["objects"]["tile"]:
+        fibers.setdefault(json.dumps(m), []).append((threes(shape["P"]), shape["width"][0] / 2))
+    shapes = []
+    for i, (m, of_material) in enumerate(fibers.items()):
+        m = json.loads(m)
+        shapes.append(curves(folder, i, of_material, {
+            "type": "hair", "longitudinal_roughness": m["beta_m"][0], "azimuthal_roughness": m["beta_n"][0], "scale_tilt": m["alpha"][0],
+            "int_ior": m["eta"][0], "sigma_a": rgb(m["sigma_a"])}))
+    others = pbrt_surroundings(found, px, spp)
     return assemble(shapes, [where for _, where in found["instances"]], others)
+
+
+def textures_scene(folder, row, px, spp):
+    """A plane with the maps of the U3M material under Mitsuba's principled BSDF, in the light of pbrt's view of that row. What a fiber shades or
+    lets through is in the maps, so there is no sheet below."""
+    with open(os.path.join(folder, "cloth.u3m"), encoding="utf-8") as f:
+        front = json.load(f)["material"]["front"]
+    found = pbrt_file.read_scene(os.path.join(os.path.dirname(folder), "pbrt", f"view-{row}.pbrt"))
+    found["meshes"] = [m for m in found["meshes"] if m[2]]
+    half = 30.0
+
+    def bitmap(key, raw=True):
+        image = front[key]["texture"]["image"]
+        size = mitsuba.ScalarTransform4f().scale([2 * half / image["width"], 2 * half / image["height"], 1])
+        return {"type": "bitmap", "filename": os.path.join(folder, image["path"]), "raw": raw, "to_uv": size}
+
+    surface = {"type": "principled", "base_color": bitmap("basecolor", raw=False), "roughness": bitmap("roughness"),
+               "anisotropic": bitmap("anisotropy_value"), "specular": front["specular_value"]["constant"]}
+    plane = {"type": "rectangle", "to_world": mitsuba.ScalarTransform4f().scale([half, half, 1]),
+             "bsdf": {"type": "normalmap", "normalmap": bitmap("normal"), "bsdf": surface}}
+    return mitsuba.load_dict({"type": "scene", "integrator": {"type": "path"}, "plane": plane, **pbrt_surroundings(found, px, spp)})
 
 
 def usd_scene(folder, row, px, spp):
@@ -121,7 +149,7 @@ def usd_scene(folder, row, px, spp):
 def main():
     form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
     mitsuba.set_variant("scalar_rgb")
-    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene}[form](folder, row, px, spp)
+    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene, "textures": textures_scene}[form](folder, row, px, spp)
     picture = numpy.array(mitsuba.render(scene))
     print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))
 

@@ -308,5 +308,10 @@ const struct job_option option_rows_fit[] = {
      .standard = "false",
      .meaning = "Textures of one tile with a MaterialX document (OpenPBR) and a U3M 1.1 material. Their pixels follow "
                 "from `fit.render_px`."},
+    {.path = "export.pdf",
+     .kind = OPTION_BOOL,
+     INTO(export_pdf),
+     .standard = "false",
+     .meaning = "The report as PDF, too: `report.pdf`. Needs the program WeasyPrint on the machine of the service."},
     {.path = NULL},
 };

@@ -3,6 +3,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 
 import jsonschema
@@ -16,12 +17,12 @@ FIT = {"path_budget": 20000, "render_px": 16, "render_samples": 1}
 VIEWS = [(20, 20, 180, 0), (45, 45, 180, 0), (60, 0, 180, 0), (45, 45, 90, 90)]
 
 
-def run(folder, document, **files):
+def run(folder, document, path=os.environ["PATH"], **files):
     (folder / "input").mkdir(parents=True)
     for name, data in {"cloth.hair": hair(), **files}.items():
         (folder / "input" / name).write_bytes(data)
     (folder / "job.json").write_text(json.dumps({"sample": "report <&> \"x\"", "fibers": {"file": "cloth.hair", "voxel_um": 5}, **document}))
-    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True)
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True, env={**os.environ, "PATH": path})
     return folder / "results"
 
 
@@ -80,3 +81,41 @@ def test_the_data_beside_it(of_table):
     assert inputs["cloth.hair"]["size"] == len(hair())
     assert len(data["curve"]) == data["result"]["n_step"] and data["curve"][0]["objective"] > 0
     assert 0 < data["started_unix_s"] <= data["written_unix_s"]
+
+
+FAKE = """#!/bin/sh
+[ "$1" = --quiet ] && [ -s "$2" ] || exit 3
+echo "%PDF-1.7 of $(basename "$2")" > "$3"
+exit {code}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", [None, 0, 1])
+def test_the_report_as_pdf(tmp_path, code):
+    """Without the program that makes it, with one that does, and with one that fails: the job is whole in every case."""
+    (tmp_path / "bin").mkdir()
+    if code is not None:
+        (tmp_path / "bin" / "weasyprint").write_text(FAKE.format(code=code))
+        (tmp_path / "bin" / "weasyprint").chmod(0o755)
+    for tool in ("sh", "basename"):
+        (tmp_path / "bin" / tool).symlink_to(shutil.which(tool))
+    folder = run(tmp_path / "job", {"measurements": {"file": "rows.csv"}, "fit": FIT, "export": {"pdf": True}}, path=str(tmp_path / "bin"),
+                 **{"rows.csv": TABLE.encode()})
+    warnings = json.loads((folder.parent / "status.json").read_text())["warnings"]
+    about = [w for w in map(str, warnings) if "report.pdf" in w]
+    assert (folder / "report.pdf").exists() == (code == 0) and not list(folder.glob(".part*"))
+    assert len(about) == (code != 0) and (code != 1 or "failed" in about[0])
+    if code is None:
+        assert "Debian package weasyprint" in about[0]
+        assert [w for w in json.loads((folder / "result.json").read_text())["warnings"] if "report.pdf" in str(w)]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("weasyprint") is None, reason="no WeasyPrint on this machine")
+def test_the_pdf_of_photographs(tmp_path, of_photographs):
+    """What the real program makes of the page: so many A4 pages, with its pictures."""
+    subprocess.run(["weasyprint", "--quiet", of_photographs / "report.html", tmp_path / "report.pdf"], check=True)
+    pdf = (tmp_path / "report.pdf").read_bytes()
+    assert pdf.startswith(b"%PDF-") and pdf.rstrip().endswith(b"%%EOF")
+    assert len(re.findall(rb"/Subtype ?/Image", pdf)) >= 4

@@ -26,8 +26,15 @@ static const char style[] =
     ".charts { display: flex; flex-wrap: wrap; gap: 12px; } .pictures { display: flex; flex-wrap: wrap; gap: 14px; } "
     "figure { margin: 0; break-inside: avoid; } figure img { width: 104px; height: 104px; image-rendering: pixelated; "
     "margin-right: 3px; } figcaption { font-size: .85em; color: #555; }\n"
-    "@media print { body { margin: 0; font-size: 11px; } h2 { break-after: avoid; } tr, svg { break-inside: avoid; } "
-    "}\n";
+    "@page { size: A4; margin: 15mm; }\n"
+    "@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10px; } h2, h2 + p { break-after: avoid; "
+    "} tr, "
+    "svg "
+    "{ break-inside: avoid; } th, td { padding-right: .8em; } td.n { white-space: nowrap; } td { overflow-wrap: "
+    "anywhere; "
+    "} .charts, .pictures { display: block; } .charts svg { width: 48%; height: auto; } figure { display: "
+    "inline-block; "
+    "margin: 0 14px 10px 0; vertical-align: top; } }\n";
 
 static void heading(const char *text, FILE *out) { fprintf(out, "<h2>%s</h2>\n", text); }
 

@@ -6,6 +6,7 @@
 #include "optimizer/worker/report/cloth/quality.h"
 #include "optimizer/worker/report/export/exports.h"
 #include "optimizer/worker/report/page/report_page.h"
+#include "optimizer/worker/report/page/report_pdf.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
@@ -33,12 +34,14 @@ static void warn_of_overlap(const struct pipeline_context *c)
 static status report_geometry(struct pipeline_context *c, struct error *err)
 {
     reconstruct_warn_fibers(&c->geometry, &c->fiber, &(struct warning_sink){pipeline_warn, c});
+    report_pdf_warn(c);
     pipeline_reach_verdict(c);
     status s = result_geometry_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);
     if (s == STATUS_OK) s = quality_write(c, err);
-    return s == STATUS_OK ? report_write(c, err) : s;
+    if (s == STATUS_OK) s = report_write(c, err);
+    return s == STATUS_OK ? report_pdf_write(c, err) : s;
 }
 
 status stage_report(struct pipeline_context *c, struct error *err)
@@ -50,6 +53,7 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = pipeline_cloth_use(c, pipeline_best_model(c), err);
     if (s == STATUS_OK) s = pipeline_warn_pairing(c, err);
     if (s == STATUS_OK) warn_of_overlap(c);
+    if (s == STATUS_OK) report_pdf_warn(c);
     if (s == STATUS_OK) pipeline_reach_verdict(c);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
@@ -58,5 +62,6 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = result_renderings_write(c, 0.1, err);
     if (s == STATUS_OK) s = exports_write(c, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
-    return s == STATUS_OK ? report_write(c, err) : s;
+    if (s == STATUS_OK) s = report_write(c, err);
+    return s == STATUS_OK ? report_pdf_write(c, err) : s;
 }

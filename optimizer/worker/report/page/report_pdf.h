@@ -1,0 +1,13 @@
+/* results/report.pdf: report.html as PDF, for jobs that ask for it. The program WeasyPrint makes it, which
+ * Selvedge does not need otherwise (Debian package weasyprint). */
+#ifndef SELVEDGE_OPTIMIZER_REPORT_PDF_H
+#define SELVEDGE_OPTIMIZER_REPORT_PDF_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Warns when the job asks for a PDF that this machine cannot make: before results are written, which list warnings. */
+void report_pdf_warn(const struct pipeline_context *c);
+/* Makes the PDF of the written page. One that cannot be made is a warning. STATUS_CANCELLED. */
+status report_pdf_write(struct pipeline_context *c, struct error *err);
+
+#endif
