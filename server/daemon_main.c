@@ -153,12 +153,10 @@ static void raise_descriptor_limit(const struct settings *s)
 
 /* Writes daemon.json, {"url", "pid"}, for clients on this machine. A failure is only logged: clients can be given
  * the address, and a full disk is no reason to stop. */
-static void announce(const struct settings *s, unsigned port, struct log *log)
+static void announce(const struct settings *s, const char *url, struct log *log)
 {
     struct error err = {0};
-    char path[PATH_BYTES], text[256], url[160];
-    bool v6 = strchr(s->listen, ':') != NULL;
-    snprintf(url, sizeof url, "http://%s%.100s%s:%u", v6 ? "[" : "", s->listen, v6 ? "]" : "", port);
+    char path[PATH_BYTES], text[LISTEN_URL_BYTES + 64];
     int n = snprintf(text, sizeof text, "{\"url\":\"%s\",\"pid\":%d}\n", url, (int)getpid());
     path_join(path, s->data, "daemon.json", NULL);
     if (durable_replace_volatile(path, text, (size_t)n, &err) != STATUS_OK) {
@@ -199,15 +197,15 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     struct static_files *files = NULL;
     struct http_server *server = NULL;
     char worker[PATH_BYTES];
-    unsigned port = 0;
+    char url[LISTEN_URL_BYTES] = "";
     worker_path(s, worker);
     status r = static_files_new(s->web, s->openapi, log, &files, err);
     if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
     r = supervisor_start(service, worker, &supervisor, err);
-    if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, &port, err);
+    if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, url, err);
     if (r == STATUS_OK) {
-        announce(s, port, log);
+        announce(s, url, log);
         wait_for_signal(signals, server, log);
     }
     if (service != NULL) atomic_store(&service->stopping, true);

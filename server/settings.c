@@ -29,6 +29,10 @@ struct setting {
 static const struct setting table[] = {
     TEXT("server", "listen", listen, "127.0.0.1",
          "IP address to listen on; only loopback addresses such as 127.0.0.1 and ::1 are allowed"),
+    TEXT("server", "unix_socket", unix_socket, "",
+         "path of a unix socket to listen on instead of address and port; only this user may connect to it"),
+    TEXT("server", "public_origin", public_origin, "",
+         "address under which a proxy on this machine publishes the service, such as https://selvedge.example.org"),
     NUMBER("server", "port", port, 7878, 0, 65535, "TCP port; 0 picks a free one and prints it"),
     TEXT("server", "data", data, "selvedge-data", "folder of the database and of all jobs, on a local file system"),
     TEXT("server", "web", web, "", "folder of the dashboard; empty: found from the folder of the program"),

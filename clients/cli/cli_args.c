@@ -257,8 +257,9 @@ static status check(const struct cli_args *a, int given, struct error *err)
                          c->needs != NULL ? c->needs : "a job id (`selvedge list` shows them)", c->name, c->operand);
     if (c->operand == NULL && a->operand != NULL)
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
-    if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0)
-        return error_set(err, STATUS_INVALID, "server '%s' is not an http:// or https:// address", a->server);
+    if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0 &&
+        strncmp(a->server, "unix:/", 6) != 0)
+        return error_set(err, STATUS_INVALID, "server '%s' is not an http://, https:// or unix:/ address", a->server);
     return STATUS_OK;
 }
 

@@ -14,7 +14,8 @@ enum { MAX_REPLY_BYTES = 64 << 20, CONNECT_TIMEOUT_S = 10, STALL_S = 60, MAX_TRY
 
 struct http {
     CURL *curl;
-    char *server;
+    char *server;        /* as given */
+    char *base;          /* what the paths of requests are appended to */
     char *authorization; /* "Authorization: Bearer ..." or NULL */
     const volatile sig_atomic_t *stop;
     char why[CURL_ERROR_SIZE];
@@ -27,17 +28,19 @@ status http_new(const char *server, const char *token, const volatile sig_atomic
     if (h == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
     h->curl = curl_easy_init();
     h->server = strdup(server);
+    h->base = strdup(strncmp(server, "unix:", 5) == 0 ? "http://localhost" : server);
     h->stop = stop;
     if (token != NULL) {
         size_t n = strlen(token) + sizeof "Authorization: Bearer ";
         h->authorization = malloc(n);
         if (h->authorization != NULL) snprintf(h->authorization, n, "Authorization: Bearer %s", token);
     }
-    if (h->curl == NULL || h->server == NULL || (token != NULL && h->authorization == NULL)) {
+    if (h->curl == NULL || h->server == NULL || h->base == NULL || (token != NULL && h->authorization == NULL)) {
         http_free(h);
         return error_set(err, STATUS_NO_MEMORY, "cannot start libcurl: out of memory");
     }
     for (size_t n = strlen(h->server); n > 8 && h->server[n - 1] == '/'; n--) h->server[n - 1] = '\0';
+    for (size_t n = strlen(h->base); n > 8 && h->base[n - 1] == '/'; n--) h->base[n - 1] = '\0';
     *http = h;
     return STATUS_OK;
 }
@@ -47,6 +50,7 @@ void http_free(struct http *http)
     if (http == NULL) return;
     if (http->curl != NULL) curl_easy_cleanup(http->curl);
     free(http->server);
+    free(http->base);
     free(http->authorization);
     free(http);
 }
@@ -134,13 +138,14 @@ static struct curl_slist *header_list(const struct http *http, const char *const
 static status prepare(struct http *http, const char *path, struct http_reply *reply, struct error *err)
 {
     char url[2048];
-    if (snprintf(url, sizeof url, "%s%s", strncmp(path, "http", 4) == 0 ? "" : http->server, path) >= (int)sizeof url)
+    if (snprintf(url, sizeof url, "%s%s", strncmp(path, "http", 4) == 0 ? "" : http->base, path) >= (int)sizeof url)
         return error_set(err, STATUS_INVALID, "the address '%.60s...' is too long", path);
     CURL *c = http->curl;
     curl_easy_reset(c);
     *reply = (struct http_reply){.upload_offset = -1, .log_next = -1, .retry_after_s = -1.0};
     http->why[0] = '\0';
     curl_easy_setopt(c, CURLOPT_URL, url);
+    if (strncmp(http->server, "unix:", 5) == 0) curl_easy_setopt(c, CURLOPT_UNIX_SOCKET_PATH, http->server + 5);
     curl_easy_setopt(c, CURLOPT_PROTOCOLS_STR, "http,https");
     curl_easy_setopt(c, CURLOPT_USERAGENT, "selvedge");
     curl_easy_setopt(c, CURLOPT_ERRORBUFFER, http->why);

@@ -12,8 +12,8 @@
 
 struct http;
 
-/* server: "http://host:port", with or without a trailing '/'. token may be NULL. stop is set by a signal handler
- * (may be NULL); a transfer then soon ends with STATUS_CANCELLED. STATUS_NO_MEMORY. */
+/* server: "http://host:port", with or without a trailing '/', or "unix:/path/of/the.socket". token may be NULL. stop is
+ * set by a signal handler (may be NULL); a transfer then soon ends with STATUS_CANCELLED. STATUS_NO_MEMORY. */
 status http_new(const char *server, const char *token, const volatile sig_atomic_t *stop, struct http **http,
                 struct error *err);
 void http_free(struct http *http);

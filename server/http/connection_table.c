@@ -98,12 +98,16 @@ void connection_closed(struct connection_table *t, struct connection_entry *e)
     free(e);
 }
 
-/* Bytes that the client's machine has acknowledged since the connection began; 0 where the socket counts none. */
-static uint64_t acknowledged_bytes(int fd)
+/* Bytes that the client's machine has acknowledged since the connection began. Returns false where the socket counts
+ * none: over a unix socket, whose readers are local and have no minimum rate. */
+static bool acknowledged_bytes(int fd, uint64_t *n_bytes)
 {
     struct tcp_info info = {0};
     socklen_t n = sizeof info;
-    return getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &n) == 0 ? info.tcpi_bytes_acked : 0;
+    *n_bytes = 0;
+    if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &n) != 0) return false;
+    *n_bytes = info.tcpi_bytes_acked;
+    return true;
 }
 
 static void enter(struct connection_table *t, struct connection_entry *e, enum phase phase)
@@ -116,7 +120,7 @@ static void enter(struct connection_table *t, struct connection_entry *e, enum p
     if (phase == PHASE_SEND) {
         e->served = true;
         e->window_s = e->since_s;
-        e->window_acknowledged = acknowledged_bytes(e->fd);
+        acknowledged_bytes(e->fd, &e->window_acknowledged);
     }
     pthread_mutex_unlock(&t->lock);
 }
@@ -137,7 +141,8 @@ static bool reads_slowly(const struct connection_table *t, struct connection_ent
     double window_s = now - e->window_s;
     int n_waiting = 0;
     if (window_s < RATE_GRACE_S) return false;
-    uint64_t n = acknowledged_bytes(e->fd);
+    uint64_t n;
+    if (!acknowledged_bytes(e->fd, &n)) return false;
     bool few = (double)(n - e->window_acknowledged) < t->min_rate_bytes_per_s * window_s;
     e->window_s = now;
     e->window_acknowledged = n;

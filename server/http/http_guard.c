@@ -84,30 +84,17 @@ bool guard_framing(struct http_request *r)
     return true;
 }
 
-/* host: a name with or without ":port". */
-static bool host_is_local(const char *host, const char *listen)
-{
-    const char *const known[] = {"localhost", "127.0.0.1", "[::1]", listen};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        size_t n = strlen(known[i]);
-        if (strncasecmp(host, known[i], n) != 0) continue;
-        const char *port = host + n;
-        if (*port == '\0') return true;
-        if (*port == ':' && strspn(port + 1, "0123456789") == strlen(port + 1)) return true;
-    }
-    return false;
-}
-
 bool guard_site(struct http_request *r, const char *method)
 {
     const char *host = request_header(r, "Host"), *origin = request_header(r, "Origin");
-    if (host != NULL && !host_is_local(host, r->service->settings->listen)) {
-        reply_code(r, "host", "Host", "this service accepts only requests to localhost, 127.0.0.1 and [::1]");
+    if (host != NULL && !http_host_known(r->service->settings, host)) {
+        reply_code(r, "host", "Host",
+                   "this service accepts only requests to localhost, 127.0.0.1, [::1] and its server.public_origin");
         return false;
     }
     bool reads = strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0;
     if (reads || origin == NULL) return true;
-    if (host != NULL && strncmp(origin, "http://", 7) == 0 && strcasecmp(origin + 7, host) == 0) return true;
+    if (http_origin_known(r->service->settings, origin, host)) return true;
     reply_code(r, "origin", "Origin", "a page of another site must not change anything here");
     return false;
 }

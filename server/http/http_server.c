@@ -2,23 +2,19 @@
 #include "server/endpoints/handlers.h"
 #include "server/http/connection_table.h"
 #include "server/http/http_guard.h"
+#include "server/http/http_listen.h"
 #include "server/http/http_reply.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 enum {
     CONNECTION_POOL_BYTES = 256 * 1024,
     THREAD_STACK_BYTES = 2 << 20, /* the JSON parser goes 2,048 levels deep */
-    DRAIN_LIMIT_BYTES = 64 << 20,
-    LISTEN_BACKLOG = 1024,
-    BIND_TRIES = 40,
-    BIND_PAUSE_US = 50000
+    DRAIN_LIMIT_BYTES = 64 << 20
 };
 
 struct http_server {
@@ -202,59 +198,8 @@ static void on_panic(void *context, const char *file, unsigned line, const char 
     abort();
 }
 
-/* A process that a killed daemon was starting may hold its socket for a moment. */
-static int bind_patiently(int fd, const struct sockaddr *address, socklen_t n)
-{
-    int result = bind(fd, address, n);
-    for (int i = 0; result != 0 && errno == EADDRINUSE && i < BIND_TRIES; i++) {
-        usleep(BIND_PAUSE_US);
-        result = bind(fd, address, n);
-    }
-    return result;
-}
-
-static status open_socket(const struct settings *settings, int *out, unsigned *port, struct error *err)
-{
-    struct sockaddr_storage address = {0};
-    struct sockaddr_in *v4 = (struct sockaddr_in *)(void *)&address;
-    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)(void *)&address;
-    socklen_t n = sizeof *v4;
-    bool loopback;
-    if (inet_pton(AF_INET, settings->listen, &v4->sin_addr) == 1) {
-        address.ss_family = AF_INET;
-        v4->sin_port = htons((uint16_t)settings->port);
-        loopback = (ntohl(v4->sin_addr.s_addr) >> 24) == 127;
-    } else if (inet_pton(AF_INET6, settings->listen, &v6->sin6_addr) == 1) {
-        address.ss_family = AF_INET6;
-        v6->sin6_port = htons((uint16_t)settings->port);
-        n = sizeof *v6;
-        loopback = IN6_IS_ADDR_LOOPBACK(&v6->sin6_addr);
-    } else
-        return error_set_field(err, STATUS_INVALID, "server.listen", "cannot listen on '%s': not an IP address",
-                               settings->listen);
-    if (!loopback)
-        return error_set_field(
-            err, STATUS_INVALID, "server.listen",
-            "cannot listen on '%s': without access tokens only loopback addresses (127.0.0.1, ::1) are allowed; "
-            "use an SSH tunnel or an authenticating proxy on this machine",
-            settings->listen);
-    int on = 1, fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0) return error_set_errno(err, "cannot open a socket");
-    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind_patiently(fd, (struct sockaddr *)&address, n) != 0 || listen(fd, LISTEN_BACKLOG) != 0 ||
-        getsockname(fd, (struct sockaddr *)&address, &n) != 0) {
-        status s =
-            error_set_errno(err, "cannot listen on '%s', port %lld", settings->listen, (long long)settings->port);
-        close(fd);
-        return s;
-    }
-    *port = address.ss_family == AF_INET ? ntohs(v4->sin_port) : ntohs(v6->sin6_port);
-    *out = fd;
-    return STATUS_OK;
-}
-
 status http_server_start(struct job_service *service, http_route_finder *find_route, const struct static_files *files,
-                         struct http_server **out, unsigned *port, struct error *err)
+                         struct http_server **out, char url[LISTEN_URL_BYTES], struct error *err)
 {
     const struct settings *settings = service->settings;
     int fd = -1;
@@ -265,7 +210,7 @@ status http_server_start(struct job_service *service, http_route_finder *find_ro
     s->files = files;
     status result =
         connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s, &s->connection, err);
-    if (result == STATUS_OK) result = open_socket(settings, &fd, port, err);
+    if (result == STATUS_OK) result = http_listen(settings, &fd, url, err);
     if (result != STATUS_OK) goto out;
     MHD_set_panic_func(on_panic, service->log);
     s->daemon = MHD_start_daemon(
@@ -291,7 +236,11 @@ out:
 void http_server_stop(struct http_server *s)
 {
     if (s == NULL) return;
-    if (s->daemon != NULL) MHD_stop_daemon(s->daemon);
+    if (s->daemon != NULL) {
+        http_listen_end(
+            s->service->settings); /* while the socket is open, so that no other process owns the file yet */
+        MHD_stop_daemon(s->daemon);
+    }
     connection_table_free(s->connection);
     free(s);
 }

@@ -6,6 +6,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_SERVER_H
 #define SELVEDGE_SERVER_HTTP_SERVER_H
 
+#include "server/http/http_listen.h"
 #include "server/jobs/job_service.h"
 
 #include <microhttpd.h>
@@ -55,11 +56,10 @@ typedef const struct http_route *http_route_finder(const char *method, const cha
 /* That of the service's endpoints, by the table in http_route.c. */
 http_route_finder http_route_find;
 
-/* Starts the threads that answer requests, each by the route that find_route gives for it. Address and port come
- * from the settings; *port is the port in use. files: see static_files.h. STATUS_INVALID (listen address),
- * STATUS_IO, STATUS_NO_MEMORY. */
+/* Listens as the settings say (http_listen.h) and answers requests, each by the route that find_route gives for it.
+ * *url is the address. files: see static_files.h. Fails as http_listen does, and with STATUS_NO_MEMORY. */
 status http_server_start(struct job_service *service, http_route_finder *find_route, const struct static_files *files,
-                         struct http_server **server, unsigned *port, struct error *err);
+                         struct http_server **server, char url[LISTEN_URL_BYTES], struct error *err);
 /* Ends all connections and frees the server. What unfinished uploads have received is kept. */
 void http_server_stop(struct http_server *server);
 /* Ends connections that are too slow. To be called about once a second. */
