@@ -49,7 +49,7 @@ bench-service: | deps-test ## what the daemon costs: the list of jobs, answers b
 EXPORTS_PYTHON := $(BUILD)/exports-python
 $(EXPORTS_PYTHON)/bin/packages-are-there:
 	@/usr/bin/python3 -m venv $(EXPORTS_PYTHON) && $(EXPORTS_PYTHON)/bin/pip install -q mitsuba numpy usd-core MaterialX >&2 && touch $@
-bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there | deps-test ## exported scenes rendered by Mitsuba 3 against the job's own renderings (4 minutes; installs Mitsuba and USD from PyPI into build)
+bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there | deps-test ## exported scenes rendered by Mitsuba 3 against the job's own renderings (6 minutes; installs Mitsuba and USD from PyPI into build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python
 

@@ -2,7 +2,7 @@
 has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
 
 FORMAT mitsuba: the scene as it is. pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the
-same as pbrt's. usd: what the USD library finds in the stage, with a diffuse material of the colour of its preview surface; lamp and camera are those
+same as pbrt's. usd: what the USD library finds in the stage, with the principled BSDF of the numbers of its preview surface; lamp and camera are those
 of the row in rows.csv, which the stage has for the first row only. textures: a plane with the maps of the U3M material, which has no rotation of the
 anisotropy here."""
 import csv
@@ -128,20 +128,25 @@ def textures_scene(folder, row, px, spp):
     return mitsuba.load_dict({"type": "scene", "integrator": {"type": "path"}, "plane": plane, **pbrt_surroundings(found, px, spp)})
 
 
+def preview_surface(surface):
+    """A UsdPreviewSurface without metal and coat: diffuse under a dielectric."""
+    return {"type": "principled", "base_color": rgb(surface["color"]), "roughness": surface["roughness"], "eta": max(surface["index"], 1.001)}
+
+
 def usd_scene(folder, row, px, spp):
     # a process of its own: Mitsuba and the USD library in one process end it
     done = subprocess.run([sys.executable, os.path.join(SUPPORT, "usd_stage.py"), os.path.join(folder, "cloth.usda")], stdout=subprocess.PIPE, check=True)
     found = json.loads(done.stdout)
     place = place_of(folder, row)
     lamp, camera, up = ([float(place[f"{name}_{a}"]) for a in "xyz"] for name in ("lamp", "camera", "up"))
-    shapes = [curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]], {"type": "diffuse", "reflectance": rgb(group["color"])})
+    shapes = [curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]], preview_surface(group["surface"]))
               for i, group in enumerate(found["curves"])]
     turn = mitsuba.ScalarTransform4f().look_at(origin=lamp, target=[0, 0, 0], up=[0, 0.1, 1])
     half = found["lamp"]["side"] / 2
     others = {
         "lamp": {"type": "rectangle", "to_world": turn @ mitsuba.ScalarTransform4f().scale([half, half, 1]),
                  "emitter": {"type": "area", "radiance": rgb([found["lamp"]["radiance"]] * 3)}},
-        "sheet": square([found["sheet"][k] for k in (0, 1, 3)], bsdf={"type": "diffuse", "reflectance": rgb(found["sheet_color"])}),
+        "sheet": square([found["sheet"][k] for k in (0, 1, 3)], bsdf={"type": "diffuse", "reflectance": rgb(found["sheet_surface"]["color"])}),
         "sensor": sensor(camera, [0, 0, 0], up, (None, found["camera"]["fov_deg"]), px, spp, 0.9 * float(numpy.linalg.norm(camera)))}
     return assemble(shapes, found["instances"], others)
 

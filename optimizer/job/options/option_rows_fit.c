@@ -293,8 +293,8 @@ const struct job_option option_rows_fit[] = {
      INTO(export_usd),
      .check = job_check_export,
      .standard = "false",
-     .meaning = "The same scene as Universal Scene Description: curves with a diffuse preview surface of which cloth "
-                "is as bright."},
+     .meaning =
+         "The same scene as Universal Scene Description: curves with a preview surface of which cloth is as bright."},
     {.path = "export.blender",
      .kind = OPTION_BOOL,
      INTO(export_blender),

@@ -5,11 +5,12 @@ import sys
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
 
-def color_of(prim):
+def surface_of(prim):
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     surface, _, _ = material.ComputeSurfaceSource()
     assert surface.GetIdAttr().Get() == "UsdPreviewSurface"
-    return list(surface.GetInput("diffuseColor").Get())
+    return {"color": list(surface.GetInput("diffuseColor").Get()), "index": surface.GetInput("ior").Get(),
+            "roughness": surface.GetInput("roughness").Get()}
 
 
 def curves_of(stage, tile):
@@ -26,7 +27,7 @@ def curves_of(stage, tile):
         for n, width in zip(counts, widths):
             fibers.append({"points": [list(p) for p in points[at:at + n]], "radius": width / 2})
             at += n
-        found.append({"fibers": fibers, "color": color_of(prim), "display": list(c.GetDisplayColorAttr().Get()[0]),
+        found.append({"fibers": fibers, "surface": surface_of(prim), "display": list(c.GetDisplayColorAttr().Get()[0]),
                       "extent": [list(x) for x in c.GetExtentAttr().Get()], "library_extent": [list(x) for x in right]})
     return found
 
@@ -44,7 +45,7 @@ def main():
     print(json.dumps({
         "unit_m": UsdGeom.GetStageMetersPerUnit(stage), "up": UsdGeom.GetStageUpAxis(stage), "curves": curves_of(stage, tile),
         "instances": [list(p) for p in tiles.GetPositionsAttr().Get()], "sheet": [list(p) for p in sheet.GetPointsAttr().Get()],
-        "sheet_color": color_of(sheet.GetPrim()),
+        "sheet_surface": surface_of(sheet.GetPrim()),
         "camera": {"at": list(camera.transform.ExtractTranslation()), "look": list(look), "fov_deg": camera.GetFieldOfView(camera.FOVHorizontal)},
         "lamp": {"at": list(place.ExtractTranslation()), "look": list(place.TransformDir(Gf.Vec3d(0, 0, -1))),
                  "side": lamp.GetWidthAttr().Get(), "radiance": lamp.GetIntensityAttr().Get()}}))

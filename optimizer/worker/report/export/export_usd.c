@@ -2,8 +2,7 @@
  * BasisCurves (cubic B-splines) with widths and a display colour, a PointInstancer that repeats their tile, the black
  * sheet as a Mesh, camera and lamp of the first row. Millimetres, z is up.
  *
- * A UsdPreviewSurface has no light that goes through a fiber. Its colour is that of an opaque diffuse fiber of which
- * cloth is as bright (hair_fit.h); it has no highlight. */
+ * A UsdPreviewSurface has no light that goes through a fiber. It is the opaque fiber of hair_fit.h. */
 #include "optimizer/worker/report/export/export_formats.h"
 #include "optimizer/worker/report/json_number.h"
 
@@ -61,7 +60,7 @@ static void print_points(FILE *text, const struct export_scene *e, size_t group)
 
 static void print_curves(FILE *text, const struct export_scene *e, size_t group)
 {
-    const double *c = e->hair[group].diffuse;
+    const double *c = e->hair[group].surface.diffuse;
     fprintf(text,
             "            def BasisCurves \"fibers_%zu\" (\n"
             "                prepend apiSchemas = [\"MaterialBindingAPI\"]\n            )\n            {\n"
@@ -95,7 +94,7 @@ static void print_tiles(FILE *text, const struct export_scene *e)
     fprintf(text, "        }\n    }\n");
 }
 
-static void print_material(FILE *text, const char *name, const double rgb[3])
+static void print_material(FILE *text, const char *name, const struct surface_fit *f)
 {
     fprintf(text,
             "        def Material \"%s\"\n        {\n"
@@ -103,11 +102,9 @@ static void print_material(FILE *text, const char *name, const double rgb[3])
             "            def Shader \"surface\"\n            {\n"
             "                uniform token info:id = \"UsdPreviewSurface\"\n"
             "                color3f inputs:diffuseColor = (%.6g, %.6g, %.6g)\n"
-            "                int inputs:useSpecularWorkflow = 1\n"
-            "                color3f inputs:specularColor = (0, 0, 0)\n"
-            "                float inputs:roughness = 1\n                token outputs:surface\n"
-            "            }\n        }\n",
-            name, name, rgb[0], rgb[1], rgb[2]);
+            "                float inputs:ior = %.6g\n                float inputs:roughness = %.6g\n"
+            "                token outputs:surface\n            }\n        }\n",
+            name, name, f->diffuse[0], f->diffuse[1], f->diffuse[2], f->index, f->roughness);
 }
 
 static void print_materials(FILE *text, const struct export_scene *e)
@@ -116,9 +113,9 @@ static void print_materials(FILE *text, const struct export_scene *e)
     fprintf(text, "    def Scope \"Materials\"\n    {\n");
     for (size_t g = 0; g < e->model->sets.n_set; g++) {
         snprintf(name, sizeof name, "fiber_%zu", g);
-        print_material(text, name, e->hair[g].diffuse);
+        print_material(text, name, &e->hair[g].surface);
     }
-    print_material(text, "sheet", (const double[3]){0, 0, 0});
+    print_material(text, "sheet", &(struct surface_fit){.index = 1.0, .roughness = 1.0});
     fprintf(text, "    }\n");
 }
 
@@ -211,12 +208,12 @@ static status write_stage(const struct export_scene *e, struct error *err)
 
 static json_t *material_json(const struct hair_fit *h)
 {
-    double turned[3];
-    for (int c = 0; c < 3; c++) turned[c] = HAIR_FIT_DIFFUSE_TURNED * h->diffuse[c];
-    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "diffuse_color", json_number_list(h->diffuse, 3, 1.0), "rel_rms",
-                     json_number(h->diffuse_rel_rms), "fitted_albedo", json_number_list(h->albedo, 3, 1.0), "albedo",
-                     json_number_list(h->diffuse, 3, 1.0), "fitted_turned_back", json_number_list(h->turned, 3, 1.0),
-                     "turned_back", json_number_list(turned, 3, 1.0));
+    const struct surface_fit *f = &h->surface;
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "diffuse_color", json_number_list(f->diffuse, 3, 1.0),
+                     "index", json_number(f->index), "roughness", json_number(f->roughness), "rel_rms",
+                     json_number(f->rel_rms), "fitted_albedo", json_number_list(h->albedo, 3, 1.0), "albedo",
+                     json_number_list(f->albedo, 3, 1.0), "fitted_turned_back", json_number_list(h->turned, 3, 1.0),
+                     "turned_back", json_number_list(f->turned, 3, 1.0));
 }
 
 static status write_usd(struct export_scene *e, json_t **materials, struct error *err)

@@ -5,7 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_THETA_O = 6, N_THETA_I = 28, N_PHI = 18, N_TURN = 4, N_UNKNOWN = 6, N_START = 4, N_EVALUATION = 1000 };
+enum {
+    N_THETA_O = 6,
+    N_THETA_I = 28,
+    N_PHI = 18,
+    N_TURN = 4,
+    N_UNKNOWN = 6,
+    N_START = 4,
+    N_EVALUATION = 1000,
+    N_WIDTH = 12
+};
 #define N_VALUE ((size_t)N_THETA_O * N_THETA_I * N_PHI * 3)
 /* Cloth scatters light many times, and what returns from it has turned round in some fiber. So the share of light
  * that is kept, against what is absorbed, counts more than the shapes of the lobes, and what turns back as much. */
@@ -167,26 +176,101 @@ static void mean_share(const struct target *t, double share[N_THETA_O][N_SIDE][3
     }
 }
 
-/* Density of a diffuse cylinder's light: the mean over its width of cos / pi, towards both directions. */
-static void fill_cylinder(const double colour[3], struct target *t)
+/* ---- an opaque fiber ---- */
+
+static double dielectric(double cosine, double index)
 {
-    double *at = t->lobes;
+    double cos_t = sqrt(1.0 - (1.0 - cosine * cosine) / (index * index));
+    double p = (index * cosine - cos_t) / (index * cosine + cos_t),
+           s = (cosine - index * cos_t) / (cosine + index * cos_t);
+    return 0.5 * (p * p + s * s);
+}
+
+static double smith(double cosine, double alpha)
+{
+    return 2.0 * cosine / (cosine + sqrt(alpha * alpha + (1.0 - alpha * alpha) * cosine * cosine));
+}
+
+/* GGX (Walter et al. 2007) for normals in the normal plane of the fiber; times pi, so that diffuse is 1. */
+static double highlight(double cos_i, double cos_o, double half2, double index, double roughness)
+{
+    double alpha = roughness * roughness, half = sqrt(half2), z = (cos_i + cos_o) / (2.0 * half);
+    double t = z * z * (alpha * alpha - 1.0) + 1.0;
+    return alpha * alpha / (t * t) * smith(cos_i, alpha) * smith(cos_o, alpha) * dielectric(half, index) /
+           (4.0 * cos_i * cos_o);
+}
+
+/* Means over the width of the fiber of cos cos f, f = 1 / pi for [0] and the highlight for [1], towards wi from wo. */
+static void over_width(double theta_o, double theta_i, double phi, const double x[2], double out[2])
+{
+    /* square of the cosine of half of the angle between both directions */
+    double half2 = 0.5 * (1.0 + sin(theta_o) * sin(theta_i) + cos(theta_o) * cos(theta_i) * cos(phi));
+    double step = (M_PI - phi) / N_WIDTH;
+    out[0] = out[1] = 0.0;
+    for (int k = 0; k < N_WIDTH; k++) {
+        double a = phi - M_PI_2 + (k + 0.5) * step, o = cos(a), i = cos(a - phi);
+        out[0] += 0.5 * step * o * i / M_PI;
+        out[1] += 0.5 * step * o * i / M_PI *
+                  highlight(fmax(i * cos(theta_i), 1e-6), fmax(o * cos(theta_o), 1e-6), fmax(half2, 1e-6), x[0], x[1]);
+    }
+}
+
+/* The dielectric and the diffuse part of colour 1, as the first two channels of the lobes. */
+static void fill_parts(struct target *t, const double x[2])
+{
+    double *at = t->lobes, part[2];
     for (int o = 0; o < N_THETA_O; o++)
         for (int i = 0; i < N_THETA_I; i++)
             for (int k = 0; k < N_PHI; k++, at += 3) {
-                double lit = 0.5 * ((M_PI - t->phi[k]) * cos(t->phi[k]) + sin(t->phi[k]));
-                for (int c = 0; c < 3; c++) at[c] = colour[c] * cos(t->theta_i[i]) * lit / (2.0 * M_PI);
+                over_width(t->theta_o[o], t->theta_i[i], t->phi[k], x, part);
+                at[0] = part[1] * cos(t->theta_i[i]);
+                at[1] = part[0] * cos(t->theta_i[i]);
+                at[2] = 0.0;
             }
 }
 
-static void fit_cylinder(struct target *t, struct hair_fit *fit)
+/* Colours by Kubelka and Munk, from shares of the parts. */
+static void choose_colour(const struct target *t, const struct hair_fit *fit, struct surface_fit *f)
 {
+    double share[N_THETA_O][N_SIDE][3], turned[3], all[3];
+    add_shares(t, t->lobes, share);
+    mean_share(t, share, turned, all);
     for (int c = 0; c < 3; c++) {
-        double lost = fmax(1.0 - fit->albedo[c], 0.0) / fmax(fit->turned[c], 1e-6);
-        fit->diffuse[c] = 1.0 / (1.0 + HAIR_FIT_DIFFUSE_TURNED * lost);
+        double q = fmax(1.0 - fit->albedo[c], 0.0) / fmax(fit->turned[c], 1e-6);
+        double colour = (1.0 - all[0] - q * turned[0]) / (all[1] + q * turned[1]);
+        f->diffuse[c] = fmin(fmax(colour, 0.0), fmax(1.0 - all[0], 0.0));
+        f->albedo[c] = all[0] + f->diffuse[c] * all[1];
+        f->turned[c] = turned[0] + f->diffuse[c] * turned[1];
     }
-    fill_cylinder(fit->diffuse, t);
-    fit->diffuse_rel_rms = sqrt(shape_square(t));
+}
+
+static void fill_surface(struct target *t, const struct hair_fit *fit, const double x[2], struct surface_fit *f)
+{
+    fill_parts(t, x);
+    choose_colour(t, fit, f);
+    for (size_t k = 0; k < N_VALUE; k += 3) {
+        double shine = t->lobes[k], base = t->lobes[k + 1];
+        for (size_t c = 0; c < 3; c++) t->lobes[k + c] = shine + f->diffuse[c] * base;
+    }
+    f->index = x[0];
+    f->roughness = x[1];
+    f->rel_rms = sqrt(shape_square(t));
+}
+
+/* The best of a grid: two numbers, and not more than a surface can be right. */
+static void fit_surface(struct target *t, struct hair_fit *fit)
+{
+    static const double index[] = {1.0, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0},
+                        roughness[] = {0.2, 0.3, 0.4, 0.5, 0.65, 0.8};
+    double lowest = INFINITY;
+    for (size_t i = 0; i < sizeof index / sizeof index[0]; i++)
+        for (size_t k = 0; k < sizeof roughness / sizeof roughness[0]; k++) {
+            struct surface_fit f;
+            fill_surface(t, fit, (const double[2]){index[i], roughness[k]}, &f);
+            if (!(f.rel_rms < lowest)) continue;
+            lowest = f.rel_rms;
+            fit->surface = f;
+        }
 }
 
 static status fit_target(struct target *t, struct hair_fit *fit, struct error *err)
@@ -200,7 +284,7 @@ static status fit_target(struct target *t, struct hair_fit *fit, struct error *e
     add_shares(t, t->lobes, share);
     mean_share(t, t->share, fit->turned, fit->albedo);
     mean_share(t, share, fit->lobes_turned, fit->lobes_albedo);
-    fit_cylinder(t, fit);
+    fit_surface(t, fit);
     return STATUS_OK;
 }
 

@@ -13,15 +13,15 @@ struct hair_fit {
     /* Shares of the light, means over directions, by channel: what is scattered, and what of it turns back to the side
      * that it came from; of the fiber, and of the lobes. */
     double albedo[3], turned[3], lobes_albedo[3], lobes_turned[3];
-    /* For programs with surfaces only: the colour of an opaque diffuse cylinder of which a thick cloth is as
-     * bright, and how near the cylinder's own scattering comes, measured as rel_rms. By the theory of Kubelka and
-     * Munk 1931 cloth is as bright if as much is absorbed for the light that turns back: (1 - albedo) / turned is
-     * the same. */
-    double diffuse[3], diffuse_rel_rms;
+    /* For programs with surfaces only: an opaque fiber, diffuse under a rough dielectric. Index and roughness
+     * (whose square is GGX's alpha) bring its scattering nearest to that of the fiber; the colour makes a thick
+     * cloth as bright. By the theory of Kubelka and Munk 1931 that is so if as much is absorbed for the light that
+     * turns back: (1 - albedo) / turned is the same. */
+    struct surface_fit {
+        double diffuse[3], index, roughness;
+        double rel_rms, albedo[3], turned[3]; /* of this fiber; rel_rms measured as above */
+    } surface;
 };
-
-/* Of the light that a diffuse cylinder scatters, what turns back. */
-#define HAIR_FIT_DIFFUSE_TURNED (0.5 + 0.125 * 3.14159265358979323846)
 
 /* param: one set, internal units. A section that is not round is seen as a mean over its turns about the axis.
  * STATUS_INVALID as the model's prepare, STATUS_NO_MEMORY. */
