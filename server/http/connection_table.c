@@ -38,15 +38,17 @@ struct connection_table {
     size_t n;
     double header_deadline_s;
     double min_rate_bytes_per_s;
+    bool answers;
 };
 
-status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **out,
-                            struct error *err)
+status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, bool answers,
+                            struct connection_table **out, struct error *err)
 {
     struct connection_table *t = calloc(1, sizeof *t);
     if (t == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the table of connections: out of memory");
     pthread_mutex_init(&t->lock, NULL);
     t->header_deadline_s = header_deadline_s;
+    t->answers = answers;
     t->min_rate_bytes_per_s = (double)min_rate_bytes_per_s;
     *out = t;
     return STATUS_OK;
@@ -182,8 +184,8 @@ void connection_table_reap(struct connection_table *t)
         bool gone = !e->ended && client_gone(e, now);
         if (e->ended || !(gone || too_slow(t, e, now))) continue;
         e->ended = true;
-        if (gone) {
-            /* the client has gone, so no answer is sent */
+        if (gone || !t->answers) {
+            /* no answer is sent */
         } else if (e->phase == PHASE_BODY || (e->phase == PHASE_HEAD && !e->served)) {
             ssize_t n = send(e->fd, answer, (size_t)n_answer, MSG_DONTWAIT | MSG_NOSIGNAL);
             (void)n; /* the connection ends whether or not the answer arrives */

@@ -7,14 +7,16 @@
 
 #include "base/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct connection_table;
 struct connection_entry;
 
-/* min_rate_bytes_per_s 0: no minimum rate. STATUS_NO_MEMORY. */
-status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, struct connection_table **table,
-                            struct error *err);
+/* min_rate_bytes_per_s 0: no minimum rate. answers: slow clients are answered 408 on their sockets, which must not be
+ * encrypted then. STATUS_NO_MEMORY. */
+status connection_table_new(double header_deadline_s, int64_t min_rate_bytes_per_s, bool answers,
+                            struct connection_table **table, struct error *err);
 void connection_table_free(struct connection_table *table);
 size_t connection_table_count(struct connection_table *table);
 /* Closes the connections that are too slow, after answering 408 where that is unambiguous. */

@@ -1,4 +1,5 @@
 #include "server/http/http_listen.h"
+#include "server/http/http_tls.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
@@ -97,8 +98,8 @@ static status open_tcp(const struct settings *s, int *out, char url[LISTEN_URL_B
         getsockname(fd, (struct sockaddr *)&address, &n) != 0)
         return error_set_errno(err, "cannot listen on '%s', port %lld", s->listen, (long long)s->port);
     bool is_v4 = address.ss_family == AF_INET;
-    snprintf(url, LISTEN_URL_BYTES, is_v4 ? "http://%s:%u" : "http://[%s]:%u", s->listen,
-             ntohs(is_v4 ? v4->sin_port : v6->sin6_port));
+    snprintf(url, LISTEN_URL_BYTES, "%s://%s%s%s:%u", http_tls_wanted(s) ? "https" : "http", is_v4 ? "" : "[",
+             s->listen, is_v4 ? "" : "]", ntohs(is_v4 ? v4->sin_port : v6->sin6_port));
     return STATUS_OK;
 }
 
@@ -142,5 +143,6 @@ bool http_origin_known(const struct settings *s, const char *origin, const char 
     if (public_host(s) != NULL && strcasecmp(origin, s->public_origin) == 0) return true;
     /* a page that came over http is none of a service that is published by https only */
     if (host == NULL || (public_host(s) != NULL && strcasecmp(host, public_host(s)) == 0)) return false;
-    return strncmp(origin, "http://", 7) == 0 && strcasecmp(origin + 7, host) == 0;
+    const char *scheme = http_tls_wanted(s) ? "https://" : "http://";
+    return strncmp(origin, scheme, strlen(scheme)) == 0 && strcasecmp(origin + strlen(scheme), host) == 0;
 }

@@ -4,6 +4,7 @@
 #include "server/http/http_guard.h"
 #include "server/http/http_listen.h"
 #include "server/http/http_reply.h"
+#include "server/http/http_tls.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -23,6 +24,7 @@ struct http_server {
     const struct static_files *files;
     struct MHD_Daemon *daemon;
     struct connection_table *connection;
+    struct http_tls tls;
     atomic_uint_least64_t n_reply[HTTP_MAX_STATUS];
 };
 
@@ -208,22 +210,33 @@ status http_server_start(struct job_service *service, http_route_finder *find_ro
     s->service = service;
     s->find_route = find_route;
     s->files = files;
-    status result =
-        connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s, &s->connection, err);
+    status result = connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s,
+                                         !http_tls_wanted(settings), &s->connection, err);
+    if (result == STATUS_OK) result = http_tls_read(settings, &s->tls, err);
     if (result == STATUS_OK) result = http_listen(settings, &fd, url, err);
     if (result != STATUS_OK) goto out;
+    struct MHD_OptionItem tls[] = {{MHD_OPTION_HTTPS_MEM_CERT, 0, s->tls.certificate},
+                                   {MHD_OPTION_HTTPS_MEM_KEY, 0, s->tls.key},
+                                   {MHD_OPTION_END, 0, NULL}};
+    const struct MHD_OptionItem none = {MHD_OPTION_END, 0, NULL};
+    if (!http_tls_wanted(settings)) tls[0] = none;
     MHD_set_panic_func(on_panic, service->log);
     s->daemon = MHD_start_daemon(
-        MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC, 0, NULL, NULL,
-        on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s, MHD_OPTION_LISTEN_SOCKET, fd,
+        (http_tls_wanted(settings) ? MHD_USE_TLS : 0) | MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL_INTERNAL_THREAD |
+            MHD_USE_ERROR_LOG | MHD_USE_ITC,
+        0, NULL, NULL, on_request, s, MHD_OPTION_EXTERNAL_LOGGER, on_library_log, s, MHD_OPTION_LISTEN_SOCKET, fd,
         MHD_OPTION_THREAD_STACK_SIZE, (size_t)THREAD_STACK_BYTES, MHD_OPTION_CONNECTION_LIMIT,
         (unsigned)settings->max_connections, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s,
         MHD_OPTION_NOTIFY_CONNECTION, on_connection, s, MHD_OPTION_UNESCAPE_CALLBACK, unescape, s,
-        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_ARRAY, tls, MHD_OPTION_END);
     if (s->daemon == NULL) {
         close(fd);
-        result = error_set_errno(err, "cannot start the HTTP server");
+        result = http_tls_wanted(settings)
+                     ? error_set_field(err, STATUS_INVALID, "server.tls_certificate",
+                                       "cannot start the HTTP server with certificate '%s' and key '%s'",
+                                       settings->tls_certificate, settings->tls_key)
+                     : error_set_errno(err, "cannot start the HTTP server");
     }
 out:
     if (result != STATUS_OK)
@@ -242,5 +255,6 @@ void http_server_stop(struct http_server *s)
         MHD_stop_daemon(s->daemon);
     }
     connection_table_free(s->connection);
+    http_tls_release(&s->tls);
     free(s);
 }

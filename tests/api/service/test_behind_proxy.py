@@ -95,6 +95,38 @@ def certificate(folder):
                    check=True, capture_output=True)
 
 
+def test_tls_by_the_settings(tmp_path):
+    certificate(tmp_path)
+    options = {"server.tls_certificate": tmp_path / "cert.pem", "server.tls_key": tmp_path / "key.pem"}
+    with Daemon(tmp_path / "data", options=options) as d:
+        assert d.url.startswith("https://127.0.0.1:")
+        d.session.trust_env, d.session.verify = False, str(tmp_path / "cert.pem")
+        job = d.start_job("succeed")
+        assert d.wait_state(job, "succeeded")["result"]["objective"] == 0.01
+        own, foreign = f"https://127.0.0.1:{d.port}", f"http://127.0.0.1:{d.port}"
+        assert [d.post("/v1/jobs", json=DOCUMENT, headers={"Origin": o}).status_code for o in (own, foreign)] == [201, 403]
+        with pytest.raises(requests.ConnectionError):
+            requests.get(f"http://127.0.0.1:{d.port}/livez", timeout=20)
+        with pytest.raises(requests.exceptions.SSLError):
+            session = requests.Session()
+            session.trust_env = False
+            session.get(d.url + "/livez", timeout=20)
+
+
+@pytest.mark.parametrize("spoil", ["readable", "no_key", "garbage", "missing"])
+def test_what_tls_cannot_use_is_refused(tmp_path, spoil):
+    certificate(tmp_path)
+    if spoil == "garbage":
+        (tmp_path / "cert.pem").write_text("no certificate")
+    os.chmod(tmp_path / "key.pem", 0o644 if spoil == "readable" else 0o600)
+    key = {"no_key": "", "missing": tmp_path / "other.pem"}.get(spoil, tmp_path / "key.pem")
+    done = subprocess.run([program("selvedged"), "--data", str(tmp_path / "data"), "--port", "0", "--set", f"server.tls_certificate={tmp_path / 'cert.pem'}",
+                           "--set", f"server.tls_key={key}"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "listens" not in done.stdout
+    assert {"readable": "other users may read", "no_key": "needs both", "garbage": "cannot start the HTTP server with certificate",
+            "missing": "other.pem"}[spoil] in done.stderr
+
+
 def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
