@@ -55,7 +55,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all generate deps help check test nightly demo clean
+.PHONY: all generate deps help check test nightly demo demo-camera clean
 ##@ Build and run
 all: $(PROGRAMS)   ## build the programs into build/bin
 
@@ -65,6 +65,10 @@ deps:              ## install the Debian packages that are missing (as root or t
 demo: | deps       ## the main job, end to end, against a daemon started here
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@./clients/demo.sh
+
+demo-camera: | deps ## the same from raw files of a simulated camera: noise, three exposures, markers, color chart
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@./clients/demo.sh --camera
 
 clean:             ## remove build/
 	rm -rf build

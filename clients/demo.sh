@@ -1,21 +1,31 @@
 #!/usr/bin/env bash
-# Runs the main job end to end on a synthetic sample: `make demo`, or clients/demo.sh [--fresh] after a build.
-# Environment: DEMO_PORT (a fixed port), DEMO_DIR (folder, default ./demo), SELVEDGE_BUILD (default ./build).
+# Runs the main job end to end on a synthetic sample: `make demo`, or clients/demo.sh [--fresh] [--camera] after a build.
+# --camera: the photographs are raw files of a simulated camera (`make demo-camera`).
+# Environment: DEMO_PORT (a fixed port), DEMO_DIR (folder, default ./demo, with --camera ./demo-camera), SELVEDGE_BUILD
+# (default ./build).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 fresh=no
-case "${1:-}" in
---fresh) fresh=yes ;;
-"") ;;
-*) echo "usage: $0 [--fresh]    --fresh: make a new sample and run the fit again" >&2; exit 2 ;;
-esac
+camera=no
+for word in "$@"; do
+    case "$word" in
+    --fresh) fresh=yes ;;
+    --camera) camera=yes ;;
+    *)
+        echo "usage: $0 [--fresh] [--camera]    --fresh: make a new sample and run the fit again; --camera: from raw files" >&2
+        exit 2
+        ;;
+    esac
+done
 
 here=$PWD
 build=${SELVEDGE_BUILD:-build}
 [[ $build = /* ]] || build=$here/$build
 bin=$build/bin
-demo=${DEMO_DIR:-$here/demo}
+name=demo
+[ "$camera" = no ] || name="demo-camera"
+demo=${DEMO_DIR:-$here/$name}
 sample=$demo/sample
 mkdir -p "$demo"
 demo=$(cd "$demo" && pwd)
@@ -28,7 +38,7 @@ title="twill phantom"
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
 
-for program in selvedged selvedge selvedge-worker selvedge-phantom; do
+for program in selvedged selvedge selvedge-worker selvedge-phantom selvedge-camera; do
     [ -x "$bin/$program" ] || fail "$bin/$program is missing: run make first"
 done
 command -v python3 >/dev/null || fail "python3 is missing: run make deps"
@@ -93,6 +103,10 @@ start_daemon() {
 }
 
 # ---- the sample ----
+render() {
+    "$bin/selvedge-phantom" photograph --fibers "$sample/truth.hair" --seed 11 --noise 0.005 "${truth[@]}" --out "$@" >/dev/null
+}
+
 make_sample() {
     if [ "$fresh" = yes ]; then rm -rf "$sample" "$demo/job-id" "$demo/results" "$demo/summary.json"; fi
     if [ -s "$sample/job.json" ]; then
@@ -104,8 +118,15 @@ make_sample() {
     echo "cloth: a twill of 152 fibers, scanned at 2 um with noise"
     "$bin/selvedge-phantom" cloth --weave twill --seed 7 --out "$sample" >/dev/null
     echo "photographs: 16 to fit and 24 held out, rendered with known parameters (takes half a minute)"
-    "$bin/selvedge-phantom" photograph --fibers "$sample/truth.hair" --out "$sample" --seed 11 --noise 0.005 --paths 131072 --px 64 \
-        "${truth[@]}" >/dev/null
+    if [ "$camera" = no ]; then
+        render "$sample" --paths 131072 --px 64
+    else
+        # more than the crop, and the blur of the lens
+        render "$sample/rendered" --paths 204800 --px 80 --crop-cm 1.25 --blur-mm 0.12
+        echo "camera: three raw files of each, a color chart, dark and flat frames (takes half a minute)"
+        "$bin/selvedge-phantom" camera --photographs "$sample/rendered" --out "$sample" --seed 5
+        "$bin/selvedge" calibrate-camera --dark "$sample"/dark-*.dng --flat "$sample"/flat-*.dng --out "$sample/noise.json"
+    fi
     python3 clients/demo_report.py document "$sample" "$title"
 }
 
@@ -143,6 +164,9 @@ main() {
     wall=$(python3 -c "import sys,time; print(round(time.time() - float(sys.argv[1]), 1))" "$started")
     [ "$new" = yes ] || wall=
     python3 clients/demo_report.py summary "$sample/truth.json" "$demo/results/result.json" "$demo/summary.json" "$wall"
+    if [ "$camera" = yes ]; then
+        python3 clients/demo_report.py camera "$sample/truth.json" "$demo/results/result.json" "$demo/summary.json" "$here/demo/summary.json"
+    fi
 
     cat <<END
 

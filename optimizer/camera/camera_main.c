@@ -19,6 +19,7 @@ static const char usage[] =
     "  --exposure-s S, --iso N, --aperture N, --black-level N   in place of what the file states\n"
     "  --out PICTURE.png        the picture with the crop drawn on it (one FILE alone)\n"
     "  --job JOB.json           preview the photographs of a job document, with its dark frames, exposures and colors\n"
+    "  --json OUT.json          with --job: what it prints, and the crops and cameras that it found, as a JSON list\n"
     "options of calibrate-camera:\n"
     "  --dark FILE...           at least 2 frames with the lens covered, of the same exposure time in a row; better\n"
     "                           some of the shortest and some of the longest exposure time that you use\n"

@@ -1,13 +1,15 @@
 #include "base/files/durable.h"
 #include "optimizer/camera/camera_commands.h"
 #include "optimizer/fit/photographs/camera/photograph_develop.h"
+#include "optimizer/worker/report/json_number.h"
+#include "optimizer/worker/report/photograph_json.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILES, CROP, TRANSFER, EXPOSURE, ISO, APERTURE, BLACK, OUT, JOB, N_OPTION };
+enum { FILES, CROP, TRANSFER, EXPOSURE, ISO, APERTURE, BLACK, OUT, JOB, JSON, N_OPTION };
 
 static void print_stated(const char *name, double value, const char *unit)
 {
@@ -158,50 +160,67 @@ static void print_color(const struct photograph_process *k)
            k->chart.found_automatically ? "found" : "at the corners given", before, after);
 }
 
-static int preview_job(const char *path)
+/* A row of the JSON file: what a job would take from a photograph. */
+static json_t *row_json(const struct job_photograph *p, const struct photograph_mean *m)
+{
+    json_t *color = json_array();
+    for (size_t c = 0; c < 3; c++) json_array_append_new(color, json_number_list(m->record.color_error[c], 3, 1.0));
+    return json_pack("{s:s, s:o, s:o, s:o, s:[i,i,i,i], s:o, s:o, s:o}", "file", p->file, "mean_rgb",
+                     json_number_list(m->mean_rgb, 3, 1.0), "standard_error", json_number_list(m->se_rgb, 3, 1.0),
+                     "color_error", color, "crop_px", (int)p->crop_px[0], (int)p->crop_px[1], (int)p->crop_px[2],
+                     (int)p->crop_px[3], "camera_theta_deg", json_number(p->camera_theta_deg), "camera_phi_deg",
+                     json_number(p->camera_phi_deg), "photograph", photograph_record_json(&m->record));
+}
+
+/* Prints the photographs of the document and appends them to `rows`. */
+static status preview_photograph(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                                 json_t *rows)
+{
+    struct photograph_mean mean = {0};
+    struct error err = {0};
+    struct image im;
+    status s = photograph_develop(k, folder, p, &im, &mean.record, &err);
+    if (s == STATUS_OK) {
+        s = photograph_measure_image(&im, p->file, p->transfer, &mean, &err);
+        image_release(&im);
+    }
+    if (mean.record.info.format != NULL) print_mean(p->file, &mean);
+    if (s == STATUS_OK) json_array_append_new(rows, row_json(p, &mean));
+    if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
+    return s;
+}
+
+static int preview_job(const char *path, const char *json_path)
 {
     char folder[4096];
     struct job_document *doc = NULL;
     struct photograph_process process;
     struct error err = {0};
-    int exit_code = 0;
+    json_t *rows = json_array();
+    bool whole = true;
     photograph_process_init(&process);
     status s = read_document(path, folder, sizeof folder, &doc, &err);
     if (s == STATUS_OK) s = photograph_process_load(&process, doc, folder, &err);
     if (s == STATUS_OK) print_color(&process);
-    if (s != STATUS_OK) {
-        fprintf(stderr, "error: %s\n", err.text);
-        exit_code = 1;
-    }
-    for (size_t i = 0; s == STATUS_OK && i < doc->n_photograph; i++) {
-        const struct job_photograph *p = &doc->photograph[i];
-        struct photograph_mean mean = {0};
-        struct image im;
-        status one = photograph_develop(&process, folder, p, &im, &mean.record, &err);
-        if (one == STATUS_OK) {
-            one = photograph_measure_image(&im, p->file, p->transfer, &mean, &err);
-            image_release(&im);
-        }
-        if (mean.record.info.format != NULL) print_mean(p->file, &mean);
-        if (one != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
-        exit_code = one == STATUS_OK ? exit_code : 1;
-    }
+    for (size_t i = 0; s == STATUS_OK && i < doc->n_photograph; i++)
+        whole = preview_photograph(&process, folder, &doc->photograph[i], rows) == STATUS_OK && whole;
+    if (s == STATUS_OK && json_path != NULL && json_dump_file(rows, json_path, JSON_INDENT(1)) != 0)
+        s = error_set(&err, STATUS_IO, "cannot write '%s'", json_path);
+    if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
     photograph_process_release(&process);
     job_document_free(doc);
-    return exit_code;
+    json_decref(rows);
+    return s == STATUS_OK && whole ? 0 : 1;
 }
 
 int camera_command_photo(int argc, char **argv)
 {
-    struct camera_option o[N_OPTION] = {[FILES] = {"", 0, 10000, NULL, 0},
-                                        [CROP] = {"crop-px", 0, 4, NULL, 0},
-                                        [TRANSFER] = {"transfer", 0, 1, NULL, 0},
-                                        [EXPOSURE] = {"exposure-s", 0, 1, NULL, 0},
-                                        [ISO] = {"iso", 0, 1, NULL, 0},
-                                        [APERTURE] = {"aperture", 0, 1, NULL, 0},
-                                        [BLACK] = {"black-level", 0, 1, NULL, 0},
-                                        [OUT] = {"out", 0, 1, NULL, 0},
-                                        [JOB] = {"job", 0, 1, NULL, 0}};
+    struct camera_option o[N_OPTION] = {
+        [FILES] = {"", 0, 10000, NULL, 0},        [CROP] = {"crop-px", 0, 4, NULL, 0},
+        [TRANSFER] = {"transfer", 0, 1, NULL, 0}, [EXPOSURE] = {"exposure-s", 0, 1, NULL, 0},
+        [ISO] = {"iso", 0, 1, NULL, 0},           [APERTURE] = {"aperture", 0, 1, NULL, 0},
+        [BLACK] = {"black-level", 0, 1, NULL, 0}, [OUT] = {"out", 0, 1, NULL, 0},
+        [JOB] = {"job", 0, 1, NULL, 0},           [JSON] = {"json", 0, 1, NULL, 0}};
     struct error err = {0};
     struct job_photograph p;
     status s = camera_options_parse(argc, argv, o, N_OPTION, &err);
@@ -211,5 +230,5 @@ int camera_command_photo(int argc, char **argv)
         fprintf(stderr, "error: %s; `selvedge photo --help` lists the options\n", err.text);
         return 2;
     }
-    return o[JOB].n > 0 ? preview_job(o[JOB].word[0]) : preview_files(o, &p);
+    return o[JOB].n > 0 ? preview_job(o[JOB].word[0], o[JSON].n > 0 ? o[JSON].word[0] : NULL) : preview_files(o, &p);
 }

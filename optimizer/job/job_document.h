@@ -58,6 +58,7 @@ struct job_photograph {
     double light_position_mm[3], camera_position_mm[3];
     double light_distance_cm, camera_distance_cm; /* NaN: those of the document */
     size_t crop_px[4];                            /* all 0: whole picture */
+    double crop_exact_px[4];                      /* the same before rounding, where markers gave it; or all 0 */
     enum job_transfer transfer;
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
     size_t n_exposure;                             /* besides the first one, which is `file` */

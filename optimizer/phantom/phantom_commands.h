@@ -10,6 +10,7 @@
 
 int phantom_command_cloth(int argc, char **argv);
 int phantom_command_photograph(int argc, char **argv);
+int phantom_command_camera(int argc, char **argv);
 int phantom_command_compare(int argc, char **argv);
 int phantom_command_detect(int argc, char **argv);
 int phantom_command_look(int argc, char **argv);

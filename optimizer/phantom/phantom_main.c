@@ -12,6 +12,8 @@ static const char usage[] =
     "  selvedge-phantom cloth --out DIR [options]        make fibers, and the CT scan of them\n"
     "  selvedge-phantom photograph --fibers FILE --out DIR [options]\n"
     "                                                    render photographs with known parameters\n"
+    "  selvedge-phantom camera --photographs DIR --out DIR [options]\n"
+    "                                                    take them again as raw files of a simulated camera\n"
     "  selvedge-phantom compare --truth FILE --fibers FILE [options]\n"
     "                                                    measure reconstructed fibers against true ones\n"
     "  selvedge-phantom detect --photograph FILE [options]\n"
@@ -27,9 +29,9 @@ static const struct {
     const char *name;
     int (*run)(int argc, char **argv);
 } command[] = {
-    {"cloth", phantom_command_cloth},     {"photograph", phantom_command_photograph},
-    {"compare", phantom_command_compare}, {"detect", phantom_command_detect},
-    {"look", phantom_command_look},
+    {"cloth", phantom_command_cloth},   {"photograph", phantom_command_photograph},
+    {"camera", phantom_command_camera}, {"compare", phantom_command_compare},
+    {"detect", phantom_command_detect}, {"look", phantom_command_look},
 };
 
 int main(int argc, char **argv)

@@ -4,6 +4,7 @@
 #include "base/rng.h"
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/phantom/phantom_files.h"
 #include "optimizer/phantom/phantom_view_table.h"
 #include "renderer/transport/render.h"
 
@@ -199,7 +200,7 @@ static status make_photograph(const struct phantom_photograph_option *o, const s
                               const struct job_photograph *v, size_t number, struct thread_pool *pool,
                               const struct progress *progress, struct photograph_lists *lists, struct error *err)
 {
-    char path[4096];
+    char path[PHANTOM_PATH_BYTES];
     struct image im = {0};
     const struct configuration c = view_configuration(o, v);
     const size_t n_pixel = o->px * o->px, n_sample = (size_t)((o->n_path + n_pixel - 1) / n_pixel);
@@ -221,27 +222,11 @@ static status make_photograph(const struct phantom_photograph_option *o, const s
                   v->light_phi_deg, "camera_theta_deg", v->camera_theta_deg, "camera_phi_deg", v->camera_phi_deg,
                   "cloth_rotation_deg", v->cloth_rotation_deg, "scale", v->scale);
     json_t *truth = json_pack("{s:s}", "file", v->file);
-    int n = snprintf(path, sizeof path, "%s/%s", o->folder, v->file);
-    if (n < 0 || (size_t)n >= sizeof path)
-        st = error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", o->folder);
-    else
-        st = finish_picture(o, &im, number, path, truth, err);
+    st = phantom_path(o->folder, v->file, path, err);
+    if (st == STATUS_OK) st = finish_picture(o, &im, number, path, truth, err);
     json_array_append_new(lists->photographs, row);
     json_array_append_new(lists->truth, truth);
     image_release(&im);
-    return st;
-}
-
-static status write_json(const json_t *j, const char *folder, const char *name, struct error *err)
-{
-    char path[4096];
-    int n = snprintf(path, sizeof path, "%s/%s", folder, name);
-    if (n < 0 || (size_t)n >= sizeof path)
-        return error_set(err, STATUS_INVALID, "folder name '%.100s...' is too long", folder);
-    char *text = json_dumps(j, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(9));
-    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
-    status st = durable_replace(path, text, strlen(text), err);
-    free(text);
     return st;
 }
 
@@ -290,8 +275,8 @@ status phantom_photographs_make(const struct phantom_photograph_option *o, struc
                         json_pack("{s:f,s:f,s:b,s:f}", "distance_cm", o->camera_distance_cm, "crop_cm", o->crop_cm,
                                   "far_field", o->camera_far_field, "blur_mm", o->camera_blur_mm));
     json_object_set(truth, "photographs", rows);
-    st = write_json(photographs, o->folder, "photographs.json", err);
-    if (st == STATUS_OK) st = write_json(truth, o->folder, "truth.json", err);
+    st = phantom_json_write(photographs, o->folder, "photographs.json", err);
+    if (st == STATUS_OK) st = phantom_json_write(truth, o->folder, "truth.json", err);
 out:
     scene_free(scene);
     free(t);

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-cloth bench-scan-errors bench-progress bench-exports bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -52,6 +52,10 @@ $(EXPORTS_PYTHON)/bin/packages-are-there:
 bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there | deps-test ## exported scenes rendered by Mitsuba 3 against the job's own renderings (6 minutes; installs Mitsuba and USD from PyPI into build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python
+
+bench-camera: | deps-test ## mean radiances from raw files of a simulated camera against the true ones (2 minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/camera/bench_camera.py --build $(BUILD)
 
 docs-pairs: | deps-test ## draw docs/images/photo-pairs.png anew: renderings of four photo pairs (10 minutes, seconds after bench-cloth)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

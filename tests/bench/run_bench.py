@@ -40,6 +40,10 @@ def bench_real():
         figure(f"real.{name}.wall_s", round(wall_s, 2), "s")
 
 
+def bench_camera(build):
+    subprocess.run([sys.executable, os.path.join(ROOT, "tests", "bench", "camera", "bench_camera.py"), "--build", build], check=True)
+
+
 def bench_programs(build):
     """tests/bench/bench_*.c print their figures themselves."""
     folder = os.path.join(build, "tests", "bench")
@@ -55,7 +59,7 @@ def bench_service(build):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", default="build")
-    parser.add_argument("--only", choices=["demo", "real", "programs", "service"])
+    parser.add_argument("--only", choices=["demo", "real", "camera", "programs", "service"])
     arguments = parser.parse_args()
     build = os.path.join(ROOT, arguments.build)
     os.environ["SELVEDGE_BUILD"] = build
@@ -65,6 +69,8 @@ def main():
         bench_real()
     if arguments.only in (None, "service"):
         bench_service(build)
+    if arguments.only in (None, "camera"):
+        bench_camera(build)
     if arguments.only in (None, "programs"):
         bench_programs(build)
 

@@ -3,6 +3,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/phantom/phantom.h"
 #include "geometry/volume/format/vol_file.h"
+#include "optimizer/phantom/simulated_camera/dng_file.h"
 #include "renderer/image/image.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/rgl_bytes.h"
@@ -167,7 +168,9 @@ static void camera_seeds(void)
                       &(struct camera_tiff){16, 16, 1, 16, .exposure_s = 0.1, .iso = 100, .aperture = 8}, word);
     camera_write_tiff(seed_path("photograph_tiff", "f32.tif"), &(struct camera_tiff){8, 8, 4, 32, .planes = true},
                       byte);
-    camera_write_dng(seed_path("camera_raw", "bayer.dng"), &(struct camera_dng){32, 32, 512, 16383, 0.5, 100, 4}, word);
+    must(dng_file_write(seed_path("camera_raw", "bayer.dng"), &(struct dng_picture){32, 32, 512, 16383, 0.5, 100, 4},
+                        word, NULL) == STATUS_OK,
+         "a raw picture");
 }
 
 static void brdf_seeds(void)

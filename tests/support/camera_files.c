@@ -86,40 +86,6 @@ void camera_write_tiff(const char *path, const struct camera_tiff *t, const void
     TIFFClose(tiff);
 }
 
-void camera_write_dng(const char *path, const struct camera_dng *d, const uint16_t *sample)
-{
-    static const float matrix[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, neutral[3] = {0.5f, 1.0f, 0.7f};
-    float black = (float)d->black;
-    uint16_t repeat[2] = {2, 2};
-    uint32_t white = d->white;
-    TIFF *tiff = TIFFOpen(path, "w");
-    must(tiff != NULL);
-    TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, 0);
-    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, (uint32_t)d->width);
-    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, (uint32_t)d->height);
-    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
-    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
-    TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
-    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, 32803 /* CFA */);
-    TIFFSetField(tiff, TIFFTAG_MAKE, "Selvedge");
-    TIFFSetField(tiff, TIFFTAG_MODEL, "Test camera");
-    TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-    TIFFSetField(tiff, TIFFTAG_CFAREPEATPATTERNDIM, repeat);
-    TIFFSetField(tiff, TIFFTAG_CFAPATTERN, 4, "\0\1\1\2");
-    TIFFSetField(tiff, TIFFTAG_DNGVERSION, "\1\3\0\0");
-    TIFFSetField(tiff, TIFFTAG_UNIQUECAMERAMODEL, "Selvedge Test camera");
-    TIFFSetField(tiff, TIFFTAG_COLORMATRIX1, 9, matrix);
-    TIFFSetField(tiff, TIFFTAG_ASSHOTNEUTRAL, 3, neutral);
-    TIFFSetField(tiff, TIFFTAG_CALIBRATIONILLUMINANT1, 21);
-    TIFFSetField(tiff, TIFFTAG_BLACKLEVEL, 1, &black);
-    TIFFSetField(tiff, TIFFTAG_WHITELEVEL, 1, &white);
-    TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, (uint32_t)d->height);
-    must(TIFFWriteEncodedStrip(tiff, 0, (void *)(uintptr_t)sample, (tmsize_t)(d->width * d->height * 2)) > 0);
-    must(TIFFWriteDirectory(tiff) == 1);
-    if (d->exposure_s > 0.0) write_exif(tiff, d->exposure_s, d->iso, d->aperture);
-    TIFFClose(tiff);
-}
-
 /* Exif data of three entries, big-endian. */
 static size_t exif_of(double exposure_s, uint8_t out[96])
 {

@@ -1,4 +1,5 @@
-/* Picture files as cameras and programs write them: TIFF of any kind, JPEG with Exif data, raw mosaics as DNG. */
+/* Picture files as cameras and programs write them: TIFF of any kind, JPEG with Exif data. Raw mosaics are written
+ * by optimizer/phantom/simulated_camera/dng_file.h. */
 #ifndef SELVEDGE_TESTS_CAMERA_FILES_H
 #define SELVEDGE_TESTS_CAMERA_FILES_H
 
@@ -15,15 +16,6 @@ struct camera_tiff {
 
 /* sample: width x height x n_channel of the stated kind. */
 void camera_write_tiff(const char *path, const struct camera_tiff *t, const void *sample);
-
-struct camera_dng {
-    size_t width, height; /* of the mosaic; even */
-    unsigned black, white;
-    double exposure_s, iso, aperture;
-};
-
-/* A Bayer mosaic RGGB of 16 bits. */
-void camera_write_dng(const char *path, const struct camera_dng *d, const uint16_t *sample);
 
 /* An rgb JPEG of quality 100 without subsampling; exposure_s 0: without Exif data, which otherwise say ISO 200, f/8. */
 void camera_write_jpeg(const char *path, size_t width, size_t height, const uint8_t *rgb, double exposure_s);

@@ -185,6 +185,12 @@ static void warn(const struct image *im, const char *name, struct photograph_mea
                  "photograph '%s' has an alpha channel, as edited pictures have: it is opaque and was left out", name);
 }
 
+double photograph_color_se(const struct photograph_record *r, size_t c)
+{
+    const double *e = r->color_error[c];
+    return sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+}
+
 status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
                                 struct photograph_mean *mean, struct error *err)
 {
@@ -201,7 +207,7 @@ status photograph_measure_image(const struct image *im, const char *name, enum j
     for (size_t c = 0; c < 3; c++) {
         double block_sd;
         measure_channel(im, c, n_block, &mean->mean_rgb[c], &block_sd);
-        mean->se_rgb[c] = block_sd / (double)n_block;
+        mean->se_rgb[c] = hypot(block_sd / (double)n_block, photograph_color_se(r, c));
         if (mean->mean_rgb[c] > 0.0) mean->block_contrast = fmax(mean->block_contrast, block_sd / mean->mean_rgb[c]);
     }
     const double *m = mean->mean_rgb;

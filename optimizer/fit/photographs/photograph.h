@@ -24,15 +24,22 @@ struct photograph_record {
     bool merged;                 /* by the estimator of exposure_merge.h, of n_exposure pictures */
     size_t n_exposure;
     double noise_se_rgb[3]; /* of the mean, by the camera's noise; with merged alone, NaN without a noise record */
-    bool resampled;         /* pixels depend on their neighbours as after an enlargement or a strong filter */
+    /* Errors of the mean of channel c by those of the color matrix, from three independent causes of one standard
+     * deviation each; the causes of a channel are the same for all photographs that the matrix was applied to. */
+    double color_error[3][3];
+    bool resampled; /* pixels depend on their neighbours as after an enlargement or a strong filter */
 };
 
 struct photograph_mean {
     struct photograph_record record;
-    double mean_rgb[3], se_rgb[3];
+    double mean_rgb[3];
+    double se_rgb[3];      /* by the scatter of sub-blocks, and by the errors of the color matrix */
     double block_contrast; /* standard deviation of sub-block means over the mean, largest channel */
     char warning[400];     /* "" or why the mean describes the crop badly */
 };
+
+/* Standard error of the mean of channel c by all causes of color_error. */
+double photograph_color_se(const struct photograph_record *r, size_t c);
 
 /* Reads one file (photograph_read) and measures it. */
 status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,

@@ -15,6 +15,9 @@ json_t *photograph_record_json(const struct photograph_record *r)
                              json_number(i->aperture), "black_level", json_number(i->black_level), "saturated_share",
                              json_number(r->saturated_share), "resampled", (int)r->resampled);
     json_object_set_new(json, "n_exposure", json_count(r->n_exposure));
+    double color_se[3];
+    for (size_t c = 0; c < 3; c++) color_se[c] = photograph_color_se(r, c);
+    json_object_set_new(json, "color_se", json_number_list(color_se, 3, 1.0));
     json_object_set_new(json, "noise_se", r->merged ? json_number_list(r->noise_se_rgb, 3, 1.0) : json_null());
     return json;
 }

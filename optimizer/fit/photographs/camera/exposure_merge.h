@@ -4,9 +4,10 @@
  *   y = [sum (y_i - mu_r - t_i mu_d) t_i / V_i] / [sum t_i^2 / V_i],   standard error (sum t_i^2 / V_i)^(-1/2)
  *
  * Differs from the thesis in the variances: V_i = s_r^2 + s_d^2 t_i + s_s^2 y_i with the noisy y_i is used for a first
- * estimate alone, because it biases dark pixels (by -34 % at 0.02 DN/s). The second one uses V_i = s_r^2 + s_d^2 t_i
- * + s_s^2 t_i max(y, 0), and so does a third. Saturated samples are left out. The estimate is never clamped.
- */
+ * estimate alone, because it biases dark pixels (by -34 % at 0.02 DN/s). The second one uses V_i = s_r^2 + s_d^2 t_i +
+ * s_s^2 t_i max(y, 0), and so does a third. Saturated samples are left out, and in pictures so are those of which the
+ * shorter exposures of the pixels around predict that they may be: within four standard deviations of the full scale,
+ * or within 5 % of it where the noise is not known. The estimate is never clamped. */
 #ifndef SELVEDGE_OPTIMIZER_EXPOSURE_MERGE_H
 #define SELVEDGE_OPTIMIZER_EXPOSURE_MERGE_H
 
@@ -30,10 +31,11 @@ struct merged_sample exposure_merge(const struct noise_channel *k, size_t n, con
 
 /* Merges n pictures of equal size. pixel of exposure[i]: 1 is saturation, full_scale[i] DN. noise NULL: no record. The
  * result replaces exposure[0]: values per second in the same unit, not DN. Where all samples of a pixel are saturated
- * it takes that of the shortest exposure. *noise_se_rgb: standard error of the mean over the picture by the camera's
- * noise, in the unit of the result; NaN without a record. *saturated_share: of the pixels with a channel that is
- * saturated in every exposure. */
-void exposure_merge_images(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
-                           struct image *const *exposure, double noise_se_rgb[3], double *saturated_share);
+ * it takes that of the shortest exposure. variance: initialised with the size of the pictures, becomes that of each
+ * value by the camera's noise; NULL: not wanted, as without a record. *saturated_share: of the pixels with a channel
+ * that is saturated in every exposure. The other exposures lose the samples that are left out. STATUS_NO_MEMORY. */
+status exposure_merge_images(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
+                             struct image *const *exposure, struct image *variance, double *saturated_share,
+                             struct error *err);
 
 #endif

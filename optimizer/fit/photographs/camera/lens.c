@@ -3,15 +3,23 @@
 #include <math.h>
 #include <string.h>
 
-static void remove_vignetting(const struct lens *l, struct image *im)
+double lens_vignetting(const struct lens *l, const double real[2])
 {
-    for (size_t y = 0; y < im->height; y++)
-        for (size_t x = 0; x < im->width; x++) {
-            double dx = ((double)x + 0.5 - l->vignetting_center_px[0]) / l->vignetting_radius_px;
-            double dy = ((double)y + 0.5 - l->vignetting_center_px[1]) / l->vignetting_radius_px, r = dx * dx + dy * dy;
-            double share = 1.0 + r * (l->vignetting[0] + r * (l->vignetting[1] + r * l->vignetting[2]));
-            for (size_t c = 0; c < 3; c++) im->pixel[3 * (y * im->width + x) + c] /= (float)fmax(share, 0.01);
-        }
+    if (!l->has_vignetting) return 1.0;
+    double dx = (real[0] - l->vignetting_center_px[0]) / l->vignetting_radius_px;
+    double dy = (real[1] - l->vignetting_center_px[1]) / l->vignetting_radius_px, r = dx * dx + dy * dy;
+    return fmax(1.0 + r * (l->vignetting[0] + r * (l->vignetting[1] + r * l->vignetting[2])), 0.01);
+}
+
+/* Divides by the share of the light, or of variances by its square. */
+static void remove_vignetting(const struct lens *l, bool variances, struct image *im)
+{
+    for (size_t i = 0; i < im->width * im->height; i++) {
+        const double at[2] = {(double)(i % im->width) + 0.5, (double)(i / im->width) + 0.5};
+        double share = lens_vignetting(l, at);
+        if (variances) share *= share;
+        for (size_t c = 0; c < 3; c++) im->pixel[3 * i + c] /= (float)share;
+    }
 }
 
 void lens_distort(const struct lens *l, const double ideal[2], double real[2])
@@ -20,6 +28,17 @@ void lens_distort(const struct lens *l, const double ideal[2], double real[2])
     double r = x * x + y * y, radial = 1.0 + r * (l->k[0] + r * (l->k[1] + r * l->k[2]));
     real[0] = l->center_px[0] + l->focal_px[0] * (x * radial + 2.0 * l->p[0] * x * y + l->p[1] * (r + 2.0 * x * x));
     real[1] = l->center_px[1] + l->focal_px[1] * (y * radial + l->p[0] * (r + 2.0 * y * y) + 2.0 * l->p[1] * x * y);
+}
+
+void lens_undistort(const struct lens *l, const double real[2], double ideal[2])
+{
+    memcpy(ideal, real, 2 * sizeof *ideal);
+    for (int i = 0; i < 30 && l->has_distortion; i++) {
+        double back[2];
+        lens_distort(l, ideal, back);
+        for (size_t c = 0; c < 2; c++) ideal[c] += real[c] - back[c];
+        if (fabs(real[0] - back[0]) + fabs(real[1] - back[1]) < 1e-9) break;
+    }
 }
 
 /* Interpolates at a place in pixels, whose centers are at halves. False outside of the picture. */
@@ -41,17 +60,20 @@ static bool sample(const struct image *im, const double at[2], float out[3])
     return true;
 }
 
-status lens_correct(const struct lens *l, const size_t crop[4], struct image *im, struct error *err)
+static status correct(const struct lens *l, const double crop[4], bool variances, struct image *im, struct error *err)
 {
-    size_t x1 = crop[2] > 0 ? crop[2] : im->width, y1 = crop[3] > 0 ? crop[3] : im->height;
+    const double x1 = crop[2] > 0.0 ? crop[2] : (double)im->width, y1 = crop[3] > 0.0 ? crop[3] : (double)im->height;
     struct image out;
-    if (x1 > im->width || y1 > im->height)
-        return error_set(err, STATUS_INVALID, "the crop ends at (%zu, %zu), the picture at (%zu, %zu)", x1, y1,
+    if (x1 > (double)im->width || y1 > (double)im->height)
+        return error_set(err, STATUS_INVALID, "the crop ends at (%.0f, %.0f), the picture at (%zu, %zu)", x1, y1,
                          im->width, im->height);
-    if (l->has_vignetting) remove_vignetting(l, im);
-    status s = image_init(&out, x1 - crop[0], y1 - crop[1], 3, err);
+    if (l->has_vignetting) remove_vignetting(l, variances, im);
+    status s = image_init(&out, (size_t)fmax(rint(x1 - crop[0]), 1.0), (size_t)fmax(rint(y1 - crop[1]), 1.0), 3, err);
     for (size_t i = 0; s == STATUS_OK && i < out.width * out.height; i++) {
-        double ideal[2] = {(double)(crop[0] + i % out.width) + 0.5, (double)(crop[1] + i / out.width) + 0.5}, real[2];
+        const double step[2] = {(x1 - crop[0]) / (double)out.width, (y1 - crop[1]) / (double)out.height};
+        double ideal[2] = {crop[0] + ((double)(i % out.width) + 0.5) * step[0],
+                           crop[1] + ((double)(i / out.width) + 0.5) * step[1]},
+               real[2];
         memcpy(real, ideal, sizeof real);
         if (l->has_distortion) lens_distort(l, ideal, real);
         if (!sample(im, real, out.pixel + 3 * i)) {
@@ -65,4 +87,14 @@ status lens_correct(const struct lens *l, const size_t crop[4], struct image *im
     image_release(im);
     *im = out;
     return STATUS_OK;
+}
+
+status lens_correct(const struct lens *l, const double crop[4], struct image *im, struct error *err)
+{
+    return correct(l, crop, false, im, err);
+}
+
+status lens_correct_variance(const struct lens *l, const double crop[4], struct image *variance, struct error *err)
+{
+    return correct(l, crop, true, variance, err);
 }

@@ -22,8 +22,17 @@ struct lens {
 
 /* Where a point of the corrected picture lies in the picture as it was taken. */
 void lens_distort(const struct lens *l, const double ideal_px[2], double real_px[2]);
+/* The opposite, by fixed-point iteration. */
+void lens_undistort(const struct lens *l, const double real_px[2], double ideal_px[2]);
+/* Share of the light that a pixel has at a place of the picture as it was taken; at least 0.01. */
+double lens_vignetting(const struct lens *l, const double real_px[2]);
 /* The crop x0, y0, x1, y1 (all 0: everything) of the corrected picture, by bilinear interpolation where the lens has
- * distortion. im is replaced. STATUS_INVALID when the crop reaches places that the picture does not show. */
-status lens_correct(const struct lens *l, const size_t crop[4], struct image *im, struct error *err);
+ * distortion or the crop does not begin and end with pixels: it then has the next whole number of them a side. im is
+ * replaced. STATUS_INVALID when the crop reaches places that the picture does not show. */
+status lens_correct(const struct lens *l, const double crop[4], struct image *im, struct error *err);
+/* The same for the variances of the pixels of a picture before its correction. Interpolation spreads the noise of a
+ * pixel over its neighbours: each value is the density of variance there, so that the sum over an area is the variance
+ * of the sum of the corrected picture over the area, though single pixels of that are quieter. */
+status lens_correct_variance(const struct lens *l, const double crop[4], struct image *variance, struct error *err);
 
 #endif

@@ -37,17 +37,6 @@ static uint8_t *grey_of(const struct image *im)
     return grey;
 }
 
-/* The place in the picture without distortion, by fixed-point iteration. */
-static void undistort(const struct lens *l, const double real[2], double ideal[2])
-{
-    memcpy(ideal, real, 2 * sizeof *ideal);
-    for (int i = 0; i < 30 && l->has_distortion; i++) {
-        double back[2];
-        lens_distort(l, ideal, back);
-        for (size_t c = 0; c < 2; c++) ideal[c] += real[c] - back[c];
-    }
-}
-
 /* Points that are known on the plane and in the picture. */
 struct point_list {
     size_t n, n_marker;
@@ -67,7 +56,7 @@ static void add_marker(const struct marker_board *b, const struct lens *lens, co
     list->n_marker++;
     for (size_t k = 0; k < 4; k++, list->n++) {
         for (size_t c = 0; c < 2; c++) list->plane[list->n][c] = b->center_mm[m][c] + side[k][c] * b->side_mm;
-        undistort(lens, found->corner_px + 2 * k, list->pixel[list->n]);
+        lens_undistort(lens, found->corner_px + 2 * k, list->pixel[list->n]);
     }
 }
 
@@ -96,7 +85,7 @@ static status add_board_corners(const struct marker_board *b, const struct lens 
         double moved = hypot(at[i][0] - promised[i][0], at[i][1] - promised[i][1]);
         if (!(moved < 0.1 * px_per_square) || !(moved > 0.0)) continue; /* another edge, or none */
         memcpy(list->plane[list->n], b->corner_mm[which[i]], sizeof *list->plane);
-        undistort(lens, at[i], list->pixel[list->n++]);
+        lens_undistort(lens, at[i], list->pixel[list->n++]);
     }
     return s;
 }
@@ -164,18 +153,22 @@ status marker_view_find(const struct marker_board *board, const struct lens *len
 static status set_crop(const struct marker_view *v, double crop_cm, size_t width, size_t height,
                        struct job_photograph *p, struct error *err)
 {
-    double half = 0.5 * 10.0 * crop_cm * v->px_per_mm;
-    double from[2] = {rint(v->center_px[0] - half), rint(v->center_px[1] - half)}, edge = fmax(rint(2.0 * half), 1.0);
-    if (from[0] < 0.0 || from[1] < 0.0 || from[0] + edge > (double)width || from[1] + edge > (double)height)
-        return error_set(err, STATUS_INVALID,
-                         "the crop of %g cm about the orbit center, %.0f pixels about (%.0f, %.0f), is not all in the "
-                         "picture",
-                         crop_cm, edge, v->center_px[0], v->center_px[1]);
+    const double half = 0.5 * 10.0 * crop_cm * v->px_per_mm, size[2] = {(double)width, (double)height};
+    bool inside = true;
     for (size_t c = 0; c < 2; c++) {
-        p->crop_px[c] = (size_t)from[c];
-        p->crop_px[2 + c] = (size_t)(from[c] + edge);
+        double from = v->center_px[c] - half, to = v->center_px[c] + half, edge = fmax(rint(to - from), 1.0);
+        inside = inside && from >= 0.0 && to <= size[c] && rint(from) + edge <= size[c];
+        if (!inside) break;
+        p->crop_px[c] = (size_t)rint(from);
+        p->crop_px[2 + c] = (size_t)(rint(from) + edge);
+        p->crop_exact_px[c] = from;
+        p->crop_exact_px[2 + c] = to;
     }
-    return STATUS_OK;
+    if (inside) return STATUS_OK;
+    return error_set(err, STATUS_INVALID,
+                     "the crop of %g cm about the orbit center, %.0f pixels about (%.0f, %.0f), is not all in the "
+                     "picture",
+                     crop_cm, rint(2.0 * half), v->center_px[0], v->center_px[1]);
 }
 
 status marker_view_apply(const struct marker_view *v, double crop_cm, size_t width, size_t height,

@@ -116,6 +116,7 @@ struct exposures {
     const char *name[EXPOSURE_MAX];
     struct image image[EXPOSURE_MAX];
     struct photograph_record record[EXPOSURE_MAX];
+    struct image variance; /* of the merged picture by the camera's noise; no pixels without a record */
 };
 
 static bool has_lens(const struct photograph_process *k) { return k->lens.has_vignetting || k->lens.has_distortion; }
@@ -175,8 +176,8 @@ static status check_noise(const struct photograph_process *k, const struct expos
     return STATUS_OK;
 }
 
-/* Merges into image[0], which is per second afterwards. */
-static void merge(const struct photograph_process *k, struct exposures *e)
+/* Merges into image[0], whose unit stays that of the first exposure. */
+static status merge(const struct photograph_process *k, struct exposures *e, struct error *err)
 {
     struct noise_record noise = k->noise;
     double t_s[EXPOSURE_MAX], full_scale[EXPOSURE_MAX];
@@ -189,20 +190,39 @@ static void merge(const struct photograph_process *k, struct exposures *e)
         full_scale[i] = e->record[i].info.full_scale;
         image[i] = &e->image[i];
     }
-    exposure_merge_images(k->has_noise ? &noise : NULL, e->n, t_s, full_scale, image, r->noise_se_rgb,
-                          &r->saturated_share);
+    status s = k->has_noise ? image_init(&e->variance, image[0]->width, image[0]->height, 3, err) : STATUS_OK;
+    if (s != STATUS_OK) return s;
+    s = exposure_merge_images(k->has_noise ? &noise : NULL, e->n, t_s, full_scale, image,
+                              k->has_noise ? &e->variance : NULL, &r->saturated_share, err);
+    if (s != STATUS_OK) return s;
     r->merged = true;
     r->n_exposure = e->n;
-    for (size_t c = 0; c < 3; c++) r->noise_se_rgb[c] *= t_s[0]; /* the first one's time is divided by below */
-    for (size_t i = 0; i < 3 * e->image[0].width * e->image[0].height; i++) e->image[0].pixel[i] *= (float)t_s[0];
+    image_scale(image[0], t_s[0]); /* the first one's time is divided by later */
+    if (k->has_noise) image_scale(&e->variance, t_s[0] * t_s[0]);
+    return STATUS_OK;
 }
 
-static void apply_color(const struct photograph_process *k, struct image *im, double se[3])
+/* Standard error of the mean over a picture whose pixels have these variances. */
+static void mean_error(const struct image *variance, double se_rgb[3])
 {
-    double out[3] = {0};
+    const size_t n = variance->width * variance->height;
+    double sum[3] = {0};
+    for (size_t i = 0; i < 3 * n; i++) sum[i % 3] += (double)variance->pixel[i];
+    for (size_t c = 0; c < 3; c++) se_rgb[c] = n > 0 ? sqrt(sum[c]) / (double)n : NAN;
+}
+
+/* Applies the matrix to the picture, to the error of its mean by the camera's noise, and adds what the errors of the
+ * matrix make of the mean. */
+static void apply_color(const struct photograph_process *k, struct image *im, struct photograph_record *r)
+{
+    const size_t n = im->width * im->height;
+    double out[3] = {0}, mean[3] = {0};
+    for (size_t i = 0; i < 3 * n; i++) mean[i % 3] += (double)im->pixel[i] / (double)n;
+    for (size_t c = 0; c < 3; c++) color_matrix_error(k->matrix_cov[c], mean, r->color_error[c]);
     color_matrix_apply_image(k->matrix, im);
-    for (size_t c = 0; c < 9; c++) out[c / 3] += k->matrix[c] * k->matrix[c] * se[c % 3] * se[c % 3];
-    for (size_t c = 0; c < 3; c++) se[c] = sqrt(out[c]);
+    for (size_t c = 0; c < 9; c++)
+        out[c / 3] += k->matrix[c] * k->matrix[c] * r->noise_se_rgb[c % 3] * r->noise_se_rgb[c % 3];
+    for (size_t c = 0; c < 3; c++) r->noise_se_rgb[c] = sqrt(out[c]);
 }
 
 /* A lamp at twice the distance gives a quarter of the light, and radiances are relative to the light that there is. */
@@ -212,17 +232,45 @@ static double distance_factor(const struct photograph_process *k, const struct j
     return ratio > 0.0 ? ratio * ratio : 1.0;
 }
 
-/* Of the crop's pixels in the picture before the correction of the lens. */
-static double saturated_in_crop(const struct image *im, const size_t crop[4], const struct photograph_record *r)
+/* Share of the crop's pixels, in the picture before the correction of the lens, that are saturated in all exposures.
+ * Those have at least the value of full scale in the shortest one. */
+static double saturated_in_crop(const struct exposures *e, const size_t crop[4])
 {
+    const struct image *im = &e->image[0];
+    const struct photograph_info *info = &e->record[0].info;
     size_t x1 = crop[2] > 0 ? crop[2] : im->width, y1 = crop[3] > 0 ? crop[3] : im->height, n = 0;
-    if (r->info.full_scale == 1.0 || x1 > im->width || y1 > im->height) return 0.0;
+    double shortest_s = info->exposure_s;
+    for (size_t i = 1; i < e->n; i++) shortest_s = fmin(shortest_s, e->record[i].info.exposure_s);
+    const float limit = e->n > 1 ? (float)(0.999999 * info->exposure_s / shortest_s) : 1.0f;
+    if (info->full_scale == 1.0 || x1 > im->width || y1 > im->height) return 0.0;
     for (size_t y = crop[1]; y < y1; y++)
         for (size_t x = crop[0]; x < x1; x++) {
             const float *p = im->pixel + 3 * (y * im->width + x);
-            n += fmaxf(p[0], fmaxf(p[1], p[2])) >= 1.0f;
+            n += fmaxf(p[0], fmaxf(p[1], p[2])) >= limit;
         }
     return (double)n / (double)((x1 - crop[0]) * (y1 - crop[1]));
+}
+
+static status correct_lens(const struct photograph_process *k, const struct job_photograph *p, struct exposures *e,
+                           struct error *err)
+{
+    double crop[4];
+    for (size_t i = 0; i < 4; i++) crop[i] = p->crop_exact_px[2] > 0.0 ? p->crop_exact_px[i] : (double)p->crop_px[i];
+    e->record[0].saturated_share = saturated_in_crop(e, p->crop_px);
+    status s = lens_correct(&k->lens, crop, &e->image[0], err);
+    if (s == STATUS_OK && e->variance.pixel != NULL) s = lens_correct_variance(&k->lens, crop, &e->variance, err);
+    return s == STATUS_OK ? s : error_prefix(err, s, "cannot use photograph '%s'", p->file);
+}
+
+static status read_exposures(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                             struct exposures *e, struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i <= p->n_exposure && s == STATUS_OK; i++) s = read_exposure(k, folder, p, i, e, err);
+    if (s != STATUS_OK || (p->n_exposure == 0 && !k->has_noise)) return s;
+    s = check_exposures(e, err);
+    if (s == STATUS_OK) s = check_noise(k, e, err);
+    return s == STATUS_OK ? merge(k, e, err) : s;
 }
 
 status photograph_develop(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
@@ -230,27 +278,24 @@ status photograph_develop(const struct photograph_process *k, const char *folder
 {
     struct exposures *e = calloc(1, sizeof *e);
     if (e == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read photograph '%s': out of memory", p->file);
-    status s = STATUS_OK;
     memset(im, 0, sizeof *im);
-    for (size_t i = 0; i <= p->n_exposure && s == STATUS_OK; i++) s = read_exposure(k, folder, p, i, e, err);
-    bool merged = p->n_exposure > 0 || k->has_noise;
-    if (s == STATUS_OK && merged) s = check_exposures(e, err);
-    if (s == STATUS_OK && merged) s = check_noise(k, e, err);
-    if (s == STATUS_OK && merged) merge(k, e);
-    if (s == STATUS_OK && has_lens(k)) {
-        if (e->n == 1) e->record[0].saturated_share = saturated_in_crop(&e->image[0], p->crop_px, &e->record[0]);
-        s = lens_correct(&k->lens, p->crop_px, &e->image[0], err);
-        if (s != STATUS_OK) error_prefix(err, s, "cannot use photograph '%s'", p->file);
-    }
+    status s = read_exposures(k, folder, p, e, err);
+    if (s == STATUS_OK && has_lens(k)) s = correct_lens(k, p, e, err);
     if (s == STATUS_OK) {
-        if (k->has_color) apply_color(k, &e->image[0], e->record[0].noise_se_rgb);
-        double factor = p->scale / e->record[0].exposure * distance_factor(k, p);
+        struct photograph_record *r = &e->record[0];
+        const double factor = p->scale / r->exposure * distance_factor(k, p);
+        mean_error(&e->variance, r->noise_se_rgb);
+        if (k->has_color) apply_color(k, &e->image[0], r);
         image_scale(&e->image[0], factor);
-        for (size_t c = 0; c < 3; c++) e->record[0].noise_se_rgb[c] *= factor;
+        for (size_t c = 0; c < 3; c++) {
+            r->noise_se_rgb[c] *= factor;
+            for (size_t cause = 0; cause < 3; cause++) r->color_error[c][cause] *= factor;
+        }
         *im = e->image[0];
-        if (record != NULL) *record = e->record[0];
+        if (record != NULL) *record = *r;
     }
     for (size_t i = s == STATUS_OK ? 1 : 0; i < e->n; i++) image_release(&e->image[i]);
+    image_release(&e->variance);
     free(e);
     return s;
 }
@@ -281,6 +326,7 @@ static status load_chart(struct photograph_process *k, const struct job_document
     image_release(&im);
     if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", doc->chart.file);
     memcpy(k->matrix, k->chart.matrix, sizeof k->matrix);
+    memcpy(k->matrix_cov, k->chart.matrix_cov, sizeof k->matrix_cov);
     k->color_info = r.info;
     return STATUS_OK;
 }
@@ -301,6 +347,7 @@ static status load_white(struct photograph_process *k, const struct job_document
             return error_set(err, STATUS_INVALID, "cannot use white reference '%s': it is black in a channel",
                              doc->white.file);
         k->matrix[4 * c] = doc->white_reflectance[c] * cos_theta / mean.mean_rgb[c];
+        k->matrix_cov[c][4 * c] = pow(k->matrix[4 * c] * mean.se_rgb[c] / mean.mean_rgb[c], 2.0);
     }
     k->color_info = mean.record.info;
     return s;

@@ -34,6 +34,7 @@ struct photograph_process {
     double lamp_distance_cm; /* that chart, white reference and scale belong to; NaN: does not matter */
     bool has_color;          /* matrix: from the camera's rgb, over its exposure, to radiances */
     double matrix[9];
+    double matrix_cov[3][9];           /* covariance of each row of the matrix; rows are taken to be independent */
     struct photograph_info color_info; /* of the photograph of the chart or of the white reference */
     struct color_chart chart;          /* with has_color and the document's has_chart */
     struct image chart_picture;        /* color_chart_picture; no pixels without a chart */

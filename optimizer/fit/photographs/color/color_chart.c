@@ -11,7 +11,7 @@
 /* Edge of a patch and the gap between patches, in the unit of OpenCV's model of the chart. */
 static const double patch = 2.5, gap = 0.25;
 static const double middle = 0.5; /* share of a patch's edge that is averaged */
-enum { SAMPLES = 24, PICTURE_PATCH_PX = 60, LEAST_PATCH_PX = 6 };
+enum { SAMPLES = 24, PARTS = 4, PICTURE_PATCH_PX = 60, LEAST_PATCH_PX = 6 };
 static const double largest_mean_delta_e = 12.0;
 
 static const double reference_lab[2][COLOR_CHART_PATCHES][3] = {
@@ -134,10 +134,22 @@ static const float *pixel_at(const struct image *im, const double at[2])
     return im->pixel + 3 * ((size_t)at[1] * im->width + (size_t)at[0]);
 }
 
+/* part: sums over parts of the white patch. */
+static void set_white_variance(struct color_chart *k, const double (*part)[3])
+{
+    const double n = PARTS * PARTS, n_sample = SAMPLES * SAMPLES / n;
+    for (size_t c = 0; c < 3; c++) {
+        double sum = 0.0;
+        for (size_t j = 0; j < PARTS * PARTS; j++)
+            sum += pow(part[j][c] / n_sample - k->measured_rgb[COLOR_CHART_WHITE][c], 2.0);
+        k->white_var[c] = sum / (n * (n - 1.0));
+    }
+}
+
 static status measure_patch(struct color_chart *k, const struct image *im, size_t i, double saturation,
                             struct error *err)
 {
-    double sum[3] = {0};
+    double sum[3] = {0}, part[PARTS * PARTS][3] = {{0}};
     k->saturated[i] = false;
     for (size_t j = 0; j < SAMPLES * SAMPLES; j++) {
         double at[2], u = ((double)(j % SAMPLES) + 0.5) / SAMPLES - 0.5,
@@ -149,10 +161,12 @@ static status measure_patch(struct color_chart *k, const struct image *im, size_
                              at[0], at[1]);
         for (size_t c = 0; c < 3; c++) {
             sum[c] += (double)p[c];
+            part[j / SAMPLES * PARTS / SAMPLES * PARTS + j % SAMPLES * PARTS / SAMPLES][c] += (double)p[c];
             if ((double)p[c] >= saturation) k->saturated[i] = true;
         }
     }
     for (size_t c = 0; c < 3; c++) k->measured_rgb[i][c] = sum[c] / (SAMPLES * SAMPLES);
+    if (i == COLOR_CHART_WHITE) set_white_variance(k, (const double(*)[3])part);
     return STATUS_OK;
 }
 
@@ -167,7 +181,11 @@ static status fit(struct color_chart *k, struct error *err)
         memcpy(measured[n], k->measured_rgb[i], sizeof measured[n]);
         memcpy(wanted[n++], k->wanted_rgb[i], sizeof wanted[0]);
     }
-    return color_matrix_fit(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix, err);
+    status s = color_matrix_fit(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix, err);
+    if (s == STATUS_OK)
+        color_matrix_covariance(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix,
+                                k->white_var, k->matrix_cov);
+    return s;
 }
 
 /* Color differences before and after, as under a lamp that makes a perfect white 1. Returns the mean one after. */

@@ -3,26 +3,32 @@
 #include "base/small_matrix.h"
 
 #include <math.h>
+#include <string.h>
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* A^-1 of the patches over `scale`. False when their colors do not determine a matrix. */
+static bool invert_patches(size_t n, const double (*measured)[3], double scale, double inverse[9])
+{
+    double a[9] = {0}, factor[9];
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < 9; j++) a[j] += measured[i][j / 3] / scale * measured[i][j % 3] / scale;
+    memcpy(factor, a, sizeof factor);
+    return small_factor(factor, 3, 1e-12 * (a[0] + a[4] + a[8])) && small_invert(a, 3, inverse);
+}
+
+/* Scale of the white patch, by which measured values are divided so that A is near to 1. */
+static double white_scale(const double white[3]) { return fmax(fmax(white[0], white[1]), white[2]); }
 
 status color_matrix_fit(size_t n, const double (*measured)[3], const double (*wanted)[3], size_t i_white,
                         double matrix[9], struct error *err)
 {
-    double a[9] = {0}, inverse[9], b[3][3] = {{0}}, white[3], scale = 0.0;
-    for (size_t c = 0; c < 3; c++) scale = fmax(scale, measured[i_white][c]);
+    double inverse[9], b[3][3] = {{0}}, white[3], scale = white_scale(measured[i_white]);
     if (!(scale > 0.0)) return error_set(err, STATUS_NUMERIC, "cannot fit a color matrix: the white patch is black");
-    for (size_t i = 0; i < n; i++) /* p over the scale of the white patch, so that A is near to 1 */
-        for (size_t j = 0; j < 3; j++) {
-            double p = measured[i][j] / scale;
-            for (size_t k = 0; k < 3; k++) {
-                a[3 * j + k] += p * measured[i][k] / scale;
-                b[k][j] += p * wanted[i][k];
-            }
-        }
-    double trace = a[0] + a[4] + a[8], factor[9];
-    for (size_t i = 0; i < 9; i++) factor[i] = a[i];
-    if (!small_factor(factor, 3, 1e-12 * trace) || !small_invert(a, 3, inverse))
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < 3; j++)
+            for (size_t k = 0; k < 3; k++) b[k][j] += measured[i][j] / scale * wanted[i][k];
+    if (!invert_patches(n, measured, scale, inverse))
         return error_set(err, STATUS_NUMERIC,
                          "cannot fit a color matrix: the patches have too few different colors to determine it");
     for (size_t j = 0; j < 3; j++) white[j] = measured[i_white][j] / scale;
@@ -33,6 +39,37 @@ status color_matrix_fit(size_t n, const double (*measured)[3], const double (*wa
         for (size_t j = 0; j < 3; j++) matrix[3 * k + j] = (ab[j] - mu * aw[j]) / scale;
     }
     return STATUS_OK;
+}
+
+void color_matrix_covariance(size_t n, const double (*measured)[3], const double (*wanted)[3], size_t i_white,
+                             const double matrix[9], const double white_var[3], double cov[3][9])
+{
+    double inverse[9], white[3], scale = white_scale(measured[i_white]);
+    memset(cov, 0, 9 * sizeof **cov);
+    if (n < 4 || !(scale > 0.0) || !invert_patches(n, measured, scale, inverse)) return;
+    for (size_t j = 0; j < 3; j++) white[j] = measured[i_white][j] / scale;
+    const double aw[3] = {dot(inverse, white), dot(inverse + 3, white), dot(inverse + 6, white)};
+    const double waw = dot(white, aw);
+    for (size_t k = 0; k < 3; k++) {
+        double square = 0.0, of_white = 0.0;
+        for (size_t i = 0; i < n; i++) {
+            double r = dot(matrix + 3 * k, measured[i]) - wanted[i][k];
+            square += r * r / (double)(n - 3);
+        }
+        for (size_t j = 0; j < 3; j++) of_white += matrix[3 * k + j] * matrix[3 * k + j] * white_var[j];
+        for (size_t j = 0; j < 9; j++) {
+            double shared = aw[j / 3] * aw[j % 3] / waw;
+            cov[k][j] = (square * (inverse[j] - shared) + of_white * shared / waw) / (scale * scale);
+        }
+    }
+}
+
+void color_matrix_error(const double cov[9], const double in[3], double error[3])
+{
+    double value[3], vector[9];
+    small_eigen(cov, 3, value, vector);
+    for (size_t e = 0; e < 3; e++)
+        error[e] = sqrt(fmax(value[e], 0.0)) * (vector[e] * in[0] + vector[3 + e] * in[1] + vector[6 + e] * in[2]);
 }
 
 void color_matrix_apply(const double matrix[9], const double in[3], double out[3])

@@ -69,36 +69,73 @@ static void test_dark_pixels(void **state)
 static void test_pictures(void **state)
 {
     const double t[2] = {1, 4}, full[2] = {1000, 1000};
-    struct image im[2], *list[2] = {&im[0], &im[1]};
+    struct image im[2], variance, *list[2] = {&im[0], &im[1]};
     struct noise_record noise = {
         .channel = {{.read_var = 4, .shot_var = 1}, {.read_var = 4, .shot_var = 1}, {.read_var = 4, .shot_var = 1}}};
-    double se[3], saturated;
+    double saturated, sum = 0.0;
     (void)state;
     for (int i = 0; i < 2; i++) {
         assert_int_equal(image_init(&im[i], 4, 1, 3, NULL), STATUS_OK);
         for (size_t p = 0; p < 12; p++)
-            im[i].pixel[p] = (float)fmin(1.0, 0.1 * (double)(1 + p / 3) * t[i] * (p == 11 ? 30.0 : 1.0));
+            im[i].pixel[p] = (float)fmin(1.0, 0.05 * (double)(1 + p / 3) * t[i] * (p == 11 ? 30.0 : 1.0));
     }
-    exposure_merge_images(&noise, 2, t, full, list, se, &saturated);
-    for (size_t p = 0; p < 11; p++) assert_true(fabs((double)im[0].pixel[p] - 0.1 * (double)(1 + p / 3)) < 1e-6);
+    assert_int_equal(image_init(&variance, 4, 1, 3, NULL), STATUS_OK);
+    assert_int_equal(exposure_merge_images(&noise, 2, t, full, list, &variance, &saturated, NULL), STATUS_OK);
+    for (size_t p = 0; p < 11; p++) assert_true(fabs((double)im[0].pixel[p] - 0.05 * (double)(1 + p / 3)) < 1e-6);
     assert_true(im[0].pixel[11] == 1.0f && saturated == 0.25); /* saturated in both: the shortest one's value */
     double var = 0.0;
     for (size_t p = 0; p < 4; p++) {
-        double y = 100.0 * (double)(1 + p);
-        var += 1.0 / (1.0 / (4.0 + y) + (4.0 * y >= 1000.0 ? 0.0 : 16.0 / (4.0 + 4.0 * y)));
+        double y = 50.0 * (double)(1 + p);
+        var += 1.0 / (1.0 / (4.0 + y) + 16.0 / (4.0 + 4.0 * y));
     }
-    assert_true(fabs(se[0] / (sqrt(var) / 4.0 / 1000.0) - 1.0) < 0.01);
+    for (size_t p = 0; p < 4; p++) sum += (double)variance.pixel[3 * p];
+    assert_true(fabs(sum / (var / 1e6) - 1.0) < 0.02 && variance.pixel[11] == 0.0f);
+    image_release(&variance);
     image_release(&im[0]);
     image_release(&im[1]);
+}
+
+/* An even picture whose long exposure is just below the full scale, so that noise takes a part of its samples over it:
+ * the mean is right within its error. */
+static void test_near_saturation(void **state)
+{
+    enum { EDGE = 80 };
+    const double t[2] = {1, 8}, full[2] = {1000, 1000}, rate[4] = {122.0, 123.5, 124.5, 130.0};
+    const struct noise_channel k = {.read_var = 4, .shot_var = 0.5};
+    const struct noise_record noise = {.channel = {k, k, k}};
+    const struct rng_key key = {.seed = 8};
+    (void)state;
+    for (uint32_t m = 0; m < 4; m++) {
+        struct image im[2], variance, *list[2] = {&im[0], &im[1]};
+        double saturated, sum = 0.0, var = 0.0;
+        assert_int_equal(image_init(&variance, EDGE, EDGE, 3, NULL), STATUS_OK);
+        for (uint32_t i = 0; i < 2; i++) {
+            assert_int_equal(image_init(&im[i], EDGE, EDGE, 3, NULL), STATUS_OK);
+            for (uint32_t p = 0; p < 3 * EDGE * EDGE; p++) {
+                struct rng r;
+                double z[2], y = rate[m] * t[i];
+                rng_start(&r, &key, p, 2 * m + i);
+                rng_normal_pair(&r, z);
+                im[i].pixel[p] = (float)fmin(1.0, (y + sqrt(4.0 + 0.5 * y) * z[0]) / 1000.0);
+            }
+        }
+        assert_int_equal(exposure_merge_images(&noise, 2, t, full, list, &variance, &saturated, NULL), STATUS_OK);
+        for (size_t p = 0; p < 3 * EDGE * EDGE; p++) {
+            sum += 1000.0 * (double)im[0].pixel[p];
+            var += 1e6 * (double)variance.pixel[p];
+        }
+        double off = sum / (3 * EDGE * EDGE) - rate[m], se = sqrt(var) / (3 * EDGE * EDGE);
+        if (!(fabs(off) < 3.5 * se && saturated == 0.0)) fail_msg("%g: off by %g +- %g", rate[m], off, se);
+        for (int i = 0; i < 2; i++) image_release(&im[i]);
+        image_release(&variance);
+    }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_golden),
-        cmocka_unit_test(test_left_out_samples),
-        cmocka_unit_test(test_dark_pixels),
-        cmocka_unit_test(test_pictures),
+        cmocka_unit_test(test_golden),   cmocka_unit_test(test_left_out_samples), cmocka_unit_test(test_dark_pixels),
+        cmocka_unit_test(test_pictures), cmocka_unit_test(test_near_saturation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

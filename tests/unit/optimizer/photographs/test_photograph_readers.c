@@ -1,6 +1,7 @@
 /* The picture readers: exact values of files written here, what they state of the exposure, and files that must be
  * refused with a sentence that names file and reason. */
 #include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/phantom/simulated_camera/dng_file.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/scratch_folder.h"
 
@@ -171,7 +172,8 @@ static void test_dng(void **state)
     mosaic[0] = 500;            /* below black, by noise */
     mosaic[2 * 32 + 4] = 16383; /* saturated */
     const char *path = scratch_path(state, "a.dng");
-    camera_write_dng(path, &(struct camera_dng){32, 32, 512, 16383, 0.5, 100, 4}, mosaic);
+    assert_int_equal(dng_file_write(path, &(struct dng_picture){32, 32, 512, 16383, 0.5, 100, 4}, mosaic, NULL),
+                     STATUS_OK);
     read_ok(path, &no_transfer, &im, &r);
     assert_true(im.width == 16 && im.height == 16 && r.info.black_level == 512.0 && r.info.full_scale == 15871.0);
     assert_true(!r.info.less_trustworthy && r.info.bits == 14 && strstr(r.info.camera, "Test camera") != NULL);

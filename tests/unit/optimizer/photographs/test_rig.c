@@ -155,7 +155,7 @@ static void test_lens(void **state)
                            .center_px = {31, 33},
                            .k = {-0.2, 0.03, 0.001},
                            .p = {0.002, -0.001}};
-    const size_t crop[4] = {10, 12, 50, 44};
+    const double crop[4] = {10, 12, 50, 44};
     struct image im;
     struct error err = {0};
     (void)state;
@@ -176,9 +176,9 @@ static void test_lens(void **state)
         lens_distort(&l, ideal, at);
         assert_true(fabs((double)im.pixel[3 * i + 1] - (1.0 + 0.01 * at[0] + 0.02 * at[1])) < 1e-5);
     }
-    assert_int_equal(lens_correct(&l, (size_t[4]){0, 0, 80, 2}, &im, &err), STATUS_INVALID);
+    assert_int_equal(lens_correct(&l, (double[4]){0, 0, 80, 2}, &im, &err), STATUS_INVALID);
     const struct lens wide = {.has_distortion = true, .focal_px = {20, 20}, .center_px = {20, 16}, .k = {0.5, 0, 0}};
-    assert_int_equal(lens_correct(&wide, (size_t[4]){0}, &im, &err), STATUS_INVALID);
+    assert_int_equal(lens_correct(&wide, (double[4]){0}, &im, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "beyond the picture"));
     image_release(&im);
 }
