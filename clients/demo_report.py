@@ -65,7 +65,7 @@ def camera(truth_path, result_path, summary_path, demo_path):
     """Print how the radiances from raw files compare with the rendered ones, and the parameters with those of `make demo`."""
     true = {os.path.splitext(p["file"])[0]: p["mean_rgb"] for p in load(truth_path)["photographs"]}
     result, off, z = load(result_path), [], []
-    for row in result["photographs"]:
+    for row in result["rows"]:
         name = os.path.splitext(row["name"])[0].rsplit("-", 1)[0]  # fit-03-0.dng is the first exposure of fit-03.exr
         for t, m, se in zip(true[name], row["measured"], row["measured_se"]):
             off.append(abs(m / t - 1))
