@@ -22,6 +22,7 @@
 #define OPTION_DENSITY_LOW "density_low"
 #define OPTION_DENSITY_HIGH "density_high"
 #define OPTION_FIBER_DIAMETER "fiber_diameter"
+#define OPTION_HOLLOW_FIBERS "hollow_fibers"
 #define OPTION_FILTER_S "filter_s"
 #define OPTION_FILTER_T "filter_t"
 #define OPTION_FILTER_LENGTH "filter_length"

@@ -15,6 +15,7 @@
 #include "geometry/grade/scan_grade.h"
 #include "geometry/grade/scan_trial.h"
 #include "geometry/orientation/alignment.h"
+#include "geometry/orientation/lumen_evidence.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
 #include "geometry/volume/volume_source.h"
@@ -63,6 +64,7 @@ struct reconstruct_report {
     double separability;              /* of void and material in the histogram, 0..1 (density_map.h) */
     double noise_sd;                  /* of the mapped density in voxels without material */
     double lumen_share;               /* filled lumens over material; 0 if the fibers are solid */
+    struct lumen_evidence lumen;      /* whether the fibers look hollow */
     double fiber_diameter_voxel;      /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
      * there is none, or the diameter was given. */

@@ -241,7 +241,8 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->separability = m.separability;
     report->noise_sd = density_noise_sd(v);
     report->lumen_share = 0.0;
-    if (o->hollow_fibers) s = lumens_fill(v, report->noise_sd, &report->lumen_share, err);
+    s = lumen_evidence_measure(v, report->noise_sd, &report->lumen, err);
+    if (s == STATUS_OK && o->hollow_fibers) s = lumens_fill(v, report->noise_sd, &report->lumen_share, err);
     if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;

@@ -70,6 +70,11 @@ void reconstruct_warn_volume(const struct reconstruct_option *o, const struct re
         warning_send(warn, OPTION_SCAN_FILES,
                      "the scan is very noisy: its standard deviation is %.2f of the step from void to material",
                      r->noise_sd);
+    if (!o->hollow_fibers && r->lumen.middle_share > LUMEN_MIDDLE_SHARE)
+        warning_send(warn, OPTION_HOLLOW_FIBERS,
+                     "the fibers look hollow: voids in the middle of fibers are %.2f %% of the material (solid fibers "
+                     "have less than 0.01 %%), and their walls are traced as fibers; give true if they are, as cotton",
+                     100.0 * r->lumen.middle_share);
 }
 
 /* Says which of two diameters was taken. The tracing follows from it, so a wrong one makes wrong fibers. */

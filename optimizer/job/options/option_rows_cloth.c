@@ -156,12 +156,15 @@ const struct job_option option_rows_cloth[] = {
          "Whether traced fibers that the scan does not show are kept where it does not resolve single fibers. They "
          "are always kept when a surface model is fitted, which needs fibers."},
     {.path = "volume.hollow_fibers",
+     .id = OPTION_HOLLOW_FIBERS,
      .kind = OPTION_BOOL,
      INTO(hollow_fibers),
      .standard = "false",
      .meaning =
          "`true` for hollow fibers, as of cotton: void that is enclosed in material is filled before tracing, and "
-         "radii are those of the fibers' outlines. Not for solid fibers, whose enclosed gaps would be filled."},
+         "radii are those of the fibers' outlines. Not for solid fibers, whose enclosed gaps would be filled. A "
+         "warning "
+         "recommends it where the fibers look hollow."},
     {.path = "volume.trial",
      .kind = OPTION_BOOL,
      INTO(trial),

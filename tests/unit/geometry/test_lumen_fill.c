@@ -1,5 +1,6 @@
 /* Lumens of hollow fibers are filled, and nothing outside of the fibers. */
 #include "base/rng.h"
+#include "geometry/orientation/lumen_evidence.h"
 #include "geometry/orientation/lumen_fill.h"
 
 #include <math.h>
@@ -11,10 +12,10 @@
 #include <cmocka.h>
 
 static const size_t n_voxel[3] = {72, 72, 72};
-static const double voxel_m[3] = {2e-6, 2e-6, 2e-6}, radius = 3.5, pitch = 7.1, noise_sd = 0.15;
+static const double voxel_m[3] = {2e-6, 2e-6, 2e-6}, radius = 3.5, tight = 7.1, noise_sd = 0.15;
 
 /* Place of the middle of fiber i of a hexagonal bundle of 19 along x. */
-static void middle_of(int i, double *y, double *z)
+static void middle_of(int i, double pitch, double *y, double *z)
 {
     static const int per_row[5] = {3, 4, 5, 4, 3};
     int row = 0;
@@ -31,7 +32,7 @@ static double profile(double distance, double lumen)
     return 0.5 * erfc((distance - radius) / blur) - hole;
 }
 
-static void make_bundle(double lumen, struct volume *v)
+static void make_bundle(double lumen, double pitch, struct volume *v)
 {
     const struct rng_key key = {.seed = 5};
     struct rng r;
@@ -41,7 +42,7 @@ static void make_bundle(double lumen, struct volume *v)
         double sum = 0.0, z[2];
         for (int i = 0; i < 19; i++) {
             double cy, cz;
-            middle_of(i, &cy, &cz);
+            middle_of(i, pitch, &cy, &cz);
             sum += profile(hypot((double)(at / 72 % 72) + 0.5 - cy, (double)(at / (72 * 72)) + 0.5 - cz), lumen);
         }
         rng_normal_pair(&r, z);
@@ -56,7 +57,7 @@ static double middle_density(const struct volume *v, double reach)
     for (size_t at = 0; at < volume_n_voxel(n_voxel); at++)
         for (int i = 0; i < 19; i++) {
             double cy, cz;
-            middle_of(i, &cy, &cz);
+            middle_of(i, tight, &cy, &cz);
             if (hypot((double)(at / 72 % 72) + 0.5 - cy, (double)(at / (72 * 72)) + 0.5 - cz) > reach) continue;
             sum += (double)v->density[at];
             n += 1.0;
@@ -69,8 +70,8 @@ static void test_lumens_are_filled(void **state)
     (void)state;
     struct volume v, before;
     double share;
-    make_bundle(0.45 * radius, &v);
-    make_bundle(0.45 * radius, &before);
+    make_bundle(0.45 * radius, tight, &v);
+    make_bundle(0.45 * radius, tight, &before);
     double hollow = middle_density(&v, 1.2);
     assert_int_equal(lumens_fill(&v, noise_sd, &share, NULL), STATUS_OK);
     print_message("density of the middles %.3f, before %.3f; filled %.3f\n", middle_density(&v, 1.2), hollow, share);
@@ -101,9 +102,28 @@ static void test_nothing_is_enclosed(void **state)
     volume_release(&v);
 }
 
+/* Hollow fibers are noticed where they do not all touch. The gaps of a tight bundle of solid ones are enclosed too, and
+ * are not taken for lumens. */
+static void test_hollow_fibers_are_noticed(void **state)
+{
+    (void)state;
+    for (int hollow = 0; hollow < 2; hollow++) {
+        struct volume v;
+        struct lumen_evidence e;
+        make_bundle(hollow * 0.4 * radius, hollow == 1 ? 8.6 : tight, &v);
+        assert_int_equal(lumen_evidence_measure(&v, noise_sd, &e, NULL), STATUS_OK);
+        print_message("hollow %d: enclosed %.3f, width %.2f, in the middle %.5f\n", hollow, e.enclosed_share,
+                      e.width_voxel, e.middle_share);
+        assert_true(e.enclosed_share > 0.005);
+        assert_true(hollow == 1 ? e.middle_share > 10.0 * LUMEN_MIDDLE_SHARE : e.middle_share < LUMEN_MIDDLE_SHARE);
+        volume_release(&v);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_lumens_are_filled),
-                                       cmocka_unit_test(test_nothing_is_enclosed)};
+                                       cmocka_unit_test(test_nothing_is_enclosed),
+                                       cmocka_unit_test(test_hollow_fibers_are_noticed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -168,6 +168,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "separability", json_number(g->separability));
     json_object_set_new(json, "noise_sd", json_number(g->noise_sd));
     json_object_set_new(json, "lumen_share", json_number(g->lumen_share));
+    json_object_set_new(json, "lumen_evidence", json_number(g->lumen.middle_share));
     json_object_set_new(json, "fiber_diameter_voxel", json_number(g->fiber_diameter_voxel));
     json_object_set_new(json, "fiber_diameter_noise_share", json_number(g->diameter_noise_share));
     json_object_set_new(json, "fiber_diameter_other_voxel", json_number(g->other_diameter_voxel));

@@ -1,0 +1,26 @@
+/* Whether the fibers of a scan look hollow, before any of them is traced.
+ *
+ * Lumens are filled in a copy of the middle of the scan (lumen_fill.h). Enclosed gaps between solid fibers are filled
+ * too, but only a filled lumen is then the middle of a fiber, where the scale-normalised Laplacian of the scan is large
+ * at the scale of a fiber (Lindeberg 1998). The scale follows from the width of what was filled, not from a measured
+ * diameter, which may be that of walls or of a bundle. */
+#ifndef SELVEDGE_GEOMETRY_LUMEN_EVIDENCE_H
+#define SELVEDGE_GEOMETRY_LUMEN_EVIDENCE_H
+
+#include "geometry/volume/volume.h"
+
+struct lumen_evidence {
+    double enclosed_share; /* voxels filled over those of material */
+    double width_voxel;    /* of what was filled, if it were round tubes; 0: nothing was */
+    double middle_share;   /* voxels filled that are in the middle of a fiber over those of material */
+};
+
+/* middle_share from which on fibers look hollow. Phantoms of solid fibers have at most 0.00005, and of hollow ones at
+ * least 0.004 at signal-to-noise 5 and 0.0003 at 2 (geometry/NOTES.md). */
+#define LUMEN_MIDDLE_SHARE 0.0002
+
+/* v: densities in [0, 1]; noise_sd: of a voxel. At most 160 voxels along each axis are looked at, with 40 MB of memory.
+ * STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+status lumen_evidence_measure(const struct volume *v, double noise_sd, struct lumen_evidence *e, struct error *err);
+
+#endif
