@@ -4,8 +4,11 @@
 
 Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated and the true remaining time from a tenth
 of the wall time on, while at least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two
-looks. Each job runs twice on the same folder of remembered speeds, as it would on a machine that has run jobs before; the figures
-with "first" in their name are of the first run, on a machine that knows nothing. --keep keeps the jobs with their records.
+looks. On a machine that others use, too, the remaining wall time depends on what they do: cpu_worst_eta_ratio_after_10pct
+is the same factor in processor time, of the stated time at the share of the processors that the job has had so far, and
+of the processor time that it took from there on. Wall and processor time of every stage go to standard error. Each job
+runs twice on the same folder of remembered speeds, as it would on a machine that has run jobs before; the figures with
+"first" in their name are of the first run, on a machine that knows nothing. --keep keeps the jobs with their records.
 """
 import argparse
 import contextlib
@@ -76,28 +79,51 @@ def make_job(sample, job):
             os.link(os.path.join(sample, name), os.path.join(job, "input", name))
 
 
+def cpu_of(pid):
+    """Processor seconds that a process has taken with all its threads; None when it is gone."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as f:
+            word = f.read().rsplit(")", 1)[1].split()
+    except OSError:
+        return None
+    return (int(word[11]) + int(word[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def show_stages(looks):
+    """Prints how long each stage took, to the resolution of the looks."""
+    first = {}
+    for t, cpu_s, look in looks:
+        first.setdefault(look["stage"], (t, cpu_s))
+    ends = [*list(first.values())[1:], (looks[-1][0], looks[-1][1])]
+    for (stage, begin), end in zip(first.items(), ends):
+        print(f"stage {stage}: {end[0] - begin[0]:.1f} s, processor {end[1] - begin[1]:.1f} s", file=sys.stderr)
+
+
 def record(arguments, job, speeds):
-    """Runs the job; [(seconds since the start, status.json)] at every look, and its wall time."""
+    """Runs the job; [(seconds since the start, processor seconds, status.json)] at every look, and its wall time."""
     looks, start = [], time.monotonic()
     command = [program(arguments, "selvedge-worker"), "--quiet", "--speeds", speeds, "--threads", str(arguments.threads), job]
     with subprocess.Popen(command) as worker:
         while worker.poll() is None:
             time.sleep(LOOK_S)
             with contextlib.suppress(OSError, ValueError), open(os.path.join(job, "status.json"), encoding="utf-8") as f:
-                looks.append((time.monotonic() - start, json.load(f)))
+                look, cpu_s = json.load(f), cpu_of(worker.pid)
+                if cpu_s is not None:
+                    looks.append((time.monotonic() - start, cpu_s, look))
     wall_s = time.monotonic() - start
     if worker.returncode != 0:
         sys.exit(f"bench_progress: the worker ended with {worker.returncode} on {job}")
     with open(os.path.join(job, "looks.json"), "w", encoding="utf-8") as f:
-        json.dump([(t, *(look.get(key) for key in ("stage", "stage_fraction", "fraction", "eta_s", "eta_low_s", "eta_high_s")))
-                   for t, look in looks], f)
+        json.dump([(t, cpu_s, *(look.get(key) for key in ("stage", "stage_fraction", "fraction", "eta_s", "eta_low_s", "eta_high_s")))
+                   for t, cpu_s, look in looks], f)
+    show_stages(looks)
     return looks, wall_s
 
 
 def worst_ratio(looks, wall_s):
     """Largest factor between stated and true remaining time; infinite while none is stated."""
     worst = 1.0
-    for t, look in looks:
+    for t, _, look in looks:
         rest, eta = wall_s - t, look["eta_s"]
         if t < FROM * wall_s or rest < max(REST_SHARE * wall_s, REST_S) or look["state"] != "running":
             continue
@@ -105,9 +131,21 @@ def worst_ratio(looks, wall_s):
     return worst
 
 
+def worst_cpu_ratio(looks):
+    """The same in processor time."""
+    worst, total = 1.0, looks[-1][1]
+    for t, cpu_s, look in looks:
+        rest = total - cpu_s
+        if cpu_s < FROM * total or rest < max(REST_SHARE * total, REST_S) or look["state"] != "running":
+            continue
+        eta = look["eta_s"] * cpu_s / t if look["eta_s"] is not None else float("inf")
+        worst = max(worst, max(eta, rest) / max(min(eta, rest), 1e-3))
+    return worst
+
+
 def largest_jump(looks):
     """Largest change between two looks while the job runs; a step backwards counts as an infinite one."""
-    fractions = [look["fraction"] for _, look in looks if look["state"] == "running"]
+    fractions = [look["fraction"] for _, _, look in looks if look["state"] == "running"]
     steps = [b - a for a, b in zip([0.0] + fractions, fractions)]
     return float("inf") if min(steps, default=0.0) < 0.0 else max(steps, default=0.0)
 
@@ -126,8 +164,10 @@ def bench(arguments, name, folder, speeds):
         make_job(sample, job)
         looks, wall_s = record(arguments, job, speeds)
         figure(f"{name}.{run}worst_eta_ratio_after_10pct", worst_ratio(looks, wall_s), "1")
+        figure(f"{name}.{run}cpu_worst_eta_ratio_after_10pct", worst_cpu_ratio(looks), "1")
         figure(f"{name}.{run}largest_jump", largest_jump(looks), "1")
         figure(f"{name}.{run}wall_s", wall_s, "s")
+        figure(f"{name}.{run}cpu_s", looks[-1][1], "s")
 
 
 def main():
