@@ -4,19 +4,8 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-/* Tangent at vertex i of a line, by central difference. */
-static void tangent_at(const struct polyline_set *p, size_t line, size_t i, float t[3])
-{
-    size_t a = i > p->first[line] + 1 ? i - 2 : p->first[line],
-           b = i + 2 < p->first[line + 1] ? i + 2 : p->first[line + 1] - 1;
-    float norm = 0.0f;
-    for (int c = 0; c < 3; c++) {
-        t[c] = p->vertex[b][c] - p->vertex[a][c];
-        norm += t[c] * t[c];
-    }
-    norm = norm > 0.0f ? 1.0f / sqrtf(norm) : 0.0f;
-    for (int c = 0; c < 3; c++) t[c] *= norm;
-}
+/* Vertices to both sides from which a tangent is taken. */
+enum { REACH = 2 };
 
 /* Line a has precedence over b: it is longer, or the earlier one of equals. */
 static bool wins(const struct polyline_set *p, size_t a, size_t b)
@@ -48,7 +37,7 @@ static bool passes(const struct duplicate_search *s, size_t line, const float x[
 {
     size_t other_line = s->grid.line_of[other];
     float d[3], u[3], along = 0.0f, square = 0.0f, cosine = 0.0f;
-    tangent_at(s->p, other_line, other, u);
+    polyline_tangent(s->p, other_line, other, REACH, u);
     for (int a = 0; a < 3; a++) {
         d[a] = x[a] - s->p->vertex[other][a];
         along += d[a] * u[a];
@@ -66,7 +55,7 @@ static bool is_duplicate(const struct duplicate_search *s, size_t line, size_t i
     const float *x = s->p->vertex[i];
     float reach = sqrtf(s->most * s->most + 1.0f), t[3]; /* vertices are at most about 1.5 voxels apart */
     size_t from[3], to[3], c[3];
-    tangent_at(s->p, line, i, t);
+    polyline_tangent(s->p, line, i, REACH, t);
     vertex_grid_range(g, x, reach, from, to);
     for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
         for (c[1] = from[1]; c[1] <= to[1]; c[1]++)
@@ -101,7 +90,7 @@ status polylines_remove_duplicates(const struct polyline_set *lines, const size_
     bool *mark = malloc((lines->n_vertex + 1) * sizeof *mark);
     if (mark == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for duplicates of fibers: out of memory");
     status s = polylines_mark_duplicates(lines, n_voxel, diameter_voxel, touching, mark, err);
-    if (s == STATUS_OK) s = polylines_without(lines, mark, min_vertex, result, err);
+    if (s == STATUS_OK) s = polylines_without(lines, mark, min_vertex, result, NULL, err);
     counts->n_duplicate = 0;
     for (size_t i = 0; i < lines->n_vertex && s == STATUS_OK; i++) counts->n_duplicate += mark[i];
     free(mark);
@@ -123,7 +112,7 @@ bool polyline_is_overlapped(const struct polyline_set *p, const struct vertex_gr
                     if (other_line == line) continue;
                     float near = share * (p->radius[line] + p->radius[other_line]);
                     float s[3], along = 0.0f, square = 0.0f;
-                    tangent_at(p, other_line, other, s);
+                    polyline_tangent(p, other_line, other, REACH, s);
                     for (int a = 0; a < 3; a++) {
                         float d = x[a] - p->vertex[other][a];
                         along += d * s[a];

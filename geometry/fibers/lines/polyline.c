@@ -72,18 +72,35 @@ status polyline_add_part(struct polyline_set *p, const struct polyline_set *from
 }
 
 status polylines_without(const struct polyline_set *from, const bool *mark, size_t min_vertex, struct polyline_set *p,
-                         struct error *err)
+                         size_t *origin, struct error *err)
 {
     status s = STATUS_OK;
+    size_t n = 0;
     for (size_t l = 0; l < from->n_line && s == STATUS_OK; l++) {
         size_t run = from->first[l], end = from->first[l + 1];
         for (size_t i = run; i <= end && s == STATUS_OK; i++) {
             if (i < end && !mark[i]) continue;
-            if (i - run >= min_vertex) s = polyline_add_part(p, from, l, run, i, err);
+            if (i - run >= min_vertex) {
+                s = polyline_add_part(p, from, l, run, i, err);
+                for (size_t k = run; origin != NULL && k < i; k++) origin[n++] = k;
+            }
             run = i + 1;
         }
     }
     return s;
+}
+
+void polyline_tangent(const struct polyline_set *p, size_t line, size_t i, size_t reach, float t[3])
+{
+    size_t a = i > p->first[line] + reach ? i - reach : p->first[line],
+           b = i + reach < p->first[line + 1] ? i + reach : p->first[line + 1] - 1;
+    float norm = 0.0f;
+    for (int c = 0; c < 3; c++) {
+        t[c] = p->vertex[b][c] - p->vertex[a][c];
+        norm += t[c] * t[c];
+    }
+    norm = norm > 0.0f ? 1.0f / sqrtf(norm) : 0.0f;
+    for (int c = 0; c < 3; c++) t[c] *= norm;
 }
 
 static size_t cell_index(const struct vertex_grid *g, const float x[3])

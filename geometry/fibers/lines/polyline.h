@@ -26,9 +26,12 @@ status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
 /* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line. */
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
                          struct error *err);
-/* Adds the lines of `from` to p without the marked vertices (one mark for each), in pieces of at least min_vertex. */
+/* Adds the lines of `from` to p without the marked vertices (one mark for each), in pieces of at least min_vertex.
+ * origin: NULL, or the vertex of `from` that each added one comes from (room for from->n_vertex). */
 status polylines_without(const struct polyline_set *from, const bool *mark, size_t min_vertex, struct polyline_set *p,
-                         struct error *err);
+                         size_t *origin, struct error *err);
+/* Unit tangent at vertex i of a line, by the difference of the vertices `reach` before and after it, or of its ends. */
+void polyline_tangent(const struct polyline_set *p, size_t line, size_t i, size_t reach, float t[3]);
 static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
 
 /* The vertices sorted by the cells of a grid, for neighbour searches. */

@@ -9,19 +9,6 @@ enum { BAND = 5 }; /* the diagonal and four below it: second differences of two 
 /* Bounds of the half logarithm of the ratio of axes (a ratio of 4), and of one step of a component. */
 static const double FLATNESS_MOST = 0.69, STEP_MOST = 0.2;
 
-/* Tangent at vertex i, from its neighbours in the line. */
-static void tangent_at(const struct polyline_set *p, size_t line, size_t i, float t[3])
-{
-    size_t a = i > p->first[line] ? i - 1 : i, b = i + 1 < p->first[line + 1] ? i + 1 : i;
-    float norm = 0.0f;
-    for (int c = 0; c < 3; c++) {
-        t[c] = p->vertex[b][c] - p->vertex[a][c];
-        norm += t[c] * t[c];
-    }
-    norm = norm > 0.0f ? 1.0f / sqrtf(norm) : 0.0f;
-    for (int c = 0; c < 3; c++) t[c] *= norm;
-}
-
 /* Makes u a unit vector perpendicular to the unit vector t. */
 static void make_perpendicular(const float t[3], float u[3])
 {
@@ -46,7 +33,7 @@ void fiber_sections_start(const struct polyline_set *lines, struct fiber_section
             float t[3];
             section[i] = (struct fiber_section){{0.0f, 0.0f, 0.0f}, 0.0f, 0.0f};
             if (i > lines->first[l]) memcpy(section[i].u, section[i - 1].u, sizeof section[i].u);
-            tangent_at(lines, l, i, t);
+            polyline_tangent(lines, l, i, 1, t);
             make_perpendicular(t, section[i].u);
         }
 }
@@ -56,7 +43,7 @@ void fiber_sections_turn(const struct polyline_set *lines, struct fiber_section 
     for (size_t l = 0; l < lines->n_line; l++)
         for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) {
             float t[3];
-            tangent_at(lines, l, i, t);
+            polyline_tangent(lines, l, i, 1, t);
             make_perpendicular(t, section[i].u);
         }
 }

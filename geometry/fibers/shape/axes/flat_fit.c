@@ -79,30 +79,9 @@ static status find_rest(struct flat_work *w, const size_t n_voxel[3], double dia
 {
     const struct polyline_set *lines = w->lines;
     status s = polylines_mark_duplicates(lines, n_voxel, diameter, SUSPECT, w->suspect, err);
-    if (s == STATUS_OK) s = polylines_without(lines, w->suspect, LEAST_PIECE, &w->rest, err);
-    if (s != STATUS_OK) return s;
-    size_t n = 0; /* the same walk as that of polylines_without */
-    for (size_t l = 0; l < lines->n_line; l++)
-        for (size_t i = lines->first[l], run = i; i <= lines->first[l + 1]; i++) {
-            if (i < lines->first[l + 1] && !w->suspect[i]) continue;
-            for (size_t k = run; i - run >= LEAST_PIECE && k < i; k++) {
-                w->rest_section[n] = w->section[k];
-                w->origin[n++] = k;
-            }
-            run = i + 1;
-        }
-    return STATUS_OK;
-}
-
-static void tangent_at(const struct polyline_set *p, size_t line, size_t i, float t[3])
-{
-    size_t a = i > p->first[line] ? i - 1 : i, b = i + 1 < p->first[line + 1] ? i + 1 : i;
-    float norm = 0.0f;
-    for (int c = 0; c < 3; c++) {
-        t[c] = p->vertex[b][c] - p->vertex[a][c];
-        norm += t[c] * t[c];
-    }
-    for (int c = 0; c < 3 && norm > 0.0f; c++) t[c] /= sqrtf(norm);
+    if (s == STATUS_OK) s = polylines_without(lines, w->suspect, LEAST_PIECE, &w->rest, w->origin, err);
+    for (size_t k = 0; s == STATUS_OK && k < w->rest.n_vertex; k++) w->rest_section[k] = w->section[w->origin[k]];
+    return s;
 }
 
 /* Whether x, on a line with tangent t, lies inside the section at vertex k of the rest. */
@@ -110,7 +89,7 @@ static bool lies_inside(const struct flat_work *w, const float x[3], const float
 {
     const float origin[3] = {0.0f, 0.0f, 0.0f};
     float u[3], offset[3], along = 0.0f, cosine = 0.0f;
-    tangent_at(&w->rest, line, k, u);
+    polyline_tangent(&w->rest, line, k, 1, u);
     for (int a = 0; a < 3; a++) {
         offset[a] = x[a] - w->rest.vertex[k][a];
         along += offset[a] * u[a];
@@ -128,7 +107,7 @@ static size_t line_around(const struct flat_work *w, const struct vertex_grid *g
     const float *x = w->lines->vertex[i];
     size_t from[3], to[3], c[3];
     float t[3];
-    tangent_at(w->lines, w->line_of[i], i, t);
+    polyline_tangent(w->lines, w->line_of[i], i, 1, t);
     vertex_grid_range(g, x, reach, from, to);
     for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
         for (c[1] = from[1]; c[1] <= to[1]; c[1]++)
@@ -201,7 +180,7 @@ static status remove_parts(struct flat_work *w, const struct flat_fit *f, const 
     if (s == STATUS_OK) s = decide(w, f->v->n, n_removed, err);
     if (s == STATUS_OK) {
         take_rest(w);
-        s = polylines_without(w->lines, w->suspect, f->min_vertex, &kept, err);
+        s = polylines_without(w->lines, w->suspect, f->min_vertex, &kept, NULL, err);
     }
     if (s == STATUS_OK) {
         polyline_set_release(w->lines);

@@ -116,23 +116,14 @@ static status write_script(const struct export_scene *e, struct error *err)
 }
 
 /* The curves of Blender go through their points. */
-static status write_fibers(const struct export_scene *e, size_t group, struct error *err)
+static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
 {
-    struct export_text t;
-    char name[32];
     double p[3];
-    status s = export_text_open(&t, err);
-    if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < e->c->fiber.n_fiber; i++) {
-        if (!export_fiber_in(e, i, group)) continue;
-        for (size_t k = 1; k + 1 < export_n_point(e, i); k++) {
-            export_point(e, i, k, p);
-            fprintf(t.file, "%.6f %.6f %.6f %.6f\n", p[0], p[1], p[2], export_radius_mm(e, i));
-        }
-        fputc('\n', t.file);
+    for (size_t k = 1; k + 1 < export_n_point(e, i); k++) {
+        export_point(e, i, k, p);
+        fprintf(text, "%.6f %.6f %.6f %.6f\n", p[0], p[1], p[2], export_radius_mm(e, i));
     }
-    export_fibers_name(group, ".txt", name);
-    return export_text_close(e, &t, name, err);
+    fputc('\n', text);
 }
 
 static json_t *repeats_json(const struct export_scene *e)
@@ -191,7 +182,8 @@ static status write_scene(const struct export_scene *e, struct error *err)
 static status write_blender(struct export_scene *e, json_t **materials, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++) s = write_fibers(e, g, err);
+    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++)
+        s = export_fibers_write(e, g, ".txt", print_fiber, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_script(e, err);
     if (s == STATUS_OK) s = write_scene(e, err);

@@ -25,18 +25,6 @@ static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
     fprintf(text, " ]\n");
 }
 
-static status write_fibers(const struct export_scene *e, size_t group, struct error *err)
-{
-    struct export_text t;
-    char name[32];
-    status s = export_text_open(&t, err);
-    if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
-        if (export_fiber_in(e, i, group)) print_fiber(t.file, e, i);
-    export_fibers_name(group, ".pbrt", name);
-    return export_text_close(e, &t, name, err);
-}
-
 static void print_tile(FILE *text, const struct export_scene *e)
 {
     char name[32];
@@ -142,7 +130,8 @@ static status write_view(const struct export_scene *e, size_t i, struct error *e
 static status write_pbrt(struct export_scene *e, json_t **materials, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++) s = write_fibers(e, g, err);
+    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++)
+        s = export_fibers_write(e, g, ".pbrt", print_fiber, err);
     for (size_t i = 0; i < e->c->observation.n && i < MAX_VIEW && s == STATUS_OK; i++) s = write_view(e, i, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_cloth(e, err);

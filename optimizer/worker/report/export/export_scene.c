@@ -72,6 +72,19 @@ void export_fibers_name(size_t group, const char *ending, char name[32])
     snprintf(name, 32, "fibers-%zu%s", group, ending);
 }
 
+status export_fibers_write(const struct export_scene *e, size_t group, const char *ending,
+                           void (*print)(FILE *text, const struct export_scene *e, size_t i), struct error *err)
+{
+    struct export_text t;
+    char name[32];
+    status s = export_text_open(&t, err);
+    if (s != STATUS_OK) return s;
+    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
+        if (export_fiber_in(e, i, group)) print(t.file, e, i);
+    export_fibers_name(group, ending, name);
+    return export_text_close(e, &t, name, err);
+}
+
 /* ---- lamp, camera and rows ---- */
 
 static void polar(double theta, double phi, double distance, double out[3])

@@ -50,6 +50,9 @@ void export_point(const struct export_scene *e, size_t i, size_t k, double p_mm[
 double export_radius_mm(const struct export_scene *e, size_t i);
 /* "fibers-<group><ending>" */
 void export_fibers_name(size_t group, const char *ending, char name[32]);
+/* Writes the file of that name, with each fiber of the group as `print` does. */
+status export_fibers_write(const struct export_scene *e, size_t group, const char *ending,
+                           void (*print)(FILE *text, const struct export_scene *e, size_t i), struct error *err);
 
 struct export_view {
     double lamp_mm[3], camera_mm[3], up[3];
