@@ -1,6 +1,7 @@
 #include "optimizer/job/check/job_faults.h"
 #include "optimizer/job/job_document.h"
 #include "server/endpoints/handlers.h"
+#include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_view.h"
 
@@ -109,7 +110,11 @@ void handle_create_job(struct http_request *r)
 
 void handle_get_job(struct http_request *r)
 {
-    if (!job_not_modified(r)) reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
+    struct long_poll poll;
+    if (!long_poll_begin(r, r->param[0], &poll)) return;
+    do {
+        if (!job_not_modified(r)) reply_job(r, r->param[0], MHD_HTTP_OK, false, false);
+    } while (long_poll_again(r, &poll));
 }
 
 struct precondition {
@@ -205,7 +210,7 @@ static bool read_query(struct http_request *r, struct job_query *q)
     return true;
 }
 
-void handle_list_jobs(struct http_request *r)
+static void list_jobs(struct http_request *r)
 {
     struct job_query q;
     struct job_row *row = NULL;
@@ -230,4 +235,13 @@ void handle_list_jobs(struct http_request *r)
     }
     reply_json_tagged(
         r, json_pack("{s:o,s:o}", "jobs", list, "next_cursor", cursor[0] ? json_string(cursor) : json_null()));
+}
+
+void handle_list_jobs(struct http_request *r)
+{
+    struct long_poll poll;
+    if (!long_poll_begin(r, NULL, &poll)) return;
+    do {
+        list_jobs(r);
+    } while (long_poll_again(r, &poll));
 }

@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
+#include "server/events/change_feed.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_service.h"
 
@@ -135,6 +136,8 @@ static status make_data_folders(const char *data, struct error *err)
     return s;
 }
 
+static void publish(void *context, const char *job_id) { change_feed_publish(context, job_id); }
+
 status job_service_open(const struct settings *settings, struct log *log, struct job_service **out, struct error *err)
 {
     char path[PATH_BYTES];
@@ -146,6 +149,8 @@ status job_service_open(const struct settings *settings, struct log *log, struct
     status s = make_data_folders(settings->data, err);
     path_join(path, settings->data, "selvedge.db", NULL);
     if (s == STATUS_OK) s = store_open(path, &v->store, err);
+    if (s == STATUS_OK) s = change_feed_new(&v->feed, err);
+    if (s == STATUS_OK) store_on_change(v->store, publish, v->feed);
     if (s == STATUS_OK) s = upload_set_new(v->store, settings->data, settings->commit_bytes, log, &v->upload, err);
     if (s == STATUS_OK) s = remove_deleted(v, err);
     if (s == STATUS_OK) s = quarantine_unknown(v, err);
@@ -165,6 +170,7 @@ void job_service_close(struct job_service *v)
     if (v == NULL) return;
     upload_set_free(v->upload);
     store_close(v->store);
+    change_feed_free(v->feed);
     pthread_mutex_destroy(&v->change);
     free(v);
 }

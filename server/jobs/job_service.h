@@ -13,11 +13,13 @@
 #include <stdatomic.h>
 
 struct supervisor;
+struct change_feed;
 
 struct job_service {
     const struct settings *settings;
     struct store *store;
     struct upload_set *upload;
+    struct change_feed *feed; /* of what long polls wait for */
     struct log *log;
     struct supervisor *supervisor; /* notified of changes; NULL in tests */
     pthread_mutex_t change;        /* held from reading a row to writing it back */

@@ -209,6 +209,18 @@ void store_close(struct store *store)
     free(store);
 }
 
+void store_on_change(struct store *store, void (*changed)(void *context, const char *job_id), void *context)
+{
+    store->changed = changed;
+    store->changed_context = context;
+}
+
+status store_report(const struct store *store, status s, const char *job_id)
+{
+    if (s == STATUS_OK && store->changed != NULL) store->changed(store->changed_context, job_id);
+    return s;
+}
+
 status store_probe(struct store *store, struct error *err)
 {
     pthread_mutex_lock(&store->write.lock);

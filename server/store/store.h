@@ -63,6 +63,9 @@ struct store;
 /* STATUS_UNSUPPORTED on a network file system or for a newer schema. */
 status store_open(const char *path, struct store **store, struct error *err);
 void store_close(struct store *store);
+/* From now on `changed` is called with the id of a job after each change of it or of its files, by the thread that made
+ * the change. To be called once, before other threads use the store. */
+void store_on_change(struct store *store, void (*changed)(void *context, const char *job_id), void *context);
 
 /* Inserts a job, and its idempotency key with body_hash (key NULL: none), in one transaction. Sets row->serial. */
 status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash,

@@ -41,7 +41,7 @@ status store_file_insert(struct store *store, const struct file_row *row, size_t
     pthread_mutex_lock(&store->write.lock);
     status s = insert(store, row, n, job, err);
     pthread_mutex_unlock(&store->write.lock);
-    return s;
+    return store_report(store, s, row->job_id);
 }
 
 static status get_one(struct store *store, sqlite3_stmt *q, const char *what, struct file_row *row, struct error *err)
@@ -88,7 +88,7 @@ status store_file_update(struct store *store, const struct file_row *r, struct e
                          (int)STORE_HASH_STATE_BYTES, r->id);
     pthread_mutex_unlock(&store->write.lock);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' no longer exists", r->name);
-    return s;
+    return store_report(store, s, r->job_id);
 }
 
 static status erase(struct store *store, const char *id, struct job_row *job, struct error *err)
@@ -105,7 +105,7 @@ status store_file_erase(struct store *store, const char *id, struct job_row *job
     pthread_mutex_lock(&store->write.lock);
     status s = erase(store, id, job, err);
     pthread_mutex_unlock(&store->write.lock);
-    return s;
+    return job == NULL ? s : store_report(store, s, job->id);
 }
 
 status store_file_count(struct store *store, const char *job_id, int64_t *n, struct error *err)

@@ -81,7 +81,7 @@ status store_job_insert(struct store *store, struct job_row *row, const char *id
     pthread_mutex_lock(&store->write.lock);
     status s = insert(store, row, idempotency_key, body_hash, err);
     pthread_mutex_unlock(&store->write.lock);
-    return s;
+    return store_report(store, s, row->id);
 }
 
 status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES],
@@ -157,7 +157,7 @@ status store_job_update(struct store *store, struct job_row *row, struct error *
     pthread_mutex_lock(&store->write.lock);
     status s = store_job_write(store, row, err);
     pthread_mutex_unlock(&store->write.lock);
-    return s;
+    return store_report(store, s, row->id);
 }
 
 static status replace(struct store *store, struct job_row *row, struct error *err)
@@ -176,7 +176,7 @@ status store_job_replace(struct store *store, struct job_row *row, struct error 
     pthread_mutex_lock(&store->write.lock);
     status s = replace(store, row, err);
     pthread_mutex_unlock(&store->write.lock);
-    return s;
+    return store_report(store, s, row->id);
 }
 
 static status erase(struct store *store, const char *id, struct error *err)
@@ -195,7 +195,7 @@ status store_job_erase(struct store *store, const char *id, struct error *err)
     pthread_mutex_lock(&store->write.lock);
     status s = erase(store, id, err);
     pthread_mutex_unlock(&store->write.lock);
-    return s;
+    return store_report(store, s, id);
 }
 
 static status grow(struct job_row **row, size_t n, size_t *capacity, struct error *err)

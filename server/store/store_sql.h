@@ -13,7 +13,9 @@ struct store_link {
 };
 
 struct store {
-    struct store_link write, read; /* no function holds both locks */
+    struct store_link write, read;                      /* no function holds both locks */
+    void (*changed)(void *context, const char *job_id); /* NULL: nobody asks */
+    void *changed_context;
 };
 
 /* Sets err from SQLite's last result; what is for example "cannot write job". */
@@ -29,6 +31,8 @@ status store_begin(struct store_link *link, struct error *err);
 status store_end(struct store_link *link, status so_far, struct error *err);
 /* store_job_update for callers that hold store->write.lock. */
 status store_job_write(struct store *store, struct job_row *row, struct error *err);
+/* Reports a change of a job, unless s is an error. Returns s. To be called without locks. */
+status store_report(const struct store *store, status s, const char *job_id);
 /* Statements of which entry i changes the schema from version i to version i + 1. */
 const char *const *store_migrations(int *n);
 /* Copies a text column into a buffer; NULL becomes "". */

@@ -1,5 +1,6 @@
 #include "server/workers/supervisor.h"
 #include "base/clock.h"
+#include "server/events/change_feed.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/attempt.h"
@@ -131,6 +132,7 @@ static void watch(struct supervisor *u, struct slot *slot)
     if (request.heartbeat_unix_s > 0 && request.heartbeat_unix_s != slot->seen_heartbeat_unix_s) {
         slot->seen_heartbeat_unix_s = request.heartbeat_unix_s;
         slot->heartbeat_seen_s = now;
+        change_feed_publish(u->v->feed, slot->job_id);
     }
     double silent_s = known ? now - slot->heartbeat_seen_s : 0;
     if (silent_s > (double)u->v->settings->heartbeat_timeout_s && !slot->killed) {

@@ -1,11 +1,12 @@
 """What does the daemon cost, and does it answer while it stores uploads? Prints figures service.*.
 
-    bench_service.py [--build DIR] [NAME...]    NAME: list uploads slow_disk declare readers
+    bench_service.py [--build DIR] [NAME...]    NAME: list uploads slow_disk declare readers watchers
 
 list: CPU time of the daemon for one page of the list of jobs, at 100 and at 10,000 jobs. uploads: 99th percentile of the
 time of GET on a job while 8 clients upload. slow_disk: longest time of GET /livez while one client uploads and each sync
 takes 0.5 s. declare: time in which 4,000 slices of a scan are declared. readers: memory of the daemon while 60 clients
-read a job and its result of 12 MB at 100 bytes a second.
+read a job and its result of 12 MB at 100 bytes a second. watchers: CPU time of the daemon and 99th percentile of the time of
+GET while 200 clients wait for a change of a job or of the list, and the time until the last of them has seen one.
 """
 import argparse
 import contextlib
@@ -24,7 +25,7 @@ import uuid
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 sys.path.insert(0, os.path.join(ROOT, "tests", "support", "python"))
-N_LIST, N_SLICE, N_READER, RESULT_BYTES = 200, 4000, 60, 12 << 20
+N_LIST, N_SLICE, N_READER, N_WATCHER, RESULT_BYTES = 200, 4000, 60, 200, 12 << 20
 PIECE_BYTES = 16 << 20
 UPLOAD_S = 5.0
 
@@ -175,7 +176,28 @@ def bench_readers(folder, daemon_type):
         figure("rss_60_slow_readers_bytes", most, "bytes")
 
 
-BENCH = {"list": bench_list, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare, "readers": bench_readers}
+def bench_watchers(folder, daemon_type):
+    with daemon_type(os.path.join(folder, "watchers")) as daemon:
+        job = daemon.create()
+        waiting = []
+        for path in [f"/v1/jobs/{job}", "/v1/jobs"] * (N_WATCHER // 2):
+            client = http.client.HTTPConnection("127.0.0.1", daemon.port)
+            client.request("GET", f"{path}?wait=60", headers={"If-None-Match": daemon.get(path).headers["ETag"]})
+            waiting.append(client)
+        time.sleep(1)
+        before, start = cpu_s(daemon.process.pid), time.monotonic()
+        time.sleep(UPLOAD_S)
+        figure("watchers_idle_cpu", (cpu_s(daemon.process.pid) - before) / (time.monotonic() - start), "CPU")
+        times = times_of_get(daemon.port, f"/v1/jobs/{job}", time.monotonic() + UPLOAD_S)
+        figure("watchers_get_p99_ms", 1e3 * times[int(0.99 * len(times))], "ms")
+        start = time.monotonic()
+        daemon.post(f"/v1/jobs/{job}/cancel")
+        assert {client.getresponse().status for client in waiting} == {200}
+        figure("watchers_last_s", time.monotonic() - start, "s")
+
+
+BENCH = {"list": bench_list, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare, "readers": bench_readers,
+         "watchers": bench_watchers}
 
 
 def main():

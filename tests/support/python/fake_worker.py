@@ -104,6 +104,10 @@ elif behaviour == "chatter":  # writes to the console without end, and dies
 elif behaviour == "work":
     work(float(argument or 3600))
     finish()
+elif behaviour == "climb":  # makes progress until it is stopped
+    for i in range(100000):
+        say("running", min(0.9, 0.1 + 1e-3 * i))
+        time.sleep(0.2)
 elif behaviour == "work_once":  # until it is killed; the next run succeeds
     if run == 1:
         work(3600)
