@@ -66,6 +66,8 @@ void linear_gain_absorb(struct linear_model *m, const struct observation_set *o)
     for (int round = 0; round < ROUND; round++) misfit = absorbed_misfit(m, o, misfit, true);
     for (size_t i = 0; i < o->n; i++) {
         double unit[3], share = gain_share(m, &o->item[i], i, misfit, unit);
+        for (size_t k = 0; k < LINEAR_COLOR_CAUSES; k++)
+            take_out(m->color + 3 * i * LINEAR_COLOR_CAUSES + k, LINEAR_COLOR_CAUSES, unit, share);
         for (int q = 0; q < 2; q++) {
             take_out(m->r[q] + 3 * i, 1, unit, share);
             take_out_var(m->r_var[q] + 3 * i, 1, unit, share);

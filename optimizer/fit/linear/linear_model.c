@@ -9,7 +9,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
 {
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
-    double *block = calloc(2 * per_replica + 4 * n_row, sizeof *block);
+    double *block = calloc(2 * per_replica + (5 + LINEAR_COLOR_CAUSES) * n_row, sizeof *block);
     m->pair = malloc((n_row / 3 * ESTIMATE_MAX_PARTNER + 1) * sizeof *m->pair);
     m->r[0] = block;
     if (block == NULL || m->pair == NULL)
@@ -25,6 +25,8 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
     m->photograph_var = m->weight + n_row;
     m->extra = m->photograph_var + n_row;
     m->contrast = m->extra + n_row;
+    m->color_var = m->contrast + n_row;
+    m->color = m->color_var + n_row;
     for (size_t row = 0; row < n_row; row++) m->weight[row] = m->extra[row] = 1.0;
     return STATUS_OK;
 }
@@ -116,7 +118,7 @@ static double misfit_of(const struct linear_model *m, double freedom, enum row_k
             if (!counts(m, row, kind)) continue;
             double var = misfit + known_variance(m, row) + 1e-12, weight = 1.0 / (power == 2 ? var * var : var);
             square += weight * m->r[0][row] * m->r[1][row] / m->extra[row];
-            photograph += weight * m->photograph_var[row] / m->extra[row];
+            photograph += weight * (m->photograph_var[row] - m->color_var[row]) / m->extra[row];
             sum += weight;
         }
         misfit = sum > 0.0 ? fmax(0.0, (square / freedom - photograph) / sum) : 0.0;

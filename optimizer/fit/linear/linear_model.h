@@ -48,6 +48,9 @@ struct linear_pair {
     double correlation;
 };
 
+/* Causes of the errors of a color matrix that all photographs have in common: three of each channel. */
+enum { LINEAR_COLOR_CAUSES = 9 };
+
 struct linear_model {
     size_t n_row, n_param;
     double x_ref[FIT_MAX_PARAM];
@@ -55,6 +58,9 @@ struct linear_model {
     double *j[2], *j_var[2]; /* n_row x n_param */
     /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
     double *photograph_var;
+    /* n_row x LINEAR_COLOR_CAUSES: errors of a residual by one standard deviation of each cause of the color matrix's
+     * error, which all rows have in common; color_var (n_row): the part of photograph_var that they make */
+    double *color, *color_var;
     /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
     double *extra;
     double *contrast; /* n_row: 1 for a row of a contrast (texture), 0 for one of a mean; set by linear_model_pool */
@@ -92,7 +98,8 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
 /* Monte-Carlo variance of (r_A + r_B) / 2 of one row. */
 double linear_model_row_noise(const struct linear_model *m, size_t row);
 /* Variance of a residual (of extra weight 1) that neither tracing nor the photographs' stated errors explain, per
- * degree of freedom with n_free fitted parameters; 0 or more. Rows are averaged with weights 1 / (all of their
+ * degree of freedom with n_free fitted parameters; 0 or more. The error of the color matrix explains none of it,
+ * because the parameters follow an error that all rows have in common. Rows are averaged with weights 1 / (all of their
  * variance)^2, found by iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows
  * of weight 0 are left out. */
 double linear_model_misfit(const struct linear_model *m, size_t n_free);

@@ -258,6 +258,25 @@ static void pool_configuration(struct linear_model *m, const struct linear_histo
     add_carried_noise(m, h, i, &scale, carried, weight);
 }
 
+/* What the photographs state of their errors, in the unit of the residuals. No error of colors changes a contrast much,
+ * which is relative to the mean. */
+static void set_photograph(struct linear_model *m, const struct observation *o, size_t row)
+{
+    const size_t c = row % 3;
+    const bool contrast = observation_is_contrast(o);
+    double *color = m->color + row * LINEAR_COLOR_CAUSES;
+    memset(color, 0, LINEAR_COLOR_CAUSES * sizeof *color);
+    m->color_var[row] = 0.0;
+    for (size_t cause = 0; cause < 3 && !contrast; cause++) {
+        color[3 * c + cause] = sqrt(objective_weight(o)) * o->photograph.color_error[c][cause];
+        m->color_var[row] += color[3 * c + cause] * color[3 * c + cause];
+    }
+    m->photograph_var[row] = objective_photograph_variance(o, c);
+    m->color_var[row] = fmin(m->color_var[row], m->photograph_var[row]);
+    m->extra[row] = o->weight;
+    m->contrast[row] = contrast ? 1.0 : 0.0;
+}
+
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)
 {
     status s = STATUS_OK;
@@ -273,11 +292,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     mean_derivatives(h, mean);
     m->n_effective = 0.0;
     for (size_t i = 0; i < h->observation->n; i++) pool_configuration(m, h, mean, i, carried, weight);
-    for (size_t row = 0; row < m->n_row; row++) {
-        m->photograph_var[row] = objective_photograph_variance(&h->observation->item[row / 3], row % 3);
-        m->extra[row] = h->observation->item[row / 3].weight;
-        m->contrast[row] = observation_is_contrast(&h->observation->item[row / 3]) ? 1.0 : 0.0;
-    }
+    for (size_t row = 0; row < m->n_row; row++) set_photograph(m, &h->observation->item[row / 3], row);
     m->n_effective /= (double)h->observation->n;
     linear_pairs_pool(m, h);
     if (m->gain_sd > 0.0) linear_gain_absorb(m, h->observation);

@@ -16,22 +16,24 @@ static const double log_determined = 0.69;
  * fits on analytic cloth differed up to 57-fold, and do so up to 7-fold. */
 static const double least_information = 0.25;
 
-/* Share of a photograph's stated variance that its three channels have in common: exposure, lamp and the patch of
- * cloth are the same for them, noise is not. Sources state no correlation; taken as independent (0), errors of
- * widths, which all channels tell together, would be up to 30 % too small where half of the variance is common. */
+/* Share of a photograph's stated variance, without that by the color matrix, that its three channels have in common:
+ * exposure, lamp and the patch of cloth are the same for them, noise is not. Sources state no correlation; taken as
+ * independent (0), errors of widths, which all channels tell together, would be up to 30 % too small where half of the
+ * variance is common. */
 static const double photograph_in_common = 0.5;
 
 /* The part of V of one row that is independent of all other rows. */
 static double own_variance(const struct linear_model *m, size_t row, const double misfit[2])
 {
-    return (1.0 - photograph_in_common) * m->photograph_var[row] + misfit[m->contrast[row] > 0.0] * m->extra[row];
+    const double photograph = m->photograph_var[row] - m->color_var[row];
+    return (1.0 - photograph_in_common) * photograph + misfit[m->contrast[row] > 0.0] * m->extra[row];
 }
 
 static double path_variance(const struct linear_model *m, size_t row) { return linear_model_row_noise(m, row); }
 
 static double common_variance(const struct linear_model *m, size_t row)
 {
-    return photograph_in_common * m->photograph_var[row];
+    return photograph_in_common * (m->photograph_var[row] - m->color_var[row]);
 }
 
 typedef double row_variance(const struct linear_model *m, size_t row);
@@ -53,14 +55,20 @@ static struct common_noise common_noise(const struct linear_model *m, size_t i, 
     return v;
 }
 
+/* Adds the mirrored product of what both replicas make of the same noise to b. */
+static void add_outer(const struct common_noise *v, size_t n, double *b)
+{
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) b[p * n + q] += 0.5 * (v->of[0][p] * v->of[1][q] + v->of[1][p] * v->of[0][q]);
+}
+
 /* Adds the noise that the three channels of a configuration have in common, because they share their paths and the
  * exposure. */
 static void add_common_noise(const struct linear_model *m, size_t i, row_variance *variance, const size_t *index,
                              size_t n, double *b)
 {
     const struct common_noise v = common_noise(m, i, variance, index, n);
-    for (size_t p = 0; p < n; p++)
-        for (size_t q = 0; q < n; q++) b[p * n + q] += 0.5 * (v.of[0][p] * v.of[1][q] + v.of[1][p] * v.of[0][q]);
+    add_outer(&v, n, b);
 }
 
 /* The part of D, the variance of the gradient, that the noise of the derivative of one row by parameter p makes. */
@@ -103,7 +111,21 @@ static void add_shared_noise(const struct linear_model *m, const size_t *index, 
     }
 }
 
-/* B of the parameters index[0..n-1], and the mean of V. */
+/* Adds what the causes of the color matrix's error, which all rows have in common, make of the gradient. */
+static void add_color_error(const struct linear_model *m, const size_t *index, size_t n, double *b)
+{
+    for (size_t cause = 0; cause < LINEAR_COLOR_CAUSES; cause++) {
+        struct common_noise v = {0};
+        for (size_t row = 0; row < m->n_row; row++) {
+            const double error = m->weight[row] * m->color[row * LINEAR_COLOR_CAUSES + cause];
+            for (int q = 0; q < 2 && error != 0.0; q++)
+                for (size_t p = 0; p < n; p++) v.of[q][p] += error * m->j[q][row * m->n_param + index[p]];
+        }
+        add_outer(&v, n, b);
+    }
+}
+
+/* B of the parameters index[0..n-1], and the mean of V without the error of the color matrix. */
 static void residual_matrix(const struct linear_model *m, const size_t *index, size_t n, const double misfit[2],
                             double *b, double *mean_variance)
 {
@@ -124,6 +146,7 @@ static void residual_matrix(const struct linear_model *m, const size_t *index, s
         add_common_noise(m, i, common_variance, index, n, b);
     }
     add_shared_noise(m, index, n, b);
+    add_color_error(m, index, n, b);
 }
 
 /* J'J of the mean J of both replicas, and the part of it that noise makes by their difference: J_A' J_B symmetrised is

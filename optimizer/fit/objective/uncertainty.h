@@ -5,12 +5,12 @@
  * J' V J is a mirrored product of two independent replicas, so the noise of J does not make it larger. From J'J of the
  * mean of both, the noise that their difference shows is subtracted, which is the same in the mean, but in no direction
  * more than three quarters: where noise and information are alike, their difference is chance, and the errors with it.
- *   V    variance of a residual: that of the photograph, that of the misfit (the part of f per degree of freedom that
- *        no noise explains), and the Monte-Carlo variance of the pooled mean, which is fully correlated between
- *        channels, because they share their paths, and correlated between configurations that share camera paths
- *        (linear_pair);
+ *   V    covariance of the residuals: that of the photographs, in which the error of the color matrix is the same for
+ *        all of them (linear_model.h); that of the misfit (the part of f per degree of freedom that no noise explains);
+ *        and the Monte-Carlo variance of the pooled mean, which is fully correlated between channels, because they
+ *        share their paths, and correlated between configurations that share camera paths (linear_pair);
  *   D    Monte-Carlo noise of J times the residuals, with the correlations of V between configurations;
- *   s2   mean of V;
+ *   s2   mean of V, without the error of the color matrix: an error in common says nothing about the prior's weight;
  *   L    s2 / (prior sd)^2, the allowed range as a weak prior, so that an undetermined parameter gets an error as
  *        large as its range instead of infinity. The model's own priors (linear_model.h) add their precision to it.
  *
