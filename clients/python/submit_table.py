@@ -9,16 +9,16 @@ import selvedge
 
 
 def main(scan, voxel_um, *tables):
-    server = selvedge.Server()
+    client = selvedge.Client()
     for table in tables:
-        job = server.create({"sample": os.path.basename(table), "volume": {"files": [os.path.basename(scan)], "voxel_size_um": float(voxel_um)},
+        job = client.create({"sample": os.path.basename(table), "volume": {"files": [os.path.basename(scan)], "voxel_size_um": float(voxel_um)},
                              "measurements": {"file": os.path.basename(table)}})
         job.upload(scan, "volume")
         job.upload(table, "measurements")
         job.start()
         job.wait()
         result = job.result()
-        print(f"{os.path.basename(table)}: fitted {100 * result['fit_rel_rms']:.1f} %, held out {100 * result['heldout_rel_rms']:.1f} %")
+        print(f"{os.path.basename(table)}: fitted {100 * result.fit_rel_rms:.1f} %, held out {100 * result.heldout_rel_rms:.1f} %")
 
 
 if __name__ == "__main__":

@@ -225,7 +225,7 @@ def test_pieces_are_no_larger_than_the_server_takes(sample, tmp_path):
     d = Daemon(tmp_path / "small-pieces", "--set", f"upload.max_patch_bytes={1 << 20}")
     try:
         assert "2 uploaded now" in run(d.url, "submit", sample / "job.json").stderr
-        assert selvedge.Server(d.url).submit(str(sample / "job.json")).state()["files"][0]["state"] == "complete"
+        assert selvedge.Client(d.url).submit(str(sample / "job.json")).state().raw["files"][0]["state"] == "complete"
     finally:
         d.stop()
 
@@ -236,15 +236,15 @@ def test_interrupted_submit_is_continued(daemon, sample):
     (sample / "scan.tif").write_bytes(os.urandom(40_000_000))
     client = subprocess.Popen([CLI, "--server", daemon.url, "submit", str(sample / "job.json")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     job_id = client.stderr.readline().split()[1]
-    server = selvedge.Server(daemon.url)
+    server = selvedge.Client(daemon.url)
     for _ in range(2000):
-        files = server.job(job_id).state()["files"]
+        files = server.job(job_id).state().raw["files"]
         if files and files[0]["offset"] > 0:
             break
     client.kill()
     client.communicate()
     state = server.job(job_id).state()
-    assert state["state"] in ("draft", "queued", "running")
+    assert state.state in ("draft", "queued", "running")
     done = run(daemon.url, "submit", "--resume", job_id, "--watch", cwd=sample)
     assert done.stdout.splitlines()[0] == job_id and "2 files in place" in done.stderr
 
@@ -302,29 +302,29 @@ def test_a_large_result_that_changed_since_its_download_broke_off(daemon, sample
 
 
 def test_python_client(daemon, sample, tmp_path):
-    server = selvedge.Server(daemon.url)
+    server = selvedge.Client(daemon.url)
     seen = []
     job = server.submit(str(sample / "job.json"))
-    state = job.wait(seen.append, interval_s=0.1)
-    assert state["state"] == "succeeded" and len(seen) > 2
-    assert [p["name"] for p in job.parameters()][:2] == ["C_R.r", "C_R.g"]
+    state = job.wait(seen.append)
+    assert state.state == "succeeded" and len(seen) > 2
+    assert [p.name for p in job.result().parameters][:2] == ["C_R.r", "C_R.g"]
     assert [p["step"] for p in job.series()] == list(range(10))
     assert job.log().count("stage ") == 8
-    assert any(j["id"] == job.id for j in server.jobs())
+    assert any(j.id == job.id for j in server.jobs())
     paths = job.download(str(tmp_path / "out"))
     assert any(p.endswith("fit-00.bin") for p in paths)
     with pytest.raises(selvedge.Problem) as problem:
         server.create({"sample": ""})
     assert problem.value.status == 422 and problem.value.field == "sample"
     with pytest.raises(selvedge.Problem) as problem:  # the least status that is an error
-        server.request("POST", "/v1/jobs", data="{", headers={"Content-Type": "application/json"})
+        server.request("POST", "/v1/jobs", data=b"{", headers={"Content-Type": "application/json"})
     assert problem.value.status == 400
     job.delete()
     with pytest.raises(selvedge.Problem):
         job.state()
     write_document(sample, "failing twill")
     with pytest.raises(selvedge.JobFailed, match="page 2 is 8-bit"):
-        server.submit(str(sample / "job.json")).wait(interval_s=0.1)
+        server.submit(str(sample / "job.json")).wait()
     shutil.rmtree(tmp_path / "out")
 
 
@@ -335,7 +335,7 @@ def test_python_client_notices_a_download_that_is_cut_off(daemon, sample, tmp_pa
         f.write(data)
     proxy = CuttingProxy(daemon.port, [1_000_000, 900_000], replies=True)
     try:
-        paths = selvedge.Server(proxy.url).job(job_id).download(str(tmp_path / "out"))
+        paths = selvedge.Client(proxy.url).job(job_id).download(str(tmp_path / "out"))
     finally:
         proxy.stop()
     assert proxy.n >= 3, "nothing was cut off"
@@ -349,6 +349,6 @@ def test_example_documents_are_accepted(daemon):
     assert len(names) >= 4
     for name in names:
         with open(os.path.join(folder, name), encoding="utf-8") as f:
-            job = selvedge.Server(daemon.url).create(json.load(f))
-        assert job.state()["state"] == "draft", name
+            job = selvedge.Client(daemon.url).create(json.load(f))
+        assert job.state().state == "draft", name
         job.delete()

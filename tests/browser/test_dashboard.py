@@ -33,7 +33,7 @@ def real(tmp_path_factory):
                                        for t in (20, 65)]}}
     (sample / "job.json").write_text(json.dumps(document))
     process, url = start_daemon(folder / "data")
-    yield url, selvedge.Server(url).submit(str(sample / "job.json"))
+    yield url, selvedge.Client(url).submit(str(sample / "job.json"))
     stop_daemon(process)
 
 
@@ -95,7 +95,7 @@ def test_real_job_live_and_finished(real, browser):
     keep(browser, "finished")
     assert complaints(browser) == []
     browser.get(browser.find_element(By.CSS_SELECTOR, "#quality a").get_attribute("href"))
-    assert job.state()["sample"] in browser.find_element(By.TAG_NAME, "h1").text
+    assert job.state().sample in browser.find_element(By.TAG_NAME, "h1").text
     wait_for(browser, "[...document.images].length === 5 && [...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert browser.execute_script("return getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
     keep(browser, "quality")
@@ -111,7 +111,7 @@ def test_parameters_of_two_groups(real, browser, tmp_path):
         "sample": "two colours", "fibers": {"file": "cloth.hair", "groups": ["weft", "warp"]}, "measurements": {"file": "rows.csv"},
         "fit": {"model": "two_lobe.v1", "path_budget": 100000, "tied": [["beta_TT"], ["gamma_TT"]], "fixed": {"weft.beta_R": 5},
                 "render_px": 16, "render_samples": 4}}))
-    job = selvedge.Server(url).submit(str(tmp_path / "job.json"))
+    job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
     job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#parameters')")
@@ -134,7 +134,7 @@ def test_corrections(real, browser, tmp_path):
         "sample": "corrected", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
         "correction": {"radius": {"lower": 0.8, "upper": 1.2}},
         "fit": {"model": "two_lobe.v1", "path_budget": 100000, "render_px": 8, "render_samples": 1}}))
-    job = selvedge.Server(url).submit(str(tmp_path / "job.json"))
+    job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
     job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#corrections')")
@@ -155,7 +155,7 @@ def test_failed_job_and_hostile_name(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "failing <img src=x onerror=alert(1)>")
     with pytest.raises(selvedge.JobFailed):
-        job.wait(interval_s=0.2)
+        job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('.note.bad')")
     assert "volume.files" in browser.find_element(By.CSS_SELECTOR, ".note.bad").text
@@ -174,7 +174,7 @@ def test_unknown_job(stub, browser):
 def test_long_log_does_not_freeze(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "chatty twill")
-    job.wait(interval_s=0.2)
+    job.wait()
     log = glob.glob(os.path.join(str(folder), "**", job.id, "log.txt"), recursive=True)
     assert len(log) == 1
     with open(log[0], "a", encoding="utf-8") as f:

@@ -25,7 +25,7 @@ def test_submit_by_choosing_files(stub, browser):
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert browser.find_element(By.TAG_NAME, "h1").text == "dropped twill"
-    files = {f["name"]: f for f in selvedge.Server(url).job(browser.execute_script("return location.hash.slice(1)")).state()["files"]}
+    files = {f["name"]: f for f in selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).state().raw["files"]}
     assert files["scan.tif"]["state"] == "complete" and files["scan.tif"]["sha256"]
     assert complaints(browser) == []
 
@@ -103,7 +103,7 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
     click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
-    assert selvedge.Server(url).job(browser.execute_script("return location.hash.slice(1)")).state()["document"] == document
+    assert selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).document() == document
     assert [c for c in complaints(browser) if "422" not in c] == []
 
 
@@ -150,7 +150,7 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     _, sample = submit(url, folder, "broken twill")
 
     def jobs():
-        return [j["id"] for j in selvedge.Server(url).jobs()]
+        return [j.id for j in selvedge.Client(url).jobs()]
     before = jobs()
     browser.get(url + "/")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
@@ -170,7 +170,7 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     wait_for(browser, f"location.hash === '#{job_id}'")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert set(jobs()) - set(before) == {job_id}
-    assert {f["name"]: f["size"] for f in selvedge.Server(url).job(job_id).state()["files"]} == {"scan.tif": 11, "cloth.csv": 4}
+    assert {f["name"]: f["size"] for f in selvedge.Client(url).job(job_id).state().raw["files"]} == {"scan.tif": 11, "cloth.csv": 4}
     assert complaints(browser) == []
 
 
@@ -185,5 +185,5 @@ def test_the_document_is_sent_as_it_was_written(stub, browser):
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
     browser.find_element(By.CSS_SELECTOR, ".drop button").click()
     wait_for(browser, "location.hash.length > 10")
-    job = selvedge.Server(url).job(browser.execute_script("return location.hash.slice(1)"))
-    assert job.state()["document"] == document
+    job = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)"))
+    assert job.document() == document

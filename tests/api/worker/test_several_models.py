@@ -95,7 +95,7 @@ def test_series_says_what_its_numbers_are(real, finished):
 
 def test_python_client(real, finished):
     job, state = finished
-    assert selvedge.Server(real.url).job(job).models() == state["result"]["models"]
+    assert selvedge.Client(real.url).job(job).result().raw["models"] == state["result"]["models"]
 
 
 def test_command_line_prints_the_comparison(real, finished):

@@ -61,4 +61,4 @@ def submit(url, folder, name):
     (sample / "cloth.csv").write_text("set\n")
     document = {"sample": name, "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "cloth.csv"}}
     (sample / "job.json").write_text(json.dumps(document))
-    return selvedge.Server(url).submit(str(sample / "job.json")), sample
+    return selvedge.Client(url).submit(str(sample / "job.json")), sample

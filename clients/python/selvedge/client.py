@@ -1,0 +1,77 @@
+"""A server, and what can be asked of it without a job."""
+from __future__ import annotations
+
+import os
+import urllib.parse
+import uuid
+from typing import Any, Callable, Iterator, Optional
+
+from .documents import Document, DocumentOrPath, files_of, read_document
+from .job import Job, show_nothing
+from .records import JobState, Progress
+from .transport import Answer, Transport
+
+PIECE = 16 << 20
+
+
+class Client:
+    """One server. `url`: http://..., https://... or unix:/path, by default SELVEDGE_SERVER. `token`: access token, by default
+    SELVEDGE_TOKEN, sent as `Authorization: Bearer`. `ca_file`: certificates that https trusts instead of the system's. May be
+    shared between threads."""
+
+    def __init__(self, url: Optional[str] = None, token: Optional[str] = None, timeout_s: float = 60, ca_file: Optional[str] = None) -> None:
+        self.transport = Transport(url or os.environ.get("SELVEDGE_SERVER") or "http://127.0.0.1:7878", token or os.environ.get("SELVEDGE_TOKEN"),
+                                   timeout_s, ca_file)
+        self._piece: Optional[int] = None
+
+    @property
+    def url(self) -> str:
+        return self.transport.url
+
+    def request(self, method: str, path: str, **more: Any) -> Answer:
+        """Send any request of docs/api.md that must succeed (see Transport.request)."""
+        return self.transport.request(method, path, **more)
+
+    def about(self) -> dict[str, Any]:
+        """Return name, version, stages and limits of the server."""
+        about: dict[str, Any] = self.request("GET", "/v1/about").json()
+        return about
+
+    def piece_bytes(self) -> int:
+        """Size of one piece of an upload: 16 MiB, or the server's limit if that is smaller. The server is asked once."""
+        if self._piece is None:
+            self._piece = min(PIECE, self.about().get("limits", {}).get("max_patch_bytes", PIECE))
+        return self._piece
+
+    def jobs(self, state: Optional[str] = None, sample: Optional[str] = None, verdict: Optional[str] = None) -> Iterator[JobState]:
+        """Yield the jobs, newest first: all, or those in a state, with this text in the sample's name, or with this verdict."""
+        query = {"limit": "100", **({"state": state} if state else {})}
+        while True:
+            page = self.request("GET", "/v1/jobs?" + urllib.parse.urlencode(query)).json()
+            for raw in page["jobs"]:
+                job = JobState.of(raw)
+                if (sample is None or sample in job.sample) and (verdict is None or (job.verdict is not None and job.verdict.code == verdict)):
+                    yield job
+            if not page["next_cursor"]:
+                return
+            query["cursor"] = page["next_cursor"]
+
+    def job(self, job_id: str) -> Job:
+        """Return an existing job."""
+        return Job(self, job_id)
+
+    def create(self, document: Document, key: Optional[str] = None) -> Job:
+        """Create a draft from a job document. A key makes repeats of the call give the same job."""
+        answer = self.request("POST", "/v1/jobs", json_body=document, headers={"Idempotency-Key": key or uuid.uuid4().hex})
+        return Job(self, answer.json()["id"])
+
+    def submit(self, document: DocumentOrPath, folder: Optional[str] = None, *, start: bool = True, key: Optional[str] = None,
+               on_progress: Callable[[Progress], None] = show_nothing) -> Job:
+        """Create a job, upload its files and start it. document: a dict, or the path of a JSON file, whose folder is then the
+        default of `folder`. on_progress is called while files are read and sent."""
+        document, beside = read_document(document)
+        job = self.create(document, key)
+        job.upload_all([(os.path.join(folder or beside, name), role) for name, role in files_of(document)], on_progress)
+        if start:
+            job.start()
+        return job
