@@ -26,8 +26,8 @@ test: | deps-test  ## everything that continuous integration runs; ends with "N 
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
 
 # What takes too long for every commit. One part that fails does not keep the next from running.
-NIGHTLY := asan tsan fuzz-smoke coverage test-long mutants
-nightly:           ## asan, tsan, fuzz-smoke, coverage, test-long and mutants: too long for every commit
+NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-long mutants
+nightly:           ## asan, tsan, fuzz-smoke, coverage, test-crash, test-long and mutants: too long for every commit
 	@failed=""; for part in $(NIGHTLY); do \
 		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
 	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }

@@ -164,9 +164,10 @@ def scenario(d):
     ("fallocate", errno.ENOSPC, "/upload/", 1), ("write", errno.ENOSPC, "selvedge.db", 11), ("write", errno.EIO, "selvedge.db", 13),
     ("write", 0, "selvedge.db", 17), ("sync", errno.EIO, "selvedge.db", 7), ("write", errno.ENOSPC, "/jobs/", 9), ("sync", errno.EIO, "/jobs/", 9)])
 def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
-    """One call fails, at first the first one and then later ones, until a run ends without a fault."""
+    """One call fails, at first the first one and then later ones, until a run ends without a fault. SELVEDGE_EVERY=1
+    (make test-crash): every call."""
     fired = repeated = 0
-    for n in range(1, 2000, step):
+    for n in range(1, 2000, 1 if os.environ.get("SELVEDGE_EVERY") == "1" else step):
         mark = tmp_path / f"mark{n}"
         d = Daemon(tmp_path / f"data{n}", environment={"LD_PRELOAD": shim, "FAULT_CALL": call, "FAULT_AT": str(n), "FAULT_ERRNO": str(code),
                                                        "FAULT_PATH": path, "FAULT_MARK": str(mark)})

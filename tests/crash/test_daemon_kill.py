@@ -1,5 +1,9 @@
 """kill -9 of the daemon at any moment: nothing acknowledged is lost, no job is left running without a worker, and files
-match their hashes."""
+match their hashes.
+
+SELVEDGE_KILLS says how often all tests together kill (200; `make test-crash`: 2,000). They print
+the kills and the facts that were confirmed, as lines of JSON."""
+import json
 import os
 import random
 import threading
@@ -8,6 +12,21 @@ import time
 import pytest
 import requests
 from daemon_under_test import FILES, TUS, Daemon, document, sha256, wait_until
+
+
+KILLS_IN_UPLOADS = 12
+KILLS = int(os.environ.get("SELVEDGE_KILLS", "200"))
+LOOPS = max(2, KILLS // 100)
+ROUNDS = max(15, (KILLS - 3 * KILLS_IN_UPLOADS) // LOOPS)
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """Counts of all tests together. A lost fact fails its test, so that there is no figure of it other than 0."""
+    count = {"kills": 0, "facts": 0, "lost": 0}
+    yield count
+    for name, value in count.items():
+        print(json.dumps({"name": f"service.{name}", "value": value, "unit": "1", "better": "lower" if name == "lost" else "higher"}))
 
 
 def processes_of(daemon):
@@ -64,7 +83,7 @@ def test_a_delete_that_was_acknowledged_holds(daemon_maker):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_kill_in_mid_upload(tmp_path, seed):
+def test_kill_in_mid_upload(figures, tmp_path, seed):
     """Uploads continue through many kills: every acknowledged offset is kept, and the files are complete at the end."""
     rng = random.Random(seed)
     d = Daemon(tmp_path / "data", options={"upload.commit_bytes": 1 << 18}).start()
@@ -73,10 +92,10 @@ def test_kill_in_mid_upload(tmp_path, seed):
     url = {n: d.declare(job, n, data[n], FILES[n][0])["upload_url"] for n in FILES}
     acknowledged = dict.fromkeys(FILES, 0)
     kills = 0
-    while kills < 12 or min(acknowledged[n] - len(data[n]) for n in FILES) < 0:
+    while kills < KILLS_IN_UPLOADS or min(acknowledged[n] - len(data[n]) for n in FILES) < 0:
         unfinished = [n for n in FILES if acknowledged[n] < len(data[n])]
         killer = None
-        if kills < 12:
+        if kills < KILLS_IN_UPLOADS:
             delay = rng.uniform(0, 0.06)
             killer = threading.Thread(target=lambda: (time.sleep(delay), d.process.kill()))
         if killer:
@@ -93,6 +112,7 @@ def test_kill_in_mid_upload(tmp_path, seed):
                     **TUS, "Upload-Offset": str(offset), "Content-Type": "application/offset+octet-stream"})
                 assert r.status_code == 204, r.text
                 acknowledged[name] = int(r.headers["Upload-Offset"])
+                figures["facts"] += 1
                 if acknowledged[name] == len(data[name]) and not killer:
                     break
         except requests.ConnectionError:
@@ -101,6 +121,7 @@ def test_kill_in_mid_upload(tmp_path, seed):
             killer.join()
             d.kill()
             kills += 1
+            figures["kills"] += 1
             d.start()
     files = {f["name"]: f for f in d.job(job)["files"]}
     for n in FILES:
@@ -112,14 +133,14 @@ def test_kill_in_mid_upload(tmp_path, seed):
     d.stop()
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_kill_loop_over_everything(tmp_path, seed):
+@pytest.mark.parametrize("seed", range(LOOPS))
+def test_kill_loop_over_everything(figures, tmp_path, seed):
     """Random requests and kills: what was acknowledged is checked after each restart, and at the end every job reaches
     a final state."""
     rng = random.Random(100 + seed)
     d = Daemon(tmp_path / "data", options={"jobs.workers": 2, "jobs.cancel_grace_s": 0}).start()
     known = {}  # job -> set of states allowed by what was acknowledged; None: deleted
-    for round_ in range(15):
+    for _ in range(ROUNDS):
         stop_at = time.monotonic() + rng.uniform(0.02, 0.4)
         killer = threading.Thread(target=lambda: (time.sleep(max(0, stop_at - time.monotonic())), d.process.kill()))
         killer.start()
@@ -129,6 +150,7 @@ def test_kill_loop_over_everything(tmp_path, seed):
                 act = rng.choice(["create", "start", "cancel", "delete", "retry"]) if alive else "create"
                 if act == "create":
                     known[d.ready_job(rng.choice(["succeed", "fail", "kill_once", "work 0.2"]))] = "draft"
+                    figures["facts"] += 1 + 2 * len(FILES)
                 else:
                     j = rng.choice(alive)
                     if act == "delete":
@@ -136,15 +158,18 @@ def test_kill_loop_over_everything(tmp_path, seed):
                         r = d.delete(f"/v1/jobs/{j}")
                         assert r.status_code in (204, 404)
                         known[j] = None
+                        figures["facts"] += 1
                     else:
                         r = d.post(f"/v1/jobs/{j}/{act}")
                         assert r.status_code in (200, 202, 409, 404) and (r.status_code != 404 or known[j] == "unknown"), r.text
                         if r.status_code == 202 and act in ("start", "retry"):
                             known[j] = "started"
+                            figures["facts"] += 1
         except (requests.ConnectionError, requests.Timeout):
             pass
         killer.join()
         d.kill()
+        figures["kills"] += 1
         wait_until(lambda: not processes_of(d), timeout_s=5, what="the end of the workers")
         d.start()
         for j, state in known.items():

@@ -8,6 +8,7 @@ import subprocess
 import time
 
 import pytest
+from fit_outcome import outcome, read_json
 from small_cloth import TABLE, hair
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -44,26 +45,6 @@ def finish(folder, threads=1):
     worker = start(folder, threads)
     _, stderr = worker.communicate(timeout=120)
     assert worker.returncode == 0, (read_json(folder, "status.json"), stderr)
-
-
-def read_json(folder, name):
-    with open(os.path.join(folder, name)) as f:
-        return json.load(f)
-
-
-def outcome(folder):
-    """Returns what must be equal: everything except times."""
-    result = read_json(folder, "results/result.json")
-    for key in ("fit_wall_s", "stages"):
-        result.pop(key)
-    for model in result["models"]:
-        model.pop("fit_wall_s")
-    (result["radius"] or {}).pop("wall_s", None)
-    with open(os.path.join(folder, "series.rec")) as f:
-        series = [json.loads(line[9:]) for line in f]
-    for record in series:
-        record.pop("wall_s")
-    return result, series
 
 
 def journal_bytes(folder, stage, number="", name="estimates"):

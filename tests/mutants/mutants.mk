@@ -1,11 +1,18 @@
-# Targets for the night: `make nightly` runs them; neither is part of `make test`.
-.PHONY: test-long mutants
+# Targets for the night: `make nightly` runs them; none is part of `make test`.
+.PHONY: test-long test-crash mutants
 
 # tests that know a long variant (tests/support/agreement.h)
 TEST_LONG := physics/test_naive physics/volume/test_volume_naive
 test-long: | deps-test ## the renderer against the naive tracers with enough paths to see a difference of 0.5 % (half an hour on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(addprefix $(BUILD)/tests/,$(TEST_LONG))
 	@for t in $(TEST_LONG); do echo "$$t"; SELVEDGE_TEST_LONG=1 $(BUILD)/tests/$$t || exit 1; done
+
+# every system call, every state of a disk and 2,000 kills, where make test takes a sample
+KILLS ?= 2000
+test-crash: | deps-test ## kills (KILLS: 2000), faults at every system call, every state after a power cut (an hour)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@SELVEDGE_EVERY=1 SELVEDGE_KILLS=$(KILLS) SELVEDGE_BUILD=$(CURDIR)/$(BUILD) \
+		/usr/bin/python3 -m pytest -q -s -p no:cacheprovider tests/crash
 
 # PART: only files whose path begins so. QUICK=1: the tests of `make check`. The copy of the tree and all results stay in build/mutants.
 MUTANTS ?= 200
