@@ -1,5 +1,6 @@
 #include "optimizer/job/job_folder.h"
 #include "server/endpoints/handlers.h"
+#include "server/endpoints/request_json.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
@@ -36,6 +37,8 @@ static status member_text(const json_t *j, const char *name, char *out, size_t n
     if (!json_is_string(x)) return error_set_field(err, STATUS_INVALID, name, "member '%s' must be a string", name);
     if (json_string_length(x) >= n_out || strlen(json_string_value(x)) != json_string_length(x))
         return error_set_field(err, STATUS_INVALID, name, "member '%s' is too long", name);
+    if (optional && json_string_length(x) == 0)
+        return error_set_field(err, STATUS_INVALID, name, "member '%s' is empty; null leaves it out", name);
     snprintf(out, n_out, "%s", json_string_value(x));
     return STATUS_OK;
 }
@@ -133,15 +136,8 @@ static void declare(struct http_request *r, const json_t *list, bool in_list)
 
 void handle_declare_files(struct http_request *r)
 {
-    json_error_t where;
-    char text[256];
-    json_t *j = json_loadb(r->body, r->n_body, JSON_REJECT_DUPLICATES, &where);
-    if (j == NULL) {
-        snprintf(text, sizeof text, "the body is not JSON: line %d, column %d: %s", where.line, where.column,
-                 where.text);
-        reply_code(r, "malformed", "", text);
-        return;
-    }
+    json_t *j = request_json(r);
+    if (j == NULL) return;
     bool in_list = json_is_array(j);
     json_t *list = in_list ? json_incref(j) : json_pack("[O]", j);
     declare(r, list, in_list);

@@ -1,6 +1,7 @@
 #include "optimizer/job/check/job_faults.h"
 #include "optimizer/job/job_document.h"
 #include "server/endpoints/handlers.h"
+#include "server/endpoints/request_json.h"
 #include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_view.h"
@@ -67,19 +68,12 @@ static void reply_refusal(struct http_request *r, const struct job_refusal *refu
     reply_problem(r, refusal->code, err, extra);
 }
 
-/* Decides a 400 and returns false when the body is not JSON. JSON that is not a valid job document gets a 422 later. */
+/* Replies and returns false when the body is not JSON. JSON that is not a valid job document gets a 422 later. */
 static bool body_is_json(struct http_request *r)
 {
-    json_error_t where;
-    json_t *j = json_loadb(r->body, r->n_body, JSON_REJECT_DUPLICATES, &where);
-    if (j != NULL) {
-        json_decref(j);
-        return true;
-    }
-    char text[256];
-    snprintf(text, sizeof text, "the body is not JSON: line %d, column %d: %s", where.line, where.column, where.text);
-    reply_code(r, "malformed", "", text);
-    return false;
+    json_t *j = request_json(r);
+    json_decref(j);
+    return j != NULL;
 }
 
 void handle_create_job(struct http_request *r)

@@ -31,6 +31,23 @@ def test_the_document_is_sound():
         assert operation["summary"] and all(r["description"] for r in operation["responses"].values())
 
 
+def properties_without_description(schema, path):
+    """Yields the paths of properties that say nothing of their meaning. Conditions (if, then) have none of their own."""
+    for key, member in schema.get("properties", {}).items():
+        if not member.get("description"):
+            yield f"{path}.{key}"
+    for key, member in schema.items():
+        children = member.items() if key == "properties" else [(key, m) for m in (member if isinstance(member, list) else [member])]
+        for name, child in children:
+            if isinstance(child, dict) and key not in ("if", "then", "else", "default"):
+                yield from properties_without_description(child, f"{path}.{name}")
+
+
+def test_every_property_is_described():
+    found = [p for name, schema in API["components"]["schemas"].items() for p in properties_without_description(schema, name)]
+    assert found == []
+
+
 def test_the_daemon_serves_it(daemon):
     assert daemon.get("/v1/openapi.json").json() == API
 

@@ -8,10 +8,7 @@
 /* A number is a value, or an object for a number that is searched. */
 #define NUMBER_SCHEMA(lower, upper)                                                                                    \
     "{\"anyOf\": [{\"type\": \"number\", \"minimum\": " lower ", \"maximum\": " upper                                  \
-    "}, {\"type\": \"object\", \"properties\": {\"value\": {\"type\": \"number\"}, \"lower\": {\"type\": "             \
-    "\"number\"}, "                                                                                                    \
-    "\"upper\": {\"type\": \"number\"}, \"prior\": {\"type\": \"array\", \"items\": {\"type\": \"number\"}, "          \
-    "\"minItems\": 2, \"maxItems\": 2}, \"fit\": {\"type\": \"boolean\"}}, \"additionalProperties\": false}]}"
+    "}, {\"$ref\": \"#/components/schemas/SearchedNumber\"}]}"
 #define NUMBER_ROW(where, name, units, lower, upper, value, text)                                                      \
     {.path = where #name,                                                                                              \
      .kind = OPTION_OWN,                                                                                               \

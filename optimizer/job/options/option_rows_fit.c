@@ -17,7 +17,9 @@ static const char *const gain[] = {
     "\"minItems\": 2, \"maxItems\": 2}}"
 #define PRIORS                                                                                                         \
     "{\"type\": \"object\", \"additionalProperties\": {\"type\": \"object\", \"properties\": {\"mean\": {\"type\": "   \
-    "\"number\"}, \"se\": {\"type\": \"number\"}}, \"additionalProperties\": false, \"required\": [\"mean\", "         \
+    "\"number\", \"description\": \"Most likely value\"}, \"se\": {\"type\": \"number\", \"description\": "            \
+    "\"Its standard error, in the unit of the parameter\"}}, \"additionalProperties\": false, \"required\": "          \
+    "[\"mean\", "                                                                                                      \
     "\"se\"]}}"
 /* Several starts allow fewer iterations. */
 #define FEWER_ITERATIONS                                                                                               \

@@ -80,3 +80,17 @@ def test_the_console_is_bounded_and_keeps_its_last_words(daemon):
     daemon.post(f"/v1/jobs/{job}/start")
     assert daemon.wait_state(job, "failed")["error"]["text"].endswith("these are my last words")
     assert os.path.getsize(os.path.join(daemon.data, "jobs", job, "console.txt")) <= 1 << 20
+
+
+@pytest.mark.parametrize("body, word", [(b'{"size": 99999999999999999999}', "too large"), (b'{"name": "a\\u0000b"}', "NUL"), (b'{"a\\u0000b": 1}', "NUL")])
+def test_json_beyond_what_can_be_represented(daemon, body, word):
+    """It is JSON, so 400 would be untrue."""
+    job = daemon.create()
+    for path in ("/v1/jobs", f"/v1/jobs/{job}/files"):
+        r = daemon.post(path, data=body, headers={"Content-Type": "application/json"})
+        assert word in problem(r, 422, "invalid")["detail"]
+
+
+def test_an_empty_hash_is_not_taken_for_none(daemon):
+    r = daemon.post(f"/v1/jobs/{daemon.create()}/files", json={"name": "scan.tif", "role": "volume", "size": 10, "sha256": ""})
+    problem(r, 422, "invalid", "sha256")
