@@ -55,7 +55,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
 
-.PHONY: all generate deps help check test nightly demo demo-camera clean
+.PHONY: all generate deps help check test nightly demo demo-camera night clean
 ##@ Build and run
 all: $(PROGRAMS)   ## build the programs into build/bin
 
@@ -69,6 +69,10 @@ demo: | deps       ## the main job, end to end, against a daemon started here
 demo-camera: | deps ## the same from raw files of a simulated camera: noise, three exposures, markers, color chart
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@./clients/demo.sh --camera
+
+night: | deps      ## a night's run: ten synthetic samples in a watched folder (a few minutes; docs/automation.md)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@./clients/night.sh
 
 clean:             ## remove build/
 	rm -rf build

@@ -1,5 +1,5 @@
 # Tests: their programs, and the targets that run them. tests/README.md says what each one is.
-.PHONY: tsan deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+.PHONY: tsan test-watched-folder deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -44,6 +44,11 @@ tsan: | deps-test  ## tests of the daemon under the thread sanitizer (three minu
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/tsan SANITIZE=thread OPTIMIZE=-O1 build/tsan/bin/selvedged
 	@for t in $(THREADED_TESTS); do TSAN_OPTIONS="suppressions=$(CURDIR)/config/tsan.txt" SELVEDGE_SANITIZED=1 \
 		/usr/bin/python3 tests/run_tests.py --quick --programs --only $$t --build build/tsan || exit 1; done
+
+# SAMPLES, KILLS: fewer for a quick look
+test-watched-folder: | deps-test ## 100 samples dropped into a watched folder, real jobs, while the daemon is killed 20 times: each ends once (some minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@/usr/bin/python3 tests/crash/watched_folder_kills.py --build $(BUILD) $(if $(SAMPLES),--samples $(SAMPLES)) $(if $(KILLS),--kills $(KILLS))
 
 asan-physics: | deps-test ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \

@@ -37,13 +37,21 @@ status cli_series(struct cli *cli, int *exit_code, struct error *err);
 status cli_delete(struct cli *cli, int *exit_code, struct error *err);
 
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
+status cli_watch_folder(struct cli *cli, int *exit_code, struct error *err);
 
 /* Creates a job of a document, uploads its files from `folder` and starts it. id receives the job's id. */
 enum { CLI_ID_BYTES = 80 };
 status cli_submit_document(struct cli *cli, const json_t *document, const char *folder, char id[CLI_ID_BYTES],
                            struct error *err);
-/* Downloads the results of job `id` to --out, or to selvedge-ID. */
-status cli_results_of(struct cli *cli, const char *id, struct error *err);
+/* The same, but a sample that was sent before gives the job that it gave then, by a key of the document and the content
+ * of its files. Only a draft is uploaded and started, and it is started only if unchanged(context) returns true after
+ * the upload; otherwise the draft is deleted and STATUS_STALE returned. */
+status cli_submit_once(struct cli *cli, const json_t *document, const char *folder, bool (*unchanged)(void *context),
+                       void *context, char id[CLI_ID_BYTES], struct error *err);
+/* Downloads the results of job `id` to a folder. */
+status cli_results_of(struct cli *cli, const char *id, const char *folder, struct error *err);
+/* The same to --out, or to selvedge-ID, and prints the folder. */
+status cli_results_to_out(struct cli *cli, const char *id, struct error *err);
 /* Follows job `id` until it ends, and prints the fitted parameters. */
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
 /* Writes "/v1/jobs/ID" + tail to path. STATUS_INVALID when the id has characters that no id has. */

@@ -20,7 +20,11 @@ enum {
     OPT_ID_FILE = 2048,
     OPT_VOXEL = 4096,
     OPT_AXES = 8192,
-    OPT_ALIGN = 16384
+    OPT_ALIGN = 16384,
+    OPT_TEMPLATE = 32768,
+    OPT_MARKER = 65536,
+    OPT_QUIET = 131072,
+    OPT_ONCE = 262144
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
@@ -65,6 +69,14 @@ static const struct cli_command {
                     OPT_JSON},
     [CLI_DELETE] = {"delete", "ID", "remove a job and its files",
                     "A running job is stopped first; its results are lost.\n", 0},
+    [CLI_WATCH_FOLDER] =
+        {"watch-folder", "DIR", "make a job of every sample folder that is put into DIR",
+         "A sample folder NAME is complete when it has the marker file, or has not changed for the quiet time. It "
+         "becomes\n"
+         "a job by its job.json or by the template; results, or the reason why there are none, are then in "
+         "NAME.selvedge\n"
+         "beside it. Runs until it is stopped; what is known is on disk, so it may be killed at any time.\n",
+         OPT_TEMPLATE | OPT_MARKER | OPT_QUIET | OPT_ONCE, "a folder"},
 };
 
 static const struct cli_option {
@@ -82,6 +94,11 @@ static const struct cli_option {
     {OPT_VOXEL, 0, "voxel-um", "UM", "edge of a voxel in micrometres, or three, such as 2,2,3 (default: the file's)"},
     {OPT_AXES, 0, "axes", "XYZ", "which axis of the file is weft, warp and height, such as xzy (default: xyz)"},
     {OPT_ALIGN, 0, "align", NULL, "turn weft and warp to x and y, and crop to what repeats"},
+    {OPT_TEMPLATE, 0, "template", "JOB.json",
+     "job document of samples that have no job.json; '*' in names of files is filled in"},
+    {OPT_MARKER, 0, "marker", "NAME", "file that says that a sample is complete (default: READY)"},
+    {OPT_QUIET, 0, "quiet", "S", "seconds without a change after which it is complete, too (default: 60; 0: never)"},
+    {OPT_ONCE, 0, "once", NULL, "end when all samples that are there have ended; status 1 if one failed"},
     {OPT_JSON, 0, "json", NULL, "print JSON"},
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
@@ -142,55 +159,66 @@ static const struct cli_option *option_of(int code)
     return NULL;
 }
 
-static void apply(struct cli_args *a, int bit, const char *value)
+/* Where the value of an option goes; NULL: it has none. */
+static const char **text_of(struct cli_args *a, int bit)
 {
     switch (bit) {
     case OPT_SERVER:
-        a->server = value;
-        break;
+        return &a->server;
     case OPT_TOKEN:
-        a->token = value;
-        break;
+        return &a->token;
     case OPT_INPUT:
-        a->input_dir = value;
-        break;
+        return &a->input_dir;
     case OPT_RESUME:
-        a->resume_id = value;
-        break;
+        return &a->resume_id;
     case OPT_OUT:
-        a->out_dir = value;
-        break;
+        return &a->out_dir;
     case OPT_ID_FILE:
-        a->id_file = value;
-        break;
+        return &a->id_file;
     case OPT_VOXEL:
-        a->voxel_um = value;
-        break;
+        return &a->voxel_um;
     case OPT_AXES:
-        a->axes = value;
-        break;
-    case OPT_ALIGN:
-        a->align = true;
-        break;
-    case OPT_WATCH:
-        a->watch = true;
-        break;
-    case OPT_JSON:
-        a->json = true;
-        break;
-    case OPT_FOLLOW:
-        a->follow = true;
-        break;
-    case OPT_DRAFT:
-        a->draft = true;
-        break;
-    case OPT_HELP:
-        a->help = true;
-        break;
+        return &a->axes;
+    case OPT_TEMPLATE:
+        return &a->template;
+    case OPT_MARKER:
+        return &a->marker;
+    case OPT_QUIET:
+        return &a->quiet_s;
     default:
-        a->version = true;
-        break;
+        return NULL;
     }
+}
+
+static bool *flag_of(struct cli_args *a, int bit)
+{
+    switch (bit) {
+    case OPT_ONCE:
+        return &a->once;
+    case OPT_ALIGN:
+        return &a->align;
+    case OPT_WATCH:
+        return &a->watch;
+    case OPT_JSON:
+        return &a->json;
+    case OPT_FOLLOW:
+        return &a->follow;
+    case OPT_DRAFT:
+        return &a->draft;
+    case OPT_HELP:
+        return &a->help;
+    default:
+        return &a->version;
+    }
+}
+
+static void apply(struct cli_args *a, int bit, const char *value)
+{
+    const char **text = text_of(a, bit);
+    if (text != NULL)
+        *text = value;
+    else
+        *flag_of(a, bit) = true;
 }
 
 /* Letters ("-": operands are returned in their place; ":": a missing value gives a code of its own) and names for

@@ -23,6 +23,7 @@ enum cli_command_id {
     CLI_LOG,
     CLI_SERIES,
     CLI_DELETE,
+    CLI_WATCH_FOLDER,
     CLI_N_COMMAND
 };
 
@@ -30,15 +31,19 @@ enum cli_command_id {
 struct cli_args {
     enum cli_command_id command;
     const char *server, *token;
-    const char
-        *operand; /* a job document for submit and check, a scan for reconstruct, a job id for the other commands */
+    const char *
+        operand; /* a job document for submit and check, a scan for reconstruct, a folder for watch-folder, a job id for
+                     the other commands */
     const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */
     const char *id_file;   /* --id-file */
     const char *voxel_um;  /* --voxel-um */
     const char *axes;      /* --axes */
-    bool watch, json, follow, draft, align;
+    const char *template;  /* --template */
+    const char *marker;    /* --marker */
+    const char *quiet_s;   /* --quiet */
+    bool watch, json, follow, draft, align, once;
     bool help; /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;

@@ -141,7 +141,7 @@ status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err)
     status s = make_document(cli->args, &document, folder, sizeof folder, err);
     if (s == STATUS_OK) s = cli_submit_document(cli, document, folder, id, err);
     if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
-    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_of(cli, id, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
     if (s != STATUS_OK && id[0] != '\0')
         fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
     json_decref(document);

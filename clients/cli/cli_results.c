@@ -78,12 +78,24 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
 status cli_results(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
-    return cli_results_of(cli, cli->args->operand, err);
+    return cli_results_to_out(cli, cli->args->operand, err);
 }
 
-status cli_results_of(struct cli *cli, const char *id, struct error *err)
+status cli_results_to_out(struct cli *cli, const char *id, struct error *err)
 {
-    char path[256], folder[4096], size[CLI_SHORT_TEXT];
+    char folder[4096];
+    if (cli->args->out_dir != NULL)
+        snprintf(folder, sizeof folder, "%s", cli->args->out_dir);
+    else
+        snprintf(folder, sizeof folder, "selvedge-%s", id);
+    status s = cli_results_of(cli, id, folder, err);
+    if (s == STATUS_OK) fprintf(cli->out, "%s\n", folder);
+    return s;
+}
+
+status cli_results_of(struct cli *cli, const char *id, const char *folder, struct error *err)
+{
+    char path[256], size[CLI_SHORT_TEXT];
     struct transfer t = {.cli = cli};
     json_t *list = NULL, *file;
     size_t i, n_fetched = 0;
@@ -95,10 +107,6 @@ status cli_results_of(struct cli *cli, const char *id, struct error *err)
         s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` waits for them", id, id);
         goto out;
     }
-    if (cli->args->out_dir != NULL)
-        snprintf(folder, sizeof folder, "%s", cli->args->out_dir);
-    else
-        snprintf(folder, sizeof folder, "selvedge-%s", id);
     json_array_foreach(files, i, file) t.n_total += (uint64_t)json_integer_value(json_object_get(file, "size"));
     json_array_foreach(files, i, file)
     {
@@ -108,7 +116,6 @@ status cli_results_of(struct cli *cli, const char *id, struct error *err)
     if (s != STATUS_OK) goto out;
     text_size((double)t.n_total, size);
     fprintf(cli->note, "%zu files (%s) in %s, %zu of them new\n", json_array_size(files), size, folder, n_fetched);
-    fprintf(cli->out, "%s\n", folder);
 out:
     json_decref(list);
     return s;

@@ -17,6 +17,7 @@ struct submit {
     json_t *document, *job;
     struct cli_file_list list;
     char id[CLI_ID_BYTES];
+    char key[2 * crypto_hash_sha256_BYTES + 1]; /* Idempotency-Key */
     /* progress over all files */
     const char *verb, *name;
     uint64_t n_total, n_before, n_now;
@@ -133,13 +134,34 @@ static status hash_files(struct submit *u, struct error *err)
     return s;
 }
 
-static status create_job(struct submit *u, struct error *err)
+static void random_key(char *key, size_t n_key)
 {
     unsigned char random[16];
-    char key[2 * sizeof random + 1];
     randombytes_buf(random, sizeof random);
-    sodium_bin2hex(key, sizeof key, random, sizeof random);
-    status s = http_json(u->cli->http, "POST", "/v1/jobs", key, u->document, &u->job, err);
+    sodium_bin2hex(key, n_key, random, sizeof random);
+}
+
+/* The key of a sample: the hash of its document, as it is sent, and of the hashes of its files. */
+static status content_key(struct submit *u, struct error *err)
+{
+    unsigned char digest[crypto_hash_sha256_BYTES];
+    crypto_hash_sha256_state hash;
+    char *text = json_dumps(u->document, JSON_COMPACT);
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the job document: out of memory");
+    crypto_hash_sha256_init(&hash);
+    crypto_hash_sha256_update(&hash, (const unsigned char *)text, strlen(text));
+    for (size_t i = 0; i < u->list.n_file; i++)
+        crypto_hash_sha256_update(&hash, (const unsigned char *)u->list.file[i].sha256, CLI_SHA256_HEX);
+    crypto_hash_sha256_final(&hash, digest);
+    sodium_bin2hex(u->key, sizeof u->key, digest, sizeof digest);
+    free(text);
+    return STATUS_OK;
+}
+
+static status create_job(struct submit *u, struct error *err)
+{
+    if (u->key[0] == '\0') random_key(u->key, sizeof u->key);
+    status s = http_json(u->cli->http, "POST", "/v1/jobs", u->key, u->document, &u->job, err);
     if (s != STATUS_OK) return error_prefix(err, s, "the job document was refused");
     const char *id = json_string_value(json_object_get(u->job, "id"));
     if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's reply has no job id");
@@ -270,6 +292,36 @@ status cli_submit_document(struct cli *cli, const json_t *document, const char *
     if (s == STATUS_OK) s = send_files(&u, err);
     if (s == STATUS_OK) s = start_job(&u, err);
     draw_end(&u);
+    snprintf(id, CLI_ID_BYTES, "%s", u.id);
+    cli_job_files_release(&u.list);
+    json_decref(u.document);
+    json_decref(u.job);
+    return s;
+}
+
+static status send_once(struct submit *u, bool (*unchanged)(void *context), void *context, struct error *err)
+{
+    char path[256];
+    const char *state = json_string_value(json_object_get(u->job, "state"));
+    if (state == NULL || strcmp(state, "draft") != 0) return STATUS_OK;
+    status s = send_files(u, err);
+    if (s != STATUS_OK) return s;
+    if (unchanged(context)) return start_job(u, err);
+    s = cli_job_path(u->id, "", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(u->cli->http, "DELETE", path, NULL, NULL, NULL, err);
+    return s == STATUS_OK ? error_set(err, STATUS_STALE, "the files changed while they were sent") : s;
+}
+
+status cli_submit_once(struct cli *cli, const json_t *document, const char *folder, bool (*unchanged)(void *context),
+                       void *context, char id[CLI_ID_BYTES], struct error *err)
+{
+    struct submit u = {.cli = cli, .document = json_deep_copy(document)};
+    status s = u.document != NULL ? cli_job_files_list(u.document, folder, &u.list, err)
+                                  : error_set(err, STATUS_NO_MEMORY, "cannot make the job document: out of memory");
+    if (s == STATUS_OK) s = hash_files(&u, err);
+    if (s == STATUS_OK) s = content_key(&u, err);
+    if (s == STATUS_OK) s = create_job(&u, err);
+    if (s == STATUS_OK) s = send_once(&u, unchanged, context, err);
     snprintf(id, CLI_ID_BYTES, "%s", u.id);
     cli_job_files_release(&u.list);
     json_decref(u.document);
