@@ -14,6 +14,7 @@
 #include "geometry/reconstruct.h"
 #include "geometry/volume/volume.h"
 #include "geometry/weave/weave_detect.h"
+#include "optimizer/fit/baseline/expected_rows.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/cloth/cloth_search.h"
 #include "optimizer/fit/descent/descent.h"
@@ -134,8 +135,10 @@ struct pipeline_context {
     struct photograph_process process;  /* what is known of the camera */
     struct observation_set observation; /* all */
     struct observation_set fitted;      /* those of the set "fit" */
-    struct observation_set row;         /* what the fit sees: those, and their contrasts if these have a weight */
-    struct observation_set contrast;    /* of all observations, in their order; empty when not asked for */
+    /* what the fit sees: those, their contrasts if these have a weight, and what is expected between them */
+    struct observation_set row;
+    struct expected_rows expected;
+    struct observation_set contrast; /* of all observations, in their order; empty when not asked for */
     size_t n_model;
     struct pipeline_model *model; /* in the order of the document */
     struct pipeline_numbers number;

@@ -177,6 +177,23 @@ static status select_rows(struct pipeline_context *c, struct error *err)
                : s;
 }
 
+/* Adds what a plain BRDF expects between the rows of the fit. */
+static status expect_rows(struct pipeline_context *c, struct error *err)
+{
+    const double strength = c->doc->plain_prior;
+    status s = expected_rows_append(&c->fitted, strength, &c->expected, &c->row, err);
+    if (s != STATUS_OK || !(strength > 0.0)) return s;
+    if (c->expected.n == 0)
+        worker_status_warn(c->status,
+                           "%s: no plain BRDF can be fitted to these rows (too few directions, no lamp in front, or an "
+                           "environment), so the fit goes without one",
+                           job_option_key(OPTION_PLAIN_PRIOR));
+    else
+        log_info(c->log, "%zu radiances that a plain BRDF expects between the rows weigh as much as %.2g of them",
+                 c->expected.n, c->expected.count);
+    return STATUS_OK;
+}
+
 static status read_document(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -202,6 +219,7 @@ static status read_rows(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) texture_take_colors(c);
     if (s == STATUS_OK) s = load_environment(c, err);
     if (s == STATUS_OK) s = select_rows(c, err);
+    if (s == STATUS_OK) s = expect_rows(c, err);
     if (s == STATUS_OK) s = check_density(c, err);
     if (s == STATUS_OK) warn_few_rows(c);
     return s == STATUS_OK ? pipeline_warn_budget(c, err) : s;

@@ -89,7 +89,8 @@ def cross_validation(result):
 def bench_table(arguments, table):
     """Figures of one table; returns (held-out error of the twin, of the plain BRDF)."""
     sample = os.path.splitext(os.path.basename(table))[0]
-    fit = {"models": arguments.models.split(","), "render_px": 16, "render_samples": 4, "path_budget": arguments.path_budget}
+    fit = {"models": arguments.models.split(","), "render_px": 16, "render_samples": 4,
+           "path_budget": arguments.path_budget, "plain_prior": arguments.plain_prior}
     best, wall_s = None, 0.0
     for name, cloth in DESCRIPTIONS.items():
         document = {"sample": f"{sample} as {name}", "cloth": cloth, "measurements": {"file": os.path.basename(table)}, "fit": fit}
@@ -307,6 +308,7 @@ def main():
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
     parser.add_argument("--models", default="textile.v3", help="scattering models, separated by commas; several: the worker chooses by cross-validation")
     parser.add_argument("--path-budget", type=int, default=6000000)
+    parser.add_argument("--plain-prior", type=float, default=0, help="option plain_prior of the tables' jobs")
     parser.add_argument("--recovery-budget", type=int, default=18000000, help="paths of a recovery")
     parser.add_argument("--recovery-model", default="textile.v3", help="model of the recoveries")
     parser.add_argument("what", nargs="*", help="tables or recoveries")

@@ -39,6 +39,10 @@ void plain_brdf_radiance(const struct plain_brdf *b, const struct configuration 
  * left out. Takes milliseconds. STATUS_INVALID when no row is left, STATUS_NO_MEMORY. */
 status plain_brdf_fit(const struct observation_set *rows, struct plain_brdf *b, struct error *err);
 
+/* The same without the rows of one fold. fold: of each row (folds.h). */
+status plain_brdf_fit_without(const struct observation_set *rows, const size_t *fold, size_t i_fold,
+                              struct plain_brdf *b, struct error *err);
+
 /* Relative RMS error by cross-validation over `rows`: fitted anew without the rows of each fold (folds.h), which it
  * then predicts. The counterpart of cross_validation.h, by the same folds. NaN with fewer than FOLDS_LEAST folds. Takes
  * FOLDS_MAX times as long as plain_brdf_fit at most. The errors of plain_brdf_fit. */

@@ -11,13 +11,25 @@ struct left_out {
 
 static bool scored(const struct observation *o) { return o->weight > 0.0 && !observation_is_contrast(o); }
 
-/* Fits the rows outside one fold and predicts those in it. The rows of a fold are left out by a weight of 0. */
-static status predict_fold(const struct observation_set *rows, const size_t *fold, size_t i_fold,
-                           struct observation_set *part, struct left_out *out, struct error *err)
+status plain_brdf_fit_without(const struct observation_set *rows, const size_t *fold, size_t i_fold,
+                              struct plain_brdf *b, struct error *err)
+{
+    struct observation_set part;
+    status s = STATUS_OK;
+    observation_set_init(&part);
+    for (size_t i = 0; i < rows->n && s == STATUS_OK; i++)
+        if (fold[i] != i_fold) s = observation_set_append(&part, &rows->item[i], err);
+    if (s == STATUS_OK) s = plain_brdf_fit(&part, b, err);
+    observation_set_release(&part);
+    return s;
+}
+
+/* Fits the rows outside one fold and predicts those in it. */
+static status predict_fold(const struct observation_set *rows, const size_t *fold, size_t i_fold, struct left_out *out,
+                           struct error *err)
 {
     struct plain_brdf b;
-    for (size_t i = 0; i < rows->n; i++) part->item[i].weight = fold[i] == i_fold ? 0.0 : rows->item[i].weight;
-    status s = plain_brdf_fit(part, &b, err);
+    status s = plain_brdf_fit_without(rows, fold, i_fold, &b, err);
     for (size_t i = 0; s == STATUS_OK && i < rows->n; i++) {
         const struct observation *o = &rows->item[i];
         double rgb[3];
@@ -32,18 +44,14 @@ static status predict_fold(const struct observation_set *rows, const size_t *fol
 status plain_brdf_left_out(const struct observation_set *rows, double *rel_rms, struct error *err)
 {
     struct left_out out = {0.0, 0.0};
-    struct observation_set part;
     status s = STATUS_OK;
     *rel_rms = NAN;
-    observation_set_init(&part);
     size_t *fold = malloc((rows->n + 1) * sizeof *fold);
     if (fold == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit the plain BRDF: out of memory");
     const size_t n_fold = folds_deal(rows, fold);
-    for (size_t i = 0; i < rows->n && s == STATUS_OK; i++) s = observation_set_append(&part, &rows->item[i], err);
     for (size_t k = 0; n_fold >= FOLDS_LEAST && k < n_fold && s == STATUS_OK; k++)
-        s = predict_fold(rows, fold, k, &part, &out, err);
+        s = predict_fold(rows, fold, k, &out, err);
     if (s == STATUS_OK && out.count > 0.0) *rel_rms = sqrt(out.square / out.count);
-    observation_set_release(&part);
     free(fold);
     return s;
 }

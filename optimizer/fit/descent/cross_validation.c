@@ -1,6 +1,7 @@
 #include "optimizer/fit/descent/cross_validation.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/objective/folds.h"
+#include "optimizer/fit/objective/objective.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,12 +13,13 @@ enum { N = FIT_MAX_PARAM };
 static const double reach = 4.0;
 static bool scored(const struct linear_model *m, size_t i)
 {
-    return m->extra[3 * i] > 0.0 && !(m->contrast[3 * i] > 0.0);
+    return m->extra[3 * i] > 0.0 && !(m->contrast[3 * i] > 0.0) && !(m->expected[3 * i] > 0.0);
 }
 
 /* A fit without the rows of one fold: the free parameters in step limits. */
 struct fold_fit {
-    struct linear_model part; /* m with weights of its own */
+    struct linear_model part; /* m with weights and residuals of its own */
+    double *own;              /* these: n_row weights, then the residuals of both replicas */
     size_t n, index[N];
     double h[N * N], g[N], lower[N], upper[N];
 };
@@ -52,11 +54,26 @@ static double predicted_square(const struct linear_model *m, size_t row, const d
     return r[0] * r[1] / m->extra[row];
 }
 
-static status leave_out(const struct linear_model *m, const struct coordinate *k, const size_t *fold, size_t i_fold,
-                        struct fold_fit *f, struct cross_validation *out, struct error *err)
+/* Fills in weights and residuals of a fold. What is expected between the rows is expected without those of the fold. */
+static void own_rows(const struct linear_model *m, const struct observation_set *o, const size_t *fold, size_t i_fold,
+                     struct fold_fit *f)
+{
+    for (size_t row = 0; row < m->n_row; row++) {
+        const struct observation *item = &o->item[row / 3];
+        f->part.weight[row] = fold[row / 3] == i_fold ? 0.0 : m->weight[row];
+        double shift = 0.0;
+        if (item->expected)
+            shift = sqrt(objective_weight(item)) * (item->mean_rgb[row % 3] - item->left_out_rgb[3 * i_fold + row % 3]);
+        for (size_t q = 0; q < 2; q++) f->part.r[q][row] = m->r[q][row] + shift;
+    }
+}
+
+static status leave_out(const struct linear_model *m, const struct observation_set *o, const struct coordinate *k,
+                        const size_t *fold, size_t i_fold, struct fold_fit *f, struct cross_validation *out,
+                        struct error *err)
 {
     double y[N], dx[N] = {0};
-    for (size_t row = 0; row < m->n_row; row++) f->part.weight[row] = fold[row / 3] == i_fold ? 0.0 : m->weight[row];
+    own_rows(m, o, fold, i_fold, f);
     quadratic_model(f, k, fmax(linear_model_weighted_objective(m), 0.0) / (double)m->n_row + linear_model_noise(m));
     status s = bounded_quadratic(f->h, f->g, f->lower, f->upper, f->n, y, err);
     if (s != STATUS_OK) return s;
@@ -116,21 +133,22 @@ status cross_validation_compute(const struct linear_model *m, const struct obser
     struct fold_fit f = {.part = *m};
     status s = STATUS_OK;
     size_t *fold = malloc(o->n * sizeof *fold);
-    double *weight = malloc(m->n_row * sizeof *weight);
+    f.own = malloc(3 * m->n_row * sizeof *f.own);
     memset(out, 0, sizeof *out);
-    if (fold == NULL || weight == NULL) {
+    if (fold == NULL || f.own == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot cross-validate %zu rows: out of memory", o->n);
         goto out;
     }
-    f.part.weight = weight;
+    f.part.weight = f.own;
+    for (size_t q = 0; q < 2; q++) f.part.r[q] = f.own + (1 + q) * m->n_row;
     for (size_t p = 0; p < m->n_param; p++)
         if (!fixed[p]) f.index[f.n++] = p;
     const size_t n_fold = folds_deal(o, fold);
     if (!enough_rows(m, fold, n_fold, f.n)) goto out;
-    for (size_t i = 0; i < n_fold && s == STATUS_OK; i++) s = leave_out(m, k, fold, i, &f, out, err);
+    for (size_t i = 0; i < n_fold && s == STATUS_OK; i++) s = leave_out(m, o, k, fold, i, &f, out, err);
     if (s == STATUS_OK) summarise(n_fold, out);
 out:
-    free(weight);
+    free(f.own);
     free(fold);
     return s;
 }

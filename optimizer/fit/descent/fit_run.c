@@ -68,7 +68,7 @@ static status report(void *context, const struct fit_step *step, struct error *e
     if (step->param_se != NULL) fit_layout_full(&f->layout, step->param_se, se);
     nuisance_of(&f->layout, step->param, step->param_se, NULL, &nuisance);
     while (outer.n_configuration > 0 &&
-           observation_is_contrast(&f->problem->observation->item[outer.n_configuration - 1]))
+           !observation_is_measured_mean(&f->problem->observation->item[outer.n_configuration - 1]))
         outer.n_configuration--;
     if (f->n_start > 1) {
         snprintf(phase, sizeof phase, "start %zu of %zu: %.30s", f->i_start + 1, f->n_start, step->phase);

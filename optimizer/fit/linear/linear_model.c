@@ -9,7 +9,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
 {
     *m = (struct linear_model){.n_row = n_row, .n_param = n_param};
     size_t per_replica = 2 * n_row + 2 * n_row * n_param;
-    double *block = calloc(2 * per_replica + (5 + LINEAR_COLOR_CAUSES) * n_row, sizeof *block);
+    double *block = calloc(2 * per_replica + (6 + LINEAR_COLOR_CAUSES) * n_row, sizeof *block);
     m->pair = malloc((n_row / 3 * ESTIMATE_MAX_PARTNER + 1) * sizeof *m->pair);
     m->r[0] = block;
     if (block == NULL || m->pair == NULL)
@@ -27,6 +27,7 @@ status linear_model_init(struct linear_model *m, size_t n_row, size_t n_param, s
     m->contrast = m->extra + n_row;
     m->color_var = m->contrast + n_row;
     m->color = m->color_var + n_row;
+    m->expected = m->color + LINEAR_COLOR_CAUSES * n_row;
     for (size_t row = 0; row < n_row; row++) m->weight[row] = m->extra[row] = 1.0;
     return STATUS_OK;
 }
@@ -97,7 +98,8 @@ enum row_kind { ROWS_OF_MEANS, ROWS_OF_CONTRASTS, ROWS_OF_BOTH };
 
 static bool counts(const struct linear_model *m, size_t row, enum row_kind kind)
 {
-    return m->extra[row] > 0.0 && (kind == ROWS_OF_BOTH || (m->contrast[row] > 0.0) == (kind == ROWS_OF_CONTRASTS));
+    return m->extra[row] > 0.0 && !(m->expected[row] > 0.0) &&
+           (kind == ROWS_OF_BOTH || (m->contrast[row] > 0.0) == (kind == ROWS_OF_CONTRASTS));
 }
 
 /* freedom: degrees of freedom per row. Rows have the weights 1 / variance^power. */
@@ -129,7 +131,7 @@ static double misfit_of(const struct linear_model *m, double freedom, enum row_k
 static double freedom_of_row(const struct linear_model *m, size_t n_free)
 {
     double n = 0.0;
-    for (size_t row = 0; row < m->n_row; row++) n += m->extra[row] > 0.0;
+    for (size_t row = 0; row < m->n_row; row++) n += counts(m, row, ROWS_OF_BOTH);
     return fmax(1.0, n - (double)n_free) / fmax(1.0, n);
 }
 

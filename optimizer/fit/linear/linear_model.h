@@ -64,6 +64,7 @@ struct linear_model {
     /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
     double *extra;
     double *contrast; /* n_row: 1 for a row of a contrast (texture), 0 for one of a mean; set by linear_model_pool */
+    double *expected; /* n_row: 1 for a row that was not measured (observation.h); set by linear_model_pool */
     double *weight;   /* n_row: factor of a row in gradient and Hessian; 1 unless linear_model_weigh was called */
     double row_var;   /* variance of a residual by misfit and noise, set by linear_model_weigh: the prior's unit */
     const struct gaussian_prior *prior; /* n_param, NULL: none; the caller's */
@@ -101,7 +102,7 @@ double linear_model_row_noise(const struct linear_model *m, size_t row);
  * degree of freedom with n_free fitted parameters; 0 or more. The error of the color matrix explains none of it,
  * because the parameters follow an error that all rows have in common. Rows are averaged with weights 1 / (all of their
  * variance)^2, found by iterating: rows known to 0.5 % say more about a misfit of 1 % than those known to 5 %. Rows
- * of weight 0 are left out. */
+ * of weight 0 and expected rows are left out. */
 double linear_model_misfit(const struct linear_model *m, size_t n_free);
 /* The same for the errors of the result: with weights 1 / (all of their variance), by which it does not hang on the few
  * rows that are known best (Paule and Mandel 1982). For the rows of means ([0]) and of contrasts ([1], 0 without any)

@@ -275,6 +275,7 @@ static void set_photograph(struct linear_model *m, const struct observation *o, 
     m->color_var[row] = fmin(m->color_var[row], m->photograph_var[row]);
     m->extra[row] = o->weight;
     m->contrast[row] = contrast ? 1.0 : 0.0;
+    m->expected[row] = o->expected ? 1.0 : 0.0;
 }
 
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)

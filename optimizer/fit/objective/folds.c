@@ -18,6 +18,8 @@ size_t folds_deal(const struct observation_set *o, size_t *fold)
     size_t n_group = 0;
     for (size_t i = 0; i < o->n; i++) {
         size_t j = 0;
+        fold[i] = FOLDS_MAX;
+        if (o->item[i].expected) continue;
         while (j < i && !same_directions(&o->item[j].configuration, &o->item[i].configuration)) j++;
         fold[i] = j < i ? fold[j] : n_group++ % FOLDS_MAX;
     }

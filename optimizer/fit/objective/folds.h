@@ -12,7 +12,8 @@
 
 enum { FOLDS_MAX = 16, FOLDS_LEAST = 4 };
 
-/* Writes the fold of each of the o->n observations and returns the number of folds. */
+/* Writes the fold of each of the o->n observations and returns the number of folds. Expected rows are in none of them
+ * (FOLDS_MAX) and come last. */
 size_t folds_deal(const struct observation_set *o, size_t *fold);
 
 #endif

@@ -71,7 +71,7 @@ static double factor_of_objective(const struct observation *o, int channel)
     return objective_weight(o);
 }
 
-static bool scored(const struct observation *o) { return !observation_is_contrast(o) && o->weight > 0.0; }
+static bool scored(const struct observation *o) { return observation_is_measured_mean(o) && o->weight > 0.0; }
 
 static double factor_of_relative(const struct observation *o, int channel)
 {

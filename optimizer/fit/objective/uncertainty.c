@@ -22,9 +22,11 @@ static const double least_information = 0.25;
  * variance is common. */
 static const double photograph_in_common = 0.5;
 
-/* The part of V of one row that is independent of all other rows. */
+/* The part of V of one row that is independent of all other rows. The weighted residual of an expected row, whose
+ * weight falls with its error, counts as one of a measured row. */
 static double own_variance(const struct linear_model *m, size_t row, const double misfit[2])
 {
+    if (m->expected[row] > 0.0) return misfit[0];
     const double photograph = m->photograph_var[row] - m->color_var[row];
     return (1.0 - photograph_in_common) * photograph + misfit[m->contrast[row] > 0.0] * m->extra[row];
 }
@@ -305,7 +307,7 @@ static void mean_variances(const struct linear_model *m, struct uncertainty *u)
 {
     double n = 0.0;
     for (size_t row = 0; row < m->n_row; row++) {
-        if (!(m->extra[row] > 0.0) || m->contrast[row] > 0.0) continue;
+        if (!(m->extra[row] > 0.0) || m->contrast[row] > 0.0 || m->expected[row] > 0.0) continue;
         u->noise_var += linear_model_row_noise(m, row) / m->extra[row];
         u->photograph_var += m->photograph_var[row] / m->extra[row];
         n += 1.0;

@@ -61,6 +61,8 @@ void observation_set_weigh(struct observation_set *o)
 
 bool observation_is_contrast(const struct observation *o) { return o->configuration.contrast_cells > 0; }
 
+bool observation_is_measured_mean(const struct observation *o) { return !o->expected && !observation_is_contrast(o); }
+
 bool observation_contrast_known(const struct observation *o)
 {
     return o->contrast_se_rgb[0] < 1.0 && o->contrast_se_rgb[1] < 1.0 && o->contrast_se_rgb[2] < 1.0;

@@ -20,7 +20,12 @@ struct observation {
     double weight;    /* factor of the objective's weight of this observation; 1 */
     size_t n_cell;    /* parts along an edge of the crop of which the contrast is taken; 0: not measured */
     double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
-    struct photograph_record photograph;        /* how it was read; info.format is NULL for a row of a table */
+    /* True: not measured, but what a simpler model expects there (expected_rows.h). Such rows weigh in a fit, and are
+     * neither scored nor reported. left_out_rgb: their mean_rgb without the rows of each fold, 3 * FOLDS_MAX values, of
+     * the maker; NULL for other rows. */
+    bool expected;
+    const double *left_out_rgb;
+    struct photograph_record photograph; /* how it was read; info.format is NULL for a row of a table */
 };
 
 struct observation_set {
@@ -42,6 +47,8 @@ void observation_set_weigh(struct observation_set *o);
 /* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb are those of the
  * contrast, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
 bool observation_is_contrast(const struct observation *o);
+/* Whether the row is a measured mean radiance: neither a contrast nor an expected row. */
+bool observation_is_measured_mean(const struct observation *o);
 /* Whether the contrast of all channels is known: its standard errors are below 1, which a black channel has not. */
 bool observation_contrast_known(const struct observation *o);
 /* Makes that observation from one with n_cell > 0. weight: of contrasts beside means. */

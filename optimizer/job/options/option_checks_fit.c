@@ -26,6 +26,10 @@ status job_check_nuisance(const struct option_value *v, struct error *err)
         return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
                                "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
                                "fitted");
+    if (v->doc->plain_prior > 0.0 && (o->gain != JOB_GAIN_NONE || o->stray_light))
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' cannot be used with 'fit.plain_prior': the plain BRDF does not know these faults",
+                               v->path);
     return STATUS_OK;
 }
 

@@ -93,6 +93,16 @@ const struct job_option option_rows_fit[] = {
          "takes 0.54 to 0.63 of the time for two of them. The noise of such rows then goes together; the errors of "
          "parameters and scores contain that. A path counts once for each row. Not together with `texture`; volumes "
          "trace separate paths all the same."},
+    {.path = "fit.plain_prior",
+     .kind = OPTION_NUMBER,
+     .id = OPTION_PLAIN_PRIOR,
+     INTO(plain_prior),
+     RANGE(0, 100),
+     .standard = "0",
+     .meaning =
+         "How much the fit listens to a plain BRDF that is fitted to the same rows: 0, not at all; 1, as much as "
+         "was best for a dozen measured rows of a described cloth (docs/model.md, section 5). With few rows many "
+         "cloths fit them, and differ in between; this chooses among these. Not together with `nuisance`."},
     {.path = "fit.fixed",
      .kind = OPTION_OWN,
      .unit = "degrees for angles",

@@ -27,6 +27,28 @@ def test_the_plain_brdf_stands_beside_the_fit(real):
     assert worse, "the case does not try the warning any more"
 
 
+def test_a_fit_that_listens_to_the_plain_brdf(real):
+    """Expected rows weigh in the fit, and are no rows of the result."""
+    fit = document()["fit"]
+    deaf = real.wait_state(start_small_job(real, document()), "succeeded", timeout_s=120)["result"]
+    listening = real.wait_state(start_small_job(real, document(fit={**fit, "plain_prior": 1})), "succeeded", timeout_s=120)["result"]
+    assert [row["name"] for row in listening["rows"]] == [row["name"] for row in deaf["rows"]]
+    assert [p["value"] for p in listening["parameters"]] != [p["value"] for p in deaf["parameters"]]
+    assert listening["skill"]["plain_brdf"] == deaf["skill"]["plain_brdf"]
+
+
+def test_no_plain_prior_under_an_environment(real):
+    listening = document(environment={"radiance": [0.1, 0.1, 0.1]}, fit={**document()["fit"], "plain_prior": 1})
+    result = real.wait_state(start_small_job(real, listening), "succeeded", timeout_s=120)["result"]
+    assert [w for w in result["warnings"] if "fit.plain_prior" in w]
+
+
+def test_no_plain_prior_with_faults_of_photographs(real):
+    fit = {**document()["fit"], "plain_prior": 1, "nuisance": {"stray_light": True}}
+    reply = real.post("/v1/jobs", json=document(fit=fit))
+    assert reply.status_code == 422 and "plain_prior" in reply.json()["detail"]
+
+
 def test_no_skill_under_an_environment(real):
     result = real.wait_state(start_small_job(real, document(environment={"radiance": [0.1, 0.1, 0.1]})), "succeeded", timeout_s=120)["result"]
     assert result["skill"] is None
