@@ -9,8 +9,8 @@
  *
  * misfit^2: mean square of the BRDF's relative error over the fitted rows per degree of freedom; jackknife_i: variance
  * of its radiance there when the folds of the rows are left out in turn (Tukey 1958), relative to its brightness. Where
- * the BRDF fails or extrapolates, its rows count little, and none counts more than a measured one. A strength of 1 was chosen by cross-validation over measured
- * tables (NOTES.md of optimizer/fit).
+ * the BRDF fails or extrapolates, its rows count little, and none counts more than a measured one. A strength of 1 was
+ * chosen by cross-validation over measured tables (NOTES.md of optimizer/fit).
  *
  * Source of the idea: a prior on a model's predictions instead of on its parameters, as power priors are (Ibrahim and
  * Chen 2000, "Power prior distributions for regression models"). Differs: the expected data are those of a simpler
