@@ -53,7 +53,7 @@ LINK_BASE := -lz -lm -pthread
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
-LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive $(LINK_BASE)
+LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
 .PHONY: all generate deps help check test nightly demo demo-camera night clean
 ##@ Build and run

@@ -2,6 +2,7 @@
  * pictures and computes nothing; workers do. */
 #include "base/files/durable.h"
 #include "base/version.h"
+#include "server/events/webhook.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
 #include "server/jobs/ballast.h"
@@ -194,6 +195,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
 {
     struct job_service *service = NULL;
     struct supervisor *supervisor = NULL;
+    struct webhook *webhook = NULL;
     struct static_files *files = NULL;
     struct http_server *server = NULL;
     char worker[PATH_BYTES];
@@ -202,7 +204,8 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     status r = static_files_new(s->web, s->openapi, log, &files, err);
     if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
-    r = supervisor_start(service, worker, &supervisor, err);
+    r = webhook_start(service, &webhook, err);
+    if (r == STATUS_OK) r = supervisor_start(service, worker, &supervisor, err);
     if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, url, err);
     if (r == STATUS_OK) {
         announce(s, url, log);
@@ -212,6 +215,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
 out:
     http_server_stop(server); /* first, because its threads wake the supervisor */
     supervisor_stop(supervisor);
+    webhook_stop(webhook);
     job_service_close(service);
     static_files_free(files);
     return r;

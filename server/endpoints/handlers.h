@@ -32,6 +32,8 @@ void handle_log(struct http_request *r);
 void handle_list_results(struct http_request *r);
 void handle_get_result(struct http_request *r);
 void handle_archive(struct http_request *r);
+/* handle_deliveries.c */
+void handle_list_deliveries(struct http_request *r);
 /* handle_service.c */
 void handle_about(struct http_request *r);
 void handle_options(struct http_request *r);

@@ -25,6 +25,7 @@ static const struct http_route route[] = {
     {"GET", "/v1/jobs/{id}/results", HTTP_BODY_NONE, handle_list_results, NULL},
     {"GET", "/v1/jobs/{id}/results.tar", HTTP_BODY_NONE, handle_archive, NULL},
     {"GET", "/v1/jobs/{id}/results/{path...}", HTTP_BODY_NONE, handle_get_result, NULL},
+    {"GET", "/v1/deliveries", HTTP_BODY_NONE, handle_list_deliveries, NULL},
     {"GET", "/v1/about", HTTP_BODY_NONE, handle_about, NULL},
     {"GET", "/v1/options", HTTP_BODY_NONE, handle_options, NULL},
     {"GET", "/v1/openapi.json", HTTP_BODY_NONE, handle_openapi, NULL},

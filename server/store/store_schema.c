@@ -43,6 +43,22 @@ static const char *const migration[] = {
     " UPDATE job SET revision = revision + 1 WHERE id = NEW.job_id; END;"
     "CREATE TRIGGER file_removed AFTER DELETE ON file BEGIN"
     " UPDATE job SET revision = revision + 1 WHERE id = OLD.job_id; END;",
+    /* deliveries of webhooks, which a trigger adds in the transaction that ends a job while the table webhook has a
+     * row. The revision of a job rises with each change, so it makes the id unique */
+    "CREATE TABLE webhook (one INTEGER PRIMARY KEY);"
+    "CREATE TABLE delivery (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, job_id TEXT NOT NULL,"
+    " job_state INTEGER NOT NULL, sample TEXT NOT NULL, attempt INTEGER NOT NULL, error_code TEXT NOT NULL,"
+    " error_field TEXT NOT NULL, error_text TEXT NOT NULL, created REAL NOT NULL, state INTEGER NOT NULL,"
+    " tries INTEGER NOT NULL, next REAL NOT NULL, status INTEGER NOT NULL, error TEXT NOT NULL,"
+    " delivered REAL NOT NULL);"
+    "CREATE INDEX delivery_waiting ON delivery (state, next, serial);"
+    "CREATE INDEX delivery_job ON delivery (job_id, serial);"
+    "CREATE TRIGGER job_ended AFTER UPDATE OF state ON job WHEN NEW.state <> OLD.state AND NEW.state IN (4, 5, 6)"
+    " AND NEW.deleted = 0 AND EXISTS (SELECT 1 FROM webhook) BEGIN"
+    " INSERT INTO delivery (id, job_id, job_state, sample, attempt, error_code, error_field, error_text, created, "
+    "state,"
+    " tries, next, status, error, delivered) VALUES (NEW.id || '.' || NEW.revision, NEW.id, NEW.state, NEW.sample,"
+    " NEW.attempt, NEW.error_code, NEW.error_field, NEW.error_text, NEW.updated, 0, 0, NEW.updated, 0, '', 0); END;",
 };
 
 const char *const *store_migrations(int *n)

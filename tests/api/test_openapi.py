@@ -170,6 +170,7 @@ def test_every_operation_answers_as_documented(daemon):
     daemon.wait_state(other, "failed")
     call("retryJob", "POST", f"/v1/jobs/{other}/retry")
     call("deleteJob", "DELETE", f"/v1/jobs/{draft}")
+    call("listDeliveries", "GET", "/v1/deliveries")
     for operation, path in [("about", "/v1/about"), ("options", "/v1/options"), ("openapi", "/v1/openapi.json"),
                             ("livez", "/livez"), ("readyz", "/readyz"), ("metrics", "/metrics")]:
         call(operation, "GET", path)

@@ -1,0 +1,111 @@
+#include "server/store/store_delivery.h"
+#include "server/store/store_sql.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define COLUMNS                                                                                                        \
+    "serial, id, job_id, sample, job_state, attempt, error_code, error_field, error_text, created, state, tries, "     \
+    "next, status, error, delivered"
+
+static void read_row(sqlite3_stmt *q, struct delivery_row *row)
+{
+    memset(row, 0, sizeof *row);
+    row->serial = sqlite3_column_int64(q, 0);
+    store_text(q, 1, row->id, sizeof row->id);
+    store_text(q, 2, row->job_id, sizeof row->job_id);
+    store_text(q, 3, row->sample, sizeof row->sample);
+    row->job_state = (enum job_state)sqlite3_column_int(q, 4);
+    row->attempt = sqlite3_column_int64(q, 5);
+    store_text(q, 6, row->error_code, sizeof row->error_code);
+    store_text(q, 7, row->error_field, sizeof row->error_field);
+    store_text(q, 8, row->error_text, sizeof row->error_text);
+    row->created_unix_s = sqlite3_column_double(q, 9);
+    row->state = (enum delivery_state)sqlite3_column_int(q, 10);
+    row->n_try = sqlite3_column_int64(q, 11);
+    row->next_unix_s = sqlite3_column_double(q, 12);
+    row->http_status = sqlite3_column_int64(q, 13);
+    store_text(q, 14, row->error, sizeof row->error);
+    row->delivered_unix_s = sqlite3_column_double(q, 15);
+}
+
+/* One statement that changes something, under the lock. */
+#define CHANGE(store, err, ...)                                                                                        \
+    do {                                                                                                               \
+        pthread_mutex_lock(&(store)->write.lock);                                                                      \
+        status changed_ = store_run(&(store)->write, NULL, err, __VA_ARGS__);                                          \
+        pthread_mutex_unlock(&(store)->write.lock);                                                                    \
+        return changed_;                                                                                               \
+    } while (0)
+
+status store_webhook_enable(struct store *store, bool enabled, struct error *err)
+{
+    CHANGE(store, err, enabled ? "INSERT OR IGNORE INTO webhook VALUES (1)" : "DELETE FROM webhook", "");
+}
+
+status store_delivery_update(struct store *store, const struct delivery_row *r, struct error *err)
+{
+    CHANGE(store, err, "UPDATE delivery SET state=?, tries=?, next=?, status=?, error=?, delivered=? WHERE serial=?",
+           "iidisdi", (int64_t)r->state, r->n_try, r->next_unix_s, r->http_status, r->error, r->delivered_unix_s,
+           r->serial);
+}
+
+status store_delivery_prune(struct store *store, int64_t most, struct error *err)
+{
+    CHANGE(store, err,
+           "DELETE FROM delivery WHERE state <> 0 AND serial <= (SELECT serial FROM delivery ORDER BY serial DESC "
+           "LIMIT 1 OFFSET ?)",
+           "i", most);
+}
+
+status store_delivery_next(struct store *store, struct delivery_row *row, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    memset(row, 0, sizeof *row);
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err,
+                             "SELECT " COLUMNS " FROM delivery WHERE state = 0 ORDER BY next, serial LIMIT 1", "");
+    if (s != STATUS_OK) goto out;
+    int rc = sqlite3_step(q);
+    if (rc == SQLITE_ROW)
+        read_row(q, row);
+    else
+        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "no delivery waits")
+                              : store_error(&store->read, "cannot read deliveries", err);
+out:
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->read.lock);
+    return s;
+}
+
+status store_delivery_list(struct store *store, const char *job_id, int64_t before, size_t limit,
+                           struct delivery_row **out, size_t *n_out, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    size_t n = 0;
+    int rc = SQLITE_DONE;
+    struct delivery_row *row = calloc(limit, sizeof *row);
+    if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list deliveries: out of memory");
+    if (before <= 0) before = INT64_MAX;
+    pthread_mutex_lock(&store->read.lock);
+    status s = job_id == NULL
+                   ? store_prepare(&store->read, &q, err,
+                                   "SELECT " COLUMNS " FROM delivery WHERE serial < ? ORDER BY serial DESC LIMIT ?",
+                                   "ii", before, (int64_t)limit)
+                   : store_prepare(&store->read, &q, err,
+                                   "SELECT " COLUMNS " FROM delivery WHERE job_id = ? AND serial < ? "
+                                   "ORDER BY serial DESC LIMIT ?",
+                                   "sii", job_id, before, (int64_t)limit);
+    while (s == STATUS_OK && n < limit && (rc = sqlite3_step(q)) == SQLITE_ROW) read_row(q, &row[n++]);
+    if (s == STATUS_OK && rc != SQLITE_DONE && rc != SQLITE_ROW)
+        s = store_error(&store->read, "cannot list deliveries", err);
+    sqlite3_finalize(q);
+    pthread_mutex_unlock(&store->read.lock);
+    if (s != STATUS_OK) {
+        free(row);
+        return s;
+    }
+    *out = row;
+    *n_out = n;
+    return STATUS_OK;
+}
