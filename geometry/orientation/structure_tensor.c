@@ -1,11 +1,10 @@
 #include "geometry/orientation/structure_tensor.h"
+
+#include "base/lanes.h"
 #include "base/small_matrix.h"
 
 #include <math.h>
 #include <string.h>
-
-enum { LANES = 8 };
-typedef float lanes __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
 
 void tensor_window_init(struct tensor_window *w, double sd_voxel)
 {

@@ -14,22 +14,24 @@ void segment_bricks_release(struct segment_bricks *s)
     *s = (struct segment_bricks){0};
 }
 
-static void brick_range(const struct segment_bricks *s, const struct segment *g, size_t from[3], size_t to[3])
+static void brick_range(const struct segment_bricks *s, const struct segment *g, float reach, size_t from[3],
+                        size_t to[3])
 {
+    const float inverse = 1.0f / (float)s->edge;
     for (int a = 0; a < 3; a++) {
-        float lo = (fminf(g->a[a], g->b[a]) - s->reach) / (float)s->edge;
-        float hi = (fmaxf(g->a[a], g->b[a]) + s->reach) / (float)s->edge, last = (float)(s->n_brick[a] - 1);
-        from[a] = (size_t)fminf(fmaxf(floorf(lo), 0.0f), last);
-        to[a] = (size_t)fminf(fmaxf(floorf(hi), 0.0f), last);
+        float low = g->a[a] < g->b[a] ? g->a[a] : g->b[a], high = g->a[a] < g->b[a] ? g->b[a] : g->a[a];
+        float lo = (low - reach) * inverse, hi = (high + reach) * inverse, last = (float)(s->n_brick[a] - 1);
+        from[a] = lo <= 0.0f ? 0 : lo >= last ? s->n_brick[a] - 1 : (size_t)lo;
+        to[a] = hi <= 0.0f ? 0 : hi >= last ? s->n_brick[a] - 1 : (size_t)hi;
     }
 }
 
 /* Counting pass and filling pass of a compressed row list. */
-static void sort_segments(struct segment_bricks *s, bool fill)
+static void sort_segments(struct segment_bricks *s, const float *reach, bool fill)
 {
     for (size_t i = 0; i < s->n_segment; i++) {
         size_t from[3], to[3], b[3];
-        brick_range(s, &s->segment[i], from, to);
+        brick_range(s, &s->segment[i], reach != NULL ? reach[i] : s->reach, from, to);
         for (b[2] = from[2]; b[2] <= to[2]; b[2]++)
             for (b[1] = from[1]; b[1] <= to[1]; b[1]++)
                 for (b[0] = from[0]; b[0] <= to[0]; b[0]++) {
@@ -42,16 +44,17 @@ static void sort_segments(struct segment_bricks *s, bool fill)
     }
 }
 
-static status sort_all(struct segment_bricks *s, struct error *err)
+/* reach: of each segment; NULL: s->reach */
+static status sort_all(struct segment_bricks *s, const float *reach, struct error *err)
 {
     size_t n = segment_n_brick(s);
     s->first = calloc(n + 2, sizeof *s->first);
     if (s->first == NULL) goto no_memory;
-    sort_segments(s, false);
+    sort_segments(s, reach, false);
     for (size_t b = 2; b <= n + 1; b++) s->first[b] += s->first[b - 1];
     s->index = malloc((s->first[n + 1] + 1) * sizeof *s->index);
     if (s->index == NULL) goto no_memory;
-    sort_segments(s, true);
+    sort_segments(s, reach, true);
     return STATUS_OK;
 no_memory:
     segment_bricks_release(s);
@@ -70,8 +73,9 @@ static status start(struct segment_bricks *s, size_t n_segment, const size_t n_v
     return STATUS_OK;
 }
 
-status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
-                           size_t edge, float reach, struct error *err)
+/* Makes the segments, without the lists of the bricks. */
+static status take_lines(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
+                         size_t edge, float reach, struct error *err)
 {
     status st = start(s, lines->n_vertex, n_voxel, edge, reach, err);
     if (st != STATUS_OK) return st;
@@ -86,7 +90,22 @@ status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *
             g->is_first = i == lines->first[l];
             g->is_last = i + 2 == lines->first[l + 1];
         }
-    return sort_all(s, err);
+    return STATUS_OK;
+}
+
+status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
+                           size_t edge, float reach, struct error *err)
+{
+    status st = take_lines(s, lines, n_voxel, edge, reach, err);
+    return st == STATUS_OK ? sort_all(s, NULL, err) : st;
+}
+
+status segment_bricks_init_each(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
+                                size_t edge, const float *reach, struct error *err)
+{
+    status st = take_lines(s, lines, n_voxel, edge, 0.0f, err);
+    for (size_t i = 0; st == STATUS_OK && i < s->n_segment; i++) s->reach = fmaxf(s->reach, reach[i]);
+    return st == STATUS_OK ? sort_all(s, reach, err) : st;
 }
 
 status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],
@@ -107,7 +126,7 @@ status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_s
             g->is_first = i == f->first_vertex[l];
             g->is_last = i + 2 == f->first_vertex[l + 1];
         }
-    return sort_all(s, err);
+    return sort_all(s, NULL, err);
 }
 
 void segment_brick_box(const struct segment_bricks *s, size_t i_brick, size_t from[3], size_t n[3])

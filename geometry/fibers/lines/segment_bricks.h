@@ -19,7 +19,7 @@ struct segment {
 struct segment_bricks {
     size_t n_voxel[3], n_brick[3];
     size_t edge; /* edge of a brick in voxels */
-    float reach; /* the list of a brick has all segments within this distance of it */
+    float reach; /* the list of a brick has all segments within this distance of it, unless each has its own */
     struct segment *segment;
     size_t n_segment;
     size_t *first; /* number of bricks + 1 */
@@ -30,6 +30,9 @@ struct segment_bricks {
  * (2^32 segments) there is nothing to release. */
 status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
                            size_t edge, float reach, struct error *err);
+/* The list of a brick has the segments that reach it. reach: of each segment, in the order of the lines. */
+status segment_bricks_init_each(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
+                                size_t edge, const float *reach, struct error *err);
 status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],
                                   const double voxel_size_m[3], size_t edge, float reach, struct error *err);
 void segment_bricks_release(struct segment_bricks *s);

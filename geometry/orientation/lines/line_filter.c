@@ -1,11 +1,10 @@
 #include "geometry/orientation/lines/line_filter.h"
 
+#include "base/lanes.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { LANES = 8 };
-typedef float lanes __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
 
 struct line_filter {
     size_t half; /* offsets -half .. half */

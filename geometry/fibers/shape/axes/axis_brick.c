@@ -1,335 +1,315 @@
 #include "geometry/fibers/shape/axes/axis_brick.h"
 
+#include "base/lanes.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { BRICK = AXIS_BRICK, LANES = 8 };
-static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
+enum { BRICK = AXIS_BRICK, SHIFT = 5, BOUND = BRICK - 1 };
+static const float OUTLIER = 0.6f;  /* difference of densities beyond which a residual comes from another fiber */
+static const float ON_AXIS = 1e-3f; /* distance below which a voxel has no direction from the axis */
 
 void axis_scratch_init(struct axis_scratch *s)
 {
     memset(s, 0, sizeof *s);
-    for (size_t i = 0; i < AXIS_N_CELL; i++) s->own[i] = UINT32_MAX;
+    axis_claims_init(&s->claims);
 }
 
-void axis_scratch_release(struct axis_scratch *s)
-{
-    free(s->claim);
-    free(s->place);
-}
+void axis_scratch_release(struct axis_scratch *s) { axis_claims_release(&s->claims); }
 
-/* A segment with what the rows of voxels near it share. */
-struct stamp {
-    float a[3], u[3], length2, inverse_length2, inverse_x; /* u: from its begin to its end */
-    float margin, reach2, least_t, most_t;                 /* t beyond least and most lies beyond an end of the line */
-    size_t lo[3], hi[3];                                   /* voxels of the brick in reach */
+/* A segment, with what the voxels near it share. */
+struct axis_view {
+    float a[3], u[3], inverse_length2, radius; /* a: begin from the centre of the brick's first voxel; u: to its end */
+    const struct section_view *section;        /* NULL: a disc */
 };
 
-/* Returns false if the segment reaches no voxel of the brick. */
-static bool stamp_init(struct stamp *w, const struct axis_model *m, uint32_t segment, const size_t from[3],
-                       const size_t n[3])
+static struct axis_view view_of(const struct axis_model *m, uint32_t i_segment, const size_t from[3])
 {
-    const struct segment *g = &m->bricks->segment[segment];
-    const float reach = (m->section != NULL ? m->section[segment].stretch : 1.0f) * g->radius + m->tail;
-    w->length2 = 0.0f;
+    const struct segment *g = &m->bricks->segment[i_segment];
+    struct axis_view w = {.radius = g->radius, .section = m->section != NULL ? &m->section[i_segment] : NULL};
+    float length2 = 0.0f;
     for (int a = 0; a < 3; a++) {
-        float low = g->a[a] < g->b[a] ? g->a[a] : g->b[a], high = g->a[a] < g->b[a] ? g->b[a] : g->a[a];
-        float l = ceilf(low - reach - 0.5f), h = floorf(high + reach - 0.5f) + 1.0f;
-        float first = (float)from[a], end = (float)(from[a] + n[a]);
-        if (h <= first || l >= end) return false;
-        w->lo[a] = l <= first ? 0 : (size_t)(l - first);
-        w->hi[a] = h >= end ? n[a] : (size_t)(h - first);
-        w->a[a] = g->a[a];
-        w->u[a] = g->b[a] - g->a[a];
-        w->length2 += w->u[a] * w->u[a];
+        w.a[a] = (g->a[a] - (float)from[a]) - 0.5f;
+        w.u[a] = g->b[a] - g->a[a];
+        length2 += w.u[a] * w.u[a];
     }
-    w->inverse_length2 = w->length2 > 0.0f ? 1.0f / w->length2 : 0.0f;
-    w->margin = sqrtf(w->length2);
-    w->inverse_x = fabsf(w->u[0]) < 0.2f * w->margin ? 0.0f : 1.0f / w->u[0];
-    w->reach2 = reach * reach;
-    w->least_t = g->is_first ? 0.0f : -INFINITY;
-    w->most_t = g->is_last ? 1.0f : INFINITY;
-    return true;
+    w.inverse_length2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+    return w;
 }
 
-/* Finds the part of a row of n voxel centres, from p on relative to the segment's begin, whose nearest points lie
- * within a voxel of the segment. */
-static void row_range(const struct stamp *w, const float p[3], size_t n, size_t *from, size_t *to)
+/* LANES voxels seen from the segment that they are nearest to (section_place). The first n count. */
+struct axis_places {
+    const uint16_t *cell;
+    size_t n;
+    lanes along, distance, depth, normal[3], by_radius, by_c, by_s;
+};
+
+/* The places in a section that is not a disc (fiber_section_place). offset: from the axis. */
+static void place_in_section(const struct section_view *s, float radius, const lanes offset[3], struct axis_places *p)
 {
-    float x = p[0], fixed = p[1] * w->u[1] + p[2] * w->u[2], margin = w->margin;
-    *from = 0;
-    *to = n;
-    if (w->inverse_x == 0.0f) {
-        float wide = (float)n * fabsf(w->u[0]) + fabsf(x * w->u[0]);
-        if (fixed < -margin - wide || fixed > w->length2 + margin + wide) *to = 0;
+    const lanes zero = {0.0f}, one = zero + 1.0f;
+    const lanes x = offset[0] * s->u[0] + offset[1] * s->u[1] + offset[2] * s->u[2];
+    const lanes y = offset[0] * s->v[0] + offset[1] * s->v[1] + offset[2] * s->v[2];
+    const lanes g = s->uu * x + s->uv * y, h = s->uv * x + s->vv * y, form = x * g + y * h;
+    const lanes share = lanes_sqrt(form) / radius, norm = lanes_sqrt(g * g + h * h);
+    const lane_mask off = p->distance > ON_AXIS;
+    const lanes inverse = one / lanes_choose(off, norm, one), outline = inverse / lanes_choose(off, share, one);
+    p->depth = lanes_choose(off, (form - radius * radius * share) * inverse, zero - radius);
+    p->by_radius = lanes_choose(off, -radius * share * inverse, -one);
+    p->by_c = (y * h - x * g) * outline;
+    p->by_s = -(y * g + x * h) * outline;
+    for (int a = 0; a < 3; a++) p->normal[a] = (g * s->u[a] + h * s->v[a]) * inverse;
+}
+
+/* Finds the places of the first n of LANES voxels of a segment. */
+static void find_places(const struct axis_view *w, const uint16_t *cell, size_t n, struct axis_places *p)
+{
+    const lanes zero = {0.0f}, one = zero + 1.0f;
+    const lane_mask at = {cell[0], cell[1], cell[2], cell[3], cell[4], cell[5], cell[6], cell[7]};
+    lanes x[3], offset[3], along = zero, distance2 = zero;
+    p->cell = cell;
+    p->n = n < LANES ? n : LANES;
+    for (int a = 0; a < 3; a++) {
+        x[a] = __builtin_convertvector(at >> SHIFT * a & BOUND, lanes) - w->a[a];
+        along += x[a] * w->u[a];
+    }
+    along *= w->inverse_length2;
+    along = lanes_choose(along < zero, zero, along);
+    p->along = lanes_choose(along > one, one, along);
+    for (int a = 0; a < 3; a++) {
+        offset[a] = x[a] - p->along * w->u[a];
+        distance2 += offset[a] * offset[a];
+    }
+    p->distance = lanes_sqrt(distance2);
+    if (w->section != NULL) {
+        place_in_section(w->section, w->radius, offset, p);
         return;
     }
-    float x0 = (-margin - fixed) * w->inverse_x - x, x1 = (w->length2 + margin - fixed) * w->inverse_x - x;
-    float lo = ceilf(x0 < x1 ? x0 : x1), hi = floorf(x0 < x1 ? x1 : x0) + 1.0f;
-    *from = lo <= 0.0f ? 0 : lo >= (float)n ? n : (size_t)lo;
-    *to = hi <= 0.0f ? 0 : hi >= (float)n ? n : (size_t)hi;
+    const lanes inverse = one / lanes_choose(p->distance > ON_AXIS, p->distance, one);
+    p->depth = p->distance - w->radius;
+    p->by_radius = -one;
+    for (int a = 0; a < 3; a++) p->normal[a] = offset[a] * inverse;
 }
 
-/* Squared distances of LANES voxel centres that follow each other along x from the segment; infinite beyond an end of
- * the line. Without branches, so that the loop is vectorised. */
-static void row_distances(const struct stamp *w, const float p[3], float distance2[LANES])
+/* Entries of the table at places (axis_table_place), 0 beyond its end. */
+static lanes look_up(const float table[AXIS_N_TABLE + 2], lanes at)
 {
-    const float ux = w->u[0], uy = w->u[1], uz = w->u[2], x = p[0], y = p[1], z = p[2], fixed = y * uy + z * uz;
-    const float inverse = w->inverse_length2, least = w->least_t, most = w->most_t;
-    for (int i = 0; i < LANES; i++) {
-        float px = x + (float)i, t = (px * ux + fixed) * inverse;
-        bool beside = t >= least && t <= most;
-        t = t < 0.0f ? 0.0f : t;
-        t = t > 1.0f ? 1.0f : t;
-        float dx = px - t * ux, dy = y - t * uy, dz = z - t * uz, d2 = dx * dx + dy * dy + dz * dz;
-        distance2[i] = beside ? d2 : INFINITY;
+    lanes low, high, f;
+    for (int l = 0; l < LANES; l++) {
+        const int i = (int)at[l] < AXIS_N_TABLE ? (int)at[l] : AXIS_N_TABLE;
+        f[l] = (float)i;
+        low[l] = table[i];
+        high[l] = table[i + 1];
     }
+    const lanes value = low + (at - f) * (high - low), zero = {0.0f};
+    return lanes_choose(at < (float)AXIS_N_TABLE, value, zero);
 }
 
-/* Lists the voxels of the brick for which this segment is the nearest of its line so far. */
-static size_t stamp(const struct axis_model *m, struct axis_scratch *s, const size_t from[3], const size_t n[3],
-                    uint32_t segment, size_t n_touched)
+static lanes place_in_table(const struct axis_table *t, lanes depth)
 {
-    struct stamp w;
-    if (!stamp_init(&w, m, segment, from, n)) return n_touched;
-    for (size_t k = w.lo[2]; k < w.hi[2]; k++)
-        for (size_t j = w.lo[1]; j < w.hi[1]; j++) {
-            size_t i0, i1;
-            float p[3] = {(float)(from[0] + w.lo[0]) + 0.5f - w.a[0], (float)(from[1] + j) + 0.5f - w.a[1],
-                          (float)(from[2] + k) + 0.5f - w.a[2]};
-            row_range(&w, p, w.hi[0] - w.lo[0], &i0, &i1);
-            p[0] += (float)i0;
-            size_t at = (k * BRICK + j) * BRICK + w.lo[0] + i0;
-            for (; i0 < i1; i0 += LANES, p[0] += (float)LANES) {
-                float d2[LANES];
-                row_distances(&w, p, d2);
-                for (size_t l = 0; l < LANES && i0 + l < i1; l++, at++) {
-                    bool is_new = s->own[at] == UINT32_MAX;
-                    if (!(d2[l] < (is_new ? w.reach2 : s->own2[at]))) continue;
-                    if (is_new) s->touched[n_touched++] = (uint32_t)at;
-                    s->own2[at] = d2[l];
-                    s->own[at] = segment;
-                }
-            }
-        }
-    return n_touched;
+    const lanes at = (depth + (float)AXIS_CORE) * t->scale, zero = {0.0f};
+    return lanes_choose(at > zero, at, zero);
 }
 
-/* Appends the touched voxels of a line to the claims, and makes the scratch ready for the next line. */
-static bool keep_claims(struct axis_scratch *s, size_t n_touched)
+/* Adds the claims of a segment to the model. */
+static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const struct axis_view *w, size_t from,
+                         size_t to)
 {
-    if (s->n_claim + n_touched > s->capacity) {
-        size_t n = 2 * s->capacity + n_touched + AXIS_N_CELL;
-        struct axis_claim *bigger = realloc(s->claim, n * sizeof *bigger);
-        if (bigger != NULL) {
-            s->claim = bigger;
-            s->capacity = n;
+    for (size_t i = from; i < to; i += LANES) {
+        struct axis_places p;
+        find_places(w, s->claims.cell + i, to - i, &p);
+        const lanes depth = p.depth * m->inverse_blur, at = place_in_table(&m->table, depth);
+        const lanes share = look_up(m->table.share, at), slope = look_up(m->table.slope, at) * m->inverse_blur;
+        const lanes by_radius = slope * p.by_radius, by_blur = slope * depth;
+        for (size_t l = 0; l < p.n; l++) {
+            s->share[p.cell[l]] += share[l];
+            s->by_radius[p.cell[l]] += by_radius[l];
+            s->by_blur[p.cell[l]] -= by_blur[l];
         }
     }
-    bool fits = s->n_claim + n_touched <= s->capacity;
-    for (size_t i = 0; i < n_touched; i++) {
-        uint32_t cell = s->touched[i];
-        if (fits) s->claim[s->n_claim++] = (struct axis_claim){cell, s->own[cell], s->own2[cell]};
-        s->own[cell] = UINT32_MAX;
+}
+
+/* Sums of shared_sum for one plane of the brick. */
+struct plane_sum {
+    lanes gradient[4], normal[10], square, weight;
+};
+
+/* Finds residual and weight of LANES voxels, of which n are in the brick, and adds those with fibers to the sums. */
+static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, size_t at, const float *density, size_t n,
+                          struct plane_sum *sum)
+{
+    static const lanes step = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+    const float low = (float)m->profile.low, amplitude = (float)(m->profile.high - m->profile.low);
+    lanes value = {0.0f}, zero = {0.0f}, one = zero + 1.0f, *share = (lanes *)(s->share + at);
+    if (n >= LANES)
+        value = *(const lanes *)density;
+    else
+        memcpy(&value, density, n * sizeof *density);
+    const lane_mask near = (*share > zero) & (step < (float)n);
+    *share = lanes_choose(*share < one, *share, one);
+    const lanes e = value - low - amplitude * *share, q = one / (one + e * e / (OUTLIER * OUTLIER));
+    const lanes weight = lanes_choose(near, q * q, zero), weighted = weight * e;
+    *(lanes *)(s->weight + at) = weight;
+    *(lanes *)(s->residual + at) = weighted;
+    const lanes by[4] = {amplitude * *(const lanes *)(s->by_radius + at), amplitude * *(const lanes *)(s->by_blur + at),
+                         one - *share, *share};
+    sum->square += weighted * e;
+    sum->weight += weight;
+    for (int a = 0, i = 0; a < 4; a++) {
+        sum->gradient[a] += weighted * by[a];
+        for (int b = 0; b <= a; b++, i++) sum->normal[i] += weight * by[a] * by[b];
     }
-    return fits;
 }
 
-/* Finds the point of the segment nearest to p (relative to its begin): *t is its position along the segment in
- * [0, 1]. */
-static void foot_of(const struct segment *g, const float p[3], float *t, float offset[3])
+static void add_plane(const struct plane_sum *plane, struct shared_sum *sum)
 {
-    float u[3], along = 0.0f, length2 = 0.0f;
-    for (int a = 0; a < 3; a++) {
-        u[a] = g->b[a] - g->a[a];
-        along += u[a] * p[a];
-        length2 += u[a] * u[a];
-    }
-    *t = length2 > 0.0f ? along / length2 : 0.0f;
-    /* comparisons, because fminf would be a function call */
-    *t = *t < 0.0f ? 0.0f : *t > 1.0f ? 1.0f : *t;
-    for (int a = 0; a < 3; a++) offset[a] = p[a] - *t * u[a];
-}
-
-/* The place of a claimed voxel in the section of its line. */
-static struct section_place place_of(const struct axis_model *m, const size_t from[3], const struct axis_claim *c)
-{
-    const struct segment *g = &m->bricks->segment[c->segment];
-    uint32_t at = c->cell;
-    float p[3] = {(float)(from[0] + at % BRICK) + 0.5f - g->a[0],
-                  (float)(from[1] + at / BRICK % BRICK) + 0.5f - g->a[1],
-                  (float)(from[2] + at / (BRICK * BRICK)) + 0.5f - g->a[2]};
-    float offset[3], t, d = sqrtf(c->distance2);
-    foot_of(g, p, &t, offset);
-    struct section_place place = {.depth = d - g->radius, .by_radius = -1.0f};
-    if (m->section != NULL && d > 1e-3f) {
-        place = fiber_section_place(&m->section[c->segment], g->radius, offset);
-    } else {
-        for (int a = 0; a < 3 && d > 0.0f; a++) place.normal[a] = offset[a] / d;
-    }
-    place.along = t;
-    return place;
-}
-
-/* Makes room for the places of all claims. */
-static bool fit_places(struct axis_scratch *s)
-{
-    if (s->n_claim <= s->place_capacity) return true;
-    struct section_place *bigger = realloc(s->place, s->capacity * sizeof *bigger);
-    if (bigger == NULL) return false;
-    s->place = bigger;
-    s->place_capacity = s->capacity;
-    return true;
-}
-
-/* Adds the claims of a line from number `first` on to the model. */
-static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const size_t from[3], size_t first)
-{
-    for (size_t i = first; i < s->n_claim; i++) {
-        const struct axis_claim *c = &s->claim[i];
-        float depth = sqrtf(c->distance2) - m->bricks->segment[c->segment].radius, by_radius = -1.0f;
-        if (m->section != NULL) {
-            s->place[i] = place_of(m, from, c);
-            depth = s->place[i].depth;
-            by_radius = s->place[i].by_radius;
+    sum->square += (double)lanes_sum(plane->square);
+    sum->weight += (double)lanes_sum(plane->weight);
+    for (int a = 0, i = 0; a < 4; a++) {
+        sum->gradient[a] += (double)lanes_sum(plane->gradient[a]);
+        for (int b = 0; b <= a; b++, i++) {
+            const double value = (double)lanes_sum(plane->normal[i]);
+            sum->normal[a][b] += value;
+            if (b < a) sum->normal[b][a] += value;
         }
-        depth *= m->inverse_blur;
-        float at = axis_table_place(&m->table, depth);
-        s->model[c->cell] += axis_table_look_up(m->table.share, at);
-        float slope = axis_table_look_up(m->table.slope, at) * m->inverse_blur;
-        s->by_radius[c->cell] += slope * by_radius;
-        s->by_blur[c->cell] -= slope * depth;
     }
 }
 
-/* Residual and weight of a voxel. */
-static float residual(const struct axis_model *m, const struct axis_scratch *s, const size_t from[3], uint32_t at,
-                      float *weight)
+/* Compares the model with the scan, and adds to the normal equations of what fibers share: a change of all radii, blur,
+ * low, high. Shares above 1 become 1. */
+static void compare(const struct axis_model *m, struct axis_scratch *s, const size_t from[3], const size_t n[3],
+                    struct shared_sum *sum)
 {
-    size_t i = from[0] + at % BRICK, j = from[1] + at / BRICK % BRICK, k = from[2] + at / (BRICK * BRICK);
-    float low = (float)m->profile.low, high = (float)m->profile.high, share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
-    float e = m->v->density[volume_index(m->v->n, i, j, k)] - low - (high - low) * share;
-    float q = 1.0f / (1.0f + e * e / (OUTLIER * OUTLIER));
-    *weight = q * q;
-    return e;
+    for (size_t k = 0; k < n[2]; k++) {
+        struct plane_sum plane = {0};
+        for (size_t j = 0; j < n[1]; j++) {
+            const float *density = m->v->density + volume_index(m->v->n, from[0], from[1] + j, from[2] + k);
+            for (size_t i = 0; i < n[0]; i += LANES)
+                compare_lanes(m, s, (k * BRICK + j) * BRICK + i, density + i, n[0] - i, &plane);
+        }
+        add_plane(&plane, sum);
+    }
 }
 
-/* Adds a voxel to the normal equation of its line's radius. by: derivative of the model by the radius. */
-static void add_radius(const struct axis_scratch *s, uint32_t at, float amplitude, float by, float e, float weight,
-                       struct axis_pull *q)
+/* Sums of axis_pull for the ends of a segment, and of section_pull. */
+struct segment_sum {
+    lanes gradient[2][3], normal[2][6], radius_normal, radius_gradient, radius_cross[4];
+    lanes section_gradient[2], section_normal[3];
+};
+
+/* The work's arrays at the voxels of some places; the weight is 0 where a place does not count. */
+struct voxel_lanes {
+    lanes weight, residual, share, by_radius, by_blur;
+};
+
+static lanes gather(const float *value, const uint16_t c[LANES])
 {
-    float share = s->model[at] < 1.0f ? s->model[at] : 1.0f;
-    q->radius_normal += weight * by * by;
-    q->radius_gradient += weight * e * by;
-    q->radius_cross[0] += weight * by * amplitude * s->by_radius[at];
-    q->radius_cross[1] += weight * by * amplitude * s->by_blur[at];
-    q->radius_cross[2] += weight * by * (1.0f - share);
-    q->radius_cross[3] += weight * by * share;
+    return (lanes){value[c[0]], value[c[1]], value[c[2]], value[c[3]],
+                   value[c[4]], value[c[5]], value[c[6]], value[c[7]]};
 }
 
-/* Adds a claimed voxel to the normal equations of its segment's ends, of the radius and of the section. */
-static void add_pull(const struct axis_model *m, const struct axis_scratch *s, const size_t from[3], size_t i_claim,
-                     struct axis_pull *pull, struct section_pull *section)
+static struct voxel_lanes voxels_of(const struct axis_scratch *s, const struct axis_places *p)
+{
+    static const lanes step = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+    const lane_mask counts = (step < (float)p->n) & (p->distance > ON_AXIS);
+    const lanes zero = {0.0f};
+    return (struct voxel_lanes){lanes_choose(counts, gather(s->weight, p->cell), zero),
+                                lanes_choose(counts, gather(s->residual, p->cell), zero), gather(s->share, p->cell),
+                                gather(s->by_radius, p->cell), gather(s->by_blur, p->cell)};
+}
+
+/* Adds places to the normal equations of their segment's ends, of the radius and of the section. */
+static void add_places(const struct axis_model *m, const struct axis_scratch *s, const struct axis_places *p,
+                       struct segment_sum *sum)
 {
     const float amplitude = (float)(m->profile.high - m->profile.low);
-    const struct axis_claim *c = &s->claim[i_claim];
-    float weight;
-    if (!(c->distance2 > 1e-6f)) return;
-    const struct section_place place = m->section != NULL ? s->place[i_claim] : place_of(m, from, c);
-    float e = residual(m, s, from, c->cell, &weight), at = axis_table_place(&m->table, place.depth * m->inverse_blur);
-    float slope = -amplitude * m->inverse_blur * axis_table_look_up(m->table.slope, at);
-    add_radius(s, c->cell, amplitude, -slope * place.by_radius, e, weight, pull);
+    const struct voxel_lanes v = voxels_of(s, p);
+    const lanes at = place_in_table(&m->table, p->depth * m->inverse_blur);
+    const lanes slope = -amplitude * m->inverse_blur * look_up(m->table.slope, at);
+    const lanes by = -slope * p->by_radius, weighted = v.weight * by;
+    sum->radius_normal += weighted * by;
+    sum->radius_gradient += v.residual * by;
+    sum->radius_cross[0] += weighted * amplitude * v.by_radius;
+    sum->radius_cross[1] += weighted * amplitude * v.by_blur;
+    sum->radius_cross[2] += weighted * (1.0f - v.share);
+    sum->radius_cross[3] += weighted * v.share;
     for (int end = 0; end < 2; end++) {
-        struct axis_pull *q = pull + end;
-        float w = weight * (end == 0 ? 1.0f - place.along : place.along) * slope;
+        const lanes part = end == 0 ? (lanes)(1.0f - p->along) : p->along;
+        const lanes pull = part * slope * v.residual, hold = part * slope * slope * v.weight;
         for (int a = 0, i = 0; a < 3; a++) {
-            q->gradient[a] += w * e * place.normal[a];
-            for (int b = 0; b <= a; b++, i++) q->normal[i] += w * slope * place.normal[a] * place.normal[b];
+            sum->gradient[end][a] += pull * p->normal[a];
+            for (int b = 0; b <= a; b++, i++) sum->normal[end][i] += hold * p->normal[a] * p->normal[b];
         }
     }
-    if (section == NULL) return;
-    float by_c = -slope * place.by_c, by_s = -slope * place.by_s;
-    section->gradient[0] += weight * e * by_c;
-    section->gradient[1] += weight * e * by_s;
-    section->normal[0] += weight * by_c * by_c;
-    section->normal[1] += weight * by_c * by_s;
-    section->normal[2] += weight * by_s * by_s;
+    if (m->section == NULL) return;
+    const lanes by_c = -slope * p->by_c, by_s = -slope * p->by_s;
+    sum->section_gradient[0] += v.residual * by_c;
+    sum->section_gradient[1] += v.residual * by_s;
+    sum->section_normal[0] += v.weight * by_c * by_c;
+    sum->section_normal[1] += v.weight * by_c * by_s;
+    sum->section_normal[2] += v.weight * by_s * by_s;
 }
 
-/* Finds the voxels near every line of a brick and adds their densities to the model. */
-static bool claim_voxels(const struct axis_model *m, struct axis_scratch *s, size_t i_brick, const size_t from[3],
-                         const size_t n[3])
+/* pull: of both ends. section: NULL for discs. */
+static void keep_sum(const struct segment_sum *sum, struct axis_pull *pull, struct section_pull *section)
 {
-    const struct segment_bricks *b = m->bricks;
-    bool fits = true;
-    s->n_claim = 0;
-    for (size_t e = b->first[i_brick], end; e < b->first[i_brick + 1]; e = end) {
-        uint32_t line = b->segment[b->index[e]].line;
-        size_t n_touched = 0, first = s->n_claim;
-        for (end = e; end < b->first[i_brick + 1] && b->segment[b->index[end]].line == line; end++)
-            n_touched = stamp(m, s, from, n, b->index[end], n_touched);
-        fits = keep_claims(s, n_touched) && fits && (m->section == NULL || fit_places(s));
-        if (fits) add_to_model(m, s, from, first);
+    for (int end = 0; end < 2; end++) {
+        for (int i = 0; i < 3; i++) pull[end].gradient[i] = lanes_sum(sum->gradient[end][i]);
+        for (int i = 0; i < 6; i++) pull[end].normal[i] = lanes_sum(sum->normal[end][i]);
     }
-    return fits;
+    pull->radius_normal = lanes_sum(sum->radius_normal);
+    pull->radius_gradient = lanes_sum(sum->radius_gradient);
+    for (int i = 0; i < 4; i++) pull->radius_cross[i] = lanes_sum(sum->radius_cross[i]);
+    if (section == NULL) return;
+    for (int i = 0; i < 2; i++) section->gradient[i] = lanes_sum(sum->section_gradient[i]);
+    for (int i = 0; i < 3; i++) section->normal[i] = lanes_sum(sum->section_normal[i]);
 }
 
-/* Adds the claimed voxels to the normal equations of the segments. The list of a brick is in ascending order, and the
- * segments of a line follow each other in it. */
+/* Adds the claims to the normal equations of the segments. */
 static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, size_t i_brick, const size_t from[3],
                       const struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = m->bricks;
-    const size_t begin = b->first[i_brick], end = b->first[i_brick + 1];
-    size_t e = begin;
-    for (size_t i = 0; i < s->n_claim; i++) {
-        uint32_t segment = s->claim[i].segment;
-        while (e > begin && b->index[e] > segment) e--;
-        while (e + 1 < end && b->index[e] < segment) e++;
-        add_pull(m, s, from, i, &sum->pull[2 * (e - begin)], sum->section != NULL ? &sum->section[e - begin] : NULL);
+    for (size_t e = 0; e < b->first[i_brick + 1] - b->first[i_brick]; e++) {
+        const uint32_t i_segment = b->index[b->first[i_brick] + e], end = s->claims.first[e + 1];
+        const struct axis_view w = view_of(m, i_segment, from);
+        struct segment_sum total = {0};
+        for (size_t i = s->claims.first[e]; i < end; i += LANES) {
+            struct axis_places p;
+            find_places(&w, s->claims.cell + i, end - i, &p);
+            add_places(m, s, &p, &total);
+        }
+        sum->pull[2 * e].segment = sum->pull[2 * e + 1].segment = i_segment;
+        keep_sum(&total, &sum->pull[2 * e], sum->section != NULL ? &sum->section[e] : NULL);
     }
 }
 
-/* Adds to the normal equations of what fibers share: a change of all radii, blur, low, high. */
-static void add_shared(const struct axis_model *m, const struct axis_scratch *s, const size_t from[3],
-                       const size_t n[3], struct shared_sum *sum)
+static void forget_claims(struct axis_scratch *s, size_t n_claim)
 {
-    double amplitude = m->profile.high - m->profile.low;
-    for (size_t k = 0; k < n[2]; k++)
-        for (size_t j = 0; j < n[1]; j++)
-            for (size_t i = 0; i < n[0]; i++) {
-                uint32_t at = (uint32_t)((k * BRICK + j) * BRICK + i);
-                float weight;
-                if (!(s->model[at] > 0.0f)) continue;
-                double e = (double)residual(m, s, from, at, &weight), share = fmin(1.0, (double)s->model[at]);
-                sum->square += (double)weight * e * e;
-                sum->weight += (double)weight;
-                double by[4] = {amplitude * (double)s->by_radius[at], amplitude * (double)s->by_blur[at], 1.0 - share,
-                                share};
-                for (int a = 0; a < 4; a++) {
-                    sum->gradient[a] += (double)weight * e * by[a];
-                    for (int c = 0; c < 4; c++) sum->normal[a][c] += (double)weight * by[a] * by[c];
-                }
-            }
+    for (size_t i = 0; i < n_claim; i++) {
+        const uint16_t cell = s->claims.cell[i];
+        s->share[cell] = s->by_radius[cell] = s->by_blur[cell] = 0.0f;
+    }
 }
 
 bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_scratch *s, struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = model->bricks;
-    size_t n_segment = b->first[i_brick + 1] - b->first[i_brick], from[3], n[3];
+    const size_t n_segment = b->first[i_brick + 1] - b->first[i_brick];
+    size_t from[3], n[3];
     if (n_segment == 0) return true;
     sum->pull = calloc(2 * n_segment, sizeof *sum->pull);
     if (model->section != NULL) sum->section = calloc(n_segment, sizeof *sum->section);
+    if (sum->pull == NULL || (model->section != NULL && sum->section == NULL)) return false;
+    if (!axis_claims_find(&s->claims, b, model->section, model->tail, i_brick)) return false;
     segment_brick_box(b, i_brick, from, n);
-    bool fits = claim_voxels(model, s, i_brick, from, n) && sum->pull != NULL &&
-                (model->section == NULL || sum->section != NULL);
-    if (fits) {
-        for (size_t e = 0; e < 2 * n_segment; e++) sum->pull[e].segment = b->index[b->first[i_brick] + e / 2];
-        add_pulls(model, s, i_brick, from, sum);
-        add_shared(model, s, from, n, &sum->shared);
+    for (size_t e = 0; e < n_segment; e++) {
+        const struct axis_view w = view_of(model, b->index[b->first[i_brick] + e], from);
+        add_to_model(model, s, &w, s->claims.first[e], s->claims.first[e + 1]);
     }
-    for (size_t i = 0; i < s->n_claim; i++)
-        s->model[s->claim[i].cell] = s->by_radius[s->claim[i].cell] = s->by_blur[s->claim[i].cell] = 0.0f;
-    return fits;
+    compare(model, s, from, n, &sum->shared);
+    add_pulls(model, s, i_brick, from, sum);
+    forget_claims(s, s->claims.first[n_segment]);
+    return true;
 }

@@ -3,15 +3,13 @@
 #ifndef SELVEDGE_GEOMETRY_AXIS_BRICK_H
 #define SELVEDGE_GEOMETRY_AXIS_BRICK_H
 
-#include "geometry/fibers/lines/segment_bricks.h"
+#include "geometry/fibers/shape/axes/axis_claim.h"
 #include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/fiber_section.h"
 #include "geometry/volume/volume.h"
 
 #include <stdbool.h>
-
-enum { AXIS_BRICK = 32, AXIS_N_CELL = AXIS_BRICK * AXIS_BRICK * AXIS_BRICK };
 
 /* What all bricks share. */
 struct axis_model {
@@ -23,19 +21,11 @@ struct axis_model {
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
 };
 
-/* A voxel near a line, and the segment of the line that is nearest to it. */
-struct axis_claim {
-    uint32_t cell, segment;
-    float distance2;
-};
-
-/* Work of one thread. Between bricks model, by_radius and by_blur are 0, and own is UINT32_MAX. */
+/* Work of one thread. By voxels of a brick: the share of fibers, 0 between bricks, and its derivatives by all radii and by
+ * the blur; the weight, and the weight times the residual. */
 struct axis_scratch {
-    float model[AXIS_N_CELL], by_radius[AXIS_N_CELL], by_blur[AXIS_N_CELL], own2[AXIS_N_CELL];
-    uint32_t own[AXIS_N_CELL], touched[AXIS_N_CELL];
-    struct axis_claim *claim;    /* of all lines of the brick, in their order */
-    struct section_place *place; /* of each claim, where sections are not discs */
-    size_t n_claim, capacity, place_capacity;
+    float share[AXIS_N_CELL], by_radius[AXIS_N_CELL], by_blur[AXIS_N_CELL], weight[AXIS_N_CELL], residual[AXIS_N_CELL];
+    struct axis_claims claims;
 };
 
 void axis_scratch_init(struct axis_scratch *s);

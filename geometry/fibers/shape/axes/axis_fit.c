@@ -11,6 +11,7 @@ static const double SECTION_DIAMETERS = 1.0; /* length over which sections are s
 /* Standard deviation of the flatness of fibers (fiber_section.h) that holds sections to discs. */
 static const double FLATNESS_SD = 0.3;
 static const double PIECE_DIAMETERS = 2.0; /* length of the pieces that show the error of a radius */
+static const float ROUNDING = 0.01f;       /* voxels added to the reach of segments */
 
 struct fit_job {
     struct axis_model model;
@@ -50,6 +51,7 @@ static void state_error(double information, double variance, double stiffness, s
 struct fit_work {
     uint32_t *first_vertex_of;    /* per segment */
     struct axis_pull *total;      /* per vertex */
+    float *reach;                 /* per segment */
     struct section_view *view;    /* per segment; NULL for discs, as the next */
     struct section_pull *section; /* per vertex */
     struct radius_sum *radius;    /* per line */
@@ -61,6 +63,7 @@ static void release_work(struct fit_work *w)
 {
     free(w->first_vertex_of);
     free(w->total);
+    free(w->reach);
     free(w->view);
     free(w->section);
     free(w->radius);
@@ -72,9 +75,11 @@ static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool
     size_t n_segment = 0;
     *w = (struct fit_work){.first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *w->first_vertex_of),
                            .total = malloc((lines->n_vertex + 1) * sizeof *w->total),
+                           .reach = malloc((lines->n_vertex + 1) * sizeof *w->reach),
                            .radius = malloc((lines->n_line + 1) * sizeof *w->radius),
                            .length = malloc((lines->n_line + 1) * sizeof *w->length)};
-    if (w->first_vertex_of == NULL || w->total == NULL || w->radius == NULL || w->length == NULL) return false;
+    if (w->first_vertex_of == NULL || w->total == NULL || w->reach == NULL || w->radius == NULL || w->length == NULL)
+        return false;
     if (with_sections) {
         w->view = malloc((lines->n_vertex + 1) * sizeof *w->view);
         w->section = malloc((lines->n_vertex + 1) * sizeof *w->section);
@@ -140,17 +145,12 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
     return s == STATUS_OK ? axis_solve_lines(lines, w->total, stiffness, pool, err) : s;
 }
 
-/* Longest distance of an outline from its axis. */
-static float largest_reach(const struct polyline_set *lines, const struct fiber_section *section)
+/* Finds how far each segment's fiber reaches in the model. view: NULL for discs. */
+static void find_reach(const struct polyline_set *lines, const struct section_view *view, float tail, float *reach)
 {
-    float most = 0.0f;
-    for (size_t l = 0; l < lines->n_line; l++) {
-        float ratio = 1.0f;
-        for (size_t i = lines->first[l]; section != NULL && i < lines->first[l + 1]; i++)
-            ratio = fmaxf(ratio, fiber_section_ratio(&section[i]));
-        most = fmaxf(most, sqrtf(ratio) * lines->radius[l]);
-    }
-    return most;
+    for (size_t l = 0, n = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++, n++)
+            reach[n] = (view != NULL ? view[n].stretch : 1.0f) * lines->radius[l] + tail + ROUNDING;
 }
 
 /* Prepares the sections of all segments. */
@@ -208,8 +208,8 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, struct 
         memset(w->section, 0, lines->n_vertex * sizeof *w->section);
     }
     m->section = w->view;
-    const float reach = largest_reach(lines, m->profile.section) + m->tail + 1.0f;
-    status s = segment_bricks_init(&bricks, lines, m->v->n, AXIS_BRICK, reach, err);
+    find_reach(lines, w->view, m->tail, w->reach);
+    status s = segment_bricks_init_each(&bricks, lines, m->v->n, AXIS_BRICK, w->reach, err);
     if (s != STATUS_OK) return s;
     size_t n_brick = segment_n_brick(&bricks), n_batch;
     m->bricks = &bricks;

@@ -36,20 +36,6 @@ struct axis_table {
 
 void axis_table_init(struct axis_table *t);
 
-/* Position in the table of a place `depth` beyond the surface, in units of the blur. */
-static inline float axis_table_place(const struct axis_table *t, float depth)
-{
-    float at = (depth + (float)AXIS_CORE) * t->scale;
-    return at < 0.0f ? 0.0f : at;
-}
-
-static inline float axis_table_look_up(const float table[AXIS_N_TABLE + 2], float at)
-{
-    int i = (int)at;
-    float f = at - (float)i;
-    return i >= AXIS_N_TABLE ? 0.0f : (1.0f - f) * table[i] + f * table[i + 1];
-}
-
 /* Normal equations of what all fibers share: a change of all radii, blur, low, high. */
 struct shared_sum {
     double normal[4][4], gradient[4];
