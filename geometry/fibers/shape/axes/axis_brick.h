@@ -21,8 +21,8 @@ struct axis_model {
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
 };
 
-/* Work of one thread. By voxels of a brick: the share of fibers, 0 between bricks, and its derivatives by all radii and by
- * the blur; the weight, and the weight times the residual. */
+/* Work of one thread. By voxels of a brick: the share of fibers, 0 between bricks, and its derivatives by all radii and
+ * by the blur; the weight, and the weight times the residual. */
 struct axis_scratch {
     float share[AXIS_N_CELL], by_radius[AXIS_N_CELL], by_blur[AXIS_N_CELL], weight[AXIS_N_CELL], residual[AXIS_N_CELL];
     struct axis_claims claims;

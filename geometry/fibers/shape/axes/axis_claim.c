@@ -148,8 +148,8 @@ static void row_ranges(const struct stamp *w, float y0, float z, lane_mask *from
     }
 }
 
-/* Gives LANES voxels of a row that follow each other to the segment where it is the nearest so far. p: of the first from
- * the segment's begin; n: of the voxels that are in the row. */
+/* Gives LANES voxels of a row that follow each other to the segment where it is the nearest so far. p: of the first
+ * from the segment's begin; n: of the voxels that are in the row. */
 static void stamp_lanes(struct axis_claims *c, const struct stamp *w, const float p[3], size_t at, int n)
 {
     const lanes x = STEP + p[0], zero = {0.0f}, one = zero + 1.0f;

@@ -32,8 +32,8 @@ struct axis_claims {
 void axis_claims_init(struct axis_claims *c);
 void axis_claims_release(struct axis_claims *c);
 
-/* Finds the claims in brick i_brick of bricks with edge AXIS_BRICK. section: of each segment; NULL: discs. Returns false
- * when memory is out. */
+/* Finds the claims in brick i_brick of bricks with edge AXIS_BRICK. section: of each segment; NULL: discs. Returns
+ * false when memory is out. */
 bool axis_claims_find(struct axis_claims *c, const struct segment_bricks *bricks, const struct section_view *section,
                       float tail, size_t i_brick);
 
