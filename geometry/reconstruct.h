@@ -27,12 +27,15 @@
 struct reconstruct_option {
     struct volume_raw_declaration raw; /* n[0] == 0 (default): the file has a header */
     double voxel_size_m[3];            /* required unless the file states it; NaN: take the file's */
-    char axes[8];                     /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
-    double matrix[9];                 /* rotation/shear applied after `axes`, row-major; identity by default */
-    size_t crop_voxel[6];             /* x0 y0 z0 x1 y1 z1 after the matrix; all 0: everything */
-    bool align;                       /* estimate the matrix (main_directions.h); a given matrix has precedence */
-    bool crop;                        /* choose the box that tiles best (tile_crop.h); a given box has precedence */
-    double crop_keep;                 /* least share of each edge that is kept, 0.5 by default */
+    char axes[8];         /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
+    double matrix[9];     /* rotation/shear applied after `axes`, row-major; identity by default */
+    size_t crop_voxel[6]; /* x0 y0 z0 x1 y1 z1 after the matrix; all 0: everything */
+    bool align;           /* estimate the matrix (main_directions.h); a given matrix has precedence */
+    bool crop;            /* choose the box that tiles best (tile_crop.h); a given box has precedence */
+    double crop_keep;     /* least share of each edge that is kept, 0.5 by default */
+    /* Scans with more voxels are cropped in z to what holds material (void_trim.h), unless a box or a matrix is given or
+     * estimated, or voxels are not cubes: 2^30 by default. */
+    size_t trim_above_voxel;
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
     bool hollow_fibers;               /* lumens are filled when the volume is read (lumen_fill.h) */
     double fiber_diameter_voxel;      /* typical diameter, from which scales and reaches follow */

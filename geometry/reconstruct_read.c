@@ -5,6 +5,7 @@
 #include "geometry/orientation/lumen_fill.h"
 #include "geometry/orientation/repeat_direction.h"
 #include "geometry/volume/density_map.h"
+#include "geometry/volume/void_trim.h"
 #include "geometry/volume/volume_align.h"
 #include "geometry/volume/volume_source.h"
 
@@ -19,6 +20,7 @@ void reconstruct_option_default(struct reconstruct_option *o)
         .voxel_size_m = {NAN, NAN, NAN},
         .axes = "xyz",
         .crop_keep = 0.5,
+        .trim_above_voxel = (size_t)1 << 30,
         .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         .density_low = NAN,
         .density_high = NAN,
@@ -45,6 +47,7 @@ struct plan {
     bool resample;
     size_t box[6];        /* in the result */
     size_t box_stored[6]; /* part of the stored grid that is kept in memory */
+    bool trimmed;         /* the box was cropped in z to what holds material */
 };
 
 static bool is_identity(const double m[9])
@@ -113,17 +116,44 @@ static status plan_read(const struct volume_source_info *info, struct reconstruc
     return plan_crop(o, p, err);
 }
 
+/* Crops a large scan in z to what holds material. */
+static status trim_void(struct volume_source *source, const struct reconstruct_option *o, struct plan *p,
+                        const struct progress *progress, struct error *err)
+{
+    bool given = p->resample;
+    for (int i = 0; i < 6; i++) given = given || o->crop_voxel[i] > 0;
+    if (given || volume_n_voxel(p->n_stored) <= o->trim_above_voxel) return STATUS_OK;
+    size_t range[2];
+    status s = void_trim_find(source, p->map.source[2], progress, range, err);
+    if (s != STATUS_OK) return s;
+    const size_t n = p->n_stored[2];
+    p->box[2] = p->box_stored[2] = p->map.flip[2] ? n - range[1] : range[0];
+    p->box[5] = p->box_stored[5] = p->map.flip[2] ? n - range[0] : range[1];
+    p->trimmed = p->box[2] > 0 || p->box[5] < n;
+    return s;
+}
+
+/* The file indices that are kept. */
+static void file_range(const struct plan *p, size_t from[3], size_t to[3])
+{
+    for (int a = 0; a < 3; a++) {
+        const int f = p->map.source[a];
+        const size_t lo = p->box_stored[a], hi = p->box_stored[3 + a], n = p->n_file[f];
+        from[f] = p->map.flip[a] ? n - hi : lo;
+        to[f] = p->map.flip[a] ? n - lo : hi;
+    }
+}
+
 /* Copies n_slice slices of the file from i_slice on to their places in the stored grid. block is n_slice x n_file[1]
  * x n_file[0]. */
 static void scatter_slices(const struct plan *p, const float *block, size_t i_slice, size_t n_slice, struct volume *v)
 {
-    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, from[3], to[3]; /* from, to: file indices that are kept */
+    size_t stride[3] = {1, v->n[0], v->n[0] * v->n[1]}, from[3], to[3];
     ptrdiff_t step[3], first = 0;
+    file_range(p, from, to);
     for (int a = 0; a < 3; a++) {
-        int f = p->map.source[a];
-        size_t lo = p->box_stored[a], hi = p->box_stored[3 + a], n = p->n_file[f];
-        from[f] = p->map.flip[a] ? n - hi : lo;
-        to[f] = p->map.flip[a] ? n - lo : hi;
+        const int f = p->map.source[a];
+        const size_t lo = p->box_stored[a], hi = p->box_stored[3 + a];
         step[f] = p->map.flip[a] ? -(ptrdiff_t)stride[a] : (ptrdiff_t)stride[a];
         if (p->map.flip[a]) first += (ptrdiff_t)((hi - lo - 1) * stride[a]);
     }
@@ -150,14 +180,15 @@ static void scatter_slices(const struct plan *p, const float *block, size_t i_sl
 static status read_slices(struct volume_source *source, const struct plan *p, const struct progress *progress,
                           struct volume *v, struct error *err)
 {
-    size_t n_page = p->n_file[0] * p->n_file[1], n_block = 1;
+    size_t n_page = p->n_file[0] * p->n_file[1], n_block = 1, from[3], to[3];
+    file_range(p, from, to);
     if (p->map.source[0] == 2) n_block = scratch_buffer_bytes(v->space) / (n_page * sizeof(float));
-    n_block = n_block < 1 ? 1 : n_block > p->n_file[2] ? p->n_file[2] : n_block;
+    n_block = n_block < 1 ? 1 : n_block > to[2] - from[2] ? to[2] - from[2] : n_block;
     float *block = malloc(n_block * n_page * sizeof *block);
     if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
     status s = STATUS_OK;
-    for (size_t k = 0; k < p->n_file[2] && s == STATUS_OK; k += n_block) {
-        size_t n = k + n_block <= p->n_file[2] ? n_block : p->n_file[2] - k;
+    for (size_t k = from[2]; k < to[2] && s == STATUS_OK; k += n_block) {
+        size_t n = k + n_block <= to[2] ? n_block : to[2] - k;
         for (size_t i = 0; i < n && s == STATUS_OK; i++) {
             if (progress_cancelled(progress))
                 s = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
@@ -168,7 +199,7 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
              i++) /* VOLUME_OUTSIDE in a file is an infinite value, which is refused later */
             if (block[i] == VOLUME_OUTSIDE) block[i] = INFINITY;
         if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
-        progress_report(progress, 0.8 * (double)(k + n) / (double)p->n_file[2]);
+        progress_report(progress, 0.8 * (double)(k + n - from[2]) / (double)(to[2] - from[2]));
     }
     free(block);
     return s;
@@ -211,6 +242,16 @@ static status choose_crop(struct volume *v, struct reconstruct_option *o, struct
     memcpy(o->crop_voxel, report->tile.box, sizeof o->crop_voxel);
     volume_crop(v, o->crop_voxel);
     return STATUS_OK;
+}
+
+/* States the box of a trimmed scan in voxels of the whole scan. */
+static void state_trim(const struct plan *p, struct reconstruct_option *o, struct tile_crop *tile)
+{
+    if (!o->crop) memcpy(o->crop_voxel, p->box, sizeof o->crop_voxel);
+    for (int i = 2; i < 6 && o->crop; i += 3) {
+        o->crop_voxel[i] += p->box[2];
+        tile->box[i] += p->box[2];
+    }
 }
 
 static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
@@ -262,6 +303,7 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     if (s != STATUS_OK) return s;
     memcpy(report->file_voxel_size_m, volume_source_describe(source)->voxel_size_m, sizeof report->file_voxel_size_m);
     s = plan_read(volume_source_describe(source), o, &p, err);
+    if (s == STATUS_OK) s = trim_void(source, o, &p, progress, err);
     if (s != STATUS_OK) goto out;
     size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
@@ -277,6 +319,7 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
         stored = (struct volume){0};
     }
     if (s == STATUS_OK) s = choose_crop(v, o, pool, NULL, report, err);
+    if (s == STATUS_OK && p.trimmed) state_trim(&p, o, &report->tile);
     if (s == STATUS_OK) s = map_densities(v, o, pool, report, err);
     if (s != STATUS_OK) goto out;
     memcpy(report->n, v->n, sizeof report->n);

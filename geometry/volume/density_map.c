@@ -183,6 +183,26 @@ status density_modes_find(const struct volume *v, struct density_modes *m, struc
     return STATUS_OK;
 }
 
+bool density_threshold(const float *value, size_t n, double *threshold)
+{
+    struct histogram h = {0};
+    double separability;
+    float least = INFINITY, most = -INFINITY;
+    for (size_t i = 0; i < n; i++) {
+        least = fminf(least, value[i]);
+        most = fmaxf(most, value[i]);
+    }
+    if (!(most > least)) return false;
+    h.first = (double)least;
+    h.width = ((double)most - (double)least) / N_BIN;
+    for (size_t i = 0; i < n; i++) {
+        const size_t bin = (size_t)(((double)value[i] - h.first) / h.width);
+        h.count[bin < N_BIN ? bin : N_BIN - 1] += 1.0;
+    }
+    *threshold = h.first + (double)otsu(&h, &separability) * h.width;
+    return true;
+}
+
 struct mapping {
     struct volume *v;
     float low, scale;

@@ -6,6 +6,8 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
+#include <stdbool.h>
+
 struct density_modes {
     double low; /* scanner value of void: the lower mode */
     /* of solid material: the 90 % quantile of the values above the threshold, but at least the upper mode */
@@ -21,6 +23,9 @@ struct density_modes {
  * (1979), then the peaks on either side. STATUS_INVALID, field OPTION_SCAN_FILES: NaN or infinite voxels (the first
  * is named), a constant volume, or fewer than 1000 places. */
 status density_modes_find(const struct volume *v, struct density_modes *m, struct error *err);
+
+/* Otsu's threshold of n finite values. Returns false if they are all the same. */
+bool density_threshold(const float *value, size_t n, double *threshold);
 
 /* Maps each value to density = clamp((value - low) / (high - low), 0, 1), and VOLUME_OUTSIDE to 0. Clamped noise is
  * symmetric about 1/2, so surfaces at half density do not move. STATUS_INVALID, field OPTION_DENSITY_HIGH, if high

@@ -1,18 +1,20 @@
 /* Time and memory of reconstructions of different sizes, with the default memory limit of 2 GiB. Prints one JSON object
  * on each line.
  *
- *   geometry.{cotton,fleece,1024}.{wall_s,cpu_s,peak_bytes,material_voxels,material_share}
+ *   geometry.{cotton,fleece,1024,2048}.{wall_s,cpu_s,peak_bytes,material_voxels,material_share}
  *       From the scan's file to transferred directions, at a signal-to-noise ratio of 5. peak_bytes is the largest
  *       resident memory of the process, without the files that it reads and writes.
  *         cotton   461 x 440 x 160 voxels, plain weave
  *         fleece   500 x 540 x 586 voxels, felt with fibers of 5 voxels that fill a fifth of the volume
  *         1024     1024 x 1024 x 1024 voxels, twill with void above and below
+ *         2048     2048 x 2048 x 2048 voxels of a byte, the same of 40 x 40 yarns; the void beyond 256 slices repeats that
+ *                  of these slices, so that the scan can be made without a file of 34 GB
  *   geometry.fleece.{quarter,half,full}.cpu_us_per_material_voxel
  *       Parts of the same scan. The figures are equal when time is linear in the material.
  *
  * bench_geometry_size [--folder DIR] [NAME...]
  *   NAME   run only these
- *   DIR    scans (up to 2 GiB) are kept there and used again the next time; otherwise they are temporary
+ *   DIR    scans (up to 8.6 GB) are kept there and used again the next time; otherwise they are temporary
  * Progress goes to standard error.
  */
 #include "base/clock.h"
@@ -37,12 +39,14 @@ struct sample {
     size_t n_yarn, n_fiber, n_relax,
         n[3]; /* n_fiber: of a yarn; felt: in all. n: of the cropped scan; n[2]: with void */
     double diameter_voxel, cover, tile_voxel, thickness_voxel;
+    size_t n_made; /* slices that are made; the others repeat the void of them. 0: all */
 };
 
 static const struct sample sample[] = {
     {"cotton", PHANTOM_PLAIN, 10, 19, 150, {461, 440, 160}, 7.0, 1.05, 0.0, 0.0},
     {"fleece", PHANTOM_FELT, 0, 1600, 6, {500, 540, 586}, 5.0, 0.0, 540.0, 540.0},
     {"1024", PHANTOM_TWILL_2_2, 20, 19, 100, {1024, 1024, 1024}, 7.0, 1.0182, 0.0, 0.0},
+    {"2048", PHANTOM_TWILL_2_2, 40, 19, 100, {2048, 2048, 2048}, 7.0, 1.0182, 0.0, 0.0, .n_made = 256},
 };
 
 struct outcome {
@@ -58,6 +62,27 @@ static double processor_s(int who)
     struct rusage u;
     getrusage(who, &u);
     return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+}
+
+/* Writes the scan as bytes without a header, n_slice slices: those of v in the middle, and void from its ends, of which
+ * it has PAD slices at least. */
+static status write_bytes(const struct volume *v, size_t n_slice, const char *path, struct error *err)
+{
+    enum { PAD = 32 };
+    const size_t n_page = v->n[0] * v->n[1], below = (n_slice - v->n[2]) / 2;
+    uint8_t *page = malloc(n_page);
+    FILE *file = fopen(path, "wb");
+    bool ok = page != NULL && file != NULL;
+    for (size_t k = 0; k < n_slice && ok; k++) {
+        const size_t slice = k < below ? k % PAD : k < below + v->n[2] ? k - below : v->n[2] - 1 - k % PAD;
+        const float *from = v->density + slice * n_page;
+        for (size_t i = 0; i < n_page; i++) page[i] = (uint8_t)fminf(fmaxf(40.0f + 160.0f * from[i], 0.0f), 255.0f);
+        ok = fwrite(page, 1, n_page, file) == n_page;
+        scratch_keep_within(v->space);
+    }
+    if (file != NULL) ok = fclose(file) == 0 && ok;
+    free(page);
+    return ok ? STATUS_OK : error_set_errno(err, "cannot write '%s'", path);
 }
 
 static status make_scan(const struct sample *p, const char *folder, const char *path, struct error *err)
@@ -86,11 +111,14 @@ static status make_scan(const struct sample *p, const char *folder, const char *
     status s = thread_pool_new(0, &pool, err);
     if (s == STATUS_OK) s = scratch_space_new(folder, MEMORY_BYTES, &space, err);
     if (s == STATUS_OK) s = phantom_generate(&o, pool, NULL, &f, &r, err);
-    if (s == STATUS_OK) s = phantom_pad(&f, &r, VOXEL_M, p->n[2], err);
+    if (s == STATUS_OK) s = phantom_pad(&f, &r, VOXEL_M, p->n_made > 0 ? p->n_made : p->n[2], err);
     if (s == STATUS_OK && (r.n_voxel[0] < p->n[0] || r.n_voxel[1] < p->n[1]))
         s = error_set(err, STATUS_INTERNAL, "the phantom has only %zu x %zu voxels", r.n_voxel[0], r.n_voxel[1]);
     if (s == STATUS_OK) s = phantom_scan_in(&f, r.n_voxel, &scan, space, pool, NULL, &v, err);
-    if (s == STATUS_OK) s = phantom_write_tiff(&v, &file, path, err);
+    if (s == STATUS_OK && p->n_made > 0)
+        s = write_bytes(&v, p->n[2], path, err);
+    else if (s == STATUS_OK)
+        s = phantom_write_tiff(&v, &file, path, err);
     volume_release(&v);
     scratch_space_free(space);
     fiber_set_release(&f);
@@ -98,8 +126,8 @@ static status make_scan(const struct sample *p, const char *folder, const char *
     return s;
 }
 
-static status reconstruct(const char *path, const size_t n[3], const char *folder, struct reconstruct_report *report,
-                          struct error *err)
+static status reconstruct(const struct sample *p, const char *path, const size_t n[3], const char *folder,
+                          struct reconstruct_report *report, struct error *err)
 {
     struct reconstruct_option o;
     struct volume v = {0};
@@ -112,8 +140,10 @@ static status reconstruct(const char *path, const size_t n[3], const char *folde
     reconstruct_option_default(&o);
     for (int a = 0; a < 3; a++) {
         o.voxel_size_m[a] = VOXEL_M;
-        o.crop_voxel[3 + a] = n[a];
+        if (n[a] < p->n[a]) memcpy(o.crop_voxel + 3, n, 3 * sizeof *n);
+        if (p->n_made > 0) o.raw.n[a] = n[a];
     }
+    snprintf(o.raw.type, sizeof o.raw.type, "uint8");
     status s = thread_pool_new(0, &pool, err);
     if (s == STATUS_OK) s = scratch_space_new(folder, MEMORY_BYTES, &space, err);
     if (s == STATUS_OK) s = reconstruct_read(&path, 1, &o, space, pool, NULL, &v, report, err);
@@ -149,7 +179,7 @@ static struct outcome in_child(const struct sample *p, const size_t *n, const ch
     pid_t pid = fork();
     if (pid == 0) {
         struct error err = {0};
-        o.s = n == NULL ? make_scan(p, folder, path, &err) : reconstruct(path, n, folder, &o.report, &err);
+        o.s = n == NULL ? make_scan(p, folder, path, &err) : reconstruct(p, path, n, folder, &o.report, &err);
         snprintf(o.text, sizeof o.text, "%s", err.text);
         o.cpu_s = processor_s(RUSAGE_SELF);
         ssize_t put = write(end[1], &o, sizeof o);
