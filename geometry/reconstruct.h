@@ -33,8 +33,8 @@ struct reconstruct_option {
     bool align;           /* estimate the matrix (main_directions.h); a given matrix has precedence */
     bool crop;            /* choose the box that tiles best (tile_crop.h); a given box has precedence */
     double crop_keep;     /* least share of each edge that is kept, 0.5 by default */
-    /* Scans with more voxels are cropped in z to what holds material (void_trim.h), unless a box or a matrix is given or
-     * estimated, or voxels are not cubes: 2^30 by default. */
+    /* Scans with more voxels are cropped in z to what holds material (void_trim.h), unless a box or a matrix is given
+     * or estimated, or voxels are not cubes: 2^30 by default. */
     size_t trim_above_voxel;
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
     bool hollow_fibers;               /* lumens are filled when the volume is read (lumen_fill.h) */

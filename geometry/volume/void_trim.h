@@ -11,8 +11,8 @@
 
 enum { VOID_TRIM_MARGIN = 64 }; /* layers of void that are kept on either side: noise is measured in them */
 
-/* Writes the layers range[0] .. range[1] - 1 across an axis of the file (0 columns, 1 rows, 2 slices) that hold material,
- * with the margin: all of them where material cannot be told from void. Errors of reading; STATUS_CANCELLED,
+/* Writes the layers range[0] .. range[1] - 1 across an axis of the file (0 columns, 1 rows, 2 slices) that hold
+ * material, with the margin: all of them where material cannot be told from void. Errors of reading; STATUS_CANCELLED,
  * STATUS_NO_MEMORY. */
 status void_trim_find(struct volume_source *source, int axis, const struct progress *progress, size_t range[2],
                       struct error *err);

@@ -7,8 +7,8 @@
  *         cotton   461 x 440 x 160 voxels, plain weave
  *         fleece   500 x 540 x 586 voxels, felt with fibers of 5 voxels that fill a fifth of the volume
  *         1024     1024 x 1024 x 1024 voxels, twill with void above and below
- *         2048     2048 x 2048 x 2048 voxels of a byte, the same of 40 x 40 yarns; the void beyond 256 slices repeats that
- *                  of these slices, so that the scan can be made without a file of 34 GB
+ *         2048     2048 x 2048 x 2048 voxels of a byte, the same of 40 x 40 yarns; the void beyond 256 slices repeats
+ *                  that of these slices, so that the scan can be made without a file of 34 GB
  *   geometry.fleece.{quarter,half,full}.cpu_us_per_material_voxel
  *       Parts of the same scan. The figures are equal when time is linear in the material.
  *
