@@ -134,15 +134,14 @@ static const float *pixel_at(const struct image *im, const double at[2])
     return im->pixel + 3 * ((size_t)at[1] * im->width + (size_t)at[0]);
 }
 
-/* part: sums over parts of the white patch. */
-static void set_white_variance(struct color_chart *k, const double (*part)[3])
+/* part: sums over parts of patch i. */
+static void set_variance(struct color_chart *k, size_t i, const double (*part)[3])
 {
     const double n = PARTS * PARTS, n_sample = SAMPLES * SAMPLES / n;
     for (size_t c = 0; c < 3; c++) {
         double sum = 0.0;
-        for (size_t j = 0; j < PARTS * PARTS; j++)
-            sum += pow(part[j][c] / n_sample - k->measured_rgb[COLOR_CHART_WHITE][c], 2.0);
-        k->white_var[c] = sum / (n * (n - 1.0));
+        for (size_t j = 0; j < PARTS * PARTS; j++) sum += pow(part[j][c] / n_sample - k->measured_rgb[i][c], 2.0);
+        k->patch_var[i][c] = sum / (n * (n - 1.0));
     }
 }
 
@@ -166,25 +165,26 @@ static status measure_patch(struct color_chart *k, const struct image *im, size_
         }
     }
     for (size_t c = 0; c < 3; c++) k->measured_rgb[i][c] = sum[c] / (SAMPLES * SAMPLES);
-    if (i == COLOR_CHART_WHITE) set_white_variance(k, (const double(*)[3])part);
+    set_variance(k, i, (const double(*)[3])part);
     return STATUS_OK;
 }
 
 /* Fits the matrix to the patches that are not saturated. */
 static status fit(struct color_chart *k, struct error *err)
 {
-    double measured[COLOR_CHART_PATCHES][3], wanted[COLOR_CHART_PATCHES][3];
+    double measured[COLOR_CHART_PATCHES][3], wanted[COLOR_CHART_PATCHES][3], var[COLOR_CHART_PATCHES][3];
     size_t n = 0, white = 0;
     for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
         if (k->saturated[i]) continue;
         if (i == COLOR_CHART_WHITE) white = n;
+        memcpy(var[n], k->patch_var[i], sizeof var[n]);
         memcpy(measured[n], k->measured_rgb[i], sizeof measured[n]);
         memcpy(wanted[n++], k->wanted_rgb[i], sizeof wanted[0]);
     }
     status s = color_matrix_fit(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix, err);
     if (s == STATUS_OK)
         color_matrix_covariance(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix,
-                                k->white_var, k->matrix_cov);
+                                (const double(*)[3])var, k->matrix_cov);
     return s;
 }
 

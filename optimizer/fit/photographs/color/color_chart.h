@@ -24,7 +24,7 @@ struct color_chart {
     double wanted_rgb[COLOR_CHART_PATCHES][3];   /* radiances */
     bool saturated[COLOR_CHART_PATCHES];         /* a part of the middle is: the patch is not used */
     double matrix[9], matrix_cov[3][9];          /* color_matrix_covariance */
-    double white_var[3];                         /* of the mean of the white patch, by the scatter of its parts */
+    double patch_var[COLOR_CHART_PATCHES][3];    /* of measured_rgb, by the scatter of the patch's parts */
     double delta_e_before[COLOR_CHART_PATCHES];  /* CIEDE2000, with one factor for all channels, from the white patch */
     double delta_e_after[COLOR_CHART_PATCHES];
 };

@@ -41,8 +41,27 @@ status color_matrix_fit(size_t n, const double (*measured)[3], const double (*wa
     return STATUS_OK;
 }
 
+/* Variance of the value that row m of the matrix makes of patch i. */
+static double noise_of_patch(const double m[3], const double var[3])
+{
+    return m[0] * m[0] * var[0] + m[1] * m[1] * var[1] + m[2] * m[2] * var[2];
+}
+
+/* Variance of the residuals of a row beyond the mean noise of the patches. */
+static double patch_misfit(size_t n, const double (*measured)[3], const double (*wanted)[3], size_t i_white, size_t k,
+                           const double m[3], const double (*var)[3])
+{
+    double square = 0.0, noise = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        double r = dot(m, measured[i]) - wanted[i][k];
+        square += r * r / (double)(n - 3);
+        if (i != i_white) noise += noise_of_patch(m, var[i]) / (double)(n - 1);
+    }
+    return fmax(0.0, square - noise);
+}
+
 void color_matrix_covariance(size_t n, const double (*measured)[3], const double (*wanted)[3], size_t i_white,
-                             const double matrix[9], const double white_var[3], double cov[3][9])
+                             const double matrix[9], const double (*var)[3], double cov[3][9])
 {
     double inverse[9], white[3], scale = white_scale(measured[i_white]);
     memset(cov, 0, 9 * sizeof **cov);
@@ -50,17 +69,19 @@ void color_matrix_covariance(size_t n, const double (*measured)[3], const double
     for (size_t j = 0; j < 3; j++) white[j] = measured[i_white][j] / scale;
     const double aw[3] = {dot(inverse, white), dot(inverse + 3, white), dot(inverse + 6, white)};
     const double waw = dot(white, aw);
+    double project[9], half[9];
+    for (size_t j = 0; j < 9; j++) project[j] = inverse[j] - aw[j / 3] * aw[j % 3] / waw;
     for (size_t k = 0; k < 3; k++) {
-        double square = 0.0, of_white = 0.0;
-        for (size_t i = 0; i < n; i++) {
-            double r = dot(matrix + 3 * k, measured[i]) - wanted[i][k];
-            square += r * r / (double)(n - 3);
-        }
-        for (size_t j = 0; j < 3; j++) of_white += matrix[3 * k + j] * matrix[3 * k + j] * white_var[j];
-        for (size_t j = 0; j < 9; j++) {
-            double shared = aw[j / 3] * aw[j % 3] / waw;
-            cov[k][j] = (square * (inverse[j] - shared) + of_white * shared / waw) / (scale * scale);
-        }
+        const double *m = matrix + 3 * k, misfit = patch_misfit(n, measured, wanted, i_white, k, m, var);
+        double b[9] = {0};
+        for (size_t i = 0; i < n; i++)
+            for (size_t j = 0; j < 9 && i != i_white; j++)
+                b[j] += (misfit + noise_of_patch(m, var[i])) * measured[i][j / 3] / scale * measured[i][j % 3] / scale;
+        small_multiply(project, b, 3, half);
+        small_multiply(half, project, 3, cov[k]);
+        for (size_t j = 0; j < 9; j++)
+            cov[k][j] =
+                (cov[k][j] + noise_of_patch(m, var[i_white]) * aw[j / 3] * aw[j % 3] / (waw * waw)) / (scale * scale);
     }
 }
 

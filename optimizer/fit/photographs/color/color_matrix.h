@@ -14,14 +14,15 @@
  * patches do not determine a matrix (all of one color). */
 status color_matrix_fit(size_t n, const double (*measured_rgb)[3], const double (*wanted_rgb)[3], size_t i_white,
                         double matrix[9], struct error *err);
-/* Covariance of each row of the matrix that color_matrix_fit gave, for independent rows. A row's residuals at the other
- * patches (noise, and colors that no matrix turns into those of the chart) have the variance s^2, of n - 3 degrees of
- * freedom, and the white patch, which has no residual, that of its measured mean, white_var of each channel of the
- * camera:
- *   cov = s^2 (A^-1 - A^-1 p_w p_w' A^-1 / p_w' A^-1 p_w) + v_w g g',  g = A^-1 p_w / (p_w' A^-1 p_w),
- *   v_w = sum m_k^2 white_var_k. Zero with fewer than 4 patches. */
+/* Covariance of each row of the matrix that color_matrix_fit gave, for independent rows. var: of the measured means of
+ * each patch and channel of the camera. A patch has in row m the variance v_i = sum m_k^2 var_ik and, besides the white
+ * one, what the row's residuals (of n - 3 degrees of freedom) have beyond the mean of these: colors that no matrix
+ * turns into those of the chart. Bright patches, which have the most noise, also weigh most.
+ *   cov = P (sum v_i p_i p_i') P + v_w g g',  P = A^-1 - A^-1 p_w p_w' A^-1 / p_w' A^-1 p_w,
+ *   g = A^-1 p_w / (p_w' A^-1 p_w).
+ * Zero with fewer than 4 patches. */
 void color_matrix_covariance(size_t n, const double (*measured_rgb)[3], const double (*wanted_rgb)[3], size_t i_white,
-                             const double matrix[9], const double white_var[3], double cov[3][9]);
+                             const double matrix[9], const double (*var)[3], double cov[3][9]);
 /* The errors of a channel of camera rgb `in` that the covariance of its row makes, by three independent causes. */
 void color_matrix_error(const double cov[9], const double in[3], double error[3]);
 void color_matrix_apply(const double matrix[9], const double in[3], double out[3]);

@@ -1,5 +1,6 @@
 /* The color matrix on patches without noise, published color differences, and ColorCheckers: drawn and warped here, and
  * a real one (data/color-target). */
+#include "base/rng.h"
 #include "optimizer/fit/photographs/color/color_chart.h"
 #include "optimizer/fit/photographs/color/color_matrix.h"
 #include "optimizer/fit/photographs/photograph.h"
@@ -39,6 +40,57 @@ static void test_matrix(void **state)
         for (size_t c = 0; c < 3; c++) measured[i][c] = 0.1 * (double)i + 0.1;
     assert_int_equal(color_matrix_fit(24, (const double(*)[3])measured, (const double(*)[3])wanted, 18, matrix, NULL),
                      STATUS_NUMERIC);
+}
+
+/* Radiance of one row of the matrix for a card, in one draw of the patches' noise, whose variance is proportional to
+ * the light, and the variance that is stated. */
+static double read_card(struct rng *rng, const double (*exact)[3], const double (*wanted)[3], const double card[3],
+                        double *stated)
+{
+    double measured[24][3], var[24][3], matrix[9], cov[3][9], error[3], out[3], z[4];
+    for (size_t i = 0; i < 24; i++) {
+        rng_normal_pair(rng, z);
+        rng_normal_pair(rng, z + 2);
+        for (size_t c = 0; c < 3; c++) {
+            var[i][c] = 1e-6 + 1e-4 * exact[i][c];
+            measured[i][c] = exact[i][c] + sqrt(var[i][c]) * z[c];
+        }
+    }
+    assert_int_equal(color_matrix_fit(24, (const double(*)[3])measured, wanted, 18, matrix, NULL), STATUS_OK);
+    color_matrix_covariance(24, (const double(*)[3])measured, wanted, 18, matrix, (const double(*)[3])var, cov);
+    color_matrix_apply(matrix, card, out);
+    color_matrix_error(cov[0], card, error);
+    *stated = error[0] * error[0] + error[1] * error[1] + error[2] * error[2];
+    return out[0];
+}
+
+/* Stated errors of the matrix are the scatter over draws of noise that is stronger in bright patches, for a bright card
+ * and for a dark one. With one variance for all patches that of the bright card would be too small. */
+static void test_errors_of_the_matrix(void **state)
+{
+    enum { N_DRAW = 2000 };
+    static const double card_rgb[2][3] = {{0.9, 0.3, 0.1}, {0.05, 0.06, 0.2}};
+    double exact[24][3], wanted[24][3];
+    (void)state;
+    for (size_t i = 0; i < 24; i++) {
+        color_chart_reference(false, i, wanted[i]);
+        color_matrix_apply(camera, wanted[i], exact[i]);
+    }
+    for (size_t k = 0; k < 2; k++) {
+        double card[3], mean = 0.0, square = 0.0, stated = 0.0;
+        struct rng rng;
+        rng_start(&rng, &(struct rng_key){.seed = 3 + k}, 0, 0);
+        color_matrix_apply(camera, card_rgb[k], card);
+        for (size_t draw = 0; draw < N_DRAW; draw++) {
+            double var, value = read_card(&rng, (const double(*)[3])exact, (const double(*)[3])wanted, card, &var);
+            mean += value / N_DRAW;
+            square += value * value / N_DRAW;
+            stated += var / N_DRAW;
+        }
+        double ratio = sqrt(stated / (square - mean * mean));
+        print_message("card %zu: stated error over scatter %.3f\n", k, ratio);
+        assert_true(ratio > 0.95 && ratio < 1.1);
+    }
 }
 
 /* The neutral patches are nearly grey, their luminances those of Munsell values 9.5 to 2. */
@@ -216,10 +268,10 @@ static void test_real_chart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matrix),           cmocka_unit_test(test_reference),
-        cmocka_unit_test(test_delta_e),          cmocka_unit_test(test_drawn_charts),
-        cmocka_unit_test(test_same_chart_again), cmocka_unit_test(test_refused_charts),
-        cmocka_unit_test(test_real_chart),
+        cmocka_unit_test(test_matrix),         cmocka_unit_test(test_errors_of_the_matrix),
+        cmocka_unit_test(test_reference),      cmocka_unit_test(test_delta_e),
+        cmocka_unit_test(test_drawn_charts),   cmocka_unit_test(test_same_chart_again),
+        cmocka_unit_test(test_refused_charts), cmocka_unit_test(test_real_chart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
