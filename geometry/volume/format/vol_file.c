@@ -190,6 +190,31 @@ status vol_write_direction(const char *path, const struct direction_volume *d, e
                                    : write_slices(path, header, d, d->n, d->space, 2, encode_direction_quantised, err);
 }
 
+struct sggx_volume {
+    const struct direction_volume *d;
+    float taken; /* 1 - along^2 */
+};
+
+static void encode_sggx(const void *volume, size_t first, size_t n, uint8_t *out)
+{
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    const struct sggx_volume *v = volume;
+    for (size_t i = 0; i < n; i++) {
+        float t[3] = {0.0f, 0.0f, 0.0f};
+        if (v->d->density[first + i] > 0) direction_volume_get(v->d, first + i, t);
+        for (int k = 0; k < 6; k++)
+            put_f32(out + 24 * i + 4 * k, (k < 3 ? 1.0f : 0.0f) - v->taken * t[row[k]] * t[column[k]]);
+    }
+}
+
+status vol_write_sggx(const char *path, const struct direction_volume *d, double along, struct error *err)
+{
+    uint8_t header[HEADER_BYTES];
+    const struct sggx_volume v = {d, (float)(1.0 - along * along)};
+    fill_header(header, VOL_FLOAT32, d->n, 6, d->voxel_size_m);
+    return write_slices(path, header, &v, d->n, d->space, 24, encode_sggx, err);
+}
+
 static void copy_density(const void *volume, size_t first, size_t n, uint8_t *out)
 {
     const struct direction_volume *v = volume;

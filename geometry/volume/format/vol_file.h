@@ -1,6 +1,7 @@
 /* Mitsuba grid volumes, `.vol` version 3 (byte layout: docs/file-formats.md). Bounding boxes are in millimetres.
  * Density is written as float32 or uint8, and direction as float32 x 3 or in two quantised bytes; these four can be
- * read. As in files of other programs, density is in [0, 1] and directions are unit vectors or exactly zero. */
+ * read. Flakes about the directions are written only, for Mitsuba's phase function `sggx`. As in files of other
+ * programs, density is in [0, 1] and directions are unit vectors or exactly zero. */
 #ifndef SELVEDGE_GEOMETRY_VOL_FILE_H
 #define SELVEDGE_GEOMETRY_VOL_FILE_H
 
@@ -23,6 +24,12 @@ struct vol_header {
 status vol_write_density(const char *path, const struct volume *v, enum vol_encoding encoding, struct error *err);
 status vol_write_direction(const char *path, const struct direction_volume *d, enum vol_encoding encoding,
                            struct error *err);
+/* Six channels, float32: S = I - (1 - along^2) t t' as xx, yy, zz, xy, xz, yz, of the fiber direction t. A flake
+ * distribution with this matrix has the projected area sqrt(w' S w) (Heitz, Dupuy, Crassin, Dachsbacher 2015, "The SGGX
+ * microflake distribution", section 3): that of a cylinder for along = 0, and `along` times that across it in the
+ * direction of the fiber. S = I where there is no fiber, so that samples between voxels have a matrix, too. 0 < along
+ * <= 1. */
+status vol_write_sggx(const char *path, const struct direction_volume *d, double along, struct error *err);
 /* Writes the densities of a direction volume, 0 where emptied, as VOL_UINT8. */
 status vol_write_kept_density(const char *path, const struct direction_volume *d, struct error *err);
 

@@ -211,8 +211,21 @@ def test_volumes_of_a_scan(tmp_path):
     inside = [d for d, x in zip(density, lengths) if x > 0]
     outside = [d for d, x in zip(density, lengths) if x == 0]
     assert len(inside) > 1000 and sum(inside) / len(inside) > 2 * sum(outside) / len(outside)
+    flat, n_channel, flat_box, sggx = read_vol(made / "sggx.vol")
+    assert (flat, n_channel, flat_box) == (size, 6, box)
+    voxel = max(range(len(lengths)), key=lambda i: lengths[i] * density[i])
+    t, s = direction[3 * voxel:3 * voxel + 3], sggx[6 * voxel:6 * voxel + 6]
+    taken = 3 - sum(s[:3])
+    assert 0.1 < taken < 1 and [-s[k] / taken for k in (3, 4, 5)] == pytest.approx([t[0] * t[1], t[0] * t[2], t[1] * t[2]], abs=1e-5)
+    void = lengths.index(0)
+    assert sggx[6 * void:6 * void + 6] == (1, 1, 1, 0, 0, 0)
     seen = by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), made / "density.vol", made / "direction.vol")
     assert json.loads(seen) == pytest.approx([max(density), max(direction)])
+    place = [(index + 0.5) / n for index, n in zip((voxel % size[0], voxel // size[0] % size[1], voxel // (size[0] * size[1])), size)]
+    flakes = json.loads(by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_sggx.py"), made / "sggx.vol",
+                                  made / "density.vol", *place, *t))
+    assert flakes["areas"] == pytest.approx([math.sqrt(1 - taken), 1, 1], abs=1e-3)
+    assert 0.1 < flakes["radiance"] < 1
 
 
 def test_a_scene_for_blender(results, tmp_path):

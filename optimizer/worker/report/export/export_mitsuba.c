@@ -1,13 +1,16 @@
 /* results/export/mitsuba/: the fitted cloth for Mitsuba 3. scene.xml holds the tile of fibers, repeated, with the hair
  * lobes that come nearest to the fitted scattering (hair_fit.h), lamp, camera and black sheet of the first row;
- * fibers-<group>.txt the fibers of one group. Of a scanned cloth also density.vol and direction.vol with float32
- * samples, as Mitsuba's gridvolume reads them. */
+ * fibers-<group>.txt the fibers of one group. Of a scanned cloth also density.vol, direction.vol and sggx.vol with
+ * float32 samples, as Mitsuba's gridvolume reads them. */
 #include "geometry/volume/format/vol_file.h"
 #include "optimizer/worker/report/export/export_formats.h"
 
+#include <math.h>
 #include <stddef.h>
 
 static const double mm = 1e3;
+/* Least projected area of the flakes along the fiber, over that across it. */
+static const double least_along = 0.02;
 
 static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
 {
@@ -19,6 +22,15 @@ static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
     fputc('\n', text);
 }
 
+/* Projected area along the fiber over that across it, of flakes that are tilted so much that they widen a reflected ray
+ * as the first group's hair lobes do: by twice their tilt, of which the variance is v (hair_lobes.h, equation of v). */
+static double area_along(const struct export_scene *e)
+{
+    const double r = e->hair[0].lobes.longitudinal_roughness;
+    const double sd = 0.726 * r + 0.812 * r * r + 3.7 * pow(r, 20.0);
+    return fmin(fmax(tan(fmin(0.5 * sd, 0.7)), least_along), 1.0);
+}
+
 static status write_volumes(const struct export_scene *e, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
@@ -28,7 +40,9 @@ static status write_volumes(const struct export_scene *e, struct error *err)
     if (s == STATUS_OK) s = worker_folder_check(e->c->folder, err);
     if (s == STATUS_OK) s = vol_write_density(path, &e->c->volume, VOL_FLOAT32, err);
     export_path(e, "direction.vol", path);
-    return s == STATUS_OK ? vol_write_direction(path, &e->c->direction, VOL_FLOAT32, err) : s;
+    if (s == STATUS_OK) s = vol_write_direction(path, &e->c->direction, VOL_FLOAT32, err);
+    export_path(e, "sggx.vol", path);
+    return s == STATUS_OK ? vol_write_sggx(path, &e->c->direction, area_along(e), err) : s;
 }
 
 /* ---- scene.xml ---- */
