@@ -51,7 +51,8 @@ struct fiber_job {
     struct axis_profile profile; /* of the lines so far */
 };
 
-/* The shares of the parts are those of the time that they take on a scan of cotton. */
+/* The shares of the parts are means of those of the time that they take on a phantom, on a scan of cotton and on one of
+ * a weave. */
 static void enter_part(struct fiber_job *job, double from, double to)
 {
     job->part.from = from;
@@ -78,7 +79,7 @@ static status find_chains(struct fiber_job *job, struct polyline_set *chains, st
         struct slice_frame frame;
         size_t n_chain = 0;
         slice_frame_init(&frame, i, job->v->n);
-        enter_part(job, 0.2 * i / N_SLICE_FRAME, 0.2 * (i + 1) / N_SLICE_FRAME);
+        enter_part(job, 0.12 * i / N_SLICE_FRAME, 0.12 * (i + 1) / N_SLICE_FRAME);
         const struct center_search search = {job->v, job->d, &sub, &frame, job->diameter};
         s = centers_detect(&search, job->pool, &job->inner, &list, err);
         if (s != STATUS_OK) break;
@@ -228,31 +229,31 @@ static status trace_lines(struct fiber_job *job, struct polyline_set *lines, str
     struct join_counts counts = {0};
     for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
     status s = find_chains(job, &part[0], err);
-    enter_part(job, 0.2, 0.24);
+    enter_part(job, 0.12, 0.14);
     if (s == STATUS_OK) s = repair_lines(job, &part[0], false, 0.0, &part[1], &counts, err);
     for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
-        const double from = 0.24 + 0.26 * round / N_REPAIR;
-        enter_part(job, from, from + 0.18 / N_REPAIR);
+        const double from = 0.14 + 0.2 * round / N_REPAIR;
+        enter_part(job, from, from + 0.14 / N_REPAIR);
         s = center(job, &part[1], err);
         if (s == STATUS_OK) s = repair_lines(job, &part[1], true, 0.0, &part[2], &counts, err);
-        enter_part(job, from + 0.18 / N_REPAIR, from + 0.26 / N_REPAIR);
+        enter_part(job, from + 0.14 / N_REPAIR, from + 0.2 / N_REPAIR);
         if (s == STATUS_OK) s = center(job, &part[2], err);
         if (s == STATUS_OK) s = repair_lines(job, &part[2], false, 0.0, &part[1], &counts, err);
     }
     if (s == STATUS_OK) s = repair_lines(job, &part[1], true, 0.0, &part[0], &counts, err);
     if (s == STATUS_OK) {
         classify(&part[0]); /* from classes of subvolumes to axis classes */
-        enter_part(job, 0.5, 0.53);
+        enter_part(job, 0.34, 0.35);
         s = smooth_and_drop(job, &part[0], lines, err);
     }
-    enter_part(job, 0.53, 0.6);
+    enter_part(job, 0.35, 0.4);
     if (s == STATUS_OK) s = center(job, lines, err);
-    enter_part(job, 0.6, 0.75);
+    enter_part(job, 0.4, 0.52);
     if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, MIN_PIECE, err);
     /* lines on the fibers' axes are easier to distinguish and to join, and their radii are known */
     if (s == STATUS_OK) s = repair_lines(job, lines, true, TOUCHING, &part[1], &counts, err);
-    enter_part(job, 0.75, 0.8);
+    enter_part(job, 0.52, 0.54);
     if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], &part[2], err);
     if (s == STATUS_OK) s = repair_lines(job, &part[2], true, TOUCHING, lines, &counts, err);
     job->report->n_gap_bridged = counts.n_gap_bridged;
@@ -264,7 +265,7 @@ static status trace_lines(struct fiber_job *job, struct polyline_set *lines, str
 /* Fits whole lines for the last time and drops what deviates. */
 static status finish_lines(struct fiber_job *job, struct polyline_set *lines, struct error *err)
 {
-    enter_part(job, 0.8, 0.93);
+    enter_part(job, 0.54, 0.67);
     status s = fit_axes(job, lines, true, err);
     return s == STATUS_OK ? straighten(job, lines, true, job->o->min_vertex, err) : s;
 }
@@ -329,7 +330,7 @@ static status find_radius(struct fiber_job *job, struct polyline_set *lines, str
     double voxel_m = job->v->voxel_size_m[0];
     const bool is_given = !isnan(job->o->radius_m[0]);
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
-    enter_part(job, 0.93, 1.0);
+    enter_part(job, 0.67, 1.0);
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
                                           &job->inner, part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);

@@ -31,6 +31,7 @@ static const struct stage_code stage_code[] = {
 static void report_fraction(void *context, double fraction)
 {
     struct pipeline_context *c = context;
+    c->stage_fraction = fraction;
     worker_status_fraction(c->status, fraction);
 }
 
@@ -94,6 +95,7 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
         bool loaded = false;
         for (size_t later = i; later < n_stage; later++)
             if (!is_skipped(c, later)) pipeline_plan_stage(c, info[later].name, later);
+        c->stage_fraction = 0.0;
         worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage);
         status s = do_stage(c, i, &earlier_ran, &loaded, err);
         worker_status_stage_end(c->status, loaded);

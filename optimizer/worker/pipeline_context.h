@@ -159,6 +159,8 @@ struct pipeline_context {
     struct scene *scene;
     struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */
     bool has_volume_scene;
+    double stage_fraction;   /* of the running stage, as last reported */
+    double fit_path;         /* that the fits are expected to take, with what follows them in their stage */
     double stage_wall_s[16]; /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
 };
 

@@ -190,10 +190,10 @@ void worker_status_speeds(struct worker_status *st, const struct speed_book *boo
     pthread_mutex_unlock(&st->mutex);
 }
 
-void worker_status_plan(struct worker_status *st, size_t i_stage, const char *key, double units, double usual_s)
+void worker_status_plan(struct worker_status *st, size_t i_stage, const struct job_clock_work *work)
 {
     pthread_mutex_lock(&st->mutex);
-    job_clock_plan(&st->clock, i_stage, key, units, usual_s);
+    job_clock_plan(&st->clock, i_stage, work);
     pthread_mutex_unlock(&st->mutex);
 }
 
@@ -209,6 +209,14 @@ void worker_status_plan_share(struct worker_status *st, size_t i_stage, const ch
     pthread_mutex_lock(&st->mutex);
     job_clock_plan_share(&st->clock, i_stage, key, share, i_of);
     pthread_mutex_unlock(&st->mutex);
+}
+
+double worker_status_expected_s(struct worker_status *st, size_t i_stage)
+{
+    pthread_mutex_lock(&st->mutex);
+    double seconds = job_clock_expected_s(&st->clock, i_stage);
+    pthread_mutex_unlock(&st->mutex);
+    return seconds;
 }
 
 void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage)

@@ -4,7 +4,7 @@
 #define SELVEDGE_OPTIMIZER_WORKER_STATUS_H
 
 #include "base/log.h"
-#include "optimizer/worker/progress/speed_book.h"
+#include "optimizer/worker/progress/job_clock.h"
 #include "optimizer/worker/worker_folder.h"
 
 #include <jansson.h>
@@ -30,9 +30,10 @@ bool worker_status_stale(const struct worker_status *st);
 /* Progress and remaining time (job_clock.h). Speeds of earlier jobs are given before the first stage begins, the work
  * of a stage before that stage. */
 void worker_status_speeds(struct worker_status *st, const struct speed_book *book);
-void worker_status_plan(struct worker_status *st, size_t i_stage, const char *key, double units, double usual_s);
+void worker_status_plan(struct worker_status *st, size_t i_stage, const struct job_clock_work *work);
 void worker_status_plan_own(struct worker_status *st, size_t i_stage, const char *key, double seconds);
 void worker_status_plan_share(struct worker_status *st, size_t i_stage, const char *key, double share, size_t i_of);
+double worker_status_expected_s(struct worker_status *st, size_t i_stage);
 /* Begins stage i_stage of n_stage, and ends it; loaded: an earlier attempt has done it. */
 void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage);
 void worker_status_stage_end(struct worker_status *st, bool loaded);

@@ -60,7 +60,7 @@ struct fit_problem {
     size_t first_path;    /* of a configuration and replica in the first estimate; 0: the method's default */
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
-    const struct progress *progress;    /* reports the fraction of the budget that is used */
+    const struct progress *progress;    /* reports the used fraction of the paths that are expected */
     const struct gaussian_prior *prior; /* n_param, in fit coordinates; NULL: none. Methods without priors ignore it */
     /* standard deviation of ln gain of every configuration, which is marginalised; 0: none. Methods without gains
      * ignore it */

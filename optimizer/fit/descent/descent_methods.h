@@ -17,7 +17,9 @@ struct descent_run {
     uint64_t path_budget, n_path_total, n_path_step;
     size_t n_step;
     double wall_s;
-    bool plain_paths; /* of the method */
+    double n_path_expected; /* of the whole fit, as the method predicts it; 0: the budget */
+    double fraction;        /* as last reported; never falls */
+    bool plain_paths;       /* of the method */
 };
 
 status descent_run_init(struct descent_run *run, const struct fit_problem *problem, const struct descent_method *method,

@@ -53,17 +53,24 @@ void descent_run_release(struct descent_run *run)
     free(run->replica[1]);
 }
 
+/* Reports the fraction of the fit that n_path paths are. */
+static void report_paths(struct descent_run *run, double n_path)
+{
+    const double expected = run->n_path_expected > 0.0 ? run->n_path_expected : (double)run->path_budget;
+    run->fraction = fmax(run->fraction, fmin(1.0, n_path / expected));
+    progress_report(run->problem->progress, run->fraction);
+}
+
 /* The estimator's progress of one call, as a part of the fit's. */
 struct call_progress {
-    const struct descent_run *run;
+    struct descent_run *run;
     double n_path_call;
 };
 
 static void report_call(void *context, double fraction)
 {
     const struct call_progress *c = context;
-    double done = (double)c->run->n_path_total + fraction * c->n_path_call;
-    progress_report(c->run->problem->progress, fmin(1.0, done / (double)c->run->path_budget));
+    report_paths(c->run, (double)c->run->n_path_total + fraction * c->n_path_call);
 }
 
 status descent_estimate(struct descent_run *run, const double *param, uint32_t iteration, bool want_jacobian,
@@ -102,6 +109,6 @@ status descent_report(struct descent_run *run, struct fit_step *step, struct err
     step->replica[0] = run->replica[0];
     step->replica[1] = run->replica[1];
     objective_evaluate(run->problem->observation, run->replica[0], run->replica[1], &step->objective);
-    progress_report(run->problem->progress, fmin(1.0, (double)run->n_path_total / (double)run->path_budget));
+    report_paths(run, (double)run->n_path_total);
     return run->problem->report != NULL ? run->problem->report(run->problem->report_context, step, err) : STATUS_OK;
 }

@@ -3,13 +3,15 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Standard deviations of the logarithm of a time: of a stage without a remembered speed; between jobs where one job is
- * all that is known, and at least; of the factor by which this job is slower than earlier ones;
- * and of a stage by this job's own speed. */
-static const double sd_unknown = 0.9, sd_one_job = 0.3, sd_least = 0.08, sd_factor = 0.4, sd_own = 0.4;
+/* Standard deviations of the logarithm of a time: at least; of the factor by which this job is slower than earlier
+ * ones; and of a stage by this job's own speed. The scatter between jobs of all kinds counts like that of this many
+ * remembered jobs. */
+static const double sd_least = 0.08, sd_factor = 0.4, sd_own = 0.3, usual_jobs = 0.5;
 /* The same of elapsed time over the passed share x: by a remembered curve, and by a straight line, times
  * (1 - x) / sqrt(x). */
 static const double sd_by_curve = 0.12, sd_by_line = 0.35;
+/* Share of a stage's time in one of SPEED_CURVE_POINTS parts of its fraction from which on the fraction has waited. */
+static const double long_wait = 0.1;
 /* A stage below this many seconds is not remembered and says nothing about the others. */
 static const double least_s = 0.3;
 
@@ -28,27 +30,29 @@ static void set_curve(struct job_clock_stage *s, const struct speed_entry *e)
         s->curve[k] = e != NULL ? e->curve[k] : (double)(k + 1) / SPEED_CURVE_POINTS;
 }
 
-void job_clock_plan(struct job_clock *c, size_t i, const char *key, double units, double usual_s)
+void job_clock_plan(struct job_clock *c, size_t i, const struct job_clock_work *work)
 {
     struct job_clock_stage *s = &c->stage[i];
-    const struct speed_entry *e = speed_book_find(&c->book, key);
-    snprintf(s->key, sizeof s->key, "%s", key);
+    const struct speed_entry *e = speed_book_find(&c->book, work->key);
+    snprintf(s->key, sizeof s->key, "%s", work->key);
     s->planned = true;
     s->own_speed = false;
+    s->predicts_end = work->predicts_end;
     s->i_of_plus_one = 0;
-    s->units = units;
-    s->expected_s = units * (e != NULL ? exp(e->log_s_per_unit) : usual_s);
-    s->log_sd = sd_unknown;
+    s->units = work->units;
+    s->expected_s = work->units * (e != NULL ? exp(e->log_s_per_unit) : work->usual_s);
+    s->log_sd = work->log_sd;
     if (e != NULL) {
-        double var = (sd_one_job * sd_one_job + e->n_job * e->log_var) / e->n_job;
+        double var = (usual_jobs * work->log_sd * work->log_sd + e->n_job * e->log_var) / (usual_jobs + e->n_job);
         s->log_sd = sqrt(sd_least * sd_least + var * (1.0 + 1.0 / e->n_job));
     }
-    set_curve(s, e);
+    set_curve(s, work->predicts_end ? NULL : e);
 }
 
 void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double seconds)
 {
-    job_clock_plan(c, i, key, seconds, 1.0);
+    const struct job_clock_work work = {.key = key, .units = seconds, .usual_s = 1.0, .log_sd = sd_own};
+    job_clock_plan(c, i, &work);
     c->stage[i].own_speed = true;
     c->stage[i].log_sd = fmin(c->stage[i].log_sd, sd_own);
 }
@@ -59,7 +63,9 @@ static double slower_by(const struct job_clock *c)
     double sum = 0.0, weight = 1.0 / (sd_factor * sd_factor);
     for (size_t i = 0; i < c->n_stage; i++) {
         const struct job_clock_stage *s = &c->stage[i];
-        if (!s->ended || s->loaded || s->own_speed || !(s->wall_s >= least_s) || !(s->expected_s > 0.0)) continue;
+        if (!s->ended || s->loaded || s->own_speed || s->predicts_end || !(s->wall_s >= least_s) ||
+            !(s->expected_s > 0.0))
+            continue;
         double w = 1.0 / (s->log_sd * s->log_sd);
         sum += w * log(s->wall_s / s->expected_s);
         weight += w;
@@ -73,20 +79,29 @@ void job_clock_plan_share(struct job_clock *c, size_t i, const char *key, double
     c->stage[i].i_of_plus_one = i_of + 1;
 }
 
-/* Seconds that a stage is expected to take by what is known without its own progress. */
 static double expected_s(const struct job_clock *c, const struct job_clock_stage *s)
 {
     return s->planned ? s->expected_s * (s->own_speed ? 1.0 : slower_by(c)) : 0.0;
 }
 
-/* Share of the stage's time that has passed at a fraction. */
-static double share_at(const struct job_clock_stage *s, double fraction)
+/* Share of the stage's time that has passed at a fraction, of which `likely` is what its elapsed time says. Where the
+ * fraction of earlier jobs has waited, as between the parts of a stage, the share may lie anywhere in the waiting. */
+static double share_at(const struct job_clock_stage *s, double fraction, double likely)
 {
     double x = fmin(fmax(fraction, 0.0), 1.0) * SPEED_CURVE_POINTS;
     size_t k = (size_t)x;
     if (k >= SPEED_CURVE_POINTS) return s->curve[SPEED_CURVE_POINTS - 1];
     double before = k > 0 ? s->curve[k - 1] : 0.0;
+    if (s->curve[k] - before > long_wait) return fmin(fmax(likely, before), s->curve[k]);
     return before + (x - (double)k) * (s->curve[k] - before);
+}
+
+/* Share of the running stage's time that has passed at now_s. */
+static double running_share(const struct job_clock *c, double now_s)
+{
+    const struct job_clock_stage *s = &c->stage[c->i_stage];
+    const double since = (now_s - c->from_s) / fmax(expected_s(c, s), 1e-3);
+    return share_at(s, c->fraction, c->from_share + since);
 }
 
 /* ---- the stages as they run ---- */
@@ -111,8 +126,9 @@ void job_clock_fraction(struct job_clock *c, double stage_fraction, double now_s
 
 void job_clock_restart(struct job_clock *c, double now_s)
 {
+    const struct job_clock_stage *s = &c->stage[c->i_stage];
     c->from_s = now_s;
-    c->from_share = share_at(&c->stage[c->i_stage], c->fraction);
+    c->from_share = share_at(s, c->fraction, c->fraction);
 }
 
 void job_clock_end(struct job_clock *c, bool loaded, double now_s)
@@ -127,10 +143,10 @@ void job_clock_end(struct job_clock *c, bool loaded, double now_s)
 }
 
 /* Expected time of the running stage as a whole, and the standard deviation of its logarithm. */
-static double running_s(const struct job_clock *c, double elapsed_s, double *log_sd)
+static double running_s(const struct job_clock *c, double now_s, double *log_sd)
 {
     const struct job_clock_stage *s = &c->stage[c->i_stage];
-    const double share = share_at(s, c->fraction), passed = share - c->from_share;
+    const double share = running_share(c, now_s), passed = share - c->from_share, elapsed_s = now_s - c->from_s;
     double total = fmax(expected_s(c, s), 1e-3);
     *log_sd = hypot(s->log_sd, s->own_speed ? 0.0 : sd_least);
     if (passed > 0.0 && elapsed_s > 0.0) {
@@ -149,9 +165,9 @@ static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
     double sum = 0.0, var = 0.0, log_sd, total = 0.0, running_log_sd = 0.0;
     const bool runs = s->began && !s->ended;
     if (runs) {
-        const double elapsed_s = now_s - c->from_s, share = share_at(s, c->fraction);
-        total = running_s(c, elapsed_s, &running_log_sd);
-        double rest = total * (1.0 - c->from_share) - elapsed_s;
+        const double share = running_share(c, now_s);
+        total = running_s(c, now_s, &running_log_sd);
+        double rest = total * (1.0 - c->from_share) - (now_s - c->from_s);
         sum = fmax(rest, 0.5 * (1.0 - share) * total);
         var = total * running_log_sd * total * running_log_sd * (1.0 - share) * (1.0 - share);
     }
@@ -171,6 +187,8 @@ static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
     *sd_s = sqrt(var);
     return sum;
 }
+
+double job_clock_expected_s(const struct job_clock *c, size_t i) { return expected_s(c, &c->stage[i]); }
 
 /* Time that the job has taken, with the expected time of what earlier attempts did. */
 static double taken_s(const struct job_clock *c, double now_s)

@@ -3,7 +3,9 @@
  *
  * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which the finished stages of
  * this job were slower than expected. While it runs, that is combined with its elapsed time over the share of its time
- * that has passed at its fraction, each weighted by its uncertainty (logarithms of times are taken to be normal). The
+ * that has passed at its fraction, each weighted by its uncertainty (logarithms of times are taken to be normal). A
+ * stage that predicts its own end (a fit) has a fraction that runs evenly with time; what earlier jobs took of their
+ * budget says little about this one, and nothing about the speed of other stages. The
  * stated fraction of the job is elapsed time over elapsed and remaining time; it never falls, and it rises by at most
  * JOB_CLOCK_STEP between two looks. Times are of the monotonic clock, in seconds. Not thread-safe. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
@@ -21,6 +23,7 @@ struct job_clock_stage {
     bool planned, began, ended, loaded; /* loaded: an earlier attempt has done it */
     size_t i_of_plus_one;               /* its units are a share of that stage's time; 0: they are not */
     bool own_speed;                     /* its units are seconds by this job's own speed: the factor is not applied */
+    bool predicts_end;                  /* job_clock_work.predicts_end */
     double units, expected_s, log_sd;
     double wall_s;                       /* of an ended stage */
     double passed_s[SPEED_CURVE_POINTS]; /* time at which its fraction reached (k + 1) / SPEED_CURVE_POINTS */
@@ -43,16 +46,25 @@ struct job_clock_look {
     double eta_low_s, eta_high_s; /* two standard deviations either way; NaN where that is less than a quarter */
 };
 
+/* What a stage has to do: units > 0, of which one takes about usual_s seconds where no speed is remembered under the
+ * key. log_sd: standard deviation of the logarithm of a stage's time between jobs of all kinds. */
+struct job_clock_work {
+    const char *key;
+    double units, usual_s, log_sd;
+    bool predicts_end; /* its fraction is that of the work that the stage itself expects */
+};
+
 /* book: copied. */
 void job_clock_init(struct job_clock *c, size_t n_stage, const struct speed_book *book, double now_s);
-/* States the work of stage i, which has not begun: units > 0, of which one takes about usual_s seconds where no speed
- * is remembered under the key. */
-void job_clock_plan(struct job_clock *c, size_t i, const char *key, double units, double usual_s);
+/* States the work of stage i, which has not begun. */
+void job_clock_plan(struct job_clock *c, size_t i, const struct job_clock_work *work);
 /* The same, where units are seconds by the speed that this job has shown. */
 void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double seconds);
 /* The same, where the stage takes about a share of the time of the earlier stage i_of. */
 void job_clock_plan_share(struct job_clock *c, size_t i, const char *key, double share, size_t i_of);
 
+/* Seconds that a stage is expected to take by what is known without its own progress; 0 where it is not planned. */
+double job_clock_expected_s(const struct job_clock *c, size_t i);
 void job_clock_begin(struct job_clock *c, size_t i, double now_s);
 void job_clock_fraction(struct job_clock *c, double stage_fraction, double now_s);
 /* From here on the running stage is measured anew. */

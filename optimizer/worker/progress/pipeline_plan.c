@@ -1,7 +1,10 @@
 #include "optimizer/worker/progress/pipeline_plan.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/stage_table.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/fit/pipeline_correction.h"
+#include "optimizer/worker/stages/fit/pipeline_scan_error.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "optimizer/worker/stages/result/pipeline_validation.h"
 
 #include <math.h>
@@ -9,12 +12,18 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* Seconds that a unit takes on one thread of a common processor of 2020, for a machine that has run no job yet. */
-static const double read_s_per_voxel = 3e-8, orientation_s_per_voxel = 1.2e-6, fibers_s_per_voxel = 1.6e-6,
-                    transfer_s_per_voxel = 1e-7, fit_s_per_path = 7e-6;
-/* Of a fit with the budget of its method, the share of the paths that it takes in the mean. */
-static const double usual_budget_share = 0.8, usual_budget = 6e6;
+/* Seconds that a unit takes on one thread of a common processor of 2023, for a machine that has run no job yet: means
+ * of the demo's scan and of two real ones, which need up to 1.5 times more or less. */
+static const double read_s_per_voxel = 1e-7, orientation_s_per_voxel = 5e-7, fibers_s_per_voxel = 1e-5,
+                    transfer_s_per_voxel = 4e-7, fit_s_per_path = 9e-6;
+/* Share of the voxels that is material, before the volume is known. */
+static const double usual_material = 0.4;
+/* Of a fit with the budget of its method, the share of the paths that it takes; most take far less or nearly all. Of
+ * the time of the stage, the share of the fit where a scan's errors are carried on. */
+static const double usual_budget_share = 0.35, usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
 static const double report_s_per_voxel = 2e-7, least_s = 0.05;
+/* Standard deviations of the logarithm of a time where no job has been run. */
+static const double sd_of_voxels = 0.4, sd_of_fit = 0.8, sd_of_rest = 0.5;
 
 /* Voxels of the scan: as read, or by the size of its files, which have one or two bytes a voxel. */
 static double n_voxel(const struct pipeline_context *c)
@@ -31,10 +40,18 @@ static double n_voxel(const struct pipeline_context *c)
 
 static double n_thread(const struct pipeline_context *c) { return (double)thread_pool_n_thread(c->pool); }
 
-/* A stage that goes through the voxels. */
-static void plan_voxels(struct pipeline_context *c, size_t i, const char *key, double s_per_voxel)
+/* A stage that goes through n voxels. */
+static void plan_voxels(struct pipeline_context *c, size_t i, const char *key, double n, double s_per_voxel)
 {
-    worker_status_plan(c->status, i, key, n_voxel(c) / n_thread(c), s_per_voxel);
+    const struct job_clock_work work = {
+        .key = key, .units = n / n_thread(c), .usual_s = s_per_voxel, .log_sd = sd_of_voxels};
+    worker_status_plan(c->status, i, &work);
+}
+
+/* Voxels of material, of which there are fibers to trace. */
+static double n_material(const struct pipeline_context *c)
+{
+    return c->geometry.n_material_voxel > 0 ? (double)c->geometry.n_material_voxel : usual_material * n_voxel(c);
 }
 
 /* ---- the fit and what follows it ---- */
@@ -47,19 +64,27 @@ static const char *kind_of_fit(const struct pipeline_context *c)
     return c->doc->has_volume ? "+scan" : "";
 }
 
+static double path_budget(const struct pipeline_context *c)
+{
+    const struct method_info *method = method_catalogue_find(c->doc->method);
+    if (c->doc->path_budget > 0) return (double)c->doc->path_budget;
+    return method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget : usual_budget;
+}
+
 static void plan_fit(struct pipeline_context *c, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
-    const struct method_info *method = method_catalogue_find(c->doc->method);
-    double budget = c->doc->path_budget > 0                             ? (double)c->doc->path_budget
-                    : method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget
-                                                                        : usual_budget;
     snprintf(key, sizeof key, "fit.%.40s%s", c->doc->method, kind_of_fit(c));
-    worker_status_plan(c->status, i, key, budget * (double)c->n_model / n_thread(c),
-                       fit_s_per_path * usual_budget_share);
+    const struct job_clock_work work = {.key = key,
+                                        .units = path_budget(c) * (double)c->n_model / n_thread(c),
+                                        .usual_s = fit_s_per_path * usual_budget_share,
+                                        .log_sd = sd_of_fit,
+                                        .predicts_end = true};
+    worker_status_plan(c->status, i, &work);
+    c->fit_path = fmax(worker_status_expected_s(c->status, i) * n_thread(c) / fit_s_per_path, 1.0);
 }
 
-/* Seconds that a path has taken in this job's fits; NaN before them. */
+/* Seconds that a path has taken in this job's fits; NaN before their end. */
 static double s_per_path(const struct pipeline_context *c)
 {
     double n = 0.0, s = 0.0;
@@ -70,48 +95,68 @@ static double s_per_path(const struct pipeline_context *c)
     return n > 0.0 ? s / n : NAN;
 }
 
-/* A stage after the fit, stage i_fit: n_path paths, or, before the fit has ended, a share of the fit's time. */
-static void plan_after_fit(struct pipeline_context *c, size_t i, size_t i_fit, double n_path, double share)
+/* Paths of a model's fit: of the best one after the fit, before it those that are expected. */
+static double fit_paths(const struct pipeline_context *c)
 {
-    static const char *const key[] = {"validation", "report"};
-    const double path_s = s_per_path(c);
-    if (isfinite(path_s))
-        worker_status_plan_own(c->status, i, key[i - i_fit - 1], fmax(n_path * path_s, least_s));
-    else
-        worker_status_plan_share(c->status, i, key[i - i_fit - 1], share, i_fit);
+    const double n_model = (double)c->n_model, of_fit = c->doc->has_volume ? fit_share : 1.0;
+    if (isfinite(s_per_path(c))) return (double)c->model[pipeline_best_model(c)].fit.n_path;
+    return of_fit * c->fit_path / n_model;
 }
 
 /* Paths of all renderings together. */
 static double picture_paths(const struct pipeline_context *c)
 {
     const double px = (double)c->doc->render_px;
-    return px * px * (double)c->observation.n * (double)result_picture_samples(c);
+    return px * px * (double)c->observation.n * (double)result_picture_samples(c, fit_paths(c));
 }
 
-static void plan_report(struct pipeline_context *c, size_t i)
+static double validation_paths(const struct pipeline_context *c)
 {
-    if (job_document_geometry_only(c->doc))
-        plan_voxels(c, i, "report.geometry", report_s_per_voxel);
+    return (double)c->n_model * pipeline_validation_paths(c, fit_paths(c));
+}
+
+/* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
+static void plan_after_fit(struct pipeline_context *c, size_t i, size_t i_fit, double n_path)
+{
+    static const char *const key[] = {"validation", "report"};
+    const char *const own = key[i - i_fit - 1];
+    const double path_s = s_per_path(c), of_fit = c->doc->has_volume ? fit_share : 1.0;
+    if (isfinite(path_s))
+        worker_status_plan_own(c->status, i, own, fmax(n_path * path_s, least_s));
     else
-        plan_after_fit(c, i, i - 2, picture_paths(c), 0.5);
+        worker_status_plan_share(c->status, i, own, n_path * of_fit / ((double)c->n_model * fit_paths(c)), i_fit);
+}
+
+void pipeline_plan_fit_paths(struct pipeline_context *c, double n_path)
+{
+    size_t n_stage;
+    const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
+    if (!(c->stage_fraction > 0.0)) return;
+    c->fit_path = n_path / c->stage_fraction;
+    for (size_t i = 0; i < n_stage; i++)
+        if (strcmp(info[i].name, "validation") == 0 || strcmp(info[i].name, "report") == 0)
+            pipeline_plan_stage(c, info[i].name, i);
 }
 
 void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
 {
+    const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest};
     if (strcmp(name, "volume") == 0)
-        plan_voxels(c, i, "volume", read_s_per_voxel);
+        plan_voxels(c, i, "volume", n_voxel(c), read_s_per_voxel);
     else if (strcmp(name, "orientation") == 0)
-        plan_voxels(c, i, "orientation", orientation_s_per_voxel);
+        plan_voxels(c, i, "orientation", n_voxel(c), orientation_s_per_voxel);
     else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
-        plan_voxels(c, i, "fibers", fibers_s_per_voxel);
+        plan_voxels(c, i, "fibers.material", n_material(c), fibers_s_per_voxel);
     else if (strcmp(name, "directions") == 0)
-        plan_voxels(c, i, "directions", transfer_s_per_voxel);
+        plan_voxels(c, i, "directions.material", n_material(c), transfer_s_per_voxel);
     else if (strcmp(name, "fit") == 0)
         plan_fit(c, i);
     else if (strcmp(name, "validation") == 0)
-        plan_after_fit(c, i, i - 1, pipeline_validation_paths(c), 0.4);
+        plan_after_fit(c, i, i - 1, validation_paths(c));
+    else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
+        plan_voxels(c, i, "report.geometry", n_voxel(c), report_s_per_voxel);
     else if (strcmp(name, "report") == 0)
-        plan_report(c, i);
+        plan_after_fit(c, i, i - 2, picture_paths(c));
     else
-        worker_status_plan(c->status, i, name, 1.0, least_s);
+        worker_status_plan(c->status, i, &rest);
 }

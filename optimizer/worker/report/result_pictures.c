@@ -134,11 +134,11 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
  * within these bounds: pictures do not cost more than the fit. */
 static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0;
 
-size_t result_picture_samples(const struct pipeline_context *c)
+size_t result_picture_samples(const struct pipeline_context *c, double n_fit_path)
 {
     if (c->doc->render_sample > 0) return c->doc->render_sample;
     const double px = (double)c->doc->render_px, n = (double)c->observation.n;
-    double paths = picture_share * (double)c->model[pipeline_best_model(c)].fit.n_path;
+    double paths = picture_share * n_fit_path;
     return (size_t)fmin(fmax(floor(paths / (px * px * n)), least_sample), most_sample);
 }
 
@@ -155,7 +155,7 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
         .configuration = &c->observation.item[i].configuration,
         .width = c->doc->render_px,
         .height = c->doc->render_px,
-        .n_sample = result_picture_samples(c),
+        .n_sample = result_picture_samples(c, (double)c->model[pipeline_best_model(c)].fit.n_path),
         .seed = c->doc->seed ^ 0x70696374757265u,
         .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);

@@ -11,8 +11,9 @@ status result_geometry_write(struct pipeline_context *c, struct error *err);
 /* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
 status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width,
                             size_t height, struct error *err);
-/* Samples a pixel of the renderings: those of the job document, or as many as the fit's cost allows. After the fit. */
-size_t result_picture_samples(const struct pipeline_context *c);
+/* Samples a pixel of the renderings: those of the job document, or as many as the cost of the best model's fit allows,
+ * which has taken n_fit_path. */
+size_t result_picture_samples(const struct pipeline_context *c, double n_fit_path);
 /* renderings/<name>.exr and .png, and photographs/<name>.png, for every observation. base: share of the stage that was
  * done before, from which progress is reported. */
 status result_renderings_write(struct pipeline_context *c, double base, struct error *err);

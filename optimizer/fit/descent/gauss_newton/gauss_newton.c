@@ -26,7 +26,6 @@ enum {
 
 /* No iteration takes more than this share of the budget, so that several large ones see the end point. */
 static const double largest_share = 0.1;
-static const double pull_until = 40000.0;     /* effective paths from which on there is no pull */
 static const double least_limit = 1.0 / 32.0; /* smallest factor of the step limits */
 
 /* Parameters in internal units at the fit coordinates x. */
@@ -127,7 +126,7 @@ static void release_pull(struct gauss_newton *g, size_t max_iteration)
 {
     bool half = 2 * g->run.n_path_total >= g->run.path_budget || 2 * (g->run.n_step + 1) > max_iteration, silent = true;
     for (size_t row = 0; row < g->model.n_row; row++) silent = silent && !(g->model.weight[row] > 0.0);
-    if (g->model.n_effective >= pull_until || half || silent) g->pulls = false;
+    if (g->model.n_effective >= GAUSS_NEWTON_PULL_UNTIL || half || silent) g->pulls = false;
 }
 
 /* Ends the fit at the point with the lowest objective, because the last step has not been tried. */
@@ -179,7 +178,10 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         if ((result->converged && precise) || g->at_misfit)
             g->pulls = false; /* the fit has arrived with the pull, and goes on without it */
         bool paths_left = plan_paths(g, clear, problem->observation->n);
-        if (g->run.n_step < max_iteration && paths_left) continue;
+        if (g->run.n_step < max_iteration && paths_left) {
+            g->run.n_path_expected = gauss_newton_expected_paths(g, f, se, max_iteration - g->run.n_step);
+            continue;
+        }
         const struct gauss_newton_end at = {.used_up = paths_left ? STOP_ITERATIONS : STOP_PATH_BUDGET,
                                             .arrived = arrived,
                                             .failed = failed,

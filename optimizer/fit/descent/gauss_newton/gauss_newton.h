@@ -1,11 +1,14 @@
-/* Inside descent/: the state of gauss_newton.v1, which its three files share: gauss_newton.c (iterations and paths),
- * gauss_newton_step.c (the next step) and gauss_newton_stop.c (when the fit ends). f is the objective, sum of r^2. */
+/* Inside descent/: the state of gauss_newton.v1, which its four files share: gauss_newton.c (iterations and paths),
+ * gauss_newton_step.c (the next step), gauss_newton_stop.c (when the fit ends) and gauss_newton_outlook.c (when it is
+ * expected to). f is the objective, sum of r^2. */
 #ifndef SELVEDGE_OPTIMIZER_GAUSS_NEWTON_H
 #define SELVEDGE_OPTIMIZER_GAUSS_NEWTON_H
 
 #include "optimizer/fit/descent/descent_methods.h"
 
 enum { N = FIT_MAX_PARAM };
+/* Effective paths from which on there is no pull. */
+#define GAUSS_NEWTON_PULL_UNTIL 40000.0
 
 struct gauss_newton {
     struct descent_run run;
@@ -63,6 +66,16 @@ void gauss_newton_judge_progress(struct gauss_newton *g, double f, double se);
 bool gauss_newton_ends_at_misfit(const struct gauss_newton *g);
 /* Fills in stop and reason of such a fit. */
 void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double se, struct fit_result *result);
+
+/* Factor by which the paths of the pooled means must grow until their noise ends the fit: 1 or less where it is good
+ * enough. INFINITY where neither a target nor the photographs' errors can be reached. */
+double gauss_newton_paths_to_grow(const struct gauss_newton *g, double f, double se);
+/* Factor by which they must grow until it is plain that misfit makes the residuals. INFINITY where, by the decrease
+ * that is predicted, it will not. */
+double gauss_newton_paths_to_misfit(const struct gauss_newton *g);
+/* Paths that the whole fit is expected to take, between those of the next iteration and the budget: a prediction for
+ * its progress alone. f is the objective with noise se. n_left: iterations that are allowed. */
+double gauss_newton_expected_paths(const struct gauss_newton *g, double f, double se, size_t n_left);
 
 /* Fills in stop and reason of a fit that ended because it had arrived. precise: gauss_newton_precise; otherwise it is
  * as good as the photographs. */

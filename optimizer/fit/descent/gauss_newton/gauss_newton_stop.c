@@ -57,6 +57,23 @@ static double noise_ratio(const struct gauss_newton *g)
     return g->noise * (double)g->model.n_row / photograph;
 }
 
+double gauss_newton_paths_to_grow(const struct gauss_newton *g, double f, double se)
+{
+    double precise =
+        2.0 * (double)g->n_free * linear_model_mean_noise(&g->model) / good_enough(g, fmax(0.0, f - 2.0 * se));
+    if (g->run.problem->path_budget > 0) return precise;
+    return fmin(precise, fmax(noise_ratio(g) / photograph_share, least_effective / g->model.n_effective));
+}
+
+double gauss_newton_paths_to_misfit(const struct gauss_newton *g)
+{
+    const struct linear_model *m = &g->model;
+    const bool stalled = !g->pulls && g->n_stalled > 0;
+    double photograph = 0.0, left = linear_model_weighted_objective(m) - (stalled ? 0.0 : g->far_decrease);
+    for (size_t row = 0; row < m->n_row; row++) photograph += m->weight[row] * m->photograph_var[row];
+    return left > photograph ? g->noise_decrease / (end_noise_share * left) : INFINITY;
+}
+
 bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g)
 {
     return g->run.problem->path_budget == 0 && g->model.n_effective >= least_effective &&

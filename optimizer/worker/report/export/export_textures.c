@@ -8,6 +8,7 @@
 #include "optimizer/worker/report/export/texture_documents.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "renderer/transport/render.h"
 
 #include <math.h>
@@ -46,7 +47,8 @@ static status render_tile(const struct textures *t, bool black_sheet, struct ima
                                         .crop_m = size_m[0],
                                         .crop_aspect = size_m[0] / size_m[1]};
     struct scene *scene = NULL;
-    const size_t n_sample = SAMPLES_OF_A_RENDERING * result_picture_samples(c);
+    const size_t n_sample =
+        SAMPLES_OF_A_RENDERING * result_picture_samples(c, (double)c->model[pipeline_best_model(c)].fit.n_path);
     status s = scene_new(&c->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
     if (s != STATUS_OK) return s;
     const struct render_request q = {

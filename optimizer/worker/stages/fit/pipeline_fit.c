@@ -1,6 +1,7 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/worker/progress/pipeline_plan.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/fit/pipeline_correction.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
@@ -32,6 +33,9 @@ static status on_step(void *context, const struct fit_step *step, struct error *
     struct fit_listener *l = context;
     struct pipeline_context *c = l->pipeline;
     bool replayed = estimate_journal_replaying(l->journal);
+    double n_path = (double)step->n_path_total;
+    for (size_t i = 0; i < c->n_model; i++) n_path += i != l->i_model ? (double)c->model[i].fit.n_path : 0.0;
+    pipeline_plan_fit_paths(c, n_path);
     worker_status_objective(c->status, l->step_base + step->step, step->objective.value, step->objective.se);
     if (replayed)
         worker_status_restart_eta(c->status);

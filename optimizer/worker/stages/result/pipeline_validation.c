@@ -31,18 +31,11 @@ static double relative_path_variance(const struct observation *o, const struct e
     return (double)pilot->n_path * largest / (a * a);
 }
 
-static double validation_budget(const struct pipeline_context *c, const struct pipeline_model *m)
+double pipeline_validation_paths(const struct pipeline_context *c, double n_fit_path)
 {
     double least =
         c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
-    return fmax(validation_share * (double)m->fit.n_path, least);
-}
-
-double pipeline_validation_paths(const struct pipeline_context *c)
-{
-    double n = 0.0;
-    for (size_t i = 0; i < c->n_model; i++) n += validation_budget(c, &c->model[i]);
-    return n;
+    return fmax(validation_share * n_fit_path, least);
 }
 
 /* Plans the paths per replica so that both together reach validation_rel_se. When the budget is short, all rows get
@@ -55,7 +48,7 @@ static void plan_validation(const struct pipeline_context *c, const struct pipel
         if (c->observation.item[i].weight > 0.0)
             total +=
                 relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
-    double shrink = fmin(1.0, validation_budget(c, m) / fmax(total, 1.0));
+    double shrink = fmin(1.0, pipeline_validation_paths(c, (double)m->fit.n_path) / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
         double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
                    (validation_rel_se * validation_rel_se);

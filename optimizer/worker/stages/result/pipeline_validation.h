@@ -4,8 +4,8 @@
 
 #include "optimizer/worker/pipeline_context.h"
 
-/* Paths that the validation of all models may take, after the fit. It takes fewer where rendered means become precise
- * enough with less. */
-double pipeline_validation_paths(const struct pipeline_context *c);
+/* Paths that the validation of a model may take whose fit has taken n_fit_path. It takes fewer where rendered means
+ * become precise enough with less. */
+double pipeline_validation_paths(const struct pipeline_context *c, double n_fit_path);
 
 #endif

@@ -97,6 +97,60 @@ static void test_progress(void **state)
     }
 }
 
+/* The fractions that a fit reports, and its paths at each step. */
+struct course {
+    status (*inner)(void *context, const struct fit_step *step, struct error *err);
+    void *context;
+    double fraction, n_path[64], at[64];
+    size_t n;
+};
+
+static void follow(void *context, double fraction) { ((struct course *)context)->fraction = fraction; }
+
+static status keep_step(void *context, const struct fit_step *step, struct error *err)
+{
+    struct course *k = context;
+    if (k->n < 64) {
+        k->n_path[k->n] = (double)step->n_path_total;
+        k->at[k->n++] = k->fraction;
+    }
+    return k->inner(k->context, step, err);
+}
+
+/* A fit that ends long before its budget, by its noise or at a misfit, knows so after half of its paths. */
+static void test_the_fraction_of_an_early_end(void **state)
+{
+    (void)state;
+    for (int misfit = 0; misfit < 2; misfit++) {
+        struct descent_fixture x;
+        struct fit_result r;
+        descent_fixture_init(&x, 3, 0);
+        for (size_t i = 0; i < x.observation.n; i++)
+            for (size_t c = 0; c < 3; c++) {
+                struct observation *o = &x.observation.item[i];
+                if (misfit)
+                    o->mean_rgb[c] *= (i + c) % 2 ? 1.2 : 0.9; /* of which no parameters make every other row */
+                else
+                    o->se_rgb[c] *= 10.0; /* large enough for tracing to become as good as the photographs */
+            }
+        struct course k = {.inner = x.problem.report, .context = x.problem.report_context};
+        const struct progress progress = {.report = follow, .context = &k};
+        x.problem.report = keep_step;
+        x.problem.report_context = &k;
+        x.problem.progress = &progress;
+        descent_fixture_run(&x, descent_find("gauss_newton.v1"), &r);
+        print_message("%s: %zu steps, %.2f of the budget, stop %d\n", misfit ? "misfit" : "noise", r.n_step,
+                      (double)r.n_path / (double)method_gauss_newton.default_path_budget, (int)r.stop);
+        assert_true((double)r.n_path < 0.85 * (double)method_gauss_newton.default_path_budget);
+        for (size_t i = 0; i < k.n; i++) {
+            double share = k.n_path[i] / (double)r.n_path;
+            print_message("  %.2f of the paths: fraction %.2f\n", share, k.at[i]);
+            if (share > 0.45) assert_true(k.at[i] > 0.6 * share && k.at[i] < 1.6 * share);
+        }
+        observation_set_release(&x.observation);
+    }
+}
+
 /* With a smaller budget a method uses as many paths as it states as its least budget. With its least budget it does not
  * use more. */
 static void test_least_budget(void **state)
@@ -219,10 +273,15 @@ static void test_bad_problems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kind_of_paths),     cmocka_unit_test(test_progress),
-        cmocka_unit_test(test_least_budget),      cmocka_unit_test(test_every_method_recovers),
-        cmocka_unit_test(test_fixed_and_bounds),  cmocka_unit_test(test_every_method_repeats),
-        cmocka_unit_test(test_bounded_quadratic), cmocka_unit_test(test_bad_problems),
+        cmocka_unit_test(test_kind_of_paths),
+        cmocka_unit_test(test_progress),
+        cmocka_unit_test(test_the_fraction_of_an_early_end),
+        cmocka_unit_test(test_least_budget),
+        cmocka_unit_test(test_every_method_recovers),
+        cmocka_unit_test(test_fixed_and_bounds),
+        cmocka_unit_test(test_every_method_repeats),
+        cmocka_unit_test(test_bounded_quadratic),
+        cmocka_unit_test(test_bad_problems),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -37,15 +37,21 @@ static double run_stage(struct job_clock *c, size_t i, double *now_s, double sec
     return worst;
 }
 
+static void plan(struct job_clock *c, size_t i, const char *key, double units, double usual_s)
+{
+    const struct job_clock_work work = {.key = key, .units = units, .usual_s = usual_s, .log_sd = 0.8};
+    job_clock_plan(c, i, &work);
+}
+
 /* A job of two stages of 30 s and 70 s, `slower` times as long. */
 static double run_job(struct speed_book *book, double slower, struct job_clock *c)
 {
     double now_s = 0.0, worst;
     job_clock_init(c, 2, book, now_s);
-    job_clock_plan(c, 0, "first", 1000.0, 0.001);
-    job_clock_plan(c, 1, "second", 10.0, 100.0);
+    plan(c, 0, "first", 1000.0, 0.001);
+    plan(c, 1, "second", 10.0, 100.0);
     worst = run_stage(c, 0, &now_s, 30.0 * slower, 2.0, 100.0 * slower);
-    job_clock_plan(c, 1, "second", 10.0, 100.0);
+    plan(c, 1, "second", 10.0, 100.0);
     worst = fmax(worst, run_stage(c, 1, &now_s, 70.0 * slower, 0.5, 100.0 * slower));
     job_clock_remember(c, book);
     return worst;
@@ -64,6 +70,57 @@ static void test_remembered_speeds_predict_the_next_job(void **state)
     assert_true(run_job(&book, 1.2, &c) < 1.25); /* another program runs beside it */
 }
 
+/* A fraction that waits for 60 of 100 s, as between the parts of a stage: once that is known, the remaining time
+ * falls with the time. */
+static double waiting_job(struct speed_book *book, struct job_clock *c)
+{
+    double worst = 1.0;
+    job_clock_init(c, 1, book, 0.0);
+    plan(c, 0, "waits", 100.0, 1.0);
+    job_clock_begin(c, 0, 0.0);
+    for (int t = 1; t < 100; t++) {
+        job_clock_fraction(c, t < 20 ? 0.02 * t : t < 80 ? 0.42 : 0.42 + 0.029 * (t - 80), t);
+        double eta = job_clock_look(c, t).eta_s, rest = 100.0 - t;
+        if (t > 10 && t < 97) worst = fmax(worst, fmax(eta, rest) / fmin(eta, rest));
+    }
+    job_clock_fraction(c, 1.0, 100.0);
+    job_clock_end(c, false, 100.0);
+    job_clock_remember(c, book);
+    return worst;
+}
+
+static void test_a_fraction_that_waits(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    book = empty;
+    double first = waiting_job(&book, &c), second = waiting_job(&book, &c);
+    print_message("worst factor %.2f, then %.2f\n", first, second);
+    assert_true(first > 2.0 && second < 1.2);
+}
+
+/* A stage that predicts its own end overrules what earlier ones took, and makes the other stages no slower. */
+static void test_a_stage_that_predicts_its_end(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    book = empty;
+    const struct job_clock_work fit = {
+        .key = "fit", .units = 100.0, .usual_s = 1.0, .log_sd = 0.8, .predicts_end = true};
+    job_clock_init(&c, 2, &book, 0.0);
+    job_clock_plan(&c, 0, &fit);
+    plan(&c, 1, "after", 10.0, 1.0);
+    job_clock_begin(&c, 0, 0.0);
+    job_clock_fraction(&c, 0.5, 10.0); /* 20 s, not 100 s */
+    double eta = job_clock_look(&c, 10.0).eta_s;
+    assert_true(eta > 19.0 && eta < 27.0);
+    job_clock_fraction(&c, 1.0, 20.0);
+    job_clock_end(&c, false, 20.0);
+    assert_true(fabs(job_clock_expected_s(&c, 1) - 10.0) < 1e-9);
+}
+
 static void test_nothing_known_is_a_range(void **state)
 {
     (void)state;
@@ -72,13 +129,13 @@ static void test_nothing_known_is_a_range(void **state)
     book = empty;
     job_clock_init(&c, 1, &book, 0.0);
     assert_true(isnan(job_clock_look(&c, 0.0).eta_s));
-    job_clock_plan(&c, 0, "only", 100.0, 1.0);
+    plan(&c, 0, "only", 100.0, 1.0);
     job_clock_begin(&c, 0, 0.0);
     struct job_clock_look look = job_clock_look(&c, 0.0);
     assert_true(look.eta_s > 50.0 && look.eta_low_s < 0.5 * look.eta_s && look.eta_high_s > 2.0 * look.eta_s);
     for (int k = 0; k < 5; k++) run_job(&book, 1.0, &c);
     job_clock_init(&c, 1, &book, 0.0);
-    job_clock_plan(&c, 0, "first", 1000.0, 1.0);
+    plan(&c, 0, "first", 1000.0, 1.0);
     job_clock_begin(&c, 0, 0.0);
     look = job_clock_look(&c, 0.0);
     assert_true(fabs(look.eta_s - 30.0) < 0.1 && isnan(look.eta_low_s) == (isnan(look.eta_high_s)));
@@ -93,8 +150,8 @@ static void test_a_resumed_job(void **state)
     book = empty;
     for (int k = 0; k < 3; k++) run_job(&book, 1.0, &c);
     job_clock_init(&c, 2, &book, 0.0);
-    job_clock_plan(&c, 0, "first", 1000.0, 1.0);
-    job_clock_plan(&c, 1, "second", 10.0, 1.0);
+    plan(&c, 0, "first", 1000.0, 1.0);
+    plan(&c, 1, "second", 10.0, 1.0);
     job_clock_begin(&c, 0, 0.0);
     job_clock_end(&c, true, 0.01);
     job_clock_begin(&c, 1, 0.01);
@@ -166,6 +223,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_remembered_speeds_predict_the_next_job),
+        cmocka_unit_test(test_a_fraction_that_waits),
+        cmocka_unit_test(test_a_stage_that_predicts_its_end),
         cmocka_unit_test(test_nothing_known_is_a_range),
         cmocka_unit_test(test_a_resumed_job),
         cmocka_unit_test_setup_teardown(test_the_book_is_a_file, scratch_folder_setup, scratch_folder_teardown),
