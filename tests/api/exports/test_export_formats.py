@@ -222,7 +222,7 @@ def test_volumes_of_a_scan(tmp_path):
     seen = by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), made / "density.vol", made / "direction.vol")
     assert json.loads(seen) == pytest.approx([max(density), max(direction)])
     place = [(index + 0.5) / n for index, n in zip((voxel % size[0], voxel // size[0] % size[1], voxel // (size[0] * size[1])), size)]
-    flakes = json.loads(by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_sggx.py"), made / "sggx.vol",
+    flakes = json.loads(by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), "flakes", made / "sggx.vol",
                                   made / "density.vol", *place, *t))
     assert flakes["areas"] == pytest.approx([math.sqrt(1 - taken), 1, 1], abs=1e-3)
     assert 0.1 < flakes["radiance"] < 1
