@@ -80,8 +80,13 @@ static void test_weights(void **state)
     for (size_t k = 0; k < 3; k++) {
         make_rows(&rows, 8, error[k]);
         expect(&rows, strength[k], &e, &out);
-        double sum = 0.0;
-        for (size_t i = 0; i < out.n; i++) sum += out.item[i].weight;
+        double sum = 0.0, least = INFINITY, most = 0.0;
+        for (size_t i = 0; i < out.n; i++) {
+            sum += out.item[i].weight;
+            least = fmin(least, out.item[i].weight);
+            most = fmax(most, out.item[i].weight);
+        }
+        assert_true(least < 0.7 * most); /* the BRDF is not equally sure everywhere */
         count[k] = e.count;
         assert_true(fabs(sum - e.count) < 1e-9 * sum);
         observation_set_release(&out);
@@ -207,7 +212,7 @@ static void test_a_fit_listens(void **state)
                   sqrt(deaf.uncertainty.misfit_var), sqrt(listening.uncertainty.misfit_var));
     assert_true(with < 0.5 * without);
     assert_int_equal(listening.cross_validation.n_row, deaf.cross_validation.n_row);
-    assert_true(sqrt(listening.uncertainty.misfit_var) > 0.03); /* the 5 % of the measured rows */
+    assert_true(sqrt(listening.uncertainty.misfit_var) > 0.05); /* that of the measured rows alone */
 }
 
 /* Where the folds expect something else than the fit, rows that are left out are predicted from that. */
