@@ -1,6 +1,6 @@
 """How well are measured fabrics reproduced by described cloths? Prints figures cloth.*, one JSON object on a line.
 
-    bench_cloth.py [--build DIR] [--keep DIR] [--tables DIR] [--models IDS] [WHAT ...]
+    bench_cloth.py [--build DIR] [--keep DIR] [--tables DIR] [--models IDS] [--plain-prior X] [WHAT ...]
 
 WHAT: names of tables or of recoveries; default: everything. All tables go through the same procedure: one job for each
 of the descriptions in DESCRIPTIONS, whose cloth numbers are fitted together with the scattering parameters. The job
@@ -308,7 +308,7 @@ def main():
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
     parser.add_argument("--models", default="textile.v3", help="scattering models, separated by commas; several: the worker chooses by cross-validation")
     parser.add_argument("--path-budget", type=int, default=6000000)
-    parser.add_argument("--plain-prior", type=float, default=0, help="option plain_prior of the tables' jobs")
+    parser.add_argument("--plain-prior", type=float, default=1, help="fit.plain_prior of the tables' jobs")
     parser.add_argument("--recovery-budget", type=int, default=18000000, help="paths of a recovery")
     parser.add_argument("--recovery-model", default="textile.v3", help="model of the recoveries")
     parser.add_argument("what", nargs="*", help="tables or recoveries")
