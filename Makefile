@@ -14,7 +14,7 @@ ifeq ($(ARCH),x86_64)
 MACHINE ?= -march=x86-64-v3
 endif
 
-PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt zlib libzstd libarchive libpng libjpeg libraw_r libcurl
+PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt zlib libzstd libarchive libpng libjpeg libraw_r libcurl libseccomp
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ') -isystem /usr/include/opencv4
 # fields left out of an initialiser are zero, and zero is made to mean the usual thing
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-missing-field-initializers
@@ -25,7 +25,8 @@ WARN_C := $(WARN) -Wconversion -Wstrict-prototypes
 WERROR ?= -Werror
 COMMON := -g $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. $(PKG_CFLAGS) $(WERROR)
 ifneq ($(SANITIZE),)
-COMMON += -fsanitize=$(SANITIZE) -fno-omit-frame-pointer
+# the sanitizers need more than the sandbox of a worker permits
+COMMON += -fsanitize=$(SANITIZE) -fno-omit-frame-pointer -DSELVEDGE_NO_SANDBOX
 LDFLAGS += -fsanitize=$(SANITIZE)
 # gcc 12 reports overflows of arrays [2][2] that are none once the sanitizer's checks are part of the code
 ifeq ($(findstring clang,$(CC)),)
@@ -52,7 +53,7 @@ PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-w
 LINK_BASE := -lz -lm -pthread
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
-LINK_OPTIMIZER := -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
+LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
 .PHONY: all generate deps help check test nightly demo demo-camera night clean

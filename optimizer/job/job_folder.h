@@ -10,6 +10,7 @@
  *   JOB/series.rec          record file (durable.h), append-only: one JSON object for each step of the fit
  *   JOB/log.txt             the worker's log, append-only
  *   JOB/work/<stage>/       checkpoints of a stage; JOB/work/<stage>.done marks a stage whose outputs are complete
+ *   JOB/adopted/            links to another job's geometry, until they are in work/
  *   JOB/results/            the results for the user: result.json, *.hair, *.vol, renderings
  *
  * Keys of status.json:
@@ -39,6 +40,7 @@
 #define JOB_FILE_LOG "log.txt"
 #define JOB_FOLDER_INPUT "input"
 #define JOB_FOLDER_WORK "work"
+#define JOB_FOLDER_ADOPTED "adopted"
 #define JOB_FOLDER_RESULTS "results"
 
 /* Exit codes of the worker. */

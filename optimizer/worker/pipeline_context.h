@@ -32,6 +32,7 @@
 #include "renderer/transport/derivative_check.h"
 
 #include <jansson.h>
+#include <sys/types.h>
 
 /* Fresh estimates at the fitted parameters: two replicas of every observation, in the order of `observation`. */
 struct validation {
@@ -120,11 +121,18 @@ struct pipeline_texture {
     char taken[PIPELINE_TEXTURE_MAX_TAKEN][MODEL_SET_TEXT_BYTES];
 };
 
+/* The process that will make report.pdf (report_pdf.h). */
+struct pdf_helper {
+    pid_t pid;    /* 0: none */
+    int order_fd; /* a byte written here starts it */
+};
+
 struct pipeline_context {
     const struct worker_folder *folder; /* not owned, as the next three */
     struct worker_status *status;
     struct log *log;
     struct thread_pool *pool;
+    struct pdf_helper pdf;
     size_t memory_limit_bytes;   /* of the geometry stages; 0: none */
     struct scratch_space *space; /* of volumes: JOB/work beyond that limit; NULL without one */
     struct progress progress;    /* of the running stage */

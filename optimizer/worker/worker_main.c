@@ -6,6 +6,7 @@
 #include "optimizer/worker/check/job_check.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/result_json.h"
+#include "optimizer/worker/sandbox/worker_confine.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -28,6 +29,9 @@ static const char usage[] =
     "fiber\n"
     "                     files see coarser voxels (with a warning) where a quarter of it does not hold finer ones\n"
     "  --speeds FILE      speeds of earlier jobs, by which remaining times are predicted; those of this job are added\n"
+    "  --sandbox MODE     auto (default): as far as the kernel can, keep the worker to JOBDIR and to the system calls "
+    "that\n"
+    "                     it needs; required: fail where the kernel cannot; off\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
@@ -44,6 +48,8 @@ struct arguments {
     const char *check;  /* a document to check; NULL: the job is run */
     size_t n_thread, memory_mib;
     bool quiet;
+    enum confine_mode sandbox;
+    struct confinement confinement;
 };
 
 static bool parse_count(const char *text, size_t upper, size_t *out)
@@ -85,12 +91,14 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"memory-mib", required_argument, NULL, 'm'},
                                            {"speeds", required_argument, NULL, 's'},
                                            {"check", required_argument, NULL, 'k'},
+                                           {"sandbox", required_argument, NULL, 'b'},
+                                           {"confined", required_argument, NULL, 'C'},
                                            {"quiet", no_argument, NULL, 'q'},
                                            {"help", no_argument, NULL, 'h'},
                                            {"version", no_argument, NULL, 'v'},
                                            {"catalogue", no_argument, NULL, 'c'},
                                            {NULL, 0, NULL, 0}};
-    *a = (struct arguments){.memory_mib = 2048};
+    *a = (struct arguments){.memory_mib = 2048, .sandbox = CONFINE_AUTO, .confinement.pdf.order_fd = -1};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         bool ok = true;
         switch (c) {
@@ -105,6 +113,12 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
             break;
         case 'k':
             a->check = optarg;
+            break;
+        case 'b':
+            ok = confine_mode_parse(optarg, &a->sandbox);
+            break;
+        case 'C':
+            ok = confinement_parse(optarg, &a->confinement);
             break;
         case 'q':
             a->quiet = true;
@@ -122,7 +136,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
             return WORKER_USAGE;
         }
         if (!ok) {
-            fprintf(stderr, "selvedge-worker: '%s' is not a count in the allowed range\n", optarg);
+            fprintf(stderr, "selvedge-worker: '%s' is not an allowed value\n", optarg);
             return WORKER_USAGE;
         }
     }
@@ -131,7 +145,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
         return WORKER_USAGE;
     }
     a->folder = argv[optind];
-    return a->check != NULL ? print_check(a) : -1;
+    return -1;
 }
 
 /* Handles a signal that reaches a thread which a library has started before main (OpenBLAS does, where OpenCV loads it)
@@ -209,15 +223,47 @@ static int conclude(struct worker_status *st, struct log *log, status outcome, c
     return code;
 }
 
+/* Says in the log how far the sandbox goes, and warns the job's user when the kernel lacks a part of it. */
+static status report_sandbox(struct pipeline_context *c, const struct arguments *a, const struct error *failed,
+                             struct error *err)
+{
+    char text[200];
+    bool whole = confinement_describe(&a->confinement, a->sandbox, text, sizeof text);
+    if (failed->code != STATUS_OK) {
+        *err = *failed;
+        return failed->code;
+    }
+    if (whole)
+        log_info(c->log, "%s", text);
+    else
+        worker_status_warn(c->status, "%s", text);
+    return STATUS_OK;
+}
+
+/* Enters the sandbox. Returns only in it, or without one; what then failed is an error of the job. */
+static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
+{
+    struct confinement *c = &a->confinement;
+    const struct confine_files files = {.folder = a->folder, .document = a->check, .speeds = a->speeds};
+    if (a->sandbox == CONFINE_OFF) {
+        if (a->check == NULL) worker_prepare(a->folder, c);
+        return;
+    }
+    if (!c->executed && worker_confine(&files, argv, err) != STATUS_OK) return;
+    confinement_complete(c, a->sandbox, err);
+}
+
 int main(int argc, char **argv)
 {
     struct arguments a;
     struct worker_folder folder;
     struct pipeline_context context;
-    struct error err = {0};
+    struct error err = {0}, failed = {0};
     char log_path[WORKER_PATH_BYTES];
     int code = parse_arguments(argc, argv, &a);
     if (code >= 0) return code;
+    enter_sandbox(&a, argv, &failed);
+    if (a.check != NULL) return print_check(&a);
     set_signals();
     status s = worker_folder_open(&folder, a.folder, &err);
     if (s != STATUS_OK) {
@@ -226,6 +272,7 @@ int main(int argc, char **argv)
     }
     pipeline_context_init(&context);
     context.folder = &folder;
+    context.pdf = a.confinement.pdf;
     context.memory_limit_bytes = a.memory_mib << 20;
     worker_folder_path(&folder, JOB_FILE_LOG, NULL, log_path);
     s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &context.log, &err);
@@ -234,7 +281,8 @@ int main(int argc, char **argv)
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         code = WORKER_FAILED;
     } else {
-        s = run_job(&context, &a, &err);
+        s = report_sandbox(&context, &a, &failed, &err);
+        if (s == STATUS_OK) s = run_job(&context, &a, &err);
         code = conclude(context.status, context.log, s, &err);
     }
     worker_status_free(context.status);

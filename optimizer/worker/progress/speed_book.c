@@ -1,12 +1,16 @@
 #include "optimizer/worker/progress/speed_book.h"
 #include "base/files/durable.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 enum { LIMIT_BYTES = 1 << 20 };
 
@@ -27,6 +31,27 @@ static bool read_entry(const char *key, const json_t *from, struct speed_entry *
            e->log_var < 100.0;
 }
 
+/* Locks the file for reading or writing it whole; -1: it cannot be opened. Closing it ends the lock. */
+static int open_locked(const char *path, int flags, int how)
+{
+    int fd = open(path, flags | O_CLOEXEC, 0600);
+    while (fd >= 0 && flock(fd, how) != 0 && errno == EINTR) continue;
+    return fd;
+}
+
+/* Overwrites the file, because a worker in its sandbox may make none in the folder. A worker that is killed meanwhile
+ * leaves a damaged file, which is an empty book. */
+static status overwrite(const char *path, const char *text, size_t n, struct error *err)
+{
+    int fd = open_locked(path, O_WRONLY | O_CREAT, LOCK_EX);
+    if (fd < 0) return error_set_errno(err, "cannot write '%s'", path);
+    status s = STATUS_OK;
+    if (write(fd, text, n) != (ssize_t)n || ftruncate(fd, (off_t)n) != 0)
+        s = error_set_errno(err, "cannot write '%s'", path);
+    close(fd);
+    return s;
+}
+
 void speed_book_read(const char *path, struct speed_book *book)
 {
     char *text = NULL;
@@ -34,7 +59,10 @@ void speed_book_read(const char *path, struct speed_book *book)
     const char *key;
     json_t *value;
     book->n = 0;
-    if (file_read_all(path, LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return;
+    int fd = open_locked(path, O_RDONLY, LOCK_SH);
+    status s = file_read_all(path, LIMIT_BYTES, &text, &n, NULL);
+    if (fd >= 0) close(fd);
+    if (s != STATUS_OK) return;
     json_t *json = json_loadb(text, n, JSON_REJECT_DUPLICATES, NULL);
     json_object_foreach(json_object_get(json, "speeds"), key, value)
     {
@@ -59,7 +87,7 @@ status speed_book_write(const char *path, const struct speed_book *book, struct 
     char *text = json != NULL ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(6)) : NULL;
     json_decref(json);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
-    status s = durable_replace_volatile(path, text, strlen(text), err);
+    status s = overwrite(path, text, strlen(text), err);
     free(text);
     return s;
 }

@@ -19,15 +19,78 @@ static const struct {
                   {"directions", "direction.bin"}};
 enum { N_CHECKPOINT = sizeof checkpoint / sizeof *checkpoint };
 
-/* The folder of the other job, for reading only: without a lock. */
+/* Writes the path of the other job's folder, which lies beside this one's. false: it is too long. */
+static bool other_path(const struct worker_folder *own, const struct job_document *doc, struct worker_folder *other)
+{
+    const char *slash = strrchr(own->path, '/');
+    int length = slash == NULL ? 0 : (int)(slash - own->path) + 1;
+    int n = snprintf(other->path, sizeof other->path, "%.*s%s", length, own->path, doc->geometry_job);
+    return n > 0 && (size_t)n < sizeof other->path;
+}
+
+static bool stages_done(const struct worker_folder *f)
+{
+    for (size_t i = 0; i < N_CHECKPOINT; i++)
+        if (!worker_folder_stage_done(f, checkpoint[i].stage)) return false;
+    return true;
+}
+
+/* Makes JOB/adopted/<name> a link to the other job's file, or removes it when there is none. */
+static void link_file(const struct worker_folder *other, const struct worker_folder *own, const char *name)
+{
+    char from[WORKER_PATH_BYTES], to[WORKER_PATH_BYTES];
+    worker_folder_path(other, name, NULL, from);
+    worker_folder_path(own, JOB_FOLDER_ADOPTED, name, to);
+    unlink(to);
+    if (link(from, to) != 0) return; /* pipeline_adopt_geometry finds that it is missing */
+}
+
+/* What of another job is linked: its document, its fingerprint, and for each stage the mark and the checkpoint. */
+static void visit_files(const struct worker_folder *other, const struct worker_folder *own,
+                        void (*visit)(const struct worker_folder *other, const struct worker_folder *own,
+                                      const char *name))
+{
+    char name[160];
+    visit(other, own, JOB_FILE_DOCUMENT);
+    visit(other, own, JOB_FOLDER_WORK "/inputs.fingerprint");
+    for (size_t i = 0; i < N_CHECKPOINT; i++) {
+        snprintf(name, sizeof name, JOB_FOLDER_WORK "/%s/%s", checkpoint[i].stage, checkpoint[i].file);
+        visit(other, own, name);
+        snprintf(name, sizeof name, JOB_FOLDER_WORK "/%s.done", checkpoint[i].stage);
+        visit(other, own, name);
+    }
+}
+
+static void unlink_file(const struct worker_folder *other, const struct worker_folder *own, const char *name)
+{
+    char path[WORKER_PATH_BYTES];
+    (void)other;
+    worker_folder_path(own, JOB_FOLDER_ADOPTED, name, path);
+    unlink(path);
+}
+
+void pipeline_link_geometry(const struct worker_folder *own, const struct job_document *doc)
+{
+    struct worker_folder other = {.lock_fd = -1};
+    char folder[WORKER_PATH_BYTES], name[160];
+    if (doc->geometry_job[0] == '\0' || stages_done(own) || !other_path(own, doc, &other)) return;
+    if (access(own->path, F_OK) != 0 || access(other.path, F_OK) != 0) return;
+    for (size_t i = 0; i < N_CHECKPOINT; i++) {
+        snprintf(name, sizeof name, JOB_FOLDER_WORK "/%s", checkpoint[i].stage);
+        worker_folder_path(own, JOB_FOLDER_ADOPTED, name, folder);
+        durable_make_folder(folder, NULL);
+    }
+    visit_files(&other, own, link_file);
+}
+
+/* The links to the other job's files, laid out as a job folder. */
 static status other_folder(const struct pipeline_context *c, struct worker_folder *f, struct error *err)
 {
-    const char *own = c->folder->path, *slash = strrchr(own, '/');
-    int length = slash == NULL ? 0 : (int)(slash - own) + 1;
-    int n = snprintf(f->path, sizeof f->path, "%.*s%s", length, own, c->doc->geometry_job);
-    if (n < 0 || (size_t)n >= sizeof f->path)
+    struct worker_folder other;
+    if (!other_path(c->folder, c->doc, &other))
         return error_set(err, STATUS_INVALID, "the job folder's path is too long");
-    if (access(f->path, F_OK) == 0) return STATUS_OK;
+    snprintf(f->path, sizeof f->path, "%.2000s/%s", c->folder->path, JOB_FOLDER_ADOPTED);
+    if (access(other.path, F_OK) == 0) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
                            "cannot take over the geometry of job '%s': there is no such job", c->doc->geometry_job);
 }
@@ -76,13 +139,11 @@ static status adopt(struct pipeline_context *c, const struct worker_folder *f, s
 status pipeline_adopt_geometry(struct pipeline_context *c, struct error *err)
 {
     struct worker_folder other = {.lock_fd = -1};
-    bool done = true;
-    if (c->doc->geometry_job[0] == '\0') return STATUS_OK;
-    for (size_t i = 0; i < N_CHECKPOINT; i++) done = done && worker_folder_stage_done(c->folder, checkpoint[i].stage);
-    if (done) return STATUS_OK;
+    if (c->doc->geometry_job[0] == '\0' || stages_done(c->folder)) return STATUS_OK;
     status s = other_folder(c, &other, err);
     if (s == STATUS_OK) s = check_program(c, &other, err);
     for (size_t i = 0; i < N_CHECKPOINT && s == STATUS_OK; i++) s = adopt(c, &other, i, err);
+    if (s == STATUS_OK) visit_files(&other, c->folder, unlink_file);
     if (s == STATUS_OK) log_info(c->log, "the geometry is that of job %s", c->doc->geometry_job);
     return s;
 }

@@ -4,6 +4,9 @@
 
 #include "optimizer/worker/pipeline_context.h"
 
+/* Links what the next function needs of the other job to JOB/adopted/: before the worker enters its sandbox, in which
+ * it sees its own folder alone. What is missing is reported by the next function. */
+void pipeline_link_geometry(const struct worker_folder *own, const struct job_document *doc);
 /* Links the checkpoints of the stages "volume" to "directions" of the job that the document names into the folder of
  * this job, and marks these stages as done; what is there already stays. The folders of all jobs lie side by side.
  * Nothing happens when the document names no job. STATUS_INVALID, field OPTION_GEOMETRY_JOB: there is no such job, its
