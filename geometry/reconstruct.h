@@ -98,11 +98,14 @@ struct reconstruct_report {
     double direction_change_mean_deg; /* between filtered and transferred directions */
 };
 
+/* Memory, or space in files, that all steps together need for a voxel of the scan. */
+enum { SCAN_BYTES_PER_VOXEL = 22 };
+
 /* Step "volume": reads the files, applies axes, matrix and crop, and maps densities to [0, 1]. path: as for
  * volume_source_open_declared. space NULL: memory without a limit. Errors name the file and the option that is
  * wrong: STATUS_FORMAT (incomplete file, pages of different size or depth), STATUS_INVALID (NaN voxels, constant, or
  * empty: nothing above the threshold), STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; in all
- * steps). */
+ * steps), STATUS_TOO_LARGE (the scan needs more than the scratch space may hold, by SCAN_BYTES_PER_VOXEL). */
 status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
                         struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                         struct volume *v, struct reconstruct_report *report, struct error *err);

@@ -307,6 +307,11 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     if (s != STATUS_OK) goto out;
     size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
+    s = scratch_check(space, SCAN_BYTES_PER_VOXEL * (double)volume_n_voxel(n), "the scan", err);
+    if (s != STATUS_OK) {
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_SCAN_FILES);
+        goto out;
+    }
     s = volume_init_in(&stored, n, p.spacing_m, space, err);
     if (s == STATUS_OK) s = read_slices(source, &p, progress, &stored, err);
     if (s == STATUS_OK && o->align) s = estimate_alignment(&stored, o, pool, NULL, report, err);

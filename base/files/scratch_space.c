@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 enum { LEAST_LIMIT = 1 << 20, HUGE_PAGE = 2 << 20 };
@@ -23,7 +24,7 @@ struct array {
 
 struct scratch_space {
     char *folder;
-    size_t limit_bytes, page_bytes;
+    size_t limit_bytes, page_bytes, most_file_bytes;
     int statm_fd; /* -1: the resident size is unknown, and every call drops the mapped pages */
     pthread_mutex_t lock;
     struct array *array;
@@ -47,6 +48,7 @@ status scratch_space_new(const char *folder, size_t limit_bytes, struct scratch_
     long page = sysconf(_SC_PAGESIZE);
     s->page_bytes = page > 0 ? (size_t)page : 4096;
     s->limit_bytes = limit_bytes;
+    s->most_file_bytes = SIZE_MAX;
     s->statm_fd = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     pthread_mutex_init(&s->lock, NULL);
     *space = s;
@@ -61,6 +63,30 @@ void scratch_space_free(struct scratch_space *s)
     pthread_mutex_destroy(&s->lock);
     free(s->folder);
     free(s);
+}
+
+void scratch_space_bound(struct scratch_space *s, size_t most_file_bytes)
+{
+    s->most_file_bytes = most_file_bytes > 0 ? most_file_bytes : SIZE_MAX;
+}
+
+static status too_large(const struct scratch_space *s, double n_bytes, const char *what, struct error *err)
+{
+    return error_set(err, STATUS_TOO_LARGE,
+                     "cannot work on %s: %.3g GB are needed, but a job may hold %.3g GB in files", what, n_bytes * 1e-9,
+                     (double)s->most_file_bytes * 1e-9);
+}
+
+status scratch_check(struct scratch_space *s, double n_bytes, const char *what, struct error *err)
+{
+    struct statvfs disk;
+    if (s == NULL || n_bytes <= 0.5 * (double)s->limit_bytes) return STATUS_OK;
+    if (n_bytes > (double)s->most_file_bytes) return too_large(s, n_bytes, what, err);
+    if (statvfs(s->folder, &disk) != 0) return STATUS_OK; /* making the arrays will show what there is */
+    double free_bytes = (double)disk.f_bavail * (double)disk.f_frsize;
+    if (n_bytes <= free_bytes) return STATUS_OK;
+    return error_set(err, STATUS_TOO_LARGE, "cannot work on %s: %.3g GB are needed, but the disk has %.3g GB left",
+                     what, n_bytes * 1e-9, free_bytes * 1e-9);
 }
 
 /* Maps a new nameless file with all blocks reserved. The descriptor is closed, because the mapping keeps the file
@@ -119,7 +145,12 @@ status scratch_new(struct scratch_space *s, size_t n_bytes, const char *what, vo
     a->in_file = n_bytes > s->limit_bytes / 2 || s->memory_bytes > s->limit_bytes / 2 - n_bytes;
     if (!a->in_file) s->memory_bytes += n_bytes;
     pthread_mutex_unlock(&s->lock);
-    status st = a->in_file ? map_file(s, n_bytes, what, &a->address, err) : map_memory(n_bytes, what, &a->address, err);
+    status st = STATUS_OK;
+    size_t in_files = atomic_load(&s->file_bytes);
+    if (a->in_file && (in_files > s->most_file_bytes || n_bytes > s->most_file_bytes - in_files))
+        st = too_large(s, (double)in_files + (double)n_bytes, what, err);
+    if (st == STATUS_OK)
+        st = a->in_file ? map_file(s, n_bytes, what, &a->address, err) : map_memory(n_bytes, what, &a->address, err);
     pthread_mutex_lock(&s->lock);
     if (st == STATUS_OK) {
         a->next = s->array;

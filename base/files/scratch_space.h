@@ -16,11 +16,16 @@ struct scratch_space;
 /* limit_bytes limits the resident memory of the process; it is at least 1 MiB. folder must exist on a local file
  * system. STATUS_INVALID, STATUS_NO_MEMORY. */
 status scratch_space_new(const char *folder, size_t limit_bytes, struct scratch_space **space, struct error *err);
+/* Bounds the bytes of all arrays in files; 0: only the disk does. */
+void scratch_space_bound(struct scratch_space *space, size_t most_file_bytes);
+/* Checks, before work begins, that arrays of n_bytes in all would fit into memory, or else into files and the free
+ * space of the disk. STATUS_TOO_LARGE. */
+status scratch_check(struct scratch_space *space, double n_bytes, const char *what, struct error *err);
 /* Also releases the arrays that are still allocated. Accepts NULL. */
 void scratch_space_free(struct scratch_space *space);
 
 /* Makes an array of n_bytes zeros. space == NULL: ordinary memory without a limit. `what` names the array in error
- * texts. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_IO. */
+ * texts. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_TOO_LARGE (scratch_space_bound), STATUS_IO. */
 status scratch_new(struct scratch_space *space, size_t n_bytes, const char *what, void **array, struct error *err);
 /* Releases an array that scratch_new returned for the same space. Accepts NULL. */
 void scratch_release(struct scratch_space *space, void *array);

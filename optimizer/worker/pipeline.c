@@ -87,6 +87,7 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
     if (c->memory_limit_bytes > 0 && c->space == NULL) {
         status s = scratch_space_new(work, c->memory_limit_bytes, &c->space, err);
         if (s != STATUS_OK) return s;
+        scratch_space_bound(c->space, c->most_scratch_bytes);
     }
     c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
     for (size_t i = 0; i < n_stage; i++) {

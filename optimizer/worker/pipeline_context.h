@@ -134,6 +134,7 @@ struct pipeline_context {
     struct thread_pool *pool;
     struct pdf_helper pdf;
     size_t memory_limit_bytes;   /* of the geometry stages; 0: none */
+    size_t most_scratch_bytes;   /* bound on the files of `space`; 0: the free disk is */
     struct scratch_space *space; /* of volumes: JOB/work beyond that limit; NULL without one */
     struct progress progress;    /* of the running stage */
 

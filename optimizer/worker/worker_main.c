@@ -28,6 +28,9 @@ static const char usage[] =
     "                     worked on in files under JOBDIR/work. Results do not depend on it, but volume models of "
     "fiber\n"
     "                     files see coarser voxels (with a warning) where a quarter of it does not hold finer ones\n"
+    "  --scratch-mib N    disk in mebibytes that these files may take (default: what is free); a scan that needs more "
+    "is\n"
+    "                     refused before it is read\n"
     "  --speeds FILE      speeds of earlier jobs, by which remaining times are predicted; those of this job are added\n"
     "  --sandbox MODE     auto (default): as far as the kernel can, keep the worker to JOBDIR and to the system calls "
     "that\n"
@@ -46,7 +49,7 @@ struct arguments {
     const char *folder;
     const char *speeds; /* NULL: none are remembered */
     const char *check;  /* a document to check; NULL: the job is run */
-    size_t n_thread, memory_mib;
+    size_t n_thread, memory_mib, scratch_mib;
     bool quiet;
     enum confine_mode sandbox;
     struct confinement confinement;
@@ -89,6 +92,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
     static const struct option option[] = {{"threads", required_argument, NULL, 't'},
                                            {"memory-mib", required_argument, NULL, 'm'},
+                                           {"scratch-mib", required_argument, NULL, 'S'},
                                            {"speeds", required_argument, NULL, 's'},
                                            {"check", required_argument, NULL, 'k'},
                                            {"sandbox", required_argument, NULL, 'b'},
@@ -107,6 +111,9 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
             break;
         case 'm':
             ok = parse_count(optarg, (size_t)1 << 32, &a->memory_mib);
+            break;
+        case 'S':
+            ok = parse_count(optarg, (size_t)1 << 32, &a->scratch_mib);
             break;
         case 's':
             a->speeds = optarg;
@@ -274,6 +281,7 @@ int main(int argc, char **argv)
     context.folder = &folder;
     context.pdf = a.confinement.pdf;
     context.memory_limit_bytes = a.memory_mib << 20;
+    context.most_scratch_bytes = a.scratch_mib << 20;
     worker_folder_path(&folder, JOB_FILE_LOG, NULL, log_path);
     s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &context.log, &err);
     if (s == STATUS_OK) s = worker_status_start(&folder, context.log, &context.status, &err);

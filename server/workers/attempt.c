@@ -144,6 +144,8 @@ static void describe_end(struct job_service *v, const struct job_row *row, const
         snprintf(how, sizeof how, "the worker sent no heartbeat and was killed");
     else if (end->by_signal && end->code == SIGKILL)
         snprintf(how, sizeof how, "the worker was killed (signal 9), perhaps because memory was out");
+    else if (end->by_signal && end->code == SIGSYS)
+        snprintf(how, sizeof how, "the worker's sandbox ended it, because it made a forbidden system call");
     else if (end->by_signal)
         snprintf(how, sizeof how, "the worker crashed with signal %d (%s)", end->code, strsignal(end->code));
     else if (end->code == 127)
@@ -162,6 +164,12 @@ static void lost(struct job_service *v, struct job_row *row, const struct worker
     row->lost_attempts++;
     atomic_fetch_add(&v->n_lost_total, 1);
     log_warning(v->log, "job %s: attempt %lld was lost: %s", row->id, (long long)row->attempt, how);
+    /* what input made it do, it would do again */
+    if (end->by_signal && end->code == SIGSYS) {
+        row->state = JOB_FAILED;
+        set_error(row, "forbidden_call", "", how);
+        return;
+    }
     if (row->lost_attempts >= v->settings->max_lost_attempts) {
         row->state = JOB_FAILED;
         snprintf(text, sizeof text, "%lld attempts were lost; the last one: %s", (long long)row->lost_attempts, how);

@@ -177,9 +177,8 @@ static void launch(struct supervisor *u, const char *job_id)
     *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     path_join(speeds, u->v->settings->data, "speeds.json", NULL);
-    struct worker_limits limits = {(int)u->v->settings->nice, u->v->settings->memory_limit_bytes,
-                                   u->v->settings->volume_memory_bytes, speeds};
-    s = worker_launch(u->worker, folder, console, &limits, &slot->pid, &err);
+    const struct worker_paths paths = {u->worker, folder, console, speeds};
+    s = worker_launch(&paths, u->v->settings, &slot->pid, &err);
     if (s == STATUS_OK) {
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
         return;

@@ -4,61 +4,144 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { EXIT_CANNOT_EXECUTE = 127 };
+enum { EXIT_CANNOT_EXECUTE = 127, MAX_VARIABLE = 64, NUMBER_BYTES = 24 };
 
-/* Runs between fork and exec of a threaded process, so it makes only system calls. */
-static _Noreturn void become_worker(const char *program, char *const argv[], int console_fd, int null_fd,
-                                    const struct worker_limits *limits, pid_t parent)
+/* What the new process needs between vfork and exec. */
+struct start {
+    const char *program;
+    char *const *argv, *const *environment;
+    int console_fd, null_fd;
+    const struct settings *settings;
+    char oom_score_adj[NUMBER_BYTES];
+    pid_t parent;
+};
+
+static void set_limit(int resource, int64_t value)
+{
+    struct rlimit limit;
+    if (getrlimit(resource, &limit) != 0) return;
+    if (limit.rlim_max > (rlim_t)value) limit.rlim_max = (rlim_t)value; /* it cannot be raised */
+    limit.rlim_cur = limit.rlim_max;
+    setrlimit(resource, &limit);
+}
+
+static void set_limits(const struct start *s)
+{
+    setpriority(PRIO_PROCESS, 0, (int)s->settings->nice);
+    set_limit(RLIMIT_CORE, 0);
+    set_limit(RLIMIT_NOFILE, s->settings->open_files);
+    if (s->settings->file_limit_bytes > 0) set_limit(RLIMIT_FSIZE, s->settings->file_limit_bytes);
+    if (s->settings->memory_limit_bytes > 0) set_limit(RLIMIT_AS, s->settings->memory_limit_bytes);
+    int fd = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+    if (fd >= 0 && write(fd, s->oom_score_adj, strlen(s->oom_score_adj)) < 0) {
+        /* a container may forbid it */
+    }
+    if (fd >= 0) close(fd);
+    prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+}
+
+/* Runs in the memory of the daemon, whose calling thread waits, so it makes only system calls and changes no variable
+ * of the daemon's. */
+static _Noreturn void become_worker(const struct start *s)
 {
     setsid();
+    if (dup2(s->null_fd, 0) < 0 || dup2(s->console_fd, 1) < 0 || dup2(s->console_fd, 2) < 0) _exit(EXIT_CANNOT_EXECUTE);
+    if (close_range(3, ~0U, 0) != 0) _exit(EXIT_CANNOT_EXECUTE);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) _exit(EXIT_CANNOT_EXECUTE);
-    setpriority(PRIO_PROCESS, 0, limits->nice);
-    struct rlimit none = {0, 0};
-    setrlimit(RLIMIT_CORE, &none);
-    if (limits->memory_bytes > 0) {
-        struct rlimit memory = {(rlim_t)limits->memory_bytes, (rlim_t)limits->memory_bytes};
-        setrlimit(RLIMIT_AS, &memory);
-    }
+    if (getppid() != s->parent) _exit(EXIT_CANNOT_EXECUTE);
+    set_limits(s);
     sigset_t empty;
     sigemptyset(&empty);
     for (int i = 1; i < NSIG; i++) signal(i, SIG_DFL);
     sigprocmask(SIG_SETMASK, &empty, NULL);
-    if (dup2(null_fd, 0) < 0 || dup2(console_fd, 1) < 0 || dup2(console_fd, 2) < 0) _exit(EXIT_CANNOT_EXECUTE);
-    execv(program, argv);
+    execve(s->program, s->argv, s->environment);
     static const char text[] = "the worker program cannot be executed\n";
     ssize_t n = write(2, text, sizeof text - 1);
     _exit(n < 0 ? EXIT_CANNOT_EXECUTE : EXIT_CANNOT_EXECUTE);
 }
 
-status worker_launch(const char *program, const char *job_folder, const char *console_path,
-                     const struct worker_limits *limits, pid_t *out, struct error *err)
+static pid_t start(const struct start *s)
 {
-    status s = STATUS_OK;
-    int null_fd = -1;
-    int console_fd = open(console_path, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (console_fd < 0) return error_set_errno(err, "cannot write '%s'", console_path);
-    null_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    if (null_fd < 0) {
-        s = error_set_errno(err, "cannot open '/dev/null'");
-        goto out;
+    pid_t pid = vfork();
+    if (pid == 0) become_worker(s);
+    return pid;
+}
+
+/* Collects the daemon's variables whose names the setting lists. */
+static void choose_environment(const char *names, char *variable[MAX_VARIABLE + 1])
+{
+    size_t n = 0;
+    for (const char *at = names; *at != '\0' && n < MAX_VARIABLE;) {
+        size_t length = strcspn(at, " ,");
+        for (char **e = environ; length > 0 && *e != NULL; e++)
+            if (strncmp(*e, at, length) == 0 && (*e)[length] == '=') variable[n++] = *e;
+        at += length + (at[length] != '\0');
     }
-    char volume_mib[24];
-    snprintf(volume_mib, sizeof volume_mib, "%lld", (long long)(limits->volume_memory_bytes >> 20));
-    char *folder = (char *)(uintptr_t)job_folder, *speeds = (char *)(uintptr_t)limits->speeds_path,
-         *argv[] = {(char *)(uintptr_t)program, "--memory-mib", volume_mib, "--speeds", speeds, folder, NULL};
-    pid_t parent = getpid(), pid = fork();
-    if (pid < 0) s = error_set_errno(err, "cannot start worker '%s'", program);
-    if (pid == 0) become_worker(program, argv, console_fd, null_fd, limits, parent);
-    if (s == STATUS_OK) *out = pid;
-out:
-    if (null_fd >= 0) close(null_fd);
-    close(console_fd);
+    variable[n] = NULL;
+}
+
+/* Options of selvedge-worker; other programs find the job's folder as the last argument. */
+struct arguments {
+    char memory_mib[NUMBER_BYTES], scratch_mib[NUMBER_BYTES], threads[NUMBER_BYTES];
+    char *argv[16];
+};
+
+static void add(struct arguments *a, const char *text)
+{
+    size_t n = 0;
+    while (a->argv[n] != NULL) n++;
+    a->argv[n] = (char *)(uintptr_t)text;
+}
+
+static void set_arguments(const struct worker_paths *p, const struct settings *s, struct arguments *a)
+{
+    *a = (struct arguments){.argv = {NULL}};
+    snprintf(a->memory_mib, NUMBER_BYTES, "%lld", (long long)(s->volume_memory_bytes >> 20));
+    snprintf(a->scratch_mib, NUMBER_BYTES, "%lld", (long long)((s->scratch_limit_bytes >> 20) + 1));
+    snprintf(a->threads, NUMBER_BYTES, "%lld", (long long)s->threads);
+    const char *const always[] = {p->program, "--memory-mib", a->memory_mib, "--speeds",
+                                  p->speeds,  "--sandbox",    s->sandbox};
+    for (size_t i = 0; i < sizeof always / sizeof *always; i++) add(a, always[i]);
+    if (s->threads > 0) {
+        add(a, "--threads");
+        add(a, a->threads);
+    }
+    if (s->scratch_limit_bytes > 0) {
+        add(a, "--scratch-mib");
+        add(a, a->scratch_mib);
+    }
+    add(a, p->job_folder);
+}
+
+status worker_launch(const struct worker_paths *paths, const struct settings *settings, pid_t *out, struct error *err)
+{
+    char *variable[MAX_VARIABLE + 1];
+    struct arguments a;
+    status s = STATUS_OK;
+    choose_environment(settings->pass_environment, variable);
+    set_arguments(paths, settings, &a);
+    struct start new = {.program = paths->program,
+                        .argv = a.argv,
+                        .environment = variable,
+                        .settings = settings,
+                        .console_fd = -1,
+                        .null_fd = open("/dev/null", O_RDONLY | O_CLOEXEC),
+                        .parent = getpid()};
+    snprintf(new.oom_score_adj, NUMBER_BYTES, "%lld", (long long)settings->oom_score_adj);
+    if (new.null_fd < 0) return error_set_errno(err, "cannot open '/dev/null'");
+    new.console_fd = open(paths->console, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
+    if (new.console_fd < 0)
+        s = error_set_errno(err, "cannot write '%s'", paths->console);
+    else if ((*out = start(&new)) < 0)
+        s = error_set_errno(err, "cannot start worker '%s'", paths->program);
+    if (new.console_fd >= 0) close(new.console_fd);
+    close(new.null_fd);
     return s;
 }
 

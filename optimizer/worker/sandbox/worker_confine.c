@@ -235,7 +235,9 @@ bool confinement_describe(const struct confinement *c, enum confine_mode mode, c
         snprintf(text, n_bytes, "the worker runs in a sandbox (Landlock %d, seccomp)", c->files_version);
     else
         snprintf(text, n_bytes, "this machine's kernel lacks %s, so the worker's sandbox restricts %s",
-                 c->calls ? "Landlock" : c->files_version > 0 ? "seccomp" : "Landlock and seccomp",
+                 c->calls               ? "Landlock"
+                 : c->files_version > 0 ? "seccomp"
+                                        : "Landlock and seccomp",
                  c->calls               ? "system calls, but no files"
                  : c->files_version > 0 ? "files, but no system calls"
                                         : "nothing");

@@ -22,6 +22,8 @@ DOCUMENT = {"sample": "fake: succeed", "volume": {"files": ["scan.tif"], "voxel_
 FILES = {"scan.tif": ("volume", b"II*\0 not really a scan" * 100), "rows.csv": ("measurements", b"set,r,g,b\n" * 20)}
 # output of a sanitizer or valgrind must not be mistaken for a normal start
 TIMEOUT_S = float(os.environ.get("SELVEDGE_TEST_PATIENCE", "1"))
+# a worker that a sanitizer observes needs its settings
+SANITIZED = {"jobs.pass_environment": "PATH LANG LC_ALL ASAN_OPTIONS TSAN_OPTIONS UBSAN_OPTIONS"} if os.environ.get("SELVEDGE_SANITIZED") else {}
 
 
 def program(name):
@@ -50,7 +52,7 @@ class Daemon:
     def __init__(self, folder, worker=FAKE_WORKER, options=None, environment=None, wrapper=None):
         self.data = str(folder)
         self.worker = worker
-        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, **(options or {})}
+        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, **SANITIZED, **(options or {})}
         self.environment = environment or {}
         self.wrapper = wrapper if wrapper is not None else os.environ.get("SELVEDGE_TEST_WRAPPER", "").split()
         self.process = None

@@ -4,6 +4,7 @@ layout of job folders. It counts its runs in work/runs to distinguish "once" fro
 import fcntl
 import json
 import os
+import resource
 import signal
 import sys
 import time
@@ -82,6 +83,17 @@ log(f"run {run}, attempt {attempt}")
 say("running", 0.1)
 if behaviour == "succeed":
     finish()
+elif behaviour == "surroundings":
+    with open("/proc/self/status") as f:
+        status = dict(line.split(":\t", 1) for line in f.read().splitlines())
+    with open("/proc/self/oom_score_adj") as f:
+        oom_score_adj = f.read().strip()
+    put("results/result.json", json.dumps({
+        "parameters": [], "environment": dict(os.environ), "no_new_privs": status["NoNewPrivs"], "oom_score_adj": oom_score_adj, "nice": os.nice(0),
+        "descriptors": sorted(fd for fd in os.listdir("/proc/self/fd") if os.path.exists(f"/proc/self/fd/{fd}") and int(fd) != lock.fileno()),
+        "limits": {name: list(resource.getrlimit(getattr(resource, "RLIMIT_" + name))) for name in ("NOFILE", "FSIZE", "AS", "CORE")}}))
+    say("succeeded", 1.0)
+    sys.exit(0)
 elif behaviour == "series":
     for step in range(int(argument)):
         record(step)

@@ -1,0 +1,69 @@
+/* A library for LD_PRELOAD in tests: libtiff as if a hostile file had taken it over. Opening a TIFF does what the
+ * variable HOSTILE says, "read /etc/passwd", and reports "hostile: ..." on stderr. */
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static void report(const char *act, long result)
+{
+    dprintf(2, "hostile: %s: %s\n", act, result < 0 ? strerror(errno) : "done");
+}
+
+static void show(const char *path)
+{
+    char text[4096];
+    int fd = open(path, O_RDONLY);
+    long n = fd < 0 ? -1 : read(fd, text, sizeof text);
+    if (n > 0) dprintf(2, "hostile: %.*s\n", (int)n, text);
+    report("read", n);
+}
+
+/* The fields of every thread of this process that say what it may do. */
+static void show_threads(void)
+{
+    char path[300], line[256];
+    DIR *d = opendir("/proc/self/task");
+    for (struct dirent *e; d != NULL && (e = readdir(d)) != NULL;) {
+        snprintf(path, sizeof path, "/proc/self/task/%s/status", e->d_name);
+        FILE *f = e->d_name[0] == '.' ? NULL : fopen(path, "r");
+        while (f != NULL && fgets(line, sizeof line, f) != NULL)
+            if (strncmp(line, "Seccomp:", 8) == 0 || strncmp(line, "NoNewPrivs:", 11) == 0)
+                dprintf(2, "hostile: %s", line);
+        if (f != NULL) fclose(f);
+    }
+}
+
+static void act(const char *what, const char *argument)
+{
+    if (strcmp(what, "read") == 0) show(argument);
+    if (strcmp(what, "threads") == 0) show_threads();
+    if (strcmp(what, "write") == 0) report(what, open(argument, O_WRONLY | O_CREAT, 0600));
+    if (strcmp(what, "overwrite") == 0) report(what, open(argument, O_WRONLY));
+    if (strcmp(what, "remove") == 0) report(what, unlink(argument));
+    if (strcmp(what, "link") == 0) report(what, link(argument, getenv("HOSTILE_TO")));
+    if (strcmp(what, "socket") == 0) report(what, socket(AF_INET, SOCK_STREAM, 0));
+    if (strcmp(what, "chmod") == 0) report(what, chmod(argument, 0777));
+    if (strcmp(what, "truncate") == 0) report(what, truncate(argument, 0));
+    if (strcmp(what, "kill") == 0) report(what, kill(atoi(argument), SIGTERM));
+    if (strcmp(what, "execve") == 0) report(what, execl("/bin/true", "true", (char *)NULL));
+    if (strcmp(what, "fork") == 0) report(what, fork());
+}
+
+void *TIFFOpenExt(const char *path, const char *mode, void *option);
+void *TIFFOpenExt(const char *path, const char *mode, void *option)
+{
+    (void)path, (void)mode, (void)option;
+    char *text = getenv("HOSTILE"), what[64] = "";
+    if (text == NULL || sscanf(text, "%63s", what) != 1) return NULL;
+    const char *blank = strchr(text, ' ');
+    act(what, blank != NULL ? blank + 1 : "");
+    return NULL;
+}

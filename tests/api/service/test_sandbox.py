@@ -1,0 +1,142 @@
+"""What a worker sees of the machine, and what a file that took it over could do: with the real worker, by hand and under
+a daemon."""
+import json
+import os
+import shutil
+import struct
+import subprocess
+import zlib
+
+import pytest
+from daemon_under_test import ROOT, program, sha256
+from small_cloth import TABLE
+
+WORKER = program("selvedge-worker")
+SCAN = {"sample": "hostile", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}
+
+
+def describes_itself(tmp_path):
+    """What the log of a worker says about its sandbox."""
+    (tmp_path / "job.json").write_text("{}")
+    subprocess.run([WORKER, "--quiet", str(tmp_path)], check=False)
+    return (tmp_path / "log.txt").read_text()
+
+
+@pytest.fixture(scope="module")
+def hostile(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hostile")
+    (folder / "job").mkdir()
+    if not os.access(WORKER, os.X_OK):
+        pytest.skip("no selvedge-worker in the build folder")
+    log = describes_itself(folder / "job")
+    if "runs in a sandbox" not in log:
+        pytest.skip("no whole sandbox here: " + log.splitlines()[0])
+    path = folder / "hostile.so"
+    compiler = shutil.which("cc") or shutil.which("gcc") or pytest.skip("no C compiler")
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", path, os.path.join(ROOT, "tests", "api", "service", "hostile_library.c")], check=True)
+    return str(path)
+
+
+def job_folder(folder):
+    (folder / "input").mkdir(parents=True)
+    (folder / "job.json").write_text(json.dumps(SCAN))
+    (folder / "input" / "scan.tif").write_bytes(b"II*\0 nothing that matters")
+    (folder / "input" / "rows.csv").write_text(TABLE)
+    return folder
+
+
+def run(hostile, folder, act, *options, **variables):
+    environment = {**os.environ, "LD_PRELOAD": hostile, "HOSTILE": act, **variables}
+    return subprocess.run([WORKER, "--quiet", *options, str(folder)], env=environment, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_a_secret_elsewhere_is_not_visible(hostile, tmp_path):
+    """Neither a file of the same user, nor the environment of another process."""
+    secret = tmp_path / "secret"
+    secret.write_text("planted")
+    with subprocess.Popen(["sleep", "60"], env={"PLANTED": "planted"}) as other:
+        try:
+            for path in (secret, f"/proc/{other.pid}/environ"):
+                for options, seen in ((("--sandbox", "off"), True), ((), False)):
+                    done = run(hostile, job_folder(tmp_path / str(hash((path, seen)))), f"read {path}", *options)
+                    assert ("planted" in done.stderr) == seen and done.returncode == 1, done.stderr
+                    assert seen or "hostile: read: Permission denied" in done.stderr
+        finally:
+            other.kill()
+
+
+@pytest.mark.parametrize("act", ["write", "overwrite", "remove", "link"])
+def test_nothing_outside_of_the_folder_is_written(hostile, tmp_path, act):
+    """A link would let the daemon serve a foreign file as a result."""
+    target = tmp_path / "target"
+    if act != "write":
+        target.write_text("kept")
+    folder = job_folder(tmp_path / "job")
+    done = run(hostile, folder, f"{act} {target}", HOSTILE_TO=str(folder / "results" / "link"))
+    denied = "Invalid cross-device link" if act == "link" else "Permission denied"
+    assert f"hostile: {act}: {denied}" in done.stderr
+    assert target.read_text() == "kept" if act != "write" else not target.exists()
+    inside = run(hostile, job_folder(tmp_path / "job2"), f"write {tmp_path / 'job2' / 'work' / 'own'}")
+    assert "hostile: write: done" in inside.stderr
+
+
+@pytest.mark.parametrize("act", ["socket", "execve", "fork", "kill {pid}", "chmod {file}", "truncate {file}"])
+def test_a_forbidden_call_ends_the_worker(hostile, tmp_path, act):
+    done = run(hostile, job_folder(tmp_path / "job"), act.format(pid=os.getpid(), file=tmp_path / "job" / "job.json"))
+    name = {"fork": "clone"}.get(act, act.split()[0])
+    assert done.returncode == -31 and f"the sandbox forbids the system call '{name}'" in done.stderr, done
+
+
+def test_every_thread_is_restricted(hostile, tmp_path):
+    """Also those that libraries start before main."""
+    lines = run(hostile, job_folder(tmp_path / "job"), "threads", OPENBLAS_NUM_THREADS="4").stderr.split("\n")
+    assert lines.count("hostile: Seccomp:\t2") == lines.count("hostile: NoNewPrivs:\t1") >= 2 and "hostile: Seccomp:\t0" not in lines
+
+
+def test_the_daemon_names_the_forbidden_call(hostile, daemon_maker):
+    d = daemon_maker(worker=WORKER, environment={"LD_PRELOAD": hostile, "HOSTILE": "socket"},
+                     options={"jobs.pass_environment": "PATH, LD_PRELOAD HOSTILE", "jobs.sandbox": "required"})
+    job = d.create(SCAN)
+    d.upload(job, "scan.tif", b"II*\0 nothing that matters")
+    d.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    d.post(f"/v1/jobs/{job}/start")
+    failed = d.wait_state(job, "failed")
+    assert failed["error"]["code"] == "forbidden_call" and failed["attempt"] == 1
+    assert "forbids the system call 'socket'" in failed["error"]["text"]
+
+
+def test_what_a_worker_gets_of_the_daemon(daemon_maker):
+    """Few variables, three descriptors, no privileges to gain, and the limits of the settings."""
+    limits = {"jobs.open_files": 200, "jobs.file_limit_bytes": 1 << 20, "jobs.memory_limit_bytes": 1 << 30, "jobs.oom_score_adj": 700, "jobs.nice": 7}
+    d = daemon_maker(environment={"PLANTED": "secret", "LANG": "C.UTF-8"}, options=limits,
+                     wrapper=["bash", "-c", 'exec 9</dev/null; exec "$@"', "bash"])  # a descriptor that the daemon inherits
+    seen = d.wait_state(d.start_job("surroundings"), "succeeded")["result"]
+    assert set(seen["environment"]) <= {"PATH", "LANG", "LC_ALL", "TZ", "LC_CTYPE"} and seen["environment"]["LANG"] == "C.UTF-8"
+    assert seen["descriptors"] == ["0", "1", "2"]
+    assert seen["no_new_privs"] == "1" and seen["oom_score_adj"] == "700" and seen["nice"] == 7
+    assert seen["limits"] == {"NOFILE": [200, 200], "FSIZE": [1 << 20, 1 << 20], "AS": [1 << 30, 1 << 30], "CORE": [0, 0]}
+
+
+def bomb(edge, n_page):
+    """A TIFF of n_page pages of edge x edge zeros, all with the same deflated strip."""
+    strip = zlib.compress(bytes(edge) * edge, 9)
+    data, links = b"II*\0" + struct.pack("<I", 8 + len(strip)) + strip, []
+    tags = [(256, 4, edge), (257, 4, edge), (258, 3, 8), (259, 3, 8), (262, 3, 1), (273, 4, 8), (277, 3, 1), (278, 4, edge), (279, 4, len(strip))]
+    directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
+    for i in range(n_page):
+        following = len(data) + (i + 1) * (len(directory) + 4)
+        links.append(directory + struct.pack("<I", following if i + 1 < n_page else 0))
+    return data + b"".join(links)
+
+
+def test_a_small_file_with_a_vast_scan_is_refused_unread(real):
+    scan = bomb(1560, 1560)
+    assert len(scan) < 1_000_000
+    job = real.create(SCAN)
+    real.upload(job, "scan.tif", scan)
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    assert real.get(f"/v1/jobs/{job}/files").json()["files"][0]["sha256"] == sha256(scan)
+    real.post(f"/v1/jobs/{job}/start")
+    failed = real.wait_state(job, "failed")
+    assert failed["error"]["code"] == "too_large" and failed["error"]["field"] == "volume.files", failed["error"]
+    assert "83.5 GB are needed" in failed["error"]["text"] and failed["peak_rss_bytes"] < 300e6
