@@ -87,6 +87,29 @@ static int print_check(const struct arguments *a)
     return good && ok ? WORKER_SUCCEEDED : WORKER_FAILED;
 }
 
+/* An option with a value. Returns false when the value is not allowed. */
+static bool take_value(int option, const char *value, struct arguments *a)
+{
+    switch (option) {
+    case 't':
+        return parse_count(value, 1024, &a->n_thread);
+    case 'm':
+        return parse_count(value, (size_t)1 << 32, &a->memory_mib);
+    case 'S':
+        return parse_count(value, (size_t)1 << 32, &a->scratch_mib);
+    case 'b':
+        return confine_mode_parse(value, &a->sandbox);
+    case 'C':
+        return confinement_parse(value, &a->confinement);
+    case 's':
+        a->speeds = value;
+        return true;
+    default:
+        a->check = value;
+        return true;
+    }
+}
+
 /* Returns -1 to go on, otherwise the exit status of the program. */
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
@@ -104,48 +127,16 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {NULL, 0, NULL, 0}};
     *a = (struct arguments){.memory_mib = 2048, .sandbox = CONFINE_AUTO, .confinement.pdf.order_fd = -1};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
-        bool ok = true;
-        switch (c) {
-        case 't':
-            ok = parse_count(optarg, 1024, &a->n_thread);
-            break;
-        case 'm':
-            ok = parse_count(optarg, (size_t)1 << 32, &a->memory_mib);
-            break;
-        case 'S':
-            ok = parse_count(optarg, (size_t)1 << 32, &a->scratch_mib);
-            break;
-        case 's':
-            a->speeds = optarg;
-            break;
-        case 'k':
-            a->check = optarg;
-            break;
-        case 'b':
-            ok = confine_mode_parse(optarg, &a->sandbox);
-            break;
-        case 'C':
-            ok = confinement_parse(optarg, &a->confinement);
-            break;
-        case 'q':
+        if (c == 'h') return fputs(usage, stdout) < 0;
+        if (c == 'c') return print_catalogue();
+        if (c == 'v') return puts(RESULT_PROGRAM) < 0;
+        if (c == 'q')
             a->quiet = true;
-            break;
-        case 'h':
-            fputs(usage, stdout);
-            return 0;
-        case 'c':
-            return print_catalogue();
-        case 'v':
-            puts(RESULT_PROGRAM);
-            return 0;
-        default:
-            fputs(usage, stderr);
-            return WORKER_USAGE;
-        }
-        if (!ok) {
-            fprintf(stderr, "selvedge-worker: '%s' is not an allowed value\n", optarg);
-            return WORKER_USAGE;
-        }
+        else if (c == '?')
+            return fputs(usage, stderr) < 0 ? WORKER_FAILED : WORKER_USAGE;
+        if (c == 'q' || take_value(c, optarg, a)) continue;
+        fprintf(stderr, "selvedge-worker: '%s' is not an allowed value\n", optarg);
+        return WORKER_USAGE;
     }
     if (optind != argc - 1) {
         fputs(usage, stderr);
