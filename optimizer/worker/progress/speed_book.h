@@ -24,7 +24,8 @@ struct speed_book {
 };
 
 void speed_book_read(const char *path, struct speed_book *book);
-/* Overwrites the file in place, under a lock. Books of jobs that end at the same time overwrite each other, which loses one job's speeds. */
+/* Overwrites the file in place, under a lock. Books of jobs that end at the same time overwrite each other, which loses
+ * one job's speeds. */
 status speed_book_write(const char *path, const struct speed_book *book, struct error *err);
 /* NULL when there is none. */
 const struct speed_entry *speed_book_find(const struct speed_book *book, const char *key);
