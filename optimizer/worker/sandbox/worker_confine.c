@@ -48,8 +48,7 @@ struct path_list {
 
 static void permit(struct path_list *l, enum sandbox_right right, const char *path)
 {
-    char *copy = strdup(path);
-    if (copy != NULL && l->n == l->capacity) {
+    if (l->n == l->capacity) {
         size_t more = l->capacity == 0 ? 64 : 2 * l->capacity;
         struct sandbox_path *item = realloc(l->item, more * sizeof *item);
         if (item != NULL) {
@@ -57,12 +56,11 @@ static void permit(struct path_list *l, enum sandbox_right right, const char *pa
             l->capacity = more;
         }
     }
-    if (copy == NULL || l->n == l->capacity) {
+    if (l->n < l->capacity) l->item[l->n] = (struct sandbox_path){right, strdup(path)};
+    if (l->n < l->capacity && l->item[l->n].path != NULL)
+        l->n++;
+    else
         l->failed = true;
-        free(copy);
-        return;
-    }
-    l->item[l->n++] = (struct sandbox_path){right, copy};
 }
 
 static void path_list_free(struct path_list *l)

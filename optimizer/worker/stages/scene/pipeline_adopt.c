@@ -86,7 +86,7 @@ void pipeline_link_geometry(const struct worker_folder *own, const struct job_do
 /* The links to the other job's files, laid out as a job folder. */
 static status other_folder(const struct pipeline_context *c, struct worker_folder *f, struct error *err)
 {
-    struct worker_folder other;
+    struct worker_folder other = {.lock_fd = -1};
     if (!other_path(c->folder, c->doc, &other))
         return error_set(err, STATUS_INVALID, "the job folder's path is too long");
     snprintf(f->path, sizeof f->path, "%.2000s/%s", c->folder->path, JOB_FOLDER_ADOPTED);
