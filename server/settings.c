@@ -94,6 +94,8 @@ static const struct setting table[] = {
     NUMBER("webhook", "retry_s", webhook_retry_s, 5, 1, 3600,
            "pause in seconds before the second try; each further one is twice as long, up to an hour"),
     NUMBER("webhook", "max_tries", webhook_max_tries, 16, 1, 1000, "tries after which a delivery is given up"),
+    NUMBER("jobs", "time_limit_s", time_limit_s, 0, 0, 31536000,
+           "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
            "free space below which new work is refused and running jobs pause"),
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,

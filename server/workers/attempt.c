@@ -180,6 +180,15 @@ static void lost(struct job_service *v, struct job_row *row, const struct worker
     outcome->delay_s = 0.5 * (double)row->lost_attempts;
 }
 
+static void time_is_up(const struct job_service *v, struct job_row *row)
+{
+    char text[160];
+    snprintf(text, sizeof text, "the worker has run for %lld s, the limit of this service; retry resumes the job",
+             (long long)v->settings->time_limit_s);
+    row->state = JOB_FAILED;
+    set_error(row, "time_limit", "", text);
+}
+
 static void apply_end(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
                       struct attempt_outcome *outcome)
 {
@@ -188,6 +197,8 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
         row->state = JOB_SUCCEEDED;
     else if (!end->by_signal && end->code == WORKER_FAILED)
         failed(v, row);
+    else if (stop == STOP_TIME && !row->cancel_requested)
+        time_is_up(v, row);
     else if (asked || row->cancel_requested)
         row->state = stop == STOP_PAUSE && !row->cancel_requested      ? JOB_PAUSED
                      : stop == STOP_SHUTDOWN && !row->cancel_requested ? JOB_QUEUED

@@ -24,6 +24,7 @@ struct slot {
     enum attempt_stop stop; /* reason for the request to stop */
     double seen_heartbeat_unix_s,
         heartbeat_seen_s; /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
+    double started_s;     /* monotonic time of the start */
     double asked_s;       /* monotonic time of the request to stop; 0: none */
     bool killed, ended;
     double retry_s; /* monotonic time of the next try to record its end in the database */
@@ -127,6 +128,8 @@ static void watch(struct supervisor *u, struct slot *slot)
         request_stop(slot, STOP_CANCEL);
     else if (u->below_floor)
         request_stop(slot, STOP_PAUSE);
+    const int64_t limit_s = u->v->settings->time_limit_s;
+    if (limit_s > 0 && now - slot->started_s > (double)limit_s) request_stop(slot, STOP_TIME);
     /* measured with our own clock between heartbeats: the wall clock may be set meanwhile, and one failed read is
      * not silence */
     if (request.heartbeat_unix_s > 0 && request.heartbeat_unix_s != slot->seen_heartbeat_unix_s) {
@@ -174,7 +177,7 @@ static void launch(struct supervisor *u, const char *job_id)
     }
     struct slot *slot = u->slot;
     while (slot->used) slot++;
-    *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s()};
+    *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s(), .started_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     path_join(speeds, u->v->settings->data, "speeds.json", NULL);
     const struct worker_paths paths = {u->worker, folder, console, speeds};

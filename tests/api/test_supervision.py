@@ -255,3 +255,14 @@ def test_signals_to_a_worker_from_outside(daemon):
     os.kill(worker_pid(daemon, job), signal.SIGTERM)
     assert daemon.wait_state(job, "succeeded")["lost_attempts"] == 1
     assert daemon.job(job)["sample"] == document("work_once")["sample"]
+
+
+@pytest.mark.parametrize("behaviour", ["work", "ignore_term"])
+def test_a_job_that_runs_too_long_fails_and_can_be_resumed(daemon_maker, behaviour):
+    d = daemon_maker(options={"jobs.time_limit_s": 1, "jobs.cancel_grace_s": 0})
+    job = d.start_job(behaviour)
+    failed = d.wait_state(job, "failed")
+    assert failed["error"]["code"] == "time_limit" and failed["attempt"] == 1 and failed["lost_attempts"] == 0
+    d.put(f"/v1/jobs/{job}/document", json=document("succeed"))
+    d.post(f"/v1/jobs/{job}/start")
+    assert d.wait_state(job, "succeeded")["error"] is None
