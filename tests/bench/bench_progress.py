@@ -6,7 +6,8 @@ Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated 
 of the wall time on, while at least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two
 looks. On a machine that others use, too, the remaining wall time depends on what they do: cpu_worst_eta_ratio_after_10pct
 is the same factor in processor time, of the stated time at the share of the processors that the job has had so far, and
-of the processor time that it took from there on. Wall and processor time of every stage go to standard error. Each job
+of the processor time that it took from there on. cpu_inside_range_share and cpu_widest_range judge the stated range from low to high in the
+same way: the share of looks where the truth lies in it (25 % either way where none is stated), and the largest factor between its ends. Wall and processor time of every stage go to standard error. Each job
 runs twice on the same folder of remembered speeds, as it would on a machine that has run jobs before; the figures with
 "first" in their name are of the first run, on a machine that knows nothing. --keep keeps the jobs with their records.
 """
@@ -143,6 +144,20 @@ def worst_cpu_ratio(looks):
     return worst
 
 
+def ranges(looks):
+    """Share of the looks whose range has the true remaining processor time, and the largest factor between the ends of a range."""
+    n, inside, widest, total = 0, 0, 1.0, looks[-1][1]
+    for t, cpu_s, look in looks:
+        rest = total - cpu_s
+        if cpu_s < FROM * total or rest < max(REST_SHARE * total, REST_S) or look["state"] != "running" or look["eta_s"] is None:
+            continue
+        low, high = (look["eta_low_s"], look["eta_high_s"]) if look["eta_low_s"] is not None else (look["eta_s"] / 1.25, look["eta_s"] * 1.25)
+        n += 1
+        inside += low * cpu_s / t <= rest <= high * cpu_s / t
+        widest = max(widest, high / max(low, 1e-3))
+    return inside / max(n, 1), widest
+
+
 def largest_jump(looks):
     """Largest change between two looks while the job runs; a step backwards counts as an infinite one."""
     fractions = [look["fraction"] for _, _, look in looks if look["state"] == "running"]
@@ -150,8 +165,8 @@ def largest_jump(looks):
     return float("inf") if min(steps, default=0.0) < 0.0 else max(steps, default=0.0)
 
 
-def figure(name, value, unit):
-    print(json.dumps({"name": f"progress.{name}", "value": round(value, 4), "unit": unit, "better": "lower"}), flush=True)
+def figure(name, value, unit, better="lower"):
+    print(json.dumps({"name": f"progress.{name}", "value": round(value, 4), "unit": unit, "better": better}), flush=True)
 
 
 def bench(arguments, name, folder, speeds):
@@ -165,6 +180,9 @@ def bench(arguments, name, folder, speeds):
         looks, wall_s = record(arguments, job, speeds)
         figure(f"{name}.{run}worst_eta_ratio_after_10pct", worst_ratio(looks, wall_s), "1")
         figure(f"{name}.{run}cpu_worst_eta_ratio_after_10pct", worst_cpu_ratio(looks), "1")
+        inside, widest = ranges(looks)
+        figure(f"{name}.{run}cpu_inside_range_share", inside, "1", "higher")
+        figure(f"{name}.{run}cpu_widest_range", widest, "1")
         figure(f"{name}.{run}largest_jump", largest_jump(looks), "1")
         figure(f"{name}.{run}wall_s", wall_s, "s")
         figure(f"{name}.{run}cpu_s", looks[-1][1], "s")

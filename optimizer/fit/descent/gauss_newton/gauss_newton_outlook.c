@@ -34,7 +34,8 @@ double gauss_newton_expected_paths(const struct gauss_newton *g, double f, doubl
 {
     const double n_row_path = paths_per_effective(g), done = (double)g->run.n_path_total;
     const double next = g->n_path_mean * n_row_path;
-    double effective = g->model.n_effective * fmax(gauss_newton_paths_to_grow(g, f, se), 1.0);
+    const double f_end = f - fmax(g->far_decrease, 0.0); /* while f is large, a large noise seems good enough */
+    double effective = g->model.n_effective * fmax(gauss_newton_paths_to_grow(g, f_end, se), 1.0);
     if (g->pulls) effective = fmax(effective, GAUSS_NEWTON_PULL_UNTIL);
     double more = (effective - g->model.n_effective) * n_row_path;
     const double growth = gauss_newton_paths_to_misfit(g);
