@@ -2,14 +2,14 @@
 
     bench_progress.py [--build DIR] [--data DIR] [--threads N] [--keep DIR] [demo] [fiber_ct] [weave_ct] [fleece]
 
-Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated and the true remaining time from a tenth
-of the wall time on, while at least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two
-looks. On a machine that others use, too, the remaining wall time depends on what they do: cpu_worst_eta_ratio_after_10pct
-is the same factor in processor time, of the stated time at the share of the processors that the job has had so far, and
-of the processor time that it took from there on. cpu_inside_range_share and cpu_widest_range judge the stated range from low to high in the
-same way: the share of looks where the truth lies in it (25 % either way where none is stated), and the largest factor between its ends. Wall and processor time of every stage go to standard error. Each job
-runs twice on the same folder of remembered speeds, as it would on a machine that has run jobs before; the figures with
-"first" in their name are of the first run, on a machine that knows nothing. --keep keeps the jobs with their records.
+Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated and the true remaining time from a tenth of the wall time on, while at
+least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two looks. On a machine that others use, too, the remaining
+wall time depends on what they do: cpu_worst_eta_ratio_after_10pct is the same factor in processor time, of the stated time at the share of the
+processors that the job has had so far, and of the processor time that it took from there on. cpu_inside_range_share and cpu_widest_range judge the
+stated range from low to high in the same way: the share of looks where the truth lies in it (25 % either way where none is stated), and the largest
+factor between its ends. Wall and processor time of every stage go to standard error. Each job runs twice on the same folder of remembered speeds, as
+it would on a machine that has run jobs before; the figures with "first" in their name are of the first run, on a machine that knows nothing. --keep
+keeps the jobs with their records.
 """
 import argparse
 import contextlib
