@@ -221,24 +221,27 @@ static int conclude(struct worker_status *st, struct log *log, status outcome, c
     return code;
 }
 
-/* Says in the log how far the sandbox goes, and warns the job's user when the kernel lacks a part of it. */
+/* Says in the log how far the sandbox goes, and warns the job's user when a part of it could not be had. It is an error
+ * only where the whole sandbox is required. */
 static status report_sandbox(struct pipeline_context *c, const struct arguments *a, const struct error *failed,
                              struct error *err)
 {
     char text[200];
     bool whole = confinement_describe(&a->confinement, a->sandbox, text, sizeof text);
-    if (failed->code != STATUS_OK) {
+    if (failed->code != STATUS_OK && a->sandbox == CONFINE_REQUIRED) {
         *err = *failed;
         return failed->code;
     }
-    if (whole)
+    if (failed->code != STATUS_OK)
+        worker_status_warn(c->status, "the worker runs without its whole sandbox: %s", failed->text);
+    else if (whole)
         log_info(c->log, "%s", text);
     else
         worker_status_warn(c->status, "%s", text);
     return STATUS_OK;
 }
 
-/* Enters the sandbox. Returns only in it, or without one; what then failed is an error of the job. */
+/* Enters the sandbox. Returns only in it, or without one; report_sandbox says what then failed. */
 static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
 {
     struct confinement *c = &a->confinement;

@@ -105,6 +105,21 @@ def test_the_daemon_names_the_forbidden_call(hostile, daemon_maker):
     assert "forbids the system call 'socket'" in failed["error"]["text"]
 
 
+@pytest.mark.skipif(shutil.which("strace") is None, reason="no strace")
+@pytest.mark.parametrize("mode", ["auto", "required"])
+def test_a_kernel_that_refuses_the_sandbox(hostile, tmp_path, mode):
+    """The job goes on with a warning, unless the sandbox is required."""
+    strace = ["strace", "-qq", "-o", os.devnull, "-e", "trace=landlock_restrict_self", "-e", "inject=landlock_restrict_self:error=EPERM"]
+    if subprocess.run(["strace", "-qq", "-o", os.devnull, "true"], check=False).returncode != 0:
+        pytest.skip("strace may not trace here")
+    done = subprocess.run([*strace, WORKER, "--quiet", "--sandbox", mode, job_folder(tmp_path / "job")], capture_output=True, text=True, check=False)
+    state = json.loads((tmp_path / "job" / "status.json").read_text())
+    refusal = "cannot enter the sandbox: Operation not permitted"
+    assert done.returncode == 1 and hostile
+    assert (refusal in state["error"]["text"]) == (mode == "required")
+    assert any(refusal in w for w in map(str, state["warnings"])) == (mode == "auto")
+
+
 def test_what_a_worker_gets_of_the_daemon(daemon_maker):
     """Few variables, three descriptors, no privileges to gain, and the limits of the settings."""
     limits = {"jobs.open_files": 200, "jobs.file_limit_bytes": 1 << 20, "jobs.memory_limit_bytes": 1 << 30, "jobs.oom_score_adj": 700, "jobs.nice": 7}
