@@ -121,6 +121,33 @@ static void test_camera_from_markers(void **state)
     }
 }
 
+/* Markers that the picture's border cuts are not used: the others say where the crop is. */
+static void test_markers_cut_by_the_border(void **state)
+{
+    const struct lens lens = {.has_distortion = false};
+    const struct marker_board b = board();
+    struct image whole;
+    double camera[3];
+    (void)state;
+    camera_at(5.0, 90.0, camera);
+    draw(&whole, camera, 0);
+    for (size_t cut = 280; cut <= 360; cut += 8) { /* two markers lie from about 286 to 355 */
+        struct image im;
+        struct marker_view view;
+        struct error err = {0};
+        assert_int_equal(image_init(&im, WIDTH - cut, HEIGHT, 3, NULL), STATUS_OK);
+        for (size_t y = 0; y < HEIGHT; y++)
+            memcpy(im.pixel + 3 * y * im.width, whole.pixel + 3 * (y * WIDTH + cut), 3 * im.width * sizeof *im.pixel);
+        if (marker_view_find(&b, &lens, &im, &view, &err) != STATUS_OK) fail_msg("cut %zu: %s", cut, err.text);
+        double x = view.center_px[0] + (double)cut;
+        if (cut > 292 && cut < 350) assert_int_equal(view.n_marker, 2);
+        if (!(hypot(x - center_px[0], view.center_px[1] - center_px[1]) < 1.6)) /* half a millimetre */
+            fail_msg("cut %zu: %zu markers, center at %g, %g", cut, view.n_marker, x, view.center_px[1]);
+        image_release(&im);
+    }
+    image_release(&whole);
+}
+
 /* A job of one photograph of view v, loaded with its rig. folder: 1024 bytes, where the files are. */
 static struct job_document *load_job(void **state, const char *rig, const struct image *im,
                                      struct photograph_process *k, char *folder)
@@ -290,9 +317,13 @@ static void test_layout_of_boards(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_charuco_board),       cmocka_unit_test(test_job_with_a_board),
-        cmocka_unit_test(test_layout_of_boards),    cmocka_unit_test(test_plane_map),
-        cmocka_unit_test(test_camera_from_markers), cmocka_unit_test(test_job_with_markers),
+        cmocka_unit_test(test_charuco_board),
+        cmocka_unit_test(test_job_with_a_board),
+        cmocka_unit_test(test_layout_of_boards),
+        cmocka_unit_test(test_plane_map),
+        cmocka_unit_test(test_markers_cut_by_the_border),
+        cmocka_unit_test(test_camera_from_markers),
+        cmocka_unit_test(test_job_with_markers),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
