@@ -97,6 +97,7 @@ def test_a_worker_ends_the_wait(daemon):
     daemon.delete(f"/v1/jobs/{job}")
 
 
+@pytest.mark.slow
 def test_a_wait_longer_than_the_idle_timeout_is_answered(daemon_maker):
     d = daemon_maker(options={"server.idle_timeout_s": 1})
     w = Waiting(d, "/v1/jobs", tag_of(d, "/v1/jobs"), wait=2)
@@ -113,6 +114,7 @@ def test_a_client_that_goes_away_is_not_waited_for(daemon):
     wait_until(lambda: n_waiting(daemon) == before)
 
 
+@pytest.mark.slow
 def test_many_watchers_keep_nobody_waiting(daemon_maker):
     d = daemon_maker()
     job = d.create(document("succeed"))

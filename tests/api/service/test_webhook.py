@@ -104,6 +104,7 @@ def test_every_end_of_a_job_is_delivered_once(service):
     assert [x["id"] for x in page["deliveries"] + rest["deliveries"]] == [x["id"] for x in listed] and rest["next_cursor"] is None
 
 
+@pytest.mark.slow
 def test_a_receiver_that_fails_is_tried_again(service):
     def answer(n, handler):
         if n == 1:
@@ -143,6 +144,7 @@ def drip(n, handler):
         time.sleep(0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("answer, words", [
     (lambda n, handler: time.sleep(5), "imed out"), (drip, "imed out"), (lie_endless, "more than 65536 bytes"), (lie_length, "transfer closed"),
     (lambda n, handler: handler.reply(302, Location="/elsewhere"), "status 302"),
@@ -157,6 +159,7 @@ def test_receivers_that_hang_and_lie(service, answer, words):
     assert len(receiver.got) == 1, "a redirect was followed"
 
 
+@pytest.mark.slow
 def test_a_delivery_survives_a_kill(service):
     up = threading.Event()
     d, receiver = service(lambda n, handler: handler.reply(204 if up.is_set() else 503))
@@ -168,6 +171,7 @@ def test_a_delivery_survives_a_kill(service):
     assert only(d, "delivered")["id"] == receiver.got[0][0]["Selvedge-Delivery"] == receiver.got[-1][0]["Selvedge-Delivery"]
 
 
+@pytest.mark.slow
 def test_a_stop_does_not_wait_for_a_receiver_that_hangs(service):
     d, receiver = service(lambda n, handler: time.sleep(200), timeout_s=100)
     d.start_job("succeed")
