@@ -1,3 +1,4 @@
+#include "renderer/scene/bent/bent_scene.h"
 #include "renderer/scene/scene_data.h"
 
 #include <math.h>
@@ -269,6 +270,10 @@ out:
 void scene_free(struct scene *s)
 {
     if (s == NULL) return;
+    if (s->bent != NULL) {
+        bent_free(s); /* all else belongs to the flat scene */
+        return;
+    }
     if (s->block != NULL) rtcReleaseScene(s->block);
     if (s->tile != NULL) rtcReleaseScene(s->tile);
     if (s->device != NULL) rtcReleaseDevice(s->device);
@@ -282,6 +287,7 @@ void scene_free(struct scene *s)
 
 size_t scene_memory_bytes(const struct scene *s)
 {
+    if (s->bent != NULL) return bent_memory_bytes(s);
     long long device = atomic_load(&s->device_bytes);
     return sizeof *s + (device > 0 ? (size_t)device : 0) + s->n_vertex * sizeof *s->vertex +
            s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1 + (s->segment_group != NULL));

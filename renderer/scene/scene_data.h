@@ -9,6 +9,11 @@
 
 enum { SCENE_MAX_HALF_BLOCK = 12 };
 
+/* The top and the bottom plane of the cloth lie so far outside of its fibers. */
+#define SCENE_MARGIN_MM 1e-3f
+
+struct bent_cloth;
+
 struct scene_vertex {
     float x, y, z, radius; /* Embree's FLOAT4 */
 };
@@ -28,7 +33,14 @@ struct scene {
     float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */
     float bottom_mm;                         /* < 0; the top is 0 */
     bool black_sheet;
+    struct bent_cloth *bent; /* NULL: the cloth is flat. Otherwise device, tile and block are those of the flat cloth */
     atomic_llong device_bytes;
 };
+
+/* The nearest front face of the flat cloth over `span` of a ray, whose direction may have any length; *distance and span
+ * are in units of it. The ray is moved by whole tiles. */
+bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,
+                      float *distance);
+bool scene_occluded_span(const struct scene *scene, const struct scene_ray *ray, float span);
 
 #endif

@@ -17,6 +17,7 @@ struct scene_ray {
     float origin_mm[3];  /* local */
     float direction[3];  /* unit */
     float tnear_mm;
+    uint32_t i_cell; /* of a bent cloth: where the origin lies (bent/bent_scene.h) */
 };
 
 struct scene_hit {
@@ -25,6 +26,7 @@ struct scene_hit {
     float tangent[3];     /* unit, along the fiber */
     float radius_mm;
     uint32_t i_segment; /* scene_fiber_of gives its fiber */
+    uint32_t i_cell;    /* of a bent cloth */
 };
 
 /* Nearest front face. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves
@@ -51,6 +53,13 @@ uint32_t scene_fiber_of(const struct scene *scene, uint32_t i_segment);
 uint32_t scene_group_of(const struct scene *scene, uint32_t i_segment);
 
 bool scene_has_black_sheet(const struct scene *scene);
+/* Whether the black sheet hides what lies in a direction from anywhere in the cloth. Of a bent cloth the direction does
+ * not tell: rays that meet its sheet are occluded. */
+bool scene_sheet_hides(const struct scene *scene, const float direction[3]);
+/* Whether a ray for which scene_trace has found nothing has ended on the black sheet. */
+bool scene_sheet_met(const struct scene *scene, const struct scene_ray *ray);
+/* The unit normal of a bent cloth where a fiber was hit. False: the cloth is flat, and its normal is z. */
+bool scene_bent_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
 /* z of the lowest fiber surface (the top is 0). */
 double scene_thickness_mm(const struct scene *scene);
 

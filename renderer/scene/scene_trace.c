@@ -1,9 +1,8 @@
+#include "renderer/scene/bent/bent_scene.h"
 #include "renderer/scene/scene_data.h"
 
 #include <math.h>
 #include <string.h>
-
-#define SLAB_MARGIN_MM 1e-3f
 
 /* Local origin into the centre tile. */
 static inline void wrap(const struct scene *s, struct scene_ray *r)
@@ -27,7 +26,7 @@ static inline float reach(const struct scene *s, const struct scene_ray *r, bool
         float t_edge = d[a] != 0 ? to / d[a] : INFINITY;
         t = t_edge < t ? t_edge : t;
     }
-    float plane = d[2] > 0 ? SLAB_MARGIN_MM : s->bottom_mm - SLAB_MARGIN_MM;
+    float plane = d[2] > 0 ? SCENE_MARGIN_MM : s->bottom_mm - SCENE_MARGIN_MM;
     float t_slab = d[2] != 0 ? (plane - o[2]) / d[2] : INFINITY;
     *leaves = t_slab <= t;
     return *leaves ? t_slab : t;
@@ -67,9 +66,12 @@ static void fill_hit(const struct scene *s, const struct scene_ray *r, const str
     inv = 1 / sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
     for (int a = 0; a < 3; a++) hit->tangent[a] = t[a] * inv;
     hit->radius_mm = v[0].radius;
+    hit->i_cell = 0;
 }
 
-bool scene_trace(const struct scene *s, struct scene_ray *r, struct scene_hit *hit)
+/* The nearest front face over *span of the ray; *span is what is left of it from the ray's final origin, from which q
+ * has its distance. */
+static bool trace_span(const struct scene *s, struct scene_ray *r, float *span, struct RTCRayHit *q)
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -77,31 +79,55 @@ bool scene_trace(const struct scene *s, struct scene_ray *r, struct scene_hit *h
         bool leaves;
         wrap(s, r);
         float t = reach(s, r, &leaves);
+        if (*span <= t) {
+            t = *span;
+            leaves = true;
+        }
         if (t > r->tnear_mm) {
-            struct RTCRayHit q;
-            fill_ray(&q.ray, r, t);
-            q.hit.geomID = q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-            rtcIntersect1(s->block, &context, &q);
-            if (q.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
-                fill_hit(s, r, &q, hit);
-                return true;
-            }
+            fill_ray(&q->ray, r, t);
+            q->hit.geomID = q->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+            rtcIntersect1(s->block, &context, q);
+            if (q->hit.geomID != RTC_INVALID_GEOMETRY_ID) return true;
         }
         if (leaves || !isfinite(t)) return false;
         advance(r, t);
+        *span -= t;
     }
     return false;
 }
 
-bool scene_occluded(const struct scene *s, const struct scene_ray *ray)
+bool scene_trace(const struct scene *s, struct scene_ray *r, struct scene_hit *hit)
+{
+    struct RTCRayHit q;
+    float span = INFINITY;
+    if (s->bent != NULL) return bent_trace(s, r, hit);
+    if (!trace_span(s, r, &span, &q)) return false;
+    fill_hit(s, r, &q, hit);
+    return true;
+}
+
+bool scene_trace_span(const struct scene *s, struct scene_ray *r, float span, struct scene_hit *hit, float *distance)
+{
+    struct RTCRayHit q;
+    float left = span;
+    if (!trace_span(s, r, &left, &q)) return false;
+    fill_hit(s, r, &q, hit);
+    *distance = span - left + q.ray.tfar;
+    return true;
+}
+
+static bool occluded_span(const struct scene *s, struct scene_ray r, float span)
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct scene_ray r = *ray;
     for (int i = 0; i < SCENE_MAX_WRAP; i++) {
         bool leaves;
         wrap(s, &r);
         float t = reach(s, &r, &leaves);
+        if (span <= t) {
+            t = span;
+            leaves = true;
+        }
         if (t > r.tnear_mm) {
             struct RTCRay q;
             fill_ray(&q, &r, t);
@@ -110,8 +136,19 @@ bool scene_occluded(const struct scene *s, const struct scene_ray *ray)
         }
         if (leaves || !isfinite(t)) return false;
         advance(&r, t);
+        span -= t;
     }
     return false;
+}
+
+bool scene_occluded(const struct scene *s, const struct scene_ray *ray)
+{
+    return s->bent != NULL ? bent_occluded(s, ray) : occluded_span(s, *ray, INFINITY);
+}
+
+bool scene_occluded_span(const struct scene *s, const struct scene_ray *ray, float span)
+{
+    return occluded_span(s, *ray, span);
 }
 
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
@@ -128,6 +165,7 @@ void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], con
     memcpy(r->origin_mm, hit->position_mm, sizeof r->origin_mm);
     memcpy(r->direction, direction, sizeof r->direction);
     r->tnear_mm = tnear + 1e-3f * hit->radius_mm;
+    r->i_cell = hit->i_cell;
 }
 
 void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
@@ -150,11 +188,13 @@ void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[
     memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
     memcpy(r->direction, direction, sizeof r->direction);
     r->tnear_mm = 1e-3f * hit->radius_mm;
+    r->i_cell = hit->i_cell;
 }
 
 bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const double direction[3], struct scene_ray *r)
 {
-    double top = (double)SLAB_MARGIN_MM, bottom = (double)(s->bottom_mm - SLAB_MARGIN_MM), z = origin_mm[2], t = 0;
+    if (s->bent != NULL) return bent_enter(s, origin_mm, direction, r);
+    double top = (double)SCENE_MARGIN_MM, bottom = (double)(s->bottom_mm - SCENE_MARGIN_MM), z = origin_mm[2], t = 0;
     if (z > top) {
         if (direction[2] >= 0) return false;
         t = (top - z) / direction[2];
@@ -172,5 +212,6 @@ bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const dou
         r->direction[a] = (float)direction[a];
     }
     r->tnear_mm = 0;
+    r->i_cell = 0;
     return true;
 }

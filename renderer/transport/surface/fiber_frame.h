@@ -42,6 +42,26 @@ static inline float fiber_frame_dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/* The same in a bent cloth, whose unit normal is given. Of a fiber along it, v is any direction across the fiber. */
+static inline void fiber_frame_flat_in(struct fiber_frame *f, const float u[3], const float normal[3])
+{
+    float along = fiber_frame_dot(u, normal), level2 = 0, v[3];
+    for (int a = 0; a < 3; a++) {
+        v[a] = normal[a] - along * u[a];
+        level2 += v[a] * v[a];
+    }
+    if (!(level2 > 1e-8f)) {
+        fiber_frame_from(f, u);
+        return;
+    }
+    float inv = 1 / sqrtf(level2);
+    memcpy(f->u, u, sizeof f->u);
+    for (int a = 0; a < 3; a++) f->v[a] = inv * v[a];
+    f->w[0] = u[1] * f->v[2] - u[2] * f->v[1];
+    f->w[1] = u[2] * f->v[0] - u[0] * f->v[2];
+    f->w[2] = u[0] * f->v[1] - u[1] * f->v[0];
+}
+
 static inline void fiber_frame_to_local(const struct fiber_frame *f, const float d[3], float out[3])
 {
     out[0] = fiber_frame_dot(f->u, d);

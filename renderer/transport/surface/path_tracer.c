@@ -84,7 +84,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
-    if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return 0;
+    if (scene_sheet_hides(s->scene, direction)) return 0;
     fiber_frame_to_local(&b->frame, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float light =
@@ -116,7 +116,7 @@ static void connect_image(struct walk *w, const struct bounce *b)
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
-    if (direction[2] <= 0 && scene_has_black_sheet(s->scene)) return;
+    if (scene_sheet_hides(s->scene, direction)) return;
     fiber_frame_to_local(&b->frame, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
@@ -151,7 +151,7 @@ static void connect_image(struct walk *w, const struct bounce *b)
 static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 {
     const struct path_setting *s = w->s;
-    if (ray->direction[2] < 0 && scene_has_black_sheet(s->scene)) return;
+    if (scene_sheet_met(s->scene, ray)) return;
     float around[3] = {0, 0, 0}, position[3];
     lights_add_environment(&s->lights, ray->direction, pdf, around);
     unwrapped(ray->origin_mm, ray->offset_mm, position);
@@ -182,10 +182,13 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
     const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
     b->hit = *hit;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
-    if (w->s->model->flat_section)
-        fiber_frame_flat(&b->frame, hit->tangent);
-    else
+    float normal[3];
+    if (!w->s->model->flat_section)
         fiber_frame_from(&b->frame, hit->tangent);
+    else if (scene_bent_normal(w->s->scene, hit, normal))
+        fiber_frame_flat_in(&b->frame, hit->tangent, normal);
+    else
+        fiber_frame_flat(&b->frame, hit->tangent);
     fiber_frame_to_local(&b->frame, back, b->wo);
     if (w->s->n_set == 1) return;
     w->i_set = scene_group_of(w->s->scene, hit->i_segment);
@@ -281,7 +284,7 @@ static void connect_lamps(struct walk *w, const struct bounce *b)
         }
         if (!w->s->guided_paths) continue;
         light_guide_towards(&w->lamp[k], position, w->towards[k]);
-        bool sees = w->towards[k][2] > 0 || !scene_has_black_sheet(w->s->scene);
+        bool sees = !scene_sheet_hides(w->s->scene, w->towards[k]);
         if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, k, b);
     }
 }

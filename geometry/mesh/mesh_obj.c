@@ -1,0 +1,124 @@
+/* Wavefront OBJ: v x y z, vt u v, f v/vt[/vn] ... with indices from 1, or from the end when negative. */
+#include "base/files/durable.h"
+#include "geometry/mesh/mesh.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FILE_LIMIT_BYTES = 1 << 30 };
+
+struct obj_reader {
+    const char *name;
+    size_t line;
+    double scale_mm;
+    struct mesh *m; /* its arrays have room for all lines of the file */
+};
+
+static status at_line(const struct obj_reader *r, const char *what, struct error *err)
+{
+    return error_set(err, STATUS_FORMAT, "cannot use mesh '%s', line %zu: %s", r->name, r->line, what);
+}
+
+static status read_numbers(const struct obj_reader *r, const char *text, size_t n, double *out, struct error *err)
+{
+    for (size_t i = 0; i < n; i++) {
+        char *end;
+        out[i] = r->scale_mm * strtod(text, &end);
+        if (end == text) return at_line(r, "a number is missing", err);
+        text = end;
+    }
+    return STATUS_OK;
+}
+
+/* Index of a point in the text, from 0; UINT32_MAX when there is no such point yet. */
+static uint32_t read_index(const char **text, size_t n)
+{
+    char *end;
+    long long i = strtoll(*text, &end, 10);
+    if (end == *text) return UINT32_MAX;
+    *text = end;
+    if (i < 0) i += (long long)n + 1;
+    return i >= 1 && i <= (long long)n ? (uint32_t)(i - 1) : UINT32_MAX;
+}
+
+static status read_corner(const struct obj_reader *r, const char **text, uint32_t corner[2], struct error *err)
+{
+    corner[0] = read_index(text, r->m->n_position);
+    if (corner[0] == UINT32_MAX) return at_line(r, "the face names a position (v) that is not there", err);
+    if (**text != '/' || (*text)[1] == '/')
+        return at_line(r, "the face has no texture coordinates (vt), which say where the cloth lies", err);
+    ++*text;
+    corner[1] = read_index(text, r->m->n_texture);
+    if (corner[1] == UINT32_MAX) return at_line(r, "the face names a texture coordinate (vt) that is not there", err);
+    *text += strcspn(*text, " \t\r");
+    return STATUS_OK;
+}
+
+static status read_face(const struct obj_reader *r, const char *text, struct error *err)
+{
+    uint32_t first[2] = {0, 0}, last[2] = {0, 0}, corner[2];
+    size_t n = 0;
+    for (text += strspn(text, " \t\r"); *text != '\0'; text += strspn(text, " \t\r"), n++) {
+        status s = read_corner(r, &text, corner, err);
+        if (s != STATUS_OK) return s;
+        if (n == 0) memcpy(first, corner, sizeof first);
+        if (n >= 2) {
+            if (r->m->n_triangle >= MESH_MAX_TRIANGLE)
+                return error_set(err, STATUS_TOO_LARGE, "cannot use mesh '%s': more than %d triangles", r->name,
+                                 MESH_MAX_TRIANGLE);
+            r->m->triangle[r->m->n_triangle++] =
+                (struct mesh_triangle){{first[0], last[0], corner[0]}, {first[1], last[1], corner[1]}};
+        }
+        memcpy(last, corner, sizeof last);
+    }
+    return n >= 3 ? STATUS_OK : at_line(r, "a face needs three corners or more", err);
+}
+
+static status read_line(const struct obj_reader *r, const char *line, struct error *err)
+{
+    line += strspn(line, " \t");
+    if (strncmp(line, "v ", 2) == 0 || strncmp(line, "v\t", 2) == 0)
+        return read_numbers(r, line + 2, 3, r->m->position_mm[r->m->n_position++], err);
+    if (strncmp(line, "vt ", 3) == 0 || strncmp(line, "vt\t", 3) == 0)
+        return read_numbers(r, line + 3, 2, r->m->texture_mm[r->m->n_texture++], err);
+    if (strncmp(line, "f ", 2) == 0 || strncmp(line, "f\t", 2) == 0) return read_face(r, line + 2, err);
+    return STATUS_OK;
+}
+
+static size_t count(const char *text, char c)
+{
+    size_t n = 0;
+    for (; *text != '\0'; text++) n += *text == c;
+    return n;
+}
+
+static status read_lines(struct obj_reader *r, char *text, struct error *err)
+{
+    status s = STATUS_OK;
+    while (text != NULL && s == STATUS_OK) {
+        char *end = strchr(text, '\n');
+        if (end != NULL) *end = '\0';
+        r->line++;
+        s = read_line(r, text, err);
+        text = end != NULL ? end + 1 : NULL;
+    }
+    return s;
+}
+
+status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct error *err)
+{
+    char *text = NULL;
+    struct obj_reader r = {path_file_name(path), 0, scale_mm, m};
+    status s = file_read_all(path, FILE_LIMIT_BYTES, &text, NULL, err);
+    memset(m, 0, sizeof *m);
+    if (s != STATUS_OK) return s;
+    /* a line holds one point at most, and a corner of a triangle has a slash */
+    size_t n_line = count(text, '\n') + 1, n_corner = count(text, '/');
+    s = mesh_new(m, n_line, n_line, n_corner < MESH_MAX_TRIANGLE ? n_corner : MESH_MAX_TRIANGLE, err);
+    m->n_position = m->n_texture = m->n_triangle = 0;
+    if (s == STATUS_OK) s = read_lines(&r, text, err);
+    if (s == STATUS_OK) s = mesh_check(m, err);
+    if (s != STATUS_OK) mesh_release(m);
+    free(text);
+    return s;
+}
