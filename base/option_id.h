@@ -43,6 +43,7 @@
 #define OPTION_TEXTURE_PX_PER_MM "texture_px_per_mm"
 /* the set-up */
 #define OPTION_ENVIRONMENT_FILE "environment_file"
+#define OPTION_MESH_FILE "mesh_file"
 #define OPTION_RIG "rig_file"
 #define OPTION_PHOTOGRAPH_VIEW "photograph_view"
 #define OPTION_CAMERA_NOISE "camera_noise"

@@ -87,6 +87,23 @@ static status add_list(const json_t *names, const char *folder, const char *role
     return STATUS_OK;
 }
 
+/* Meshes of pictures; most pictures need none. */
+static status add_meshes(const json_t *pictures, const char *folder, struct cli_file_list *list, struct error *err)
+{
+    size_t i;
+    json_t *picture;
+    status s = STATUS_OK;
+    json_array_foreach(pictures, i, picture)
+    {
+        char path[64];
+        const json_t *name = json_object_get(picture, "mesh_file");
+        snprintf(path, sizeof path, "pictures[%zu].mesh_file", i);
+        if (name != NULL) s = add(list, folder, name, "mesh", path, err);
+        if (s != STATUS_OK) break;
+    }
+    return s;
+}
+
 status cli_job_files_list(const json_t *document, const char *folder, struct cli_file_list *list, struct error *err)
 {
     *list = (struct cli_file_list){0};
@@ -97,6 +114,7 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
         s = add_list(json_object_get(camera, "dark_frames"), folder, "dark_frame", "camera.dark_frames", list, err);
     if (s == STATUS_OK)
         s = add_list(json_object_get(document, "photographs"), folder, "photograph", "photographs", list, err);
+    if (s == STATUS_OK) s = add_meshes(json_object_get(document, "pictures"), folder, list, err);
     if (s != STATUS_OK) cli_job_files_release(list);
     return s;
 }

@@ -20,6 +20,7 @@ function filesOf(doc) {
   add(doc.color?.chart?.file, "chart");
   add(doc.color?.white?.file, "white_reference");
   for (const p of doc.photographs ?? []) for (const q of [p, ...(p?.more_exposures ?? [])]) add(q?.file, "photograph");
+  for (const p of doc.pictures ?? []) add(p?.mesh_file, "mesh");
   return list;
 }
 

@@ -38,6 +38,7 @@ void job_document_free(struct job_document *doc)
     free(doc->measured_row);
     free(doc->dark_frame);
     free(doc->candidate);
+    free(doc->surface_picture);
     free(doc);
 }
 

@@ -24,6 +24,7 @@ enum {
     JOB_MAX_VOLUME_FILE = 4096,
     JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
     JOB_MAX_CANDIDATE = 1024,
+    JOB_MAX_SURFACE_PICTURE = 32,
     JOB_MAX_MEASURED_ROW = 455, /* as many means over rotations as a table may have */
     JOB_MAX_TEXTURE_CELLS = 32, /* blocks along the edge of a crop; the renderer has the same limit */
     JOB_MAX_MODEL = 8
@@ -68,6 +69,19 @@ struct job_photograph {
 /* A configuration of which a photograph might be taken. */
 struct job_candidate {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
+};
+
+enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_MESH };
+
+/* A picture of the fitted cloth laid on a surface. */
+struct job_surface_picture {
+    enum job_surface on;
+    char mesh_file[JOB_MAX_NAME_BYTES]; /* of JOB_ON_MESH; "" otherwise */
+    double mesh_unit_mm;                /* a unit of the file in millimetres */
+    double radius_mm, size_mm;          /* of the cylinder; of a flat piece, or along the cylinder */
+    double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
+    double width_mm; /* what the picture shows */
+    size_t px, sample;
 };
 
 /* What a kind of yarn in the document counts or names; 0 fibers: not given. */
@@ -175,6 +189,8 @@ struct job_document {
     bool candidate_grid;                     /* true: the candidates are the built-in ones */
     struct job_candidate *candidate;
     size_t render_px, render_sample; /* render_sample 0: chosen from the paths of the fit */
+    size_t n_surface_picture;
+    struct job_surface_picture *surface_picture;
     bool export_mitsuba, export_pbrt, export_usd, export_blender, export_textures, export_pdf;
 };
 
@@ -201,7 +217,7 @@ size_t job_texture_cells(const struct job_document *doc);
 double job_texture_cell_mm(const struct job_document *doc);
 
 /* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment",
- * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference"). */
+ * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* Sets and returns the error of a job that fits the density although no fitted row is lit from behind. */

@@ -47,4 +47,6 @@ void job_document_visit_files(const struct job_document *doc,
         for (size_t j = 0; j < doc->photograph[i].n_exposure; j++)
             visit(context, doc->photograph[i].exposure[j].file, "photograph");
     }
+    for (size_t i = 0; i < doc->n_surface_picture; i++)
+        if (doc->surface_picture[i].mesh_file[0] != '\0') visit(context, doc->surface_picture[i].mesh_file, "mesh");
 }

@@ -19,6 +19,7 @@ void pipeline_context_init(struct pipeline_context *c)
     observation_set_init(&c->contrast);
     fiber_set_init(&c->fiber);
     c->exports = json_array();
+    c->surface_pictures = json_array();
     for (size_t i = 0; i < sizeof c->stage_wall_s / sizeof c->stage_wall_s[0]; i++) c->stage_wall_s[i] = NAN;
 }
 
@@ -32,6 +33,7 @@ void pipeline_context_release(struct pipeline_context *c)
     observation_set_release(&c->contrast);
     environment_free(c->environment);
     json_decref(c->exports);
+    json_decref(c->surface_pictures);
     volume_release(&c->volume);
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);

@@ -156,6 +156,7 @@ struct pipeline_context {
     size_t n_input_warning;        /* warnings of reading the job and of its geometry */
     struct verdict verdict;        /* of the best model; filled in before the report */
     json_t *exports;               /* what result.json says of the files for other programs */
+    json_t *surface_pictures;      /* and of pictures of the cloth on surfaces */
 
     struct reconstruct_option option;
     struct reconstruct_report geometry;

@@ -24,8 +24,8 @@ struct scene_option {
  * precision). Segments longer than 200 radii are cut: segments of the scene may be more than those of f. */
 status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err);
 /* The cloth of a flat scene laid on a mesh, its upper side on the mesh's and the texture coordinates of the mesh being
- * places in the cloth (a shell map: bent/shell.h). Nothing of the cloth is copied: `flat` must outlive it. The origin of
- * the mesh is the orbit centre. The black sheet, if `flat` has one, lies under all of the bent cloth. STATUS_INVALID,
+ * places in the cloth (a shell map: bent/shell.h). Nothing of the cloth is copied: `flat` must outlive it. The mesh's
+ * origin is the orbit centre. The black sheet, if `flat` has one, lies under all of the bent cloth. STATUS_INVALID,
  * naming a triangle, where the mesh bends more tightly than the cloth is thick; for a scene that is bent already;
  * STATUS_NO_MEMORY. The mesh must have passed mesh_check and may be released afterwards. */
 status scene_bend(const struct scene *flat, const struct mesh *mesh, struct scene **bent, struct error *err);

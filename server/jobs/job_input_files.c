@@ -45,8 +45,9 @@ out:
 
 static bool role_valid(const char *role)
 {
-    static const char *const known[] = {"volume", "fibers",     "measurements", "photograph",      "environment",
-                                        "chart",  "dark_frame", "camera_noise", "white_reference", "rig"};
+    static const char *const known[] = {"volume",          "fibers", "measurements", "photograph",
+                                        "environment",     "chart",  "dark_frame",   "camera_noise",
+                                        "white_reference", "rig",    "mesh"};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcmp(role, known[i]) == 0) return true;
     return false;

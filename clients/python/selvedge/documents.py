@@ -24,6 +24,7 @@ def files_of(document: Document) -> list[tuple[str, str]]:
     names += [(color[key]["file"], role) for key, role in (("chart", "chart"), ("white", "white_reference")) if key in color]
     for p in document.get("photographs", []):
         names += [(q["file"], "photograph") for q in (p, *p.get("more_exposures", []))]
+    names += [(p["mesh_file"], "mesh") for p in document.get("pictures", []) if "mesh_file" in p]
     return list(dict.fromkeys(names))
 
 

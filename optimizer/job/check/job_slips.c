@@ -22,7 +22,17 @@ bool angle_span_in_radians(const struct angle_span *span)
 
 /* ---- kinds of files by the ending of their names ---- */
 
-enum file_kind { KIND_UNKNOWN, KIND_PICTURE, KIND_TIFF, KIND_VOLUME, KIND_FIBERS, KIND_TABLE, KIND_JSON, KIND_OTHER };
+enum file_kind {
+    KIND_UNKNOWN,
+    KIND_PICTURE,
+    KIND_TIFF,
+    KIND_VOLUME,
+    KIND_FIBERS,
+    KIND_TABLE,
+    KIND_JSON,
+    KIND_MESH,
+    KIND_OTHER
+};
 
 static enum file_kind kind_of(const char *name)
 {
@@ -40,7 +50,8 @@ static enum file_kind kind_of(const char *name)
                  {".7z", KIND_OTHER},    {".json", KIND_JSON},    {".html", KIND_OTHER},  {".heic", KIND_OTHER},
                  {".gif", KIND_OTHER},   {".bmp", KIND_OTHER},    {".webp", KIND_OTHER},  {".mp4", KIND_OTHER},
                  {".dcm", KIND_OTHER},   {".hdf5", KIND_OTHER},   {".h5", KIND_OTHER},    {".npy", KIND_OTHER},
-                 {".mat", KIND_OTHER},   {".psd", KIND_OTHER}};
+                 {".mat", KIND_OTHER},   {".psd", KIND_OTHER},    {".obj", KIND_MESH},    {".ply", KIND_OTHER},
+                 {".stl", KIND_OTHER},   {".fbx", KIND_OTHER}};
     const char *dot = strrchr(name, '.');
     for (size_t i = 0; dot != NULL && i < sizeof known / sizeof known[0]; i++)
         if (strcasecmp(dot, known[i].ending) == 0) return known[i].kind;
@@ -75,6 +86,7 @@ static const struct role_rule role_rule[] = {
      "camera.noise_file",
      "a record of `selvedge calibrate-camera`: .json",
      {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
+    {"mesh", "pictures", "a mesh: .obj", {[KIND_UNKNOWN] = true, [KIND_MESH] = true}},
     {"rig", "rig.file", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 

@@ -108,6 +108,30 @@ status job_check_export(const struct option_value *v, struct error *err)
                            "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
 }
 
+status job_check_pictures(const struct option_value *v, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    if (doc->n_photograph == 0 && doc->measurement_file[0] == '\0')
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
+    for (size_t i = 0; i < doc->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &doc->surface_picture[i];
+        char field[64];
+        snprintf(field, sizeof field, "pictures[%zu].mesh_file", i);
+        if (p->on == JOB_ON_MESH && p->mesh_file[0] == '\0')
+            return error_set_field(err, STATUS_INVALID, field, "'%s' is missing: the picture is to lie on a mesh",
+                                   field);
+        if (p->on != JOB_ON_MESH && p->mesh_file[0] != '\0')
+            return error_set_field(err, STATUS_INVALID, field, "'%s' is given, but 'on' is not \"mesh\"", field);
+        snprintf(field, sizeof field, "pictures[%zu].width_mm", i);
+        if (!doc->camera_far_field && p->width_mm > 10.0 * doc->camera_distance_cm)
+            return error_set_field(err, STATUS_INVALID, field,
+                                   "'%s' is %g: allowed is at most camera.distance_cm (%g cm)", field, p->width_mm,
+                                   doc->camera_distance_cm);
+    }
+    return STATUS_OK;
+}
+
 status job_check_candidates(const struct option_value *v, struct error *err)
 {
     return v->doc->candidate_grid ? make_grid(v->doc, err) : STATUS_OK;

@@ -2,6 +2,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/worker/report/surface/surface_pictures.h"
 #include "optimizer/worker/stages/fit/pipeline_correction.h"
 #include "optimizer/worker/stages/fit/pipeline_scan_error.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -103,13 +104,6 @@ static double fit_paths(const struct pipeline_context *c)
     return of_fit * c->fit_path / n_model;
 }
 
-/* Paths of all renderings together. */
-static double picture_paths(const struct pipeline_context *c)
-{
-    const double px = (double)c->doc->render_px;
-    return px * px * (double)c->observation.n * (double)result_picture_samples(c, fit_paths(c));
-}
-
 static double validation_paths(const struct pipeline_context *c)
 {
     return (double)c->n_model * pipeline_validation_paths(c, fit_paths(c));
@@ -156,7 +150,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
         plan_voxels(c, i, "report.geometry", n_voxel(c), report_s_per_voxel);
     else if (strcmp(name, "report") == 0)
-        plan_after_fit(c, i, i - 2, picture_paths(c));
+        plan_after_fit(c, i, i - 2, result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c));
     else
         worker_status_plan(c->status, i, &rest);
 }

@@ -328,6 +328,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     json_object_set_new(json, "skill", skill_json(c));
     json_object_set_new(json, "radius", radius_json(c));
     json_object_set(json, "exports", c->exports);
+    json_object_set(json, "pictures", c->surface_pictures);
     json_object_set_new(json, "png_exposure", json_number(result_png_exposure(&c->observation)));
     put_job(json, c);
     return json;

@@ -104,7 +104,7 @@ status result_geometry_write(struct pipeline_context *c, struct error *err)
 
 /* ---- renderings ---- */
 
-static status write_image(const struct pipeline_context *c, const struct image *im, const char *folder,
+status result_image_write(const struct pipeline_context *c, const struct image *im, const char *folder,
                           const char *name, double exposure, bool exr, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
@@ -125,7 +125,7 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     status s = photograph_develop(&c->process, path, &c->doc->photograph[i], &im, NULL, err);
     if (s != STATUS_OK) return s;
-    s = write_image(c, &im, "photographs", name, exposure, false, err);
+    s = result_image_write(c, &im, "photographs", name, exposure, false, err);
     image_release(&im);
     return s;
 }
@@ -140,6 +140,12 @@ size_t result_picture_samples(const struct pipeline_context *c, double n_fit_pat
     const double px = (double)c->doc->render_px, n = (double)c->observation.n;
     double paths = picture_share * n_fit_path;
     return (size_t)fmin(fmax(floor(paths / (px * px * n)), least_sample), most_sample);
+}
+
+double result_renderings_paths(const struct pipeline_context *c, double n_fit_path)
+{
+    const double px = (double)c->doc->render_px;
+    return px * px * (double)c->observation.n * (double)result_picture_samples(c, n_fit_path);
 }
 
 static status write_rendering(struct pipeline_context *c, size_t i, const char *name, double exposure,
@@ -160,12 +166,12 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
         .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
-    s = write_image(c, &im, "renderings", name, exposure, true, err);
+    s = result_image_write(c, &im, "renderings", name, exposure, true, err);
     image_release(&im);
     return s;
 }
 
-status result_renderings_write(struct pipeline_context *c, double base, struct error *err)
+status result_renderings_write(struct pipeline_context *c, double from, double to, struct error *err)
 {
     picture_name *name = NULL;
     double exposure = result_png_exposure(&c->observation);
@@ -175,13 +181,13 @@ status result_renderings_write(struct pipeline_context *c, double base, struct e
     if (s == STATUS_OK && c->doc->n_photograph > 0) s = make_folder(c, "photographs", err);
     if (s == STATUS_OK && c->process.chart_picture.pixel != NULL) s = make_folder(c, "pictures", err);
     if (s == STATUS_OK && c->process.chart_picture.pixel != NULL)
-        s = write_image(c, &c->process.chart_picture, "pictures", "color-chart", 1.0, false, err);
+        s = result_image_write(c, &c->process.chart_picture, "pictures", "color-chart", 1.0, false, err);
     for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++)
         s = write_photograph(c, i, name[i], exposure, err);
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
         struct progress_part part;
-        struct progress progress = progress_begin_part(&part, &c->progress, base + (1.0 - base) * (double)i / (double)n,
-                                                       (1.0 - base) / (double)n);
+        struct progress progress = progress_begin_part(&part, &c->progress, from + (to - from) * (double)i / (double)n,
+                                                       (to - from) / (double)n);
         s = write_rendering(c, i, name[i], exposure, &progress, err);
     }
     free(name);

@@ -11,11 +11,16 @@ status result_geometry_write(struct pipeline_context *c, struct error *err);
 /* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
 status result_picture_write(const struct pipeline_context *c, const char *name, const uint8_t *rgb, size_t width,
                             size_t height, struct error *err);
+/* <folder>/<name>.png, brighter by exposure, and with `exr` before it <name>.exr. The folder must be there. */
+status result_image_write(const struct pipeline_context *c, const struct image *im, const char *folder,
+                          const char *name, double exposure, bool exr, struct error *err);
 /* Samples a pixel of the renderings: those of the job document, or as many as the cost of the best model's fit allows,
  * which has taken n_fit_path. */
 size_t result_picture_samples(const struct pipeline_context *c, double n_fit_path);
-/* renderings/<name>.exr and .png, and photographs/<name>.png, for every observation. base: share of the stage that was
- * done before, from which progress is reported. */
-status result_renderings_write(struct pipeline_context *c, double base, struct error *err);
+/* Samples of all renderings together, after such a fit. */
+double result_renderings_paths(const struct pipeline_context *c, double n_fit_path);
+/* renderings/<name>.exr and .png, and photographs/<name>.png, for every observation. from, to: shares of the stage
+ * before and after, between which progress is reported. */
+status result_renderings_write(struct pipeline_context *c, double from, double to, struct error *err);
 
 #endif

@@ -41,7 +41,7 @@ status scene_bend(const struct scene *flat, const struct mesh *m, struct scene *
         memcpy(s, flat, sizeof *s);
         memcpy(&b->flat, flat, sizeof b->flat);
         s->bent = b;
-        st = shell_new(m, scene_thickness_mm(flat), (double)SCENE_MARGIN_MM, &b->shell, err);
+        st = shell_new(m, -(double)flat->bottom_mm, (double)SCENE_MARGIN_MM, &b->shell, err);
     }
     if (st == STATUS_OK) st = build_outer(b, err);
     if (st == STATUS_OK) {

@@ -9,6 +9,7 @@
 #include "optimizer/worker/report/page/report_pdf.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/worker/report/surface/surface_pictures.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/result/pipeline_advice.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -59,7 +60,11 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = result_geometry_write(c, err);
     if (s == STATUS_OK) s = quality_write(c, err);
-    if (s == STATUS_OK) s = result_renderings_write(c, 0.1, err);
+    double n_fit_path = (double)c->model[pipeline_best_model(c)].fit.n_path;
+    double renderings = result_renderings_paths(c, n_fit_path), all = renderings + surface_pictures_paths(c);
+    double until = all > 0.0 ? 0.1 + 0.9 * renderings / all : 1.0;
+    if (s == STATUS_OK) s = result_renderings_write(c, 0.1, until, err);
+    if (s == STATUS_OK) s = surface_pictures_write(c, until, err);
     if (s == STATUS_OK) s = exports_write(c, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = report_write(c, err);

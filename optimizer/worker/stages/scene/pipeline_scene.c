@@ -4,6 +4,7 @@
 #include "geometry/fibers/voxelise.h"
 #include "geometry/reconstruct.h"
 #include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/surface/surface_cloth.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -104,5 +105,6 @@ status stage_scene(struct pipeline_context *c, struct error *err)
         &c->geometry, &c->fiber,
         &(struct warning_sink){pipeline_warn, c}); /* this stage runs in every attempt, so the warnings are not lost */
     status s = c->doc->has_correction ? correct_fibers(c, err) : STATUS_OK;
-    return s == STATUS_OK ? pipeline_make_scene(c, err) : s;
+    if (s == STATUS_OK) s = pipeline_make_scene(c, err);
+    return s == STATUS_OK ? surface_cloth_check(c, err) : s;
 }

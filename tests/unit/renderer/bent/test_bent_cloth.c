@@ -1,4 +1,4 @@
-/* Shell maps: a flat mesh changes nothing, fibers lie where a bent cloth has them, and no light is lost between cells. */
+/* Shell maps: a flat mesh changes nothing, fibers lie where a bent cloth has them, no light is lost between cells. */
 #include "geometry/mesh/mesh_shapes.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/camera.h"

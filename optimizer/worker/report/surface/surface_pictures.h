@@ -1,0 +1,15 @@
+/* Pictures of the fitted cloth laid on surfaces: pictures/on-<number>.exr and .png of the results, numbers from 1. */
+#ifndef SELVEDGE_OPTIMIZER_SURFACE_PICTURES_H
+#define SELVEDGE_OPTIMIZER_SURFACE_PICTURES_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* Samples of all pictures together. */
+double surface_pictures_paths(const struct pipeline_context *c);
+
+/* Renders what the job document asks for and fills c->surface_pictures, the entries of result.json. A picture that an
+ * earlier attempt has finished is not rendered again. from: share of the stage that was done before. Errors of
+ * surface_cloth_new and of render_run. */
+status surface_pictures_write(struct pipeline_context *c, double from, struct error *err);
+
+#endif

@@ -1,0 +1,79 @@
+"""Pictures of the fitted cloth on surfaces: what a job writes, and what is refused before the fit begins."""
+import json
+import math
+
+import pytest
+from daemon_under_test import problem
+from small_cloth import TABLE, hair
+
+VIEW = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "px": 16, "samples": 16}
+SHEET = "v -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nvt -5 -5\nvt 5 -5\nvt 5 5\nvt -5 5\n"
+
+
+def document(*pictures):
+    return {"sample": "pictures", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "pictures": list(pictures),
+            "fit": {"model": "two_lobe.v1", "path_budget": 20000, "max_iterations": 1, "render_px": 16, "render_samples": 16}}
+
+
+def run(real, doc, obj=None, layers=3):
+    job = real.create(doc)
+    real.upload(job, "cloth.hair", hair(layers=layers), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    if obj is not None:
+        real.upload(job, "sheet.obj", obj.encode(), "mesh")
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    return job, real.wait_state(job, "succeeded", "failed", timeout_s=60)
+
+
+def test_pictures_of_a_finished_fit(real):
+    """The flat piece and a flat mesh show what the row of the same angles shows; the cylinder shows less light."""
+    width = {"width_mm": 3, **VIEW}
+    flat, mesh = {"on": "flat", **width}, {"on": "mesh", "mesh_file": "sheet.obj", **width}
+    job, done = run(real, document(flat, mesh, {"on": "cylinder", "radius_mm": 1, **width}), SHEET + "f 1/1 2/2 3/3 4/4\n")
+    assert done["state"] == "succeeded", done["error"]
+    pictures = done["result"]["pictures"]
+    assert [p["on"] for p in pictures] == ["flat", "mesh", "cylinder"]
+    for i, p in enumerate(pictures, 1):
+        assert p["file"] == f"pictures/on-{i}.exr" and p["noise"] > 0 and p["png_exposure"] > 0
+        for ending, magic in (("exr", b"\x76\x2f\x31\x01"), ("png", b"\x89PNG")):
+            assert real.get(f"/v1/jobs/{job}/results/pictures/on-{i}.{ending}").content.startswith(magic)
+        assert json.loads(real.get(f"/v1/jobs/{job}/results/pictures/on-{i}.json").content) == p
+    row = next(r for r in done["result"]["rows"] if (r["light_theta_deg"], r["camera_theta_deg"], r["camera_phi_deg"]) == (45, 45, 180))
+    for p in pictures[:2]:
+        se = p["noise"] * sum(p["mean"]) / 3 / 16  # of the mean of 16 x 16 pixels
+        for mean, rendered, rendered_se in zip(p["mean"], row["rendered"], row["rendered_se"]):
+            assert abs(mean - rendered) < 5 * math.hypot(se, rendered_se), (p, row)
+    assert sum(pictures[2]["mean"]) < 0.9 * sum(pictures[0]["mean"]), "the cylinder fills only a part of the picture"
+
+
+@pytest.mark.parametrize("obj, words", [
+    ("v 0 0 0\nf 1 1 1\n", ["picture 2", "sheet.obj", "line 2", "texture coordinates"]),
+    (SHEET + "f 1/1 2/4 3/3\n", ["picture 2", "triangle 1", "mirrored"])])
+def test_a_mesh_that_cannot_be_used_is_found_before_the_fit(real, obj, words):
+    mesh = {"on": "mesh", "mesh_file": "sheet.obj", **VIEW}
+    _, done = run(real, document({"on": "flat", **VIEW}, mesh), obj)
+    assert done["state"] == "failed" and done["stage"] == "scene" and done["error"]["field"] == "pictures[1].mesh_file"
+    assert all(w in done["error"]["text"] for w in words), done["error"]
+
+
+def test_a_cylinder_thinner_than_the_cloth_is_refused(real):
+    _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}))  # the cloth is that thick, nearly
+    assert done["state"] == "succeeded", done["error"]
+    _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}), layers=6)
+    assert done["state"] == "failed" and "folds over itself" in done["error"]["text"], done["error"]
+
+
+@pytest.mark.parametrize("picture, field, word", [
+    ({"on": "mesh", **VIEW}, "pictures[0].mesh_file", "missing"),
+    ({"on": "flat", "mesh_file": "a.obj", **VIEW}, "pictures[0].mesh_file", "not \"mesh\""),
+    ({"on": "sphere", **VIEW}, "pictures[0].on", "cylinder"),
+    ({"on": "flat", **VIEW, "width_mm": 5000}, "pictures[0].width_mm", "camera.distance_cm"),
+    ({"on": "flat", **VIEW, "light_theta_deg": 120}, "pictures[0].light_theta_deg", "black_sheet"),
+    ({"on": "mesh", "mesh_file": "a.png", **VIEW}, "pictures", "a mesh: .obj")])
+def test_bad_pictures_are_refused_at_submission(real, picture, field, word):
+    assert word in problem(real.post("/v1/jobs", json=document(picture)), 422, "invalid", field)["detail"]
+
+
+def test_pictures_need_a_fitted_model(real):
+    doc = {"sample": "s", "volume": {"files": ["a.tif"], "voxel_size_um": 1}, "pictures": [{"on": "flat", **VIEW}]}
+    problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures")
