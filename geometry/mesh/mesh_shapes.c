@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* A grid of (n[0] + 1) x (n[1] + 1) points, each with the texture coordinate of its number; positions are the caller's. */
+/* A grid of (n[0] + 1) x (n[1] + 1) points, each with a texture coordinate; positions are the caller's. */
 static status new_grid(const size_t n[2], struct mesh *m, struct error *err)
 {
     size_t n_point = (n[0] + 1) * (n[1] + 1), i = 0;

@@ -4,8 +4,8 @@
 
 #include "geometry/mesh/mesh.h"
 
-/* A rectangle in the plane z = 0 with its middle at the origin; size_mm along x and y, n_cell cells a side. STATUS_INVALID
- * for a size that is not positive and for no cells. */
+/* A rectangle in the plane z = 0 with its middle at the origin; size_mm along x and y, n_cell cells a side.
+ * STATUS_INVALID for a size that is not positive and for no cells. */
 status mesh_flat(const double size_mm[2], const size_t n_cell[2], struct mesh *m, struct error *err);
 
 /* A piece of the upper side of a cylinder: axis parallel to y, highest line through the origin, from -angle_rad to

@@ -37,8 +37,8 @@ struct scene {
     atomic_llong device_bytes;
 };
 
-/* The nearest front face of the flat cloth over `span` of a ray, whose direction may have any length; *distance and span
- * are in units of it. The ray is moved by whole tiles. */
+/* The nearest front face of the flat cloth over `span` of a ray, whose direction may have any length; *distance and
+ * span are in units of it. The ray is moved by whole tiles. */
 bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,
                       float *distance);
 bool scene_occluded_span(const struct scene *scene, const struct scene_ray *ray, float span);

@@ -1,8 +1,8 @@
-/* The shell of a bent cloth: prisms over the triangles of a mesh, each cut into three tetrahedra (Porumbescu et al. 2005,
- * "Shell maps"; fabric thesis 5.7.3).
+/* The shell of a bent cloth: prisms over the triangles of a mesh, each cut into three tetrahedra (Porumbescu et al.
+ * 2005, "Shell maps"; fabric thesis 5.7.3).
  *
- * The mesh is the upper side of the cloth. Its points move along their normals up by margin_mm and down by the thickness
- * and margin_mm: these are the two ends of the prisms' edges. In every tetrahedron the map between the space that is
+ * The mesh is the upper side of the cloth. Its points move along their normals up by margin_mm and down by the
+ * thickness and margin_mm: these are the two ends of the prisms' edges. In every tetrahedron the map between the space that is
  * seen and the space of the flat cloth is affine, and neighbours agree on their common face. Diagonals of the prisms'
  * sides follow the numbers of positions, so that neighbours cut them alike. Millimetres.
  */
@@ -37,8 +37,8 @@ struct shell {
 };
 
 /* STATUS_INVALID: a cell without volume or one that is turned inside out, because the surface bends more tightly than
- * the cloth is thick there (names the triangle, from 1); what mesh_normals refuses. STATUS_NO_MEMORY. The mesh must have
- * passed mesh_check. */
+ * the cloth is thick there (names the triangle, from 1); what mesh_normals refuses. STATUS_NO_MEMORY. The mesh must
+ * have passed mesh_check. */
 status shell_new(const struct mesh *m, double thickness_mm, double margin_mm, struct shell *s, struct error *err);
 void shell_release(struct shell *s);
 
