@@ -31,8 +31,8 @@ void mesh_release(struct mesh *m);
 status mesh_new(struct mesh *m, size_t n_position, size_t n_texture, size_t n_triangle, struct error *err);
 
 /* STATUS_INVALID, naming the triangle (from 1, as in the file): an index or number that does not exist or is not
- * finite, a triangle without area on the surface or in the texture, one that is mirrored in the texture, an edge of more than
- * two triangles or of two that turn differently, and a mesh without triangles. */
+ * finite, a triangle without area on the surface or in the texture, one that is mirrored in the texture, an edge of
+ * more than two triangles or of two that turn differently, and a mesh without triangles. */
 status mesh_check(const struct mesh *m, struct error *err);
 
 /* Unit normals of the positions: means over the triangles around each, weighted by their angles (Thuermer and Wuethrich

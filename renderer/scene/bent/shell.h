@@ -2,9 +2,9 @@
  * 2005, "Shell maps"; fabric thesis 5.7.3).
  *
  * The mesh is the upper side of the cloth. Its points move along their normals up by margin_mm and down by the
- * thickness and margin_mm: these are the two ends of the prisms' edges. In every tetrahedron the map between the space that is
- * seen and the space of the flat cloth is affine, and neighbours agree on their common face. Diagonals of the prisms'
- * sides follow the numbers of positions, so that neighbours cut them alike. Millimetres.
+ * thickness and margin_mm: these are the two ends of the prisms' edges. In every tetrahedron the map between the space
+ * that is seen and the space of the flat cloth is affine, and neighbours agree on their common face. Diagonals of the
+ * prisms' sides follow the numbers of positions, so that neighbours cut them alike. Millimetres.
  */
 #ifndef SELVEDGE_RENDERER_SHELL_H
 #define SELVEDGE_RENDERER_SHELL_H
