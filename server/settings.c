@@ -12,19 +12,26 @@ struct setting {
     const char *text;           /* default of a text setting; NULL for a number */
     int64_t value, least, most; /* default and range of a number */
     const char *help;
+    const char *const *words; /* the values that a text setting may have; NULL: any */
 };
 
 #define TEXT(section, name, member, text, help)                                                                        \
     {                                                                                                                  \
-        section, name, offsetof(struct settings, member), text, 0, 0, 0, help                                          \
+        section, name, offsetof(struct settings, member), text, 0, 0, 0, help, NULL                                    \
+    }
+#define WORD(section, name, member, text, words, help)                                                                 \
+    {                                                                                                                  \
+        section, name, offsetof(struct settings, member), text, 0, 0, 0, help, words                                   \
     }
 #define NUMBER(section, name, member, value, least, most, help)                                                        \
     {                                                                                                                  \
-        section, name, offsetof(struct settings, member), NULL, value, least, most, help                               \
+        section, name, offsetof(struct settings, member), NULL, value, least, most, help, NULL                         \
     }
 
 #define MIB (INT64_C(1) << 20)
 #define GIB (INT64_C(1) << 30)
+
+static const char *const sandbox_words[] = {"auto", "required", "off", NULL};
 
 static const struct setting table[] = {
     TEXT("server", "listen", listen, "127.0.0.1",
@@ -60,7 +67,7 @@ static const struct setting table[] = {
            "number of jobs kept; new jobs are refused until some are deleted"),
     NUMBER("jobs", "workers", workers, 1, 1, 64, "number of jobs that run at the same time"),
     TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside the daemon"),
-    TEXT("jobs", "sandbox", sandbox, "auto",
+    WORD("jobs", "sandbox", sandbox, "auto", sandbox_words,
          "keeps workers to their job's folder and to the system calls that they need: auto, as far as the kernel can; "
          "required, else jobs fail; off"),
     TEXT("jobs", "pass_environment", pass_environment, "PATH LANG LC_ALL TZ OPENBLAS_NUM_THREADS",
@@ -128,6 +135,13 @@ static status set_one(struct settings *s, const struct setting *t, const char *v
         if (strlen(value) >= SETTING_TEXT_BYTES)
             return error_set_field(err, STATUS_INVALID, key, "setting '%s' has more than %d bytes", key,
                                    SETTING_TEXT_BYTES - 1);
+        bool allowed = t->words == NULL;
+        for (size_t i = 0; !allowed && t->words[i] != NULL; i++) allowed = strcmp(value, t->words[i]) == 0;
+        if (!allowed)
+            return error_set_field(err, STATUS_INVALID, key,
+                                   "setting '%s' is '%.80s'; its values are in the "
+                                   "configuration that 'selvedged --print-config' prints",
+                                   key, value);
         snprintf(text_of(s, t), SETTING_TEXT_BYTES, "%s", value);
         return STATUS_OK;
     }

@@ -39,7 +39,8 @@ status mesh_check(const struct mesh *m, struct error *err);
  * 1998). normal: n_position. */
 status mesh_normals(const struct mesh *m, double (*normal)[3], struct error *err);
 
-/* Reads a Wavefront OBJ file: v, vt and f; polygons become fans of triangles; all else is passed over. Positions and
+/* Reads a Wavefront OBJ file: v, vt and f; polygons become fans of triangles; all else is passed over.
+ * Equal positions become one. Positions and
  * texture coordinates are multiplied by scale_mm. The mesh is checked. STATUS_FORMAT (naming file and line), also for a
  * face without texture coordinates; STATUS_TOO_LARGE; STATUS_INVALID as mesh_check; STATUS_IO, STATUS_NOT_FOUND. */
 status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct error *err);

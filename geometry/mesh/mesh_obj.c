@@ -2,6 +2,7 @@
 #include "base/files/durable.h"
 #include "geometry/mesh/mesh.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -105,6 +106,42 @@ static status read_lines(struct obj_reader *r, char *text, struct error *err)
     return s;
 }
 
+struct numbered_point {
+    double x[3];
+    uint32_t i;
+};
+
+static int compare_points(const void *pa, const void *pb)
+{
+    const struct numbered_point *a = pa, *b = pb;
+    for (int k = 0; k < 3; k++)
+        if (a->x[k] != b->x[k]) return a->x[k] < b->x[k] ? -1 : 1;
+    return a->i < b->i ? -1 : a->i > b->i;
+}
+
+/* Makes triangles name the first of several equal positions, as programs write them along seams of the texture. */
+static status weld(struct mesh *m, struct error *err)
+{
+    struct numbered_point *p = malloc((m->n_position + 1) * sizeof *p);
+    uint32_t *first = malloc((m->n_position + 1) * sizeof *first);
+    status s =
+        p != NULL && first != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot read a mesh: no memory");
+    for (size_t i = 0; i < m->n_position && s == STATUS_OK; i++) {
+        memcpy(p[i].x, m->position_mm[i], sizeof p[i].x);
+        p[i].i = (uint32_t)i;
+    }
+    if (s == STATUS_OK) qsort(p, m->n_position, sizeof *p, compare_points);
+    for (size_t i = 0; i < m->n_position && s == STATUS_OK; i++) {
+        bool same = i > 0 && memcmp(p[i].x, p[i - 1].x, sizeof p[i].x) == 0;
+        first[p[i].i] = same ? first[p[i - 1].i] : p[i].i;
+    }
+    for (size_t i = 0; i < m->n_triangle && s == STATUS_OK; i++)
+        for (int k = 0; k < 3; k++) m->triangle[i].position[k] = first[m->triangle[i].position[k]];
+    free(p);
+    free(first);
+    return s;
+}
+
 status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct error *err)
 {
     char *text = NULL;
@@ -117,6 +154,7 @@ status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct e
     s = mesh_new(m, n_line, n_line, n_corner < MESH_MAX_TRIANGLE ? n_corner : MESH_MAX_TRIANGLE, err);
     m->n_position = m->n_texture = m->n_triangle = 0;
     if (s == STATUS_OK) s = read_lines(&r, text, err);
+    if (s == STATUS_OK) s = weld(m, err);
     if (s == STATUS_OK) s = mesh_check(m, err);
     if (s != STATUS_OK) mesh_release(m);
     free(text);

@@ -264,6 +264,10 @@ int main(int argc, char **argv)
     int code = parse_arguments(argc, argv, &a);
     if (code >= 0) return code;
     enter_sandbox(&a, argv, &failed);
+    if (a.check != NULL && failed.code != STATUS_OK && a.sandbox == CONFINE_REQUIRED) {
+        fprintf(stderr, "selvedge-worker: %s\n", failed.text);
+        return WORKER_USAGE;
+    }
     if (a.check != NULL) return print_check(&a);
     set_signals();
     status s = worker_folder_open(&folder, a.folder, &err);

@@ -22,7 +22,7 @@ struct start {
     pid_t parent;
 };
 
-static void set_limit(int resource, int64_t value)
+static void set_limit(__rlimit_resource_t resource, int64_t value)
 {
     struct rlimit limit;
     if (getrlimit(resource, &limit) != 0) return;
@@ -80,7 +80,10 @@ static void choose_environment(const char *names, char *variable[MAX_VARIABLE + 
     for (const char *at = names; *at != '\0' && n < MAX_VARIABLE;) {
         size_t length = strcspn(at, " ,");
         for (char **e = environ; length > 0 && *e != NULL; e++)
-            if (strncmp(*e, at, length) == 0 && (*e)[length] == '=') variable[n++] = *e;
+            if (strncmp(*e, at, length) == 0 && (*e)[length] == '=') {
+                variable[n++] = *e;
+                break; /* a name that is there twice counts once */
+            }
         at += length + (at[length] != '\0');
     }
     variable[n] = NULL;

@@ -35,6 +35,7 @@ def test_the_daemon_runs_with_it(daemon_maker):
     ("[server]\nport = 65536\n", "outside 0..65535"),
     ("[server]\nport\n", "line 2"),
     ("[server\n", "line 1"),
+    ("[jobs]\nsandbox = requierd\n", "'jobs.sandbox' is 'requierd'"),
 ])
 def test_mistakes_in_the_file(tmp_path, text, why):
     path = tmp_path / "bad.conf"

@@ -106,7 +106,8 @@ static void fiber_seeds(void)
 {
     put("obj", "square.obj",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nf 1/1 2/2 3/3 4/4\nf -4/-4 -2/-2/1 "
-        "-1/-1\n");
+        "-1/-1\n",
+        "", 0);
     put("yarn_file", "yarn.txt",
         "ply_num: 3\nfiber_num: 12\naabb_min: [-1,-1,-1]\n\nyarn_clock_wise: 0\nfiber_clock_wise: 1\nyarn_alpha: "
         "0.45\nalpha: 0.36\nyarn_radius: 0.038\nellipse_long: 0.026\nellipse_short: 0.02\nepsilon: 0.1\nbeta: "

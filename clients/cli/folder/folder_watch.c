@@ -269,7 +269,7 @@ static status look_at_all(struct folder_watch *w, struct error *err)
         status s = step(w, &w->sample[i], &why);
         if (s == STATUS_OK || s == STATUS_CANCELLED) continue;
         report(w, &w->sample[i], why.text);
-        w->sample[i].again_s = clock_monotonic_s() + (s == STATUS_STALE ? 0 : AGAIN_S);
+        w->sample[i].again_s = clock_monotonic_s() + AGAIN_S;
     }
     return STATUS_OK;
 }

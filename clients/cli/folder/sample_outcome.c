@@ -86,6 +86,11 @@ status sample_results_retire(const char *folder, struct error *err)
     join(from, folder, "results");
     snprintf(name, sizeof name, "results-%.3f", clock_wall_s());
     join(to, folder, name);
+    if (rename(from, to) != 0 && errno != ENOENT) return error_set_errno(err, "cannot move '%s' out of the way", from);
+    /* what an interrupted download of the earlier job has left must not mix with files of the next */
+    join(from, folder, "results.part");
+    snprintf(name, sizeof name, "results-%.3f.part", clock_wall_s());
+    join(to, folder, name);
     if (rename(from, to) == 0 || errno == ENOENT) return STATUS_OK;
     return error_set_errno(err, "cannot move '%s' out of the way", from);
 }

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { LIMIT_BYTES = 1 << 20 };
@@ -31,12 +32,23 @@ static bool read_entry(const char *key, const json_t *from, struct speed_entry *
            e->log_var < 100.0;
 }
 
-/* Locks the file for reading or writing it whole; -1: it cannot be opened. Closing it ends the lock. */
+/* Locks the file for reading or writing it whole; -1: it cannot be opened, or another worker holds it for longer than
+ * anyone needs. Closing it ends the lock. */
 static int open_locked(const char *path, int flags, int how)
 {
-    int fd = open(path, flags | O_CLOEXEC, 0600);
-    while (fd >= 0 && flock(fd, how) != 0 && errno == EINTR) continue;
-    return fd;
+    const struct timespec pause = {0, 20000000};
+    int fd = open(path, flags | O_CLOEXEC, 0600), error = 0;
+    for (int i = 0; fd >= 0 && i < 50; i++) {
+        if (flock(fd, how | LOCK_NB) == 0) return fd;
+        error = errno;
+        if (error != EINTR && error != EWOULDBLOCK) break;
+        nanosleep(&pause, NULL);
+    }
+    if (fd >= 0) {
+        close(fd);
+        errno = error;
+    }
+    return -1;
 }
 
 /* Overwrites the file, because a worker in its sandbox may make none in the folder. A worker that is killed meanwhile

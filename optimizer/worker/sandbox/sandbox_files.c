@@ -44,6 +44,7 @@ static uint64_t rights_of(enum sandbox_right right, bool folder, uint64_t handle
                            [SANDBOX_OVERWRITE] = FOLDER_READ | LANDLOCK_ACCESS_FS_WRITE_FILE | ACCESS_TRUNCATE,
                            [SANDBOX_OWN] = ~(uint64_t)(LANDLOCK_ACCESS_FS_EXECUTE | LANDLOCK_ACCESS_FS_MAKE_CHAR |
                                                        LANDLOCK_ACCESS_FS_MAKE_BLOCK | LANDLOCK_ACCESS_FS_MAKE_SOCK |
+                                                       LANDLOCK_ACCESS_FS_MAKE_SYM | LANDLOCK_ACCESS_FS_MAKE_FIFO |
                                                        ACCESS_IOCTL_DEV)};
     return of[right] & handled & (folder ? ~(uint64_t)0 : file);
 }

@@ -9,10 +9,10 @@ struct corners {
     double world[4][3], cloth[4][3];
 };
 
-/* A face of a cell, to find the cell on its other side: nodes in ascending order, and the texture coordinates of their
- * positions, which differ on a seam. */
+/* A face of a cell, to find the cell on its other side, which on a seam of the texture has another place of the cloth:
+ * nodes in ascending order. */
 struct face {
-    uint32_t node[3], texture[3], i_cell;
+    uint32_t node[3], i_cell;
     uint8_t k;
 };
 
@@ -110,7 +110,7 @@ static void node_position(const struct shell_work *w, uint32_t node, double out[
     for (int a = 0; a < 3; a++) out[a] = w->m->position_mm[node / 2][a] + along * w->normal[node / 2][a];
 }
 
-static void add_faces(struct shell_work *w, struct shell *s, uint32_t i_cell, const uint32_t texture[4])
+static void add_faces(struct shell_work *w, struct shell *s, uint32_t i_cell)
 {
     for (uint8_t k = 0; k < 4; k++) {
         struct face *f = &w->face[4 * i_cell + k];
@@ -120,19 +120,16 @@ static void add_faces(struct shell_work *w, struct shell *s, uint32_t i_cell, co
         bool low = true;
         for (int j = 0; j < 4; j++)
             if (j != k) {
-                f->node[n] = s->corner[i_cell][j];
-                f->texture[n++] = texture[j];
+                f->node[n++] = s->corner[i_cell][j];
                 low = low && s->corner[i_cell][j] % 2 == 0;
             }
         if (low) s->cell[i_cell].bottom |= (uint8_t)(1u << k);
         for (int i = 0; i < 2; i++)
             for (int j = 0; j < 2 - i; j++)
                 if (f->node[j] > f->node[j + 1]) {
-                    uint32_t node = f->node[j], t = f->texture[j];
+                    uint32_t node = f->node[j];
                     f->node[j] = f->node[j + 1];
-                    f->texture[j] = f->texture[j + 1];
                     f->node[j + 1] = node;
-                    f->texture[j + 1] = t;
                 }
     }
 }
@@ -143,14 +140,13 @@ static status add_triangle(struct shell_work *w, struct shell *s, size_t i, stru
     int order[3];
     sort_corners(t, order);
     for (size_t c = 0; c < 3; c++) {
-        uint32_t i_cell = (uint32_t)(3 * i + c), texture[4];
+        uint32_t i_cell = (uint32_t)(3 * i + c);
         struct corners at;
         for (int k = 0; k < 4; k++) {
             int corner = order[cut[c][k][0]], up = cut[c][k][1];
             s->corner[i_cell][k] = 2 * t->position[corner] + (uint32_t)up;
-            texture[k] = t->texture[corner];
             node_position(w, s->corner[i_cell][k], at.world[k]);
-            for (int a = 0; a < 2; a++) at.cloth[k][a] = w->m->texture_mm[texture[k]][a];
+            for (int a = 0; a < 2; a++) at.cloth[k][a] = w->m->texture_mm[t->texture[corner]][a];
             at.cloth[k][2] = up ? w->up_mm : -w->down_mm;
         }
         if (!fill_cell(&at, &s->cell[i_cell]))
@@ -158,7 +154,7 @@ static status add_triangle(struct shell_work *w, struct shell *s, size_t i, stru
                              "the cloth cannot be laid on triangle %zu of the mesh: over its thickness of %g mm the "
                              "surface folds over itself, so it must bend less or the cloth must be thinner",
                              i + 1, w->down_mm - w->up_mm);
-        add_faces(w, s, i_cell, texture);
+        add_faces(w, s, i_cell);
     }
     return STATUS_OK;
 }
@@ -169,14 +165,13 @@ static int compare_faces(const void *pa, const void *pb)
 {
     const struct face *a = pa, *b = pb;
     int c = memcmp(a->node, b->node, sizeof a->node);
-    if (c == 0) c = memcmp(a->texture, b->texture, sizeof a->texture);
     if (c != 0) return c;
     return a->i_cell < b->i_cell ? -1 : a->i_cell > b->i_cell;
 }
 
 static bool same_face(const struct face *a, const struct face *b)
 {
-    return memcmp(a->node, b->node, sizeof a->node) == 0 && memcmp(a->texture, b->texture, sizeof a->texture) == 0;
+    return memcmp(a->node, b->node, sizeof a->node) == 0;
 }
 
 static void add_outer(struct shell *s, const struct shell_work *w, const struct face *f)

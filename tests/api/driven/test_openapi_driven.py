@@ -27,8 +27,8 @@ def schemathesis():
 
 def drive(schemathesis, daemon, config, *options):
     done = subprocess.run([schemathesis, "--config-file", str(config), "run", daemon.url + "/v1/openapi.json",
-                           "--checks", "all", "--seed", "1", "--no-color", *options], cwd=HERE, capture_output=True, text=True,
-                          env=dict(os.environ, SCHEMATHESIS_HOOKS="schemathesis_hooks"))
+                           "--checks", "all", "--seed", "1", "--no-color", *options], cwd=os.path.dirname(daemon.data), capture_output=True, text=True,
+                          env=dict(os.environ, SCHEMATHESIS_HOOKS="schemathesis_hooks", PYTHONPATH=HERE))
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-1000:]
     assert "Tested: " in done.stdout
 

@@ -60,7 +60,7 @@ def test_a_cylinder_thinner_than_the_cloth_is_refused(real):
     _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}))  # the cloth is that thick, nearly
     assert done["state"] == "succeeded", done["error"]
     _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}), layers=6)
-    assert done["state"] == "failed" and "folds over itself" in done["error"]["text"], done["error"]
+    assert done["state"] == "failed" and "folds over itself" in done["error"]["text"] and done["error"]["field"] == "", done["error"]
 
 
 @pytest.mark.parametrize("picture, field, word", [

@@ -61,7 +61,7 @@ def service(daemon_maker, tmp_path):
         secret.write_bytes(SECRET + b"\n")
         secret.chmod(0o600)
         made.append(Receiver(answer))
-        options = {"webhook.url": made[-1].url, "webhook.secret_file": secret, "webhook.retry_s": 1, "webhook.timeout_s": 1}
+        options = {"webhook.url": made[-1].url, "webhook.secret_file": secret, "webhook.retry_s": 1, "webhook.timeout_s": 30}
         return daemon_maker(options={**options, **{"webhook." + k: v for k, v in settings.items()}}), made[-1]
 
     yield make
@@ -150,7 +150,7 @@ def drip(n, handler):
     (lambda n, handler: handler.reply(302, Location="/elsewhere"), "status 302"),
     (lambda n, handler: handler.wfile.write(b"no HTTP at all\r\n\r\n"), "")])
 def test_receivers_that_hang_and_lie(service, answer, words):
-    d, receiver = service(answer, max_tries=1)
+    d, receiver = service(answer, max_tries=1, timeout_s=1)
     d.start_job("succeed")
     begin = time.monotonic()
     assert d.get("/livez").status_code == 200 and time.monotonic() - begin < 5

@@ -7,6 +7,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,7 +29,11 @@ static bool installed(char prefix[WORKER_PATH_BYTES])
         int n = (int)strcspn(from, ":");
         int length = snprintf(path, sizeof path, "%.*s/%s", n, from, program);
         if (n > 0 && length < (int)sizeof path && access(path, X_OK) == 0) {
-            snprintf(prefix, WORKER_PATH_BYTES, "%.*s/..", n, from);
+            char up[WORKER_PATH_BYTES], whole[PATH_MAX];
+            snprintf(up, sizeof up, "%.*s/..", n, from);
+            /* from a /bin of its own it needs no more than what every program does */
+            bool all = realpath(up, whole) == NULL || strcmp(whole, "/") == 0;
+            snprintf(prefix, WORKER_PATH_BYTES, "%s", all ? "/usr" : up);
             return true;
         }
         from += n + (from[n] == ':');
@@ -67,7 +72,12 @@ static void restrict_helper(const char *prefix, const char *results, const char 
                                         {SANDBOX_EXECUTE, "/lib"},
                                         {SANDBOX_EXECUTE, "/lib64"},
                                         {SANDBOX_EXECUTE, prefix},
-                                        {SANDBOX_READ, "/etc"},
+                                        {SANDBOX_READ, "/etc/fonts"},
+                                        {SANDBOX_READ, "/etc/ld.so.cache"},
+                                        {SANDBOX_READ, "/etc/localtime"},
+                                        {SANDBOX_READ, "/etc/mime.types"},
+                                        {SANDBOX_READ, "/etc/python3"},
+                                        {SANDBOX_READ, "/etc/python3.11"},
                                         {SANDBOX_READ, "/var/cache/fontconfig"},
                                         {SANDBOX_READ, "/proc/self"},
                                         {SANDBOX_READ, "/dev/urandom"},

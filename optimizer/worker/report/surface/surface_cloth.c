@@ -20,11 +20,12 @@ static status make_mesh(const struct pipeline_context *c, const struct job_surfa
     return mesh_read_obj(path, p->mesh_unit_mm, m, err);
 }
 
-/* The picture's name before the error, and the option of its mesh as the field. */
-static status name_picture(size_t i, status s, struct error *err)
+/* The picture's name before the error, and the option of its mesh, if it has one, as the field. */
+static status name_picture(size_t i, enum job_surface on, status s, struct error *err)
 {
     if (s == STATUS_OK || s == STATUS_CANCELLED || err == NULL) return s;
-    if (s == STATUS_INVALID || s == STATUS_FORMAT) snprintf(err->field, sizeof err->field, OPTION_MESH_FILE "[%zu]", i);
+    if (on == JOB_ON_MESH && (s == STATUS_INVALID || s == STATUS_FORMAT))
+        snprintf(err->field, sizeof err->field, OPTION_MESH_FILE "[%zu]", i);
     return error_prefix(err, s, "picture %zu", i + 1);
 }
 
@@ -34,7 +35,7 @@ status surface_cloth_new(const struct pipeline_context *c, size_t i, struct scen
     status s = make_mesh(c, &c->doc->surface_picture[i], &m, err);
     if (s == STATUS_OK) s = scene_bend(c->scene, &m, bent, err);
     mesh_release(&m);
-    return name_picture(i, s, err);
+    return name_picture(i, c->doc->surface_picture[i].on, s, err);
 }
 
 status surface_cloth_check(const struct pipeline_context *c, struct error *err)

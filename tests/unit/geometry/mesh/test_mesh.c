@@ -41,6 +41,18 @@ static void polygons_become_triangles(void **state)
     }
 }
 
+static void equal_positions_become_one(void **state)
+{
+    struct mesh m;
+    struct error err = {0};
+    if (read_text(state, SQUARE "v 0 0 0\nv 1 1 0\nf 1/1 2/2 3/3\nf 5/1 6/3 4/4\n", &m, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
+    assert_int_equal(m.triangle[1].position[0], 0);
+    assert_int_equal(m.triangle[1].position[1], 2);
+    assert_int_equal(m.triangle[1].position[2], 3);
+    mesh_release(&m);
+}
+
 static void faults_are_named(void **state)
 {
     static const struct {
@@ -101,6 +113,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(polygons_become_triangles, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(equal_positions_become_one, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(faults_are_named, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(shapes_are_sound),
     };

@@ -52,14 +52,29 @@ static void random_direction(struct rng *r, double d[3])
     d[2] = z;
 }
 
-static void a_flat_mesh_changes_nothing(void **state)
+/* A texture coordinate of its own for every corner, as some programs write them. */
+static void unshare_texture(struct mesh *m)
 {
-    (void)state;
+    double(*own)[2] = malloc(3 * m->n_triangle * sizeof *own);
+    assert_non_null(own);
+    for (size_t i = 0; i < 3 * m->n_triangle; i++) {
+        uint32_t *texture = &m->triangle[i / 3].texture[i % 3];
+        memcpy(own[i], m->texture_mm[*texture], sizeof own[i]);
+        *texture = (uint32_t)i;
+    }
+    free(m->texture_mm);
+    m->texture_mm = own;
+    m->n_texture = 3 * m->n_triangle;
+}
+
+static void check_flat_mesh(bool unshared)
+{
     struct fiber_set f;
     struct mesh m;
     hand_weave_small(&f);
     struct scene *flat = flat_scene(&f, false);
     assert_int_equal(mesh_flat((const double[2]){40, 40}, (const size_t[2]){37, 23}, &m, NULL), STATUS_OK);
+    if (unshared) unshare_texture(&m);
     struct scene *bent = bend(flat, &m);
     size_t n_hit = 0, n_differ = 0;
     for (uint32_t i = 0; i < 20000; i++) {
@@ -84,6 +99,18 @@ static void a_flat_mesh_changes_nothing(void **state)
     assert_true(n_hit > 10000);
     scene_free(bent);
     scene_free(flat);
+}
+
+static void a_flat_mesh_changes_nothing(void **state)
+{
+    (void)state;
+    check_flat_mesh(false);
+}
+
+static void seams_of_the_texture_change_nothing(void **state)
+{
+    (void)state;
+    check_flat_mesh(true);
 }
 
 /* Fibers around the cylinder are rings, and fibers along it are straight lines. Rays from everywhere hit them on their
@@ -233,6 +260,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_flat_mesh_changes_nothing),
+        cmocka_unit_test(seams_of_the_texture_change_nothing),
         cmocka_unit_test(straight_fibers_lie_on_the_cylinder),
         cmocka_unit_test(no_light_is_lost_on_the_cylinder),
         cmocka_unit_test(the_sheet_lies_under_the_bent_cloth),
