@@ -64,19 +64,22 @@ static double processor_s(int who)
     return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
-/* Writes the scan as bytes without a header, n_slice slices: those of v in the middle, and void from its ends, of which
- * it has PAD slices at least. */
-static status write_bytes(const struct volume *v, size_t n_slice, const char *path, struct error *err)
+/* Writes n voxels of the scan as bytes without a header: the slices of v in the middle, cropped to n[0] x n[1], and
+ * void from its ends, of which it has PAD slices at least. */
+static status write_bytes(const struct volume *v, const size_t n[3], const char *path, struct error *err)
 {
     enum { PAD = 32 };
-    const size_t n_page = v->n[0] * v->n[1], below = (n_slice - v->n[2]) / 2;
+    const size_t n_page = n[0] * n[1], below = (n[2] - v->n[2]) / 2;
     uint8_t *page = malloc(n_page);
     FILE *file = fopen(path, "wb");
     bool ok = page != NULL && file != NULL;
-    for (size_t k = 0; k < n_slice && ok; k++) {
+    for (size_t k = 0; k < n[2] && ok; k++) {
         const size_t slice = k < below ? k % PAD : k < below + v->n[2] ? k - below : v->n[2] - 1 - k % PAD;
-        const float *from = v->density + slice * n_page;
-        for (size_t i = 0; i < n_page; i++) page[i] = (uint8_t)fminf(fmaxf(40.0f + 160.0f * from[i], 0.0f), 255.0f);
+        for (size_t j = 0; j < n[1]; j++) {
+            const float *from = v->density + volume_index(v->n, 0, j, slice);
+            for (size_t i = 0; i < n[0]; i++)
+                page[j * n[0] + i] = (uint8_t)fminf(fmaxf(40.0f + 160.0f * from[i], 0.0f), 255.0f);
+        }
         ok = fwrite(page, 1, n_page, file) == n_page;
         scratch_keep_within(v->space);
     }
@@ -116,7 +119,7 @@ static status make_scan(const struct sample *p, const char *folder, const char *
         s = error_set(err, STATUS_INTERNAL, "the phantom has only %zu x %zu voxels", r.n_voxel[0], r.n_voxel[1]);
     if (s == STATUS_OK) s = phantom_scan_in(&f, r.n_voxel, &scan, space, pool, NULL, &v, err);
     if (s == STATUS_OK && p->n_made > 0)
-        s = write_bytes(&v, p->n[2], path, err);
+        s = write_bytes(&v, p->n, path, err);
     else if (s == STATUS_OK)
         s = phantom_write_tiff(&v, &file, path, err);
     volume_release(&v);
