@@ -67,7 +67,7 @@ def test_real_job_live_and_finished(real, browser):
     keep(browser, "second-model")
     compared = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#models tbody tr")]
     assert [c.split()[0] for c in compared] == ["two_lobe.v1", "microflake.v1"] and sum("best" in c for c in compared) == 1 and "best" in compared[0]
-    result = job.result()
+    result = job.result().raw
     rows = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#parameters tbody tr")]
     assert len(rows) == 9 and rows[0].startswith("C_R.r") and "±" in rows[3]
     n_positive = sum(m > 0 and r > 0 for row in result["rows"] for m, r in zip(row["measured"], row["rendered"]))
@@ -139,7 +139,7 @@ def test_corrections(real, browser, tmp_path):
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#corrections')")
     text = browser.find_element(By.ID, "corrections").text
-    result = job.result()
+    result = job.result().raw
     without = result["without_corrections"]
     keeps = without["heldout_gain"] >= 2 * without["heldout_gain_se"]
     assert ("LOWER THE HELD-OUT ERROR" if keeps else "NOT WORTH KEEPING") in text.upper()
