@@ -2,6 +2,7 @@
 
 #include <OpenEXR/openexr.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -13,6 +14,7 @@
 /* What the library last complained about: its texts are better than its codes. */
 struct exr_note {
     char text[256];
+    int fd, cause; /* of writing: the file, and errno of the first write that failed */
 };
 
 static void on_exr_error(exr_const_context_t context, exr_result_t code, const char *text)
@@ -39,6 +41,22 @@ static const char *reason(const struct exr_note *note, exr_result_t code)
 }
 
 /* ---- writing ---- */
+
+/* Writes for the library. It hears of no failure, because OpenEXRCore 3.1.5 waits for itself for ever when it finishes a
+ * file whose header could not be written; image_write_exr looks at `cause` afterwards. */
+static int64_t write_piece(exr_const_context_t context, void *user, const void *piece, uint64_t n_byte, uint64_t offset,
+                           exr_stream_error_func_ptr_t on_error)
+{
+    (void)context;
+    (void)on_error;
+    struct exr_note *note = user;
+    for (uint64_t done = 0; done < n_byte && note->cause == 0;) {
+        ssize_t n = pwrite(note->fd, (const char *)piece + done, n_byte - done, (off_t)(offset + done));
+        if (n < 0 && errno != EINTR) note->cause = errno;
+        if (n > 0) done += (uint64_t)n;
+    }
+    return (int64_t)n_byte;
+}
 
 /* Uncompressed: the library's ZIP encoder (3.1.5 of Debian 12) damages a chunk whose compressed size happens to equal
  * its plain size (AcademySoftwareFoundation/openexr issue 2306), and path-traced floats hardly shrink anyway. */
@@ -98,15 +116,21 @@ status image_write_exr(const struct image *im, const char *path, struct error *e
     if (im->channel_name == NULL || im->width > 1u << 20 || im->height > 1u << 20)
         return error_set(err, STATUS_INVALID, "cannot write image '%s': %s", path,
                          im->channel_name == NULL ? "its channels have no names" : "too large");
-    errno = 0;
+    note.cause = 0;
+    note.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (note.fd < 0) return error_set_errno(err, "cannot write image '%s'", path);
+    init.write_fn = write_piece;
     exr_result_t r = exr_start_write(&file, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (r == EXR_ERR_SUCCESS) r = declare(file, im, &part);
     if (r == EXR_ERR_SUCCESS) r = write_chunks(file, part, im);
     exr_result_t finish = file != NULL ? exr_finish(&file) : EXR_ERR_SUCCESS;
     if (r == EXR_ERR_SUCCESS) r = finish;
-    if (r == EXR_ERR_SUCCESS) return STATUS_OK;
-    if (errno == ENOSPC || errno == EDQUOT) return error_set_errno(err, "cannot write image '%s'", path);
-    return error_set(err, STATUS_IO, "cannot write image '%s': %s", path, reason(&note, r));
+    if (close(note.fd) != 0 && note.cause == 0) note.cause = errno;
+    if (r == EXR_ERR_SUCCESS && note.cause == 0) return STATUS_OK;
+    unlink(path);
+    errno = note.cause;
+    return note.cause != 0 ? error_set_errno(err, "cannot write image '%s'", path)
+                           : error_set(err, STATUS_IO, "cannot write image '%s': %s", path, reason(&note, r));
 }
 
 /* ---- reading ---- */

@@ -1,15 +1,39 @@
 #include "renderer/image/image.h"
 
+#include <errno.h>
 #include <math.h>
 #include <png.h>
+#include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static uint8_t srgb_byte(double linear)
 {
     double v = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
     if (!(v > 0)) return 0; /* NaN too */
     return v < 1 ? (uint8_t)(255 * v + 0.5) : 255;
+}
+
+/* Not by png_image_write_to_file, whose message does not say that a disk is full. */
+static status write_file(png_image *png, const uint8_t *rgb, const char *path, struct error *err)
+{
+    FILE *f = fopen(path, "wb");
+    if (f == NULL) return error_set_errno(err, "cannot write image '%s'", path);
+    errno = 0;
+    bool ok = png_image_write_to_stdio(png, f, 0, rgb, 0, NULL) != 0 && fflush(f) == 0;
+    int cause = errno;
+    if (fclose(f) != 0 && ok) {
+        ok = false;
+        cause = errno;
+    }
+    if (ok) return STATUS_OK;
+    png_image_free(png);
+    unlink(path);
+    errno = cause;
+    return cause != 0 ? error_set_errno(err, "cannot write image '%s'", path)
+                      : error_set(err, STATUS_IO, "cannot write image '%s': %s", path, png->message);
 }
 
 status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, const char *path, struct error *err)
@@ -22,9 +46,7 @@ status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, con
     png.width = (png_uint_32)width;
     png.height = (png_uint_32)height;
     png.format = PNG_FORMAT_RGB;
-    if (png_image_write_to_file(&png, path, 0, rgb, 0, NULL)) return STATUS_OK;
-    png_image_free(&png);
-    return error_set(err, STATUS_IO, "cannot write image '%s': %s", path, png.message);
+    return write_file(&png, rgb, path, err);
 }
 
 status image_write_png(const struct image *im, double exposure, const char *path, struct error *err)

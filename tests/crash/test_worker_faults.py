@@ -15,7 +15,7 @@ from fit_outcome import outcome, read_json
 from test_worker_resume import WORKER, make_job
 
 EVERY = os.environ.get("SELVEDGE_EVERY") == "1"
-FAULTS = [("write", "ENOSPC"), ("fsync", "EIO"), ("fdatasync", "EIO"), ("rename", "EIO"), ("mkdir", "ENOSPC")]
+FAULTS = [("write", "ENOSPC"), ("pwrite64", "ENOSPC"), ("fsync", "EIO"), ("fdatasync", "EIO"), ("rename", "EIO"), ("mkdir", "ENOSPC")]
 
 
 def work(folder, *strace):
