@@ -42,8 +42,8 @@ static const char *reason(const struct exr_note *note, exr_result_t code)
 
 /* ---- writing ---- */
 
-/* Writes for the library. It hears of no failure, because OpenEXRCore 3.1.5 waits for itself for ever when it finishes a
- * file whose header could not be written; image_write_exr looks at `cause` afterwards. */
+/* Writes for the library. It hears of no failure, because OpenEXRCore 3.1.5 waits for itself for ever when it finishes
+ * a file whose header could not be written; image_write_exr looks at `cause` afterwards. */
 static int64_t write_piece(exr_const_context_t context, void *user, const void *piece, uint64_t n_byte, uint64_t offset,
                            exr_stream_error_func_ptr_t on_error)
 {
