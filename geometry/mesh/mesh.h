@@ -23,7 +23,7 @@ struct mesh {
     struct mesh_triangle *triangle;
 };
 
-enum { MESH_MAX_TRIANGLE = 4000000 };
+enum { MESH_MAX_TRIANGLE = 500000 };
 
 void mesh_release(struct mesh *m);
 

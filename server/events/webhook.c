@@ -1,8 +1,8 @@
 #include "server/events/webhook.h"
 #include "base/clock.h"
-#include "base/files/durable.h"
 #include "base/version.h"
 #include "server/events/change_feed.h"
+#include "server/secret_file.h"
 #include "server/store/store_delivery.h"
 
 #include <curl/curl.h>
@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum { SECRET_LEAST = 16, SECRET_MOST = 1024, ANSWER_MOST = 1 << 16, KEPT = 10000, PAUSE_MOST_S = 3600, IDLE_S = 60 };
 
@@ -51,15 +50,11 @@ double webhook_pause_s(double first_s, int64_t n_try)
 static status read_secret(struct webhook *w, struct error *err)
 {
     const char *path = w->v->settings->webhook_secret_file;
-    struct stat st;
     char *text = NULL;
     size_t n = 0;
     if (path[0] == '\0')
         return error_set_field(err, STATUS_INVALID, "webhook.secret_file", "a webhook needs a file with its secret");
-    if (stat(path, &st) == 0 && (st.st_mode & (S_IRWXG | S_IRWXO)) != 0)
-        return error_set_field(err, STATUS_INVALID, "webhook.secret_file",
-                               "other users may read the secret '%s'; forbid it with: chmod 600 '%s'", path, path);
-    status s = file_read_all(path, SECRET_MOST, &text, &n, err);
+    status s = secret_file_read(path, "webhook.secret_file", SECRET_MOST, &text, &n, err);
     if (s != STATUS_OK) return error_prefix(err, s, "cannot read the secret of the webhook");
     while (n > 0 && (text[n - 1] == '\n' || text[n - 1] == '\r')) n--;
     if (n >= SECRET_LEAST) memcpy(w->secret, text, n);

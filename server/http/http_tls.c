@@ -1,10 +1,10 @@
 #include "server/http/http_tls.h"
 #include "base/files/durable.h"
+#include "server/secret_file.h"
 
 #include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum { PEM_MOST_BYTES = 1 << 20 };
 
@@ -15,17 +15,13 @@ bool http_tls_wanted(const struct settings *s)
 
 status http_tls_read(const struct settings *s, struct http_tls *tls, struct error *err)
 {
-    struct stat st;
     *tls = (struct http_tls){0};
     if (!http_tls_wanted(s)) return STATUS_OK;
     if (s->tls_certificate[0] == '\0' || s->tls_key[0] == '\0')
         return error_set_field(err, STATUS_INVALID, "server.tls_key",
                                "TLS needs both server.tls_certificate and server.tls_key");
-    if (stat(s->tls_key, &st) == 0 && (st.st_mode & (S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH)) != 0)
-        return error_set_field(err, STATUS_INVALID, "server.tls_key",
-                               "other users may read the key '%s'; forbid it with: chmod 600", s->tls_key);
     status r = file_read_all(s->tls_certificate, PEM_MOST_BYTES, &tls->certificate, NULL, err);
-    if (r == STATUS_OK) r = file_read_all(s->tls_key, PEM_MOST_BYTES, &tls->key, NULL, err);
+    if (r == STATUS_OK) r = secret_file_read(s->tls_key, "server.tls_key", PEM_MOST_BYTES, &tls->key, NULL, err);
     return r == STATUS_OK ? r : error_prefix(err, r, "cannot prepare TLS");
 }
 

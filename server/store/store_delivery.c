@@ -40,7 +40,18 @@ static void read_row(sqlite3_stmt *q, struct delivery_row *row)
 
 status store_webhook_enable(struct store *store, bool enabled, struct error *err)
 {
-    CHANGE(store, err, enabled ? "INSERT OR IGNORE INTO webhook VALUES (1)" : "DELETE FROM webhook", "");
+    struct store_link *w = &store->write;
+    if (enabled) CHANGE(store, err, "INSERT OR IGNORE INTO webhook VALUES (1)", "");
+    pthread_mutex_lock(&w->lock);
+    status s = store_begin(w, err);
+    if (s == STATUS_OK) {
+        s = store_run(w, NULL, err, "UPDATE delivery SET state=?, error='the webhook was switched off' WHERE state=?",
+                      "ii", (int64_t)DELIVERY_FAILED, (int64_t)DELIVERY_WAITING);
+        if (s == STATUS_OK) s = store_run(w, NULL, err, "DELETE FROM webhook", "");
+        s = store_end(w, s, err);
+    }
+    pthread_mutex_unlock(&w->lock);
+    return s;
 }
 
 status store_delivery_update(struct store *store, const struct delivery_row *r, struct error *err)

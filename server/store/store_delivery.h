@@ -26,7 +26,8 @@ struct delivery_row {
     double delivered_unix_s; /* 0: not yet */
 };
 
-/* Says whether jobs that end from now on make a delivery. */
+/* Says whether jobs that end from now on make a delivery. When not, deliveries that wait end as failed: an address that
+ * is named later must not get what was meant for another. */
 status store_webhook_enable(struct store *store, bool enabled, struct error *err);
 /* The waiting delivery whose next try is the earliest. STATUS_NOT_FOUND: none waits. */
 status store_delivery_next(struct store *store, struct delivery_row *row, struct error *err);

@@ -1,9 +1,11 @@
 """Pictures of the fitted cloth on surfaces: what a job writes, and what is refused before the fit begins."""
 import json
 import math
+import os
+import subprocess
 
 import pytest
-from daemon_under_test import problem
+from daemon_under_test import problem, program
 from small_cloth import TABLE, hair
 
 VIEW = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "px": 16, "samples": 16}
@@ -25,6 +27,11 @@ def run(real, doc, obj=None, layers=3):
     return job, real.wait_state(job, "succeeded", "failed", timeout_s=60)
 
 
+def run_worker(folder):
+    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
+    assert p.returncode == 0, (folder / "log.txt").read_text()
+
+
 def test_pictures_of_a_finished_fit(real):
     """The flat piece and a flat mesh show what the row of the same angles shows; the cylinder shows less light."""
     width = {"width_mm": 3, **VIEW}
@@ -44,6 +51,26 @@ def test_pictures_of_a_finished_fit(real):
         for mean, rendered, rendered_se in zip(p["mean"], row["rendered"], row["rendered_se"]):
             assert abs(mean - rendered) < 5 * math.hypot(se, rendered_se), (p, row)
     assert sum(pictures[2]["mean"]) < 0.9 * sum(pictures[0]["mean"]), "the cylinder fills only a part of the picture"
+
+
+def test_a_finished_picture_is_not_rendered_again(tmp_path):
+    """The worker by hand: a second run, which has lost the first picture's entry, renders that one alone."""
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    (folder / "job.json").write_text(json.dumps(document({"on": "flat", **VIEW}, {"on": "cylinder", "radius_mm": 1, **VIEW})))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    (folder / "input/rows.csv").write_text(TABLE)
+    run_worker(folder)
+    pictures = folder / "results/pictures"
+    entry = json.loads((pictures / "on-1.json").read_text())
+    (pictures / "on-1.json").unlink()
+    for i in (1, 2):
+        os.utime(pictures / f"on-{i}.exr", (1, 1))
+    (folder / "work/report.done").unlink()
+    run_worker(folder)
+    assert (pictures / "on-1.exr").stat().st_mtime > 1, "its entry was lost"
+    assert (pictures / "on-2.exr").stat().st_mtime == 1, "it was finished"
+    assert json.loads((pictures / "on-1.json").read_text()) == entry, "the same seed makes the same picture"
 
 
 @pytest.mark.parametrize("obj, words", [

@@ -70,10 +70,12 @@ def test_a_change_ends_the_wait(daemon, watched):
 
 def test_another_job_does_not_end_the_wait(daemon):
     job, other = daemon.create(), daemon.create()
-    w = Waiting(daemon, f"/v1/jobs/{job}", tag_of(daemon, f"/v1/jobs/{job}"), wait=1)
+    before = n_waiting(daemon)
+    w = Waiting(daemon, f"/v1/jobs/{job}", tag_of(daemon, f"/v1/jobs/{job}"), wait=2)
+    wait_until(lambda: n_waiting(daemon) == before + 1)
     daemon.post(f"/v1/jobs/{other}/cancel")
     w.join(20)
-    assert w.status == 304 and w.took_s > 0.99
+    assert w.status == 304 and w.took_s > 1.99
 
 
 def test_what_does_not_wait(daemon):

@@ -56,10 +56,10 @@ def service(daemon_maker, tmp_path):
     """service(answer, **settings): a daemon and the receiver of its webhook."""
     made = []
 
-    def make(answer=None, **settings):
+    def make(answer=None, secret_mode=0o600, **settings):
         secret = tmp_path / "secret"
         secret.write_bytes(SECRET + b"\n")
-        secret.chmod(0o600)
+        secret.chmod(secret_mode)
         made.append(Receiver(answer))
         options = {"webhook.url": made[-1].url, "webhook.secret_file": secret, "webhook.retry_s": 1, "webhook.timeout_s": 30}
         return daemon_maker(options={**options, **{"webhook." + k: v for k, v in settings.items()}}), made[-1]
@@ -194,6 +194,32 @@ def test_settings_are_checked(tmp_path, settings, words):
         command += ["--set", f"webhook.{key}={value}"]
     run = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert run.returncode == 1 and words in run.stderr
+
+
+def test_a_credential_of_systemd_is_accepted(tmp_path, service, monkeypatch):
+    """systemd admits the service by an access list, which shows as permissions of the group."""
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(tmp_path))
+    d, receiver = service(secret_mode=0o440)
+    d.start_job("succeed")
+    only(d, "delivered")
+    check_signature(*receiver.got[0])
+
+
+def test_deliveries_end_when_the_webhook_is_switched_off(service):
+    """A later address must not get what was meant for this one."""
+    d, receiver = service(lambda n, handler: handler.reply(503), retry_s=3600)
+    d.start_job("succeed")
+    wait_until(lambda: receiver.got)
+    d.stop()
+    on = d.options
+    d.options = {k: v for k, v in on.items() if not k.startswith("webhook.")}
+    d.start()
+    failed = only(d, "failed")
+    assert failed["last_error"] == "the webhook was switched off" and failed["next_try_unix_s"] is None
+    d.stop()
+    d.options = on
+    d.start()
+    assert only(d, "failed")["id"] == failed["id"]
 
 
 def test_nothing_is_kept_without_an_address(daemon_maker):

@@ -61,12 +61,22 @@ static void set_paths(const struct worker_folder *folder, struct pdf_paths *p)
     worker_folder_path(folder, JOB_FOLDER_RESULTS, "report.pdf", p->to);
 }
 
+/* The folder of Python's settings for the whole machine, as "/etc/python3.11". */
+static void python_settings(char path[WORKER_PATH_BYTES])
+{
+    char program_path[PATH_MAX];
+    const char *name = realpath("/usr/bin/python3", program_path) != NULL ? strrchr(program_path, '/') : "/python3";
+    snprintf(path, WORKER_PATH_BYTES, "/etc%.100s", name);
+}
+
 /* WeasyPrint sees its own files, fonts and the page; it writes the PDF, and has no network. Where the kernel lacks a
  * part of the sandbox it does without, as the worker does. */
 static void restrict_helper(const char *prefix, const char *results, const char *work)
 {
     int version;
     bool calls;
+    char versioned[WORKER_PATH_BYTES];
+    python_settings(versioned);
     const struct sandbox_path path[] = {{SANDBOX_EXECUTE, "/usr"},
                                         {SANDBOX_EXECUTE, "/bin"},
                                         {SANDBOX_EXECUTE, "/lib"},
@@ -77,7 +87,7 @@ static void restrict_helper(const char *prefix, const char *results, const char 
                                         {SANDBOX_READ, "/etc/localtime"},
                                         {SANDBOX_READ, "/etc/mime.types"},
                                         {SANDBOX_READ, "/etc/python3"},
-                                        {SANDBOX_READ, "/etc/python3.11"},
+                                        {SANDBOX_READ, versioned},
                                         {SANDBOX_READ, "/var/cache/fontconfig"},
                                         {SANDBOX_READ, "/proc/self"},
                                         {SANDBOX_READ, "/dev/urandom"},
