@@ -18,7 +18,7 @@ import xml.etree.ElementTree as ElementTree
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lint-python", "lint-shell"]
-SLOW_CHECKS = ["clang"]
+SLOW_CHECKS = ["clang", "tsan-requests"]
 TIMEOUT_S = 600
 PYTEST_TIMEOUT_S = 1500
 

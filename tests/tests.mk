@@ -1,5 +1,5 @@
 # Tests: their programs, and the targets that run them. tests/README.md says what each one is.
-.PHONY: tsan test-watched-folder deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+.PHONY: tsan tsan-requests test-watched-folder deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -38,12 +38,18 @@ asan: | deps-test  ## unit and quick API tests under the address and undefined-b
 	@ASAN_OPTIONS=allocator_may_return_null=1 SELVEDGE_SANITIZED=1 \
 		/usr/bin/python3 tests/run_tests.py --quick --programs --build build/asan
 
-# the requests of these tests come from many threads; a report ends the daemon with a code that no test accepts
-THREADED_TESTS := api/service api/test_jobs_api api/test_uploads_api api/test_results_api api/test_supervision api/test_durable_replies
+# the requests of these tests come from many threads; a report ends the daemon with a code that no test accepts. The
+# worker and the client, other processes, are those of the normal build
+THREADED_TESTS ?= api/service api/test_jobs_api api/test_uploads_api api/test_results_api api/test_supervision api/test_durable_replies
 tsan: | deps-test  ## tests of the daemon under the thread sanitizer (three minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/tsan SANITIZE=thread OPTIMIZE=-O1 build/tsan/bin/selvedged
+	@ln -sf $(foreach p,selvedge selvedge-worker selvedge-phantom,"$(CURDIR)/$(BUILD)/bin/$p") build/tsan/bin/
 	@for t in $(THREADED_TESTS); do TSAN_OPTIONS="suppressions=$(CURDIR)/config/tsan.txt" SELVEDGE_SANITIZED=1 \
 		/usr/bin/python3 tests/run_tests.py --quick --programs --only $$t --build build/tsan || exit 1; done
+
+tsan-requests:     ## those where many requests meet: a part of `make test`
+	@$(MAKE) --no-print-directory tsan THREADED_TESTS="api/service api/test_jobs_api api/test_uploads_api"
 
 # SAMPLES, KILLS: fewer for a quick look
 test-watched-folder: | deps-test ## 100 samples dropped into a watched folder, real jobs, while the daemon is killed 20 times: each ends once (some minutes)

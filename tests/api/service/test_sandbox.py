@@ -8,7 +8,7 @@ import subprocess
 import zlib
 
 import pytest
-from daemon_under_test import ROOT, program, sha256
+from daemon_under_test import ROOT, SANITIZED, program, sha256
 from small_cloth import TABLE
 
 WORKER = program("selvedge-worker")
@@ -126,7 +126,9 @@ def test_what_a_worker_gets_of_the_daemon(daemon_maker):
     d = daemon_maker(environment={"PLANTED": "secret", "LANG": "C.UTF-8"}, options=limits,
                      wrapper=["bash", "-c", 'exec 9</dev/null; exec "$@"', "bash"])  # a descriptor that the daemon inherits
     seen = d.wait_state(d.start_job("surroundings"), "succeeded")["result"]
-    assert set(seen["environment"]) <= {"PATH", "LANG", "LC_ALL", "TZ", "OPENBLAS_NUM_THREADS", "LC_CTYPE"} and seen["environment"]["LANG"] == "C.UTF-8"
+    passed = SANITIZED.get("jobs.pass_environment", "").split()
+    assert set(seen["environment"]) <= {"PATH", "LANG", "LC_ALL", "TZ", "OPENBLAS_NUM_THREADS", "LC_CTYPE", *passed}
+    assert seen["environment"]["LANG"] == "C.UTF-8"
     assert seen["descriptors"] == ["0", "1", "2"]
     assert seen["no_new_privs"] == "1" and seen["oom_score_adj"] == "700" and seen["nice"] == 7
     assert seen["limits"] == {"NOFILE": [200, 200], "FSIZE": [1 << 20, 1 << 20], "AS": [1 << 30, 1 << 30], "CORE": [0, 0]}
