@@ -2,6 +2,7 @@
  * pictures and computes nothing; workers do. */
 #include "base/files/durable.h"
 #include "base/version.h"
+#include "server/access/first_token.h"
 #include "server/events/webhook.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
@@ -22,18 +23,21 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char usage[] = "usage: selvedged [options]\n"
-                            "  --config FILE     settings (see config/selvedge.conf)\n"
-                            "  --data DIR        folder of the database and of all jobs\n"
-                            "  --port N          TCP port; 0 picks a free one\n"
-                            "  --listen ADDRESS  a loopback address (default 127.0.0.1)\n"
-                            "  --worker PATH     the worker program (default: selvedge-worker beside this program)\n"
-                            "  --web DIR         the dashboard's folder\n"
-                            "  --set KEY=VALUE   any setting, for example --set jobs.workers=2\n"
-                            "  --print-config    print every setting with its default and an explanation\n"
-                            "  --version, --help\n";
+static const char usage[] =
+    "usage: selvedged [options]\n"
+    "  --config FILE     settings (see config/selvedge.conf)\n"
+    "  --data DIR        folder of the database and of all jobs\n"
+    "  --port N          TCP port; 0 picks a free one\n"
+    "  --listen ADDRESS  a loopback address (default 127.0.0.1)\n"
+    "  --worker PATH     the worker program (default: selvedge-worker beside this program)\n"
+    "  --web DIR         the dashboard's folder\n"
+    "  --set KEY=VALUE   any setting, for example --set jobs.workers=2\n"
+    "  --make-token NAME make an access token, print it and end; every request needs one from then on\n"
+    "  --scope SCOPE     what that token may do: read, submit or admin (default admin)\n"
+    "  --print-config    print every setting with its default and an explanation\n"
+    "  --version, --help\n";
 
-enum { LOCK_TRIES = 40, LOCK_PAUSE_US = 50000 };
+enum { LOCK_TRIES = 41, LOCK_PAUSE_US = 50000 };
 
 static const struct {
     const char *option, *key;
@@ -53,14 +57,22 @@ static status set_pair(struct settings *s, const char *pair, struct error *err)
     return settings_set(s, key, equal + 1, err);
 }
 
+/* A token to be made in place of serving. */
+struct token_wish {
+    const char *name; /* NULL: none */
+    enum access_scope scope;
+};
+
 /* Returns -1 to go on, or the exit code. The configuration file is read first, so that the other options override it
  * wherever they stand. */
-static int read_options(int argc, char **argv, struct settings *s, struct error *err)
+static int read_options(int argc, char **argv, struct settings *s, struct token_wish *wish, struct error *err)
 {
     static const struct option option[] = {
-        {"config", 1, NULL, 'c'},  {"data", 1, NULL, 0},   {"port", 1, NULL, 1},  {"listen", 1, NULL, 2},
-        {"worker", 1, NULL, 3},    {"web", 1, NULL, 4},    {"set", 1, NULL, 's'}, {"print-config", 0, NULL, 'p'},
-        {"version", 0, NULL, 'v'}, {"help", 0, NULL, 'h'}, {NULL, 0, NULL, 0}};
+        {"config", 1, NULL, 'c'}, {"data", 1, NULL, 0},           {"port", 1, NULL, 1},
+        {"listen", 1, NULL, 2},   {"worker", 1, NULL, 3},         {"web", 1, NULL, 4},
+        {"set", 1, NULL, 's'},    {"print-config", 0, NULL, 'p'}, {"make-token", 1, NULL, 't'},
+        {"scope", 1, NULL, 'o'},  {"version", 0, NULL, 'v'},      {"help", 0, NULL, 'h'},
+        {NULL, 0, NULL, 0}};
     for (int pass = 0; pass < 2; pass++) {
         optind = 1;
         for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
@@ -72,6 +84,9 @@ static int read_options(int argc, char **argv, struct settings *s, struct error 
             if (c == 'c' && pass == 0) r = settings_read_file(s, optarg, err);
             if (c == 's' && pass == 1) r = set_pair(s, optarg, err);
             if (c < 5 && pass == 1) r = settings_set(s, option_key[c].key, optarg, err);
+            if (c == 't') wish->name = optarg;
+            if (c == 'o' && !access_scope_parse(optarg, &wish->scope))
+                r = error_set(err, STATUS_INVALID, "--scope is read, submit or admin, not '%.40s'", optarg);
             if (r != STATUS_OK) return 2;
         }
         if (optind < argc) {
@@ -112,7 +127,8 @@ static status check_owner(const struct settings *s, struct error *err)
     return STATUS_OK;
 }
 
-static status lock_data(const struct settings *s, int *fd, struct error *err)
+/* tries: how often another process may be found to hold the lock; STATUS_CONFLICT after that. */
+static status lock_data(const struct settings *s, int tries, int *fd, struct error *err)
 {
     char path[PATH_BYTES];
     status r = durable_make_folder(s->data, err);
@@ -122,9 +138,9 @@ static status lock_data(const struct settings *s, int *fd, struct error *err)
     *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (*fd < 0) return error_set_errno(err, "cannot open '%s'", path);
     /* a process that a killed daemon was starting holds the lock until it becomes a worker, or ends */
-    for (int i = 0; i <= LOCK_TRIES; i++) {
+    for (int i = 0; i < tries; i++) {
+        if (i > 0) usleep(LOCK_PAUSE_US);
         if (flock(*fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
-        usleep(LOCK_PAUSE_US);
     }
     return error_set(err, STATUS_CONFLICT, "cannot use data folder '%s': another selvedged is using it", s->data);
 }
@@ -221,6 +237,30 @@ out:
     return r;
 }
 
+/* Makes a token and prints it. A daemon may use the data folder meanwhile; without one the lock keeps others away. */
+static int make_token(struct settings *s, const struct token_wish *wish)
+{
+    struct error err = {0};
+    char text[ACCESS_SECRET_TEXT_BYTES];
+    int lock_fd = -1;
+    umask(077);
+    status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
+    if (r == STATUS_OK) r = make_absolute(s->data, &err);
+    if (r == STATUS_OK) r = lock_data(s, 1, &lock_fd, &err);
+    if (r == STATUS_OK || r == STATUS_CONFLICT)
+        r = first_token_make(s->data, r == STATUS_CONFLICT, wish->name, wish->scope, text, &err);
+    if (lock_fd >= 0) close(lock_fd);
+    if (r == STATUS_OK) {
+        fprintf(stderr, "token '%s' with scope %s; it is shown only now:\n", wish->name,
+                access_scope_name(wish->scope));
+        r = printf("%s\n", text) > 0 && fflush(stdout) == 0 ? STATUS_OK
+                                                            : error_set_errno(&err, "cannot print the token");
+        sodium_memzero(text, sizeof text);
+    }
+    if (r != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
+    return r == STATUS_OK ? 0 : 1;
+}
+
 int main(int argc, char **argv)
 {
     struct settings settings;
@@ -228,12 +268,14 @@ int main(int argc, char **argv)
     struct log *log = NULL;
     int lock_fd = -1;
     sigset_t signals;
+    struct token_wish wish = {.scope = ACCESS_ADMIN};
     settings_init(&settings);
-    int code = read_options(argc, argv, &settings, &err);
+    int code = read_options(argc, argv, &settings, &wish, &err);
     if (code >= 0) {
         if (code != 0) fprintf(stderr, "error: %s\n%s", err.text[0] ? err.text : "wrong options", usage);
         return code;
     }
+    if (wish.name != NULL) return make_token(&settings, &wish);
     umask(077);
     signal(SIGPIPE, SIG_IGN);
     sigemptyset(&signals);
@@ -245,7 +287,7 @@ int main(int argc, char **argv)
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(settings.data, &err);
     if (r == STATUS_OK) r = make_absolute(settings.worker, &err);
-    if (r == STATUS_OK) r = lock_data(&settings, &lock_fd, &err);
+    if (r == STATUS_OK) r = lock_data(&settings, LOCK_TRIES, &lock_fd, &err);
     if (r == STATUS_OK) r = log_open(NULL, stderr, LOG_LEVEL_INFO, &log, &err);
     if (r == STATUS_OK) r = serve(&settings, log, &signals, &err);
     if (r != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);

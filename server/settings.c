@@ -35,7 +35,7 @@ static const char *const sandbox_words[] = {"auto", "required", "off", NULL};
 
 static const struct setting table[] = {
     TEXT("server", "listen", listen, "127.0.0.1",
-         "IP address to listen on; only loopback addresses such as 127.0.0.1 and ::1 are allowed"),
+         "IP address to listen on; another than 127.0.0.1 or ::1 needs access tokens and TLS (docs/safety.md)"),
     TEXT("server", "unix_socket", unix_socket, "",
          "path of a unix socket to listen on instead of address and port; only this user may connect to it"),
     TEXT("server", "public_origin", public_origin, "",
@@ -103,6 +103,14 @@ static const struct setting table[] = {
     NUMBER("webhook", "max_tries", webhook_max_tries, 16, 1, 1000, "tries after which a delivery is given up"),
     NUMBER("jobs", "time_limit_s", time_limit_s, 0, 0, 31536000,
            "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
+    NUMBER("access", "requests_per_minute", requests_per_minute, 0, 0, 1000000,
+           "requests that a token may make in a minute, unless it was made with a number of its own; 0: no limit"),
+    NUMBER("access", "stored_bytes", stored_bytes, 0, 0, INT64_MAX / 2,
+           "bytes of input files that the owner of a token may declare, unless the token has its own; 0: no limit"),
+    NUMBER("access", "jobs", jobs_of_owner, 0, 0, 10000000,
+           "jobs that the owner of a token may keep, unless the token has a number of its own; 0: no limit"),
+    NUMBER("access", "session_s", session_s, 43200, 60, 31536000,
+           "time in seconds after which a browser must sign in again"),
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
            "free space below which new work is refused and running jobs pause"),
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,

@@ -34,7 +34,8 @@ void handle_list_deliveries(struct http_request *r)
     if (!query_integer(r, "limit", 1, LIST_MOST, LIST_USUAL, &limit) ||
         !query_integer(r, "cursor", 1, INT64_MAX, 0, &cursor))
         return;
-    if (store_delivery_list(r->service->store, job, cursor, (size_t)limit + 1, &row, &n, &err) != STATUS_OK) {
+    const char *owner = r->grant.all ? NULL : r->grant.owner;
+    if (store_delivery_list(r->service->store, owner, job, cursor, (size_t)limit + 1, &row, &n, &err) != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
         return;
     }

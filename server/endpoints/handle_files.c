@@ -124,11 +124,11 @@ static void declare(struct http_request *r, const json_t *list, bool in_list)
         s = read_declarations(list, file, &i_fault, &err);
     if (s != STATUS_OK && n > 0 && in_list) name_place(&err, i_fault);
     if (s == STATUS_OK) {
-        s = job_declare_files(r->service, r->param[0], file, n, &i_fault, &refusal, &err);
+        s = job_declare_files(r->service, &r->grant, r->param[0], file, n, &i_fault, &refusal, &err);
         if (s != STATUS_OK && i_fault < n && in_list) name_place(&err, i_fault);
     }
     if (s != STATUS_OK)
-        reply_problem(r, refusal.code, &err, NULL);
+        reply_problem(r, refusal.code, &err, refusal.extra);
     else
         reply_declared(r, in_list, file, n);
     free(file);

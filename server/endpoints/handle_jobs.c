@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LIST_MOST = 500, LIST_USUAL = 50 };
+enum { LIST_MOST = 500, LIST_USUAL = 50, PRIORITY_MOST = 10 };
 
 /* Decides a 304 when the client has the present job. The document is not even read for it. */
 static bool job_not_modified(struct http_request *r)
@@ -64,8 +64,7 @@ static json_t *document_faults(const struct http_request *r)
 
 static void reply_refusal(struct http_request *r, const struct job_refusal *refusal, const struct error *err)
 {
-    json_t *extra = refusal->missing_files == NULL ? NULL : json_pack("{s:o}", "missing_files", refusal->missing_files);
-    reply_problem(r, refusal->code, err, extra);
+    reply_problem(r, refusal->code, err, refusal->extra);
 }
 
 /* Replies and returns false when the body is not JSON. JSON that is not a valid job document gets a 422 later. */
@@ -92,7 +91,7 @@ void handle_create_job(struct http_request *r)
         return;
     }
     if (!body_is_json(r)) return;
-    const struct job_request request = {r->body, r->n_body, key};
+    const struct job_request request = {r->body, r->n_body, key, &r->grant};
     if (job_create(r->service, &request, id, &replayed, &refusal, &err) != STATUS_OK)
         if (err.code == STATUS_INVALID && refusal.code == NULL)
             reply_problem(r, NULL, &err, document_faults(r));
@@ -151,27 +150,25 @@ void handle_delete_job(struct http_request *r)
         reply_empty(r, MHD_HTTP_NO_CONTENT);
 }
 
-void handle_start_job(struct http_request *r)
+static void begin_job(struct http_request *r, bool retry)
 {
     bool changed;
     struct job_refusal refusal = {0};
     struct error err = {0};
-    if (job_start(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK)
+    long long priority;
+    bool given = MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, "priority") != NULL;
+    if (!query_integer(r, "priority", -PRIORITY_MOST, PRIORITY_MOST, 0, &priority)) return;
+    const int64_t wanted = priority;
+    status s =
+        (retry ? job_retry : job_start)(r->service, r->param[0], given ? &wanted : NULL, &changed, &refusal, &err);
+    if (s != STATUS_OK)
         reply_refusal(r, &refusal, &err);
     else
         reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
 }
 
-void handle_retry_job(struct http_request *r)
-{
-    bool changed;
-    struct job_refusal refusal = {0};
-    struct error err = {0};
-    if (job_retry(r->service, r->param[0], &changed, &refusal, &err) != STATUS_OK)
-        reply_refusal(r, &refusal, &err);
-    else
-        reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
-}
+void handle_start_job(struct http_request *r) { begin_job(r, false); }
+void handle_retry_job(struct http_request *r) { begin_job(r, true); }
 
 void handle_cancel_job(struct http_request *r)
 {
@@ -201,6 +198,7 @@ static bool read_query(struct http_request *r, struct job_query *q)
         return false;
     q->limit = (size_t)limit + 1; /* one more than asked for, to know whether there is another page */
     q->before_serial = cursor;
+    q->owner = r->grant.all ? NULL : r->grant.owner;
     return true;
 }
 

@@ -34,6 +34,14 @@ void handle_get_result(struct http_request *r);
 void handle_archive(struct http_request *r);
 /* handle_deliveries.c */
 void handle_list_deliveries(struct http_request *r);
+/* handle_tokens.c */
+void handle_list_tokens(struct http_request *r);
+void handle_make_token(struct http_request *r);
+void handle_revoke_token(struct http_request *r);
+/* handle_session.c */
+void handle_get_session(struct http_request *r);
+void handle_sign_in(struct http_request *r);
+void handle_sign_out(struct http_request *r);
 /* handle_service.c */
 void handle_about(struct http_request *r);
 void handle_options(struct http_request *r);

@@ -1,5 +1,6 @@
 #include "server/events/long_poll.h"
 #include "base/clock.h"
+#include "server/access/access_guard.h"
 #include "server/events/change_feed.h"
 #include "server/http/http_reply.h"
 
@@ -42,7 +43,7 @@ bool long_poll_again(struct http_request *r, struct long_poll *p)
             if (woken == CHANGE_NONE) woken = CHANGE_SEEN;
         }
         p->seen_s = clock_monotonic_s();
-        if (woken == CHANGE_SEEN) return true;
+        if (woken == CHANGE_SEEN && guard_access_still(r)) return true;
     }
     change_watch_end(p->watch);
     p->watch = NULL;

@@ -8,7 +8,7 @@
 
 static const char *const single[] = {"Content-Length", "Host",          "Transfer-Encoding", "Content-Type",
                                      "Upload-Offset",  "Tus-Resumable", "Idempotency-Key",   "Origin",
-                                     "If-Match",       "Range"};
+                                     "If-Match",       "Range",         "Authorization"};
 enum { N_SINGLE = sizeof single / sizeof single[0] };
 
 struct headers_seen {

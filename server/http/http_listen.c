@@ -65,31 +65,49 @@ static status open_unix(const struct settings *s, int fd, char url[LISTEN_URL_BY
     return STATUS_OK;
 }
 
+static bool is_loopback(const char *address)
+{
+    struct in_addr v4;
+    struct in6_addr v6;
+    if (inet_pton(AF_INET, address, &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
+    return inet_pton(AF_INET6, address, &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+/* Other machines may reach the service only with tokens, and tokens may travel only under TLS. */
+static status check_reach(const struct settings *s, bool guarded, struct error *err)
+{
+    if (is_loopback(s->listen)) return STATUS_OK;
+    if (!guarded)
+        return error_set_field(
+            err, STATUS_INVALID, "server.listen",
+            "cannot listen on '%s': without access tokens only loopback addresses (127.0.0.1, ::1) are allowed; make "
+            "a first token with: selvedged --data '%s' --make-token NAME",
+            s->listen, s->data);
+    if (!http_tls_wanted(s))
+        return error_set_field(
+            err, STATUS_INVALID, "server.listen",
+            "cannot listen on '%s' without TLS, because access tokens would cross the network in the clear; set "
+            "server.tls_certificate and server.tls_key, or let a proxy on this machine do it (config/nginx.conf)",
+            s->listen);
+    return STATUS_OK;
+}
+
 static status open_tcp(const struct settings *s, int *out, char url[LISTEN_URL_BYTES], struct error *err)
 {
     struct sockaddr_storage address = {0};
     struct sockaddr_in *v4 = (struct sockaddr_in *)(void *)&address;
     struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)(void *)&address;
     socklen_t n = sizeof *v4;
-    bool loopback;
     if (inet_pton(AF_INET, s->listen, &v4->sin_addr) == 1) {
         address.ss_family = AF_INET;
         v4->sin_port = htons((uint16_t)s->port);
-        loopback = (ntohl(v4->sin_addr.s_addr) >> 24) == 127;
     } else if (inet_pton(AF_INET6, s->listen, &v6->sin6_addr) == 1) {
         address.ss_family = AF_INET6;
         v6->sin6_port = htons((uint16_t)s->port);
         n = sizeof *v6;
-        loopback = IN6_IS_ADDR_LOOPBACK(&v6->sin6_addr);
     } else
         return error_set_field(err, STATUS_INVALID, "server.listen", "cannot listen on '%s': not an IP address",
                                s->listen);
-    if (!loopback)
-        return error_set_field(
-            err, STATUS_INVALID, "server.listen",
-            "cannot listen on '%s': without access tokens only loopback addresses (127.0.0.1, ::1) are allowed; "
-            "use an SSH tunnel or an authenticating proxy on this machine",
-            s->listen);
     int on = 1, fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return error_set_errno(err, "cannot open a socket");
     *out = fd;
@@ -103,7 +121,7 @@ static status open_tcp(const struct settings *s, int *out, char url[LISTEN_URL_B
     return STATUS_OK;
 }
 
-status http_listen(const struct settings *s, int *out, char url[LISTEN_URL_BYTES], struct error *err)
+status http_listen(const struct settings *s, bool guarded, int *out, char url[LISTEN_URL_BYTES], struct error *err)
 {
     int fd = -1;
     status r = check_origin(s, err);
@@ -111,8 +129,10 @@ status http_listen(const struct settings *s, int *out, char url[LISTEN_URL_BYTES
     if (s->unix_socket[0] != '\0') {
         fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
         r = fd < 0 ? error_set_errno(err, "cannot open a socket") : open_unix(s, fd, url, err);
-    } else
-        r = open_tcp(s, &fd, url, err);
+    } else {
+        r = check_reach(s, guarded, err);
+        if (r == STATUS_OK) r = open_tcp(s, &fd, url, err);
+    }
     if (r == STATUS_OK)
         *out = fd;
     else if (fd >= 0)
@@ -135,7 +155,13 @@ bool http_host_known(const struct settings *s, const char *host)
         if (*port == '\0') return true;
         if (*port == ':' && strspn(port + 1, "0123456789") == strlen(port + 1)) return true;
     }
+    if (s->unix_socket[0] == '\0' && !is_loopback(s->listen)) return true;
     return public_host(s) != NULL && strcasecmp(host, public_host(s)) == 0;
+}
+
+bool http_host_public(const struct settings *s, const char *host)
+{
+    return host != NULL && strncmp(s->public_origin, "https://", 8) == 0 && strcasecmp(host, public_host(s)) == 0;
 }
 
 bool http_origin_known(const struct settings *s, const char *origin, const char *host)

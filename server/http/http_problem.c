@@ -26,6 +26,8 @@ static const struct http_problem of_code[] = {
     {"length_and_chunked", 400, "The length of the body is ambiguous"},
     {"duplicate_header", 400, "A header appears twice"},
     {"host", 400, "The Host header does not name this machine"},
+    {"token", 401, "A valid access token is required"},
+    {"scope", 403, "The access token does not allow this"},
     {"origin", 403, "The request comes from another site"},
     {"method", 405, "The method is not allowed here"},
     {"too_slow", 408, "The request came too slowly"},
@@ -38,8 +40,10 @@ static const struct http_problem of_code[] = {
     {"range", 416, "The range is outside the file"},
     {"idempotency_key_reused", 422, "The key was used with another body"},
     {"too_many", 429, "Too many"},
+    {"rate", 429, "Too many requests in a minute"},
     {"not_ready", 503, "The service cannot take new work"},
     {"stopping", 503, "The service is stopping"},
+    {"quota", 507, "A quota of the access token is used up"},
 };
 
 const struct http_problem *http_problem_of_status(status code)

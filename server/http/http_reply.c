@@ -68,6 +68,13 @@ void reply_json(struct http_request *r, unsigned status_code, json_t *body)
     reply_header(r, "Cache-Control", "no-cache");
 }
 
+void reply_no_store(struct http_request *r)
+{
+    if (r->reply == NULL) return;
+    MHD_del_response_header(r->reply, "Cache-Control", "no-cache");
+    reply_header(r, "Cache-Control", "no-store");
+}
+
 static void json_tag(const json_t *body, char out[40])
 {
     unsigned char sum[16] = {0};

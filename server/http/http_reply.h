@@ -24,6 +24,8 @@ bool tag_matches(const char *header, const char *tag);
 void reply_problem(struct http_request *request, const char *code, const struct error *err, json_t *extra);
 /* The same from a code of http_problem.c, the name of the field at fault ("" if none) and a sentence. */
 void reply_code(struct http_request *request, const char *code, const char *field, const char *detail);
+/* Says that no cache may keep the reply that was decided. */
+void reply_no_store(struct http_request *request);
 void reply_header(struct http_request *request, const char *name, const char *value);
 void reply_header_int(struct http_request *request, const char *name, long long value);
 

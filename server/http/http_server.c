@@ -1,4 +1,5 @@
 #include "server/http/http_server.h"
+#include "server/access/access_guard.h"
 #include "server/endpoints/handlers.h"
 #include "server/http/connection_table.h"
 #include "server/http/http_guard.h"
@@ -24,6 +25,7 @@ struct http_server {
     const struct static_files *files;
     struct MHD_Daemon *daemon;
     struct connection_table *connection;
+    struct access_desk *desk;
     struct http_tls tls;
     atomic_uint_least64_t n_reply[HTTP_MAX_STATUS];
 };
@@ -35,7 +37,11 @@ uint64_t http_server_n_reply(const struct http_server *s, unsigned status_code)
     return status_code < HTTP_MAX_STATUS ? atomic_load(&s->n_reply[status_code]) : 0;
 }
 
-void http_server_reap(struct http_server *s) { connection_table_reap(s->connection); }
+void http_server_reap(struct http_server *s)
+{
+    connection_table_reap(s->connection);
+    access_desk_flush(s->desk, false);
+}
 
 static enum MHD_Result queue_reply(struct http_request *r)
 {
@@ -66,7 +72,7 @@ static bool examine(struct http_request *r, const char *method)
     else if (r->route == NULL) {
         reply_code(r, "method", "", "this address accepts other methods; see Allow");
         reply_header(r, "Allow", allow);
-    } else if (guard_body(r) && r->route->begin != NULL)
+    } else if (guard_access(r) && guard_body(r) && r->route->begin != NULL)
         r->route->begin(r);
     /* without a length nobody knows where the next request begins */
     return r->reply != NULL && (skip_body || r->reply_status == MHD_HTTP_LENGTH_REQUIRED);
@@ -80,6 +86,7 @@ static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *
     *context = r;
     r->server = s;
     r->service = s->service;
+    r->desk = s->desk;
     r->connection = c;
     r->url = url;
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -213,7 +220,10 @@ status http_server_start(struct job_service *service, http_route_finder *find_ro
     status result = connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s,
                                          !http_tls_wanted(settings), &s->connection, err);
     if (result == STATUS_OK) result = http_tls_read(settings, &s->tls, err);
-    if (result == STATUS_OK) result = http_listen(settings, &fd, url, err);
+    if (result == STATUS_OK) result = access_desk_new(service->store, settings, &s->desk, err);
+    bool guarded = false;
+    if (result == STATUS_OK) result = access_required(s->desk, &guarded, err);
+    if (result == STATUS_OK) result = http_listen(settings, guarded, &fd, url, err);
     if (result != STATUS_OK) goto out;
     struct MHD_OptionItem tls[] = {{MHD_OPTION_HTTPS_MEM_CERT, 0, s->tls.certificate},
                                    {MHD_OPTION_HTTPS_MEM_KEY, 0, s->tls.key},
@@ -255,6 +265,7 @@ void http_server_stop(struct http_server *s)
         MHD_stop_daemon(s->daemon);
     }
     connection_table_free(s->connection);
+    access_desk_free(s->desk);
     http_tls_release(&s->tls);
     free(s);
 }

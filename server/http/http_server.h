@@ -6,6 +6,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_SERVER_H
 #define SELVEDGE_SERVER_HTTP_SERVER_H
 
+#include "server/access/access_desk.h"
 #include "server/http/http_listen.h"
 #include "server/jobs/job_service.h"
 
@@ -23,6 +24,8 @@ struct http_request {
     struct MHD_Connection *connection;
     const struct http_route *route;
     const char *url;
+    struct access_desk *desk;
+    struct access_grant grant;       /* what its token allows */
     char param[2][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */
     int64_t content_length;          /* 0: no body */
     char *body;                      /* JSON body, NUL-terminated */
@@ -44,6 +47,7 @@ enum http_body { HTTP_BODY_NONE, HTTP_BODY_JSON, HTTP_BODY_UPLOAD };
 struct http_route {
     const char *method, *path; /* path segments in braces are parameters; {path...} matches the rest of the path */
     enum http_body body;
+    enum access_scope need; /* of a token, once there are tokens (access_guard.h) */
     void (*handle)(struct http_request *request);
     /* called before the body (HTTP_BODY_UPLOAD): decides a reply or sets request->upload */
     void (*begin)(struct http_request *request);

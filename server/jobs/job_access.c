@@ -26,6 +26,30 @@ status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err)
     return STATUS_OK;
 }
 
+status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,
+                       const struct owner_use *more, struct job_refusal *refusal, struct error *err)
+{
+    struct owner_use use = {0};
+    const struct access_quota *q = &grant->quota;
+    if ((q->jobs == 0 || more->jobs == 0) && (q->stored_bytes == 0 || more->bytes == 0)) return STATUS_OK;
+    status s = store_owner_use(v->store, owner, &use, err);
+    if (s != STATUS_OK) return s;
+    bool jobs = q->jobs > 0 && more->jobs > 0 && use.jobs + more->jobs > q->jobs;
+    bool bytes = q->stored_bytes > 0 && more->bytes > 0 && more->bytes > q->stored_bytes - use.bytes;
+    if (!jobs && !bytes) return STATUS_OK;
+    refusal->code = "quota";
+    refusal->extra = json_pack(
+        "{s:I,s:I,s:I}", jobs ? "quota_jobs" : "quota_bytes", (json_int_t)(jobs ? q->jobs : q->stored_bytes), "used",
+        (json_int_t)(jobs ? use.jobs : use.bytes), "wanted", (json_int_t)(jobs ? more->jobs : more->bytes));
+    if (jobs)
+        return error_set(err, STATUS_DISK_FULL, "'%s' keeps %lld jobs of at most %lld; delete some", owner,
+                         (long long)use.jobs, (long long)q->jobs);
+    return error_set_field(err, STATUS_DISK_FULL, "size",
+                           "'%s' has declared %lld bytes of at most %lld, and %lld more are asked for; delete jobs or "
+                           "files",
+                           owner, (long long)use.bytes, (long long)q->stored_bytes, (long long)more->bytes);
+}
+
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
 {
     status s = store_job_update(v->store, row, err);

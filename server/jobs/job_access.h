@@ -14,6 +14,13 @@ status job_check_editable(const struct job_row *row, struct error *err);
 /* Marks the row of a job whose document or files were edited: the job becomes a draft, and its next start discards
  * earlier progress. The caller writes the row together with the edit, so that a job whose edit fails is unchanged. */
 void job_mark_edited(struct job_row *row);
+/* Whether the job whose geometry this one adopts, if any, exists and has the same owner. STATUS_INVALID, in the same
+ * words for a job of another owner as for one that does not exist. */
+status job_check_adopted(struct job_service *v, const struct job_row *row, struct error *err);
+/* Whether an owner, beside what it keeps, may keep further jobs and bytes; else STATUS_DISK_FULL, and the refusal says
+ * so with the numbers. */
+status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,
+                       const struct owner_use *more, struct job_refusal *refusal, struct error *err);
 /* store_job_update for changes that free space or end work: if the disk is full, the ballast file is released for
  * them. */
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);

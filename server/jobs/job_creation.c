@@ -43,11 +43,11 @@ static void text_hash(const char *text, size_t n_bytes, char out[STORE_HASH_TEXT
     sodium_bin2hex(out, STORE_HASH_TEXT_BYTES, sum, sizeof sum);
 }
 
-static status find_replay(struct job_service *v, const char *key, const char *body_hash, char id[STORE_ID_BYTES],
-                          bool *replayed, struct job_refusal *refusal, struct error *err)
+static status find_replay(struct job_service *v, const char *owner, const char *key, const char *body_hash,
+                          char id[STORE_ID_BYTES], bool *replayed, struct job_refusal *refusal, struct error *err)
 {
     char before[STORE_HASH_TEXT_BYTES];
-    status s = store_idempotency_find(v->store, key, id, before, err);
+    status s = store_idempotency_find(v->store, owner, key, id, before, err);
     if (s == STATUS_NOT_FOUND) return STATUS_OK;
     if (s != STATUS_OK) return s;
     if (strcmp(before, body_hash) != 0) {
@@ -59,10 +59,11 @@ static status find_replay(struct job_service *v, const char *key, const char *bo
     return STATUS_OK;
 }
 
-static status create_locked(struct job_service *v, struct job_row *row, const char *key, const char *body_hash,
-                            bool *replayed, struct job_refusal *refusal, struct error *err)
+static status create_locked(struct job_service *v, struct job_row *row, const struct job_request *request,
+                            const char *body_hash, bool *replayed, struct job_refusal *refusal, struct error *err)
 {
-    status s = key == NULL ? STATUS_OK : find_replay(v, key, body_hash, row->id, replayed, refusal, err);
+    const char *key = request->idempotency_key;
+    status s = key == NULL ? STATUS_OK : find_replay(v, row->owner, key, body_hash, row->id, replayed, refusal, err);
     if (s != STATUS_OK || *replayed) return s;
     int64_t count[JOB_N_STATE], n = 0;
     s = store_job_count(v->store, count, err);
@@ -73,6 +74,8 @@ static status create_locked(struct job_service *v, struct job_row *row, const ch
         return error_set(err, STATUS_TOO_LARGE, "cannot keep more than %lld jobs; delete some",
                          (long long)v->settings->max_jobs);
     }
+    s = job_check_quota(v, request->grant, row->owner, &(struct owner_use){.jobs = 1}, refusal, err);
+    if (s != STATUS_OK) return s;
     job_new_id(row->id);
     row->created_unix_s = clock_wall_s();
     s = store_job_insert(v->store, row, key, body_hash, err);
@@ -100,8 +103,9 @@ status job_create(struct job_service *v, const struct job_request *request, char
     text_hash(request->document, request->n_bytes, body_hash);
     row.document = strndup(request->document, request->n_bytes);
     if (row.document == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot create job: out of memory");
+    snprintf(row.owner, sizeof row.owner, "%s", request->grant->owner);
     pthread_mutex_lock(&v->change);
-    s = create_locked(v, &row, request->idempotency_key, body_hash, replayed, refusal, err);
+    s = create_locked(v, &row, request, body_hash, replayed, refusal, err);
     pthread_mutex_unlock(&v->change);
     if (s == STATUS_OK) snprintf(id, STORE_ID_BYTES, "%s", row.id);
     if (s == STATUS_OK && !*replayed) log_info(v->log, "job %s created: '%s'", row.id, row.sample);

@@ -43,6 +43,20 @@ out:
     return s;
 }
 
+status job_check_adopted(struct job_service *v, const struct job_row *row, struct error *err)
+{
+    struct job_document *doc = NULL;
+    char owner[STORE_OWNER_BYTES] = "";
+    status s = job_document_parse(row->document, strlen(row->document), &doc, err);
+    if (s == STATUS_OK && doc->geometry_job[0] != '\0') {
+        s = store_job_owner(v->store, doc->geometry_job, owner, err);
+        if (s == STATUS_NOT_FOUND || (s == STATUS_OK && strcmp(owner, row->owner) != 0))
+            s = error_set_field(err, STATUS_INVALID, "geometry.job", "job '%.40s' does not exist", doc->geometry_job);
+    }
+    job_document_free(doc);
+    return s;
+}
+
 static bool role_valid(const char *role)
 {
     static const char *const known[] = {"volume",          "fibers", "measurements", "photograph",
@@ -127,8 +141,8 @@ static status insert_new(struct job_service *v, struct job_row *job, struct job_
     return s;
 }
 
-static status check_room(struct job_service *v, const struct job_row *job, size_t n_new, int64_t n_bytes,
-                         struct job_refusal *refusal, struct error *err)
+static status check_room(struct job_service *v, const struct access_grant *grant, const struct job_row *job,
+                         size_t n_new, int64_t n_bytes, struct job_refusal *refusal, struct error *err)
 {
     int64_t n_before = 0;
     status s = store_file_count(v->store, job->id, &n_before, err);
@@ -139,11 +153,13 @@ static status check_room(struct job_service *v, const struct job_row *job, size_
                          (long long)v->settings->max_files_per_job);
     }
     s = job_check_editable(job, err);
+    if (s == STATUS_OK) s = job_check_quota(v, grant, job->owner, &(struct owner_use){.bytes = n_bytes}, refusal, err);
     return s == STATUS_OK ? job_disk_check(v, n_bytes, err) : s;
 }
 
-static status declare_locked(struct job_service *v, const char *id, struct job_declaration *file, size_t n,
-                             size_t *i_fault, struct job_refusal *refusal, struct error *err)
+static status declare_locked(struct job_service *v, const struct access_grant *grant, const char *id,
+                             struct job_declaration *file, size_t n, size_t *i_fault, struct job_refusal *refusal,
+                             struct error *err)
 {
     struct job_row job;
     size_t n_new = 0;
@@ -157,7 +173,7 @@ static status declare_locked(struct job_service *v, const char *id, struct job_d
         n_new++;
         n_bytes += file[i].row.size_bytes; /* at most max_file_bytes each, of at most a megabyte of declarations */
     }
-    if (s == STATUS_OK && n_new > 0) s = check_room(v, &job, n_new, n_bytes, refusal, err);
+    if (s == STATUS_OK && n_new > 0) s = check_room(v, grant, &job, n_new, n_bytes, refusal, err);
     return s == STATUS_OK && n_new > 0 ? insert_new(v, &job, file, n, n_new, err) : s;
 }
 
@@ -184,8 +200,9 @@ static status check_names(const struct job_declaration *file, size_t n, size_t *
     return s;
 }
 
-status job_declare_files(struct job_service *v, const char *id, struct job_declaration *file, size_t n, size_t *i_fault,
-                         struct job_refusal *refusal, struct error *err)
+status job_declare_files(struct job_service *v, const struct access_grant *grant, const char *id,
+                         struct job_declaration *file, size_t n, size_t *i_fault, struct job_refusal *refusal,
+                         struct error *err)
 {
     *i_fault = n;
     status s = STATUS_OK;
@@ -196,7 +213,7 @@ status job_declare_files(struct job_service *v, const char *id, struct job_decla
     if (s == STATUS_OK) s = check_names(file, n, i_fault, err);
     if (s != STATUS_OK) return s;
     pthread_mutex_lock(&v->change);
-    s = declare_locked(v, id, file, n, i_fault, refusal, err);
+    s = declare_locked(v, grant, id, file, n, i_fault, refusal, err);
     pthread_mutex_unlock(&v->change);
     return s;
 }

@@ -21,11 +21,13 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     size_t n = json_array_size(missing);
     if (n > 0) {
         refusal->code = "files_missing";
-        refusal->missing_files = missing;
-        return error_set(err, STATUS_CONFLICT, "cannot start: %zu input file%s not complete; the first is '%s'", n,
-                         n == 1 ? " is" : "s are", json_string_value(json_array_get(missing, 0)));
+        refusal->extra = json_pack("{s:O}", "missing_files", missing);
+        s = error_set(err, STATUS_CONFLICT, "cannot start: %zu input file%s not complete; the first is '%s'", n,
+                      n == 1 ? " is" : "s are", json_string_value(json_array_get(missing, 0)));
     }
     json_decref(missing);
+    if (s == STATUS_OK) s = job_check_adopted(v, row, err);
+    if (s != STATUS_OK) return s;
     row->state = JOB_QUEUED;
     row->lost_attempts = 0;
     row->cancel_requested = false;
@@ -35,18 +37,22 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     return store_job_update(v->store, row, err);
 }
 
-static status begin(struct job_service *v, const char *id, bool retry, bool *changed, struct job_refusal *refusal,
-                    struct error *err)
+static status begin(struct job_service *v, const char *id, bool retry, const int64_t *priority, bool *changed,
+                    struct job_refusal *refusal, struct error *err)
 {
     struct job_row row;
     *changed = false;
     pthread_mutex_lock(&v->change);
     status s = job_get(v, id, &row, err);
     if (s != STATUS_OK) goto out;
+    bool other = priority != NULL && *priority != row.priority;
+    if (other) row.priority = *priority;
     if (job_active(&row)) {
         if (row.cancel_requested)
             s = error_set(err, STATUS_CONFLICT,
                           "cannot start the job while it is being cancelled; wait until it has stopped");
+        else if (other)
+            s = store_job_update(v->store, &row, err);
         goto out;
     }
     if (retry && row.state != JOB_FAILED && row.state != JOB_CANCELLED) {
@@ -66,14 +72,16 @@ out:
     return s;
 }
 
-status job_start(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err)
+status job_start(struct job_service *v, const char *id, const int64_t *priority, bool *changed,
+                 struct job_refusal *refusal, struct error *err)
 {
-    return begin(v, id, false, changed, refusal, err);
+    return begin(v, id, false, priority, changed, refusal, err);
 }
 
-status job_retry(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err)
+status job_retry(struct job_service *v, const char *id, const int64_t *priority, bool *changed,
+                 struct job_refusal *refusal, struct error *err)
 {
-    return begin(v, id, true, changed, refusal, err);
+    return begin(v, id, true, priority, changed, refusal, err);
 }
 
 status job_cancel(struct job_service *v, const char *id, bool *changed, struct error *err)

@@ -4,6 +4,7 @@
 #define SELVEDGE_SERVER_JOB_SERVICE_H
 
 #include "base/log.h"
+#include "server/access/access_desk.h"
 #include "server/jobs/upload.h"
 #include "server/settings.h"
 #include "server/store/store.h"
@@ -30,7 +31,7 @@ struct job_service {
 /* The code of http_problem.c for a refused request, if the status does not determine it; else NULL. */
 struct job_refusal {
     const char *code;
-    json_t *missing_files; /* owned by the caller */
+    json_t *extra; /* further members of the problem: {"missing_files"} or numbers; NULL or owned by the caller */
 };
 
 /* Opens the database in the data folder, moves unknown job folders to the quarantine, removes tombstones, queues
@@ -44,6 +45,7 @@ struct job_request {
     const char *document;
     size_t n_bytes;
     const char *idempotency_key;
+    const struct access_grant *grant; /* whose job it is to be, and what they may keep */
 };
 
 /* Creates a draft and gives its id. *replayed: an earlier request with the same key and document has created it; its
@@ -55,9 +57,12 @@ status job_create(struct job_service *v, const struct job_request *request, char
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
                             status (*may_edit)(void *context, const struct job_row *row, struct error *err),
                             void *context, struct error *err);
-/* *changed: false if the job already was in the requested state. */
-status job_start(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);
-status job_retry(struct job_service *v, const char *id, bool *changed, struct job_refusal *refusal, struct error *err);
+/* *changed: false if the job already was in the requested state. priority: the new one of the job, also if it is queued
+ * already; NULL: as it is. */
+status job_start(struct job_service *v, const char *id, const int64_t *priority, bool *changed,
+                 struct job_refusal *refusal, struct error *err);
+status job_retry(struct job_service *v, const char *id, const int64_t *priority, bool *changed,
+                 struct job_refusal *refusal, struct error *err);
 status job_cancel(struct job_service *v, const char *id, bool *changed, struct error *err);
 status job_delete(struct job_service *v, const char *id, struct error *err);
 
@@ -72,8 +77,9 @@ struct job_declaration {
     bool existed;        /* the same declaration was made before */
 };
 /* Declares n >= 1 files, all or none, in one transaction. *i_fault: the declaration that an error is about, or n. */
-status job_declare_files(struct job_service *v, const char *id, struct job_declaration *file, size_t n, size_t *i_fault,
-                         struct job_refusal *refusal, struct error *err);
+status job_declare_files(struct job_service *v, const struct access_grant *grant, const char *id,
+                         struct job_declaration *file, size_t n, size_t *i_fault, struct job_refusal *refusal,
+                         struct error *err);
 status job_delete_file(struct job_service *v, const char *id, const char *name, struct error *err);
 status job_delete_upload(struct job_service *v, const char *upload_id, struct error *err);
 

@@ -148,6 +148,8 @@ status job_view(struct job_service *v, const struct job_row *row, bool full, jso
                             "started_unix_s", time_or_null(row->started_unix_s), "finished_unix_s",
                             time_or_null(row->finished_unix_s), "attempt", (json_int_t)row->attempt, "lost_attempts",
                             (json_int_t)row->lost_attempts, "generation", (json_int_t)row->generation);
+    json_object_set_new(out, "priority", json_integer((json_int_t)row->priority));
+    json_object_set_new(out, "owner", row->owner[0] != '\0' ? json_string(row->owner) : json_null());
     put_progress(out, row, st);
     put_error(out, row);
     json_decref(st);

@@ -179,7 +179,22 @@ static status open_link(struct store_link *link, const char *path, int flags, co
     return rc == SQLITE_OK ? STATUS_OK : store_error(link, "cannot open the database", err);
 }
 
-status store_open(const char *path, struct store **out, struct error *err)
+/* A running daemon has migrated its database when it started. */
+static status check_version(struct store_link *link, const char *path, struct error *err)
+{
+    int version = 0, n_migration;
+    store_migrations(&n_migration);
+    status s = read_version(link, &version, err);
+    if (s != STATUS_OK || version == n_migration) return s;
+    return error_set(err, STATUS_CONFLICT,
+                     "database '%s' has version %d, and this program writes version %d: the daemon that uses it is of "
+                     "another version; stop it first",
+                     path, version, n_migration);
+}
+
+static status open_store(const char *path, int create,
+                         status (*prepare_schema)(struct store_link *, const char *, struct error *),
+                         struct store **out, struct error *err)
 {
     status s = refuse_network(path, err);
     if (s != STATUS_OK) return s;
@@ -187,16 +202,26 @@ status store_open(const char *path, struct store **out, struct error *err)
     if (store == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot open the database: out of memory");
     pthread_mutex_init(&store->write.lock, NULL);
     pthread_mutex_init(&store->read.lock, NULL);
-    s = open_link(&store->write, path, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
+    s = open_link(&store->write, path, SQLITE_OPEN_READWRITE | create,
                   "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA trusted_schema=OFF",
                   err);
-    if (s == STATUS_OK) s = migrate(&store->write, path, err);
+    if (s == STATUS_OK) s = prepare_schema(&store->write, path, err);
     if (s == STATUS_OK) s = open_link(&store->read, path, SQLITE_OPEN_READONLY, "PRAGMA trusted_schema=OFF", err);
     if (s != STATUS_OK)
         store_close(store);
     else
         *out = store;
     return s;
+}
+
+status store_open(const char *path, struct store **out, struct error *err)
+{
+    return open_store(path, SQLITE_OPEN_CREATE, migrate, out, err);
+}
+
+status store_open_beside(const char *path, struct store **out, struct error *err)
+{
+    return open_store(path, 0, check_version, out, err);
 }
 
 void store_close(struct store *store)

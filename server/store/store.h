@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { STORE_ID_BYTES = 40, STORE_HASH_TEXT_BYTES = 65, STORE_HASH_STATE_BYTES = 256 };
+enum { STORE_ID_BYTES = 40, STORE_OWNER_BYTES = 65, STORE_HASH_TEXT_BYTES = 65, STORE_HASH_STATE_BYTES = 256 };
 
 enum job_state {
     JOB_DRAFT,
@@ -42,6 +42,8 @@ struct job_row {
     double created_unix_s, updated_unix_s, queued_unix_s, started_unix_s, finished_unix_s; /* 0: not yet */
     char error_code[32], error_field[160], error_text[1024];                               /* error_code "": none */
     int64_t peak_rss_bytes;
+    char owner[STORE_OWNER_BYTES]; /* whose token made the job; "": made without a token. Never changes */
+    int64_t priority;              /* -10..10, higher first among the queued jobs of an owner */
 };
 void job_row_release(struct job_row *row);
 
@@ -62,6 +64,9 @@ struct store;
 
 /* STATUS_UNSUPPORTED on a network file system or for a newer schema. */
 status store_open(const char *path, struct store **store, struct error *err);
+/* Opens the database of a daemon that runs. It is not migrated: STATUS_CONFLICT when its version is not that of this
+ * program. */
+status store_open_beside(const char *path, struct store **store, struct error *err);
 void store_close(struct store *store);
 /* From now on `changed` is called with the id of a job after each change of it or of its files, by the thread that made
  * the change. To be called once, before other threads use the store. */
@@ -70,8 +75,8 @@ void store_on_change(struct store *store, void (*changed)(void *context, const c
 /* Inserts a job, and its idempotency key with body_hash (key NULL: none), in one transaction. Sets row->serial. */
 status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash,
                         struct error *err);
-/* STATUS_NOT_FOUND when the key is new or its job was deleted. */
-status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES],
+/* STATUS_NOT_FOUND when the key is new to this owner or its job was deleted. */
+status store_idempotency_find(struct store *store, const char *owner, const char *key, char job_id[STORE_ID_BYTES],
                               char body_hash[STORE_HASH_TEXT_BYTES], struct error *err);
 /* Reads a job; tombstones are found too (row->deleted). The caller releases the row. STATUS_NOT_FOUND. */
 status store_job_get(struct store *store, const char *id, struct job_row *row, struct error *err);
@@ -88,13 +93,15 @@ struct job_query {
     int state;             /* -1: all */
     int64_t before_serial; /* 0: from the newest */
     bool deleted;          /* tombstones instead of jobs */
-    bool queue_order;      /* by queued_unix_s, oldest first; with a state only */
+    const char *owner;     /* NULL: of all owners */
     size_t limit;
 };
 /* *row is an array of *n rows without their documents; the caller calls job_rows_free. */
 status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n,
                       struct error *err);
 void job_rows_free(struct job_row *row, size_t n);
+/* Lists the first n_each queued jobs of each owner, by priority and then by queued_unix_s, owner by owner. As above. */
+status store_job_heads(struct store *store, size_t n_each, struct job_row **row, size_t *n, struct error *err);
 /* Counts the jobs in each state, without tombstones. */
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err);
 

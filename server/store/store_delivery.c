@@ -89,9 +89,17 @@ out:
     return s;
 }
 
-status store_delivery_list(struct store *store, const char *job_id, int64_t before, size_t limit,
+status store_delivery_list(struct store *store, const char *owner, const char *job_id, int64_t before, size_t limit,
                            struct delivery_row **out, size_t *n_out, struct error *err)
 {
+#define WANTED "SELECT " COLUMNS " FROM delivery WHERE serial < ?1 "
+#define NEWEST " ORDER BY serial DESC LIMIT ?2"
+    /* one statement for each index, as for jobs; the deliveries of a job are few */
+    static const char *const sql[2][2] = {
+        {WANTED "AND ?3 = '' AND ?4 = ''" NEWEST, WANTED "AND ?3 = '' AND owner = ?4" NEWEST},
+        {WANTED "AND job_id = ?3 AND ?4 = ''" NEWEST, WANTED "AND job_id = ?3 AND +owner = ?4" NEWEST}};
+#undef WANTED
+#undef NEWEST
     sqlite3_stmt *q = NULL;
     size_t n = 0;
     int rc = SQLITE_DONE;
@@ -99,14 +107,8 @@ status store_delivery_list(struct store *store, const char *job_id, int64_t befo
     if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list deliveries: out of memory");
     if (before <= 0) before = INT64_MAX;
     pthread_mutex_lock(&store->read.lock);
-    status s = job_id == NULL
-                   ? store_prepare(&store->read, &q, err,
-                                   "SELECT " COLUMNS " FROM delivery WHERE serial < ? ORDER BY serial DESC LIMIT ?",
-                                   "ii", before, (int64_t)limit)
-                   : store_prepare(&store->read, &q, err,
-                                   "SELECT " COLUMNS " FROM delivery WHERE job_id = ? AND serial < ? "
-                                   "ORDER BY serial DESC LIMIT ?",
-                                   "sii", job_id, before, (int64_t)limit);
+    status s = store_prepare(&store->read, &q, err, sql[job_id != NULL][owner != NULL], "iiss", before, (int64_t)limit,
+                             job_id == NULL ? "" : job_id, owner == NULL ? "" : owner);
     while (s == STATUS_OK && n < limit && (rc = sqlite3_step(q)) == SQLITE_ROW) read_row(q, &row[n++]);
     if (s == STATUS_OK && rc != SQLITE_DONE && rc != SQLITE_ROW)
         s = store_error(&store->read, "cannot list deliveries", err);

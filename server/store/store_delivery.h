@@ -33,10 +33,10 @@ status store_webhook_enable(struct store *store, bool enabled, struct error *err
 status store_delivery_next(struct store *store, struct delivery_row *row, struct error *err);
 /* Writes what a try has changed. */
 status store_delivery_update(struct store *store, const struct delivery_row *row, struct error *err);
-/* The newest deliveries before a serial (0: from the newest). job_id NULL: of all jobs. The caller frees
- * *row. */
-status store_delivery_list(struct store *store, const char *job_id, int64_t before_serial, size_t limit,
-                           struct delivery_row **row, size_t *n, struct error *err);
+/* The newest deliveries before a serial (0: from the newest). job_id NULL: of all jobs; owner NULL: of all owners. The
+ * caller frees *row. */
+status store_delivery_list(struct store *store, const char *owner, const char *job_id, int64_t before_serial,
+                           size_t limit, struct delivery_row **row, size_t *n, struct error *err);
 /* Removes the oldest deliveries that do not wait, so that `most` of all are left. */
 status store_delivery_prune(struct store *store, int64_t most, struct error *err);
 

@@ -9,7 +9,8 @@
 #define COLUMNS(document)                                                                                              \
     "serial, id, sample, " document                                                                                    \
     ", revision, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "                        \
-    "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss"
+    "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner, "       \
+    "priority"
 
 void job_row_release(struct job_row *row)
 {
@@ -51,6 +52,8 @@ static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
     store_text(q, 19, row->error_field, sizeof row->error_field);
     store_text(q, 20, row->error_text, sizeof row->error_text);
     row->peak_rss_bytes = sqlite3_column_int64(q, 21);
+    store_text(q, 22, row->owner, sizeof row->owner);
+    row->priority = sqlite3_column_int64(q, 23);
     return STATUS_OK;
 }
 
@@ -61,17 +64,17 @@ static status insert(struct store *store, struct job_row *r, const char *key, co
     s = store_run(&store->write, NULL, err,
                   "INSERT INTO job (id, sample, state, cancel_requested, dirty, deleted, attempt, "
                   "lost_attempts, generation, token, created, "
-                  "updated, queued, started, finished, error_code, error_field, error_text, peak_rss) VALUES "
-                  "(?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0)",
-                  "ssidd", r->id, r->sample, (int64_t)r->state, r->created_unix_s, r->created_unix_s);
+                  "updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner) VALUES "
+                  "(?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0,?)",
+                  "ssidds", r->id, r->sample, (int64_t)r->state, r->created_unix_s, r->created_unix_s, r->owner);
     if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->write.db);
     if (s == STATUS_OK)
         s = store_run(&store->write, NULL, err, "INSERT INTO document (job_id, text) VALUES (?,?)", "ss", r->id,
                       r->document);
     if (s == STATUS_OK && key != NULL)
         s = store_run(&store->write, NULL, err,
-                      "INSERT OR REPLACE INTO idempotency (key, job_id, body_hash, created) VALUES (?,?,?,?)", "sssd",
-                      key, r->id, body_hash, r->created_unix_s);
+                      "INSERT OR REPLACE INTO idempotency (owner, key, job_id, body_hash, created) VALUES (?,?,?,?,?)",
+                      "ssssd", r->owner, key, r->id, body_hash, r->created_unix_s);
     return store_end(&store->write, s, err);
 }
 
@@ -84,15 +87,15 @@ status store_job_insert(struct store *store, struct job_row *row, const char *id
     return store_report(store, s, row->id);
 }
 
-status store_idempotency_find(struct store *store, const char *key, char job_id[STORE_ID_BYTES],
+status store_idempotency_find(struct store *store, const char *owner, const char *key, char job_id[STORE_ID_BYTES],
                               char body_hash[STORE_HASH_TEXT_BYTES], struct error *err)
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              "SELECT i.job_id, i.body_hash FROM idempotency i JOIN job j ON j.id = i.job_id WHERE "
-                             "i.key = ? AND j.deleted = 0",
-                             "s", key);
+                             "i.owner = ? AND i.key = ? AND j.deleted = 0",
+                             "ss", owner, key);
     if (s != STATUS_OK) goto out;
     int rc = sqlite3_step(q);
     if (rc == SQLITE_ROW) {
@@ -140,14 +143,15 @@ status store_job_write(struct store *store, struct job_row *r, struct error *err
 {
     int n = 0;
     r->updated_unix_s = clock_wall_s();
-    status s = store_run(
-        &store->write, &n, err,
-        "UPDATE job SET revision=revision+1, sample=?, state=?, cancel_requested=?, dirty=?, "
-        "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
-        "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=? WHERE id=?",
-        "siiiiiiisddddsssis", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
-        (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
-        r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes, r->id);
+    status s =
+        store_run(&store->write, &n, err,
+                  "UPDATE job SET revision=revision+1, sample=?, state=?, cancel_requested=?, dirty=?, "
+                  "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
+                  "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=?, priority=? WHERE id=?",
+                  "siiiiiiisddddsssiis", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
+                  (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s,
+                  r->queued_unix_s, r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text,
+                  r->peak_rss_bytes, r->priority, r->id);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
     return s;
 }
@@ -209,21 +213,12 @@ static status grow(struct job_row **row, size_t n, size_t *capacity, struct erro
     return STATUS_OK;
 }
 
-status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out,
-                      struct error *err)
+/* Runs a prepared query for rows and finalizes it. */
+static status read_rows(struct store *store, status s, sqlite3_stmt *q, struct job_row **out, size_t *n_out,
+                        struct error *err)
 {
-#define WANTED "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND serial < ?3 "
-    /* one statement for each index: with "?2 < 0 OR state = ?2" no index would find the rows */
-    const char *sql = query->state < 0     ? WANTED "AND ?2 < 0 ORDER BY serial DESC LIMIT ?4"
-                      : query->queue_order ? WANTED "AND state = ?2 ORDER BY queued, serial LIMIT ?4"
-                                           : WANTED "AND state = ?2 ORDER BY serial DESC LIMIT ?4";
-#undef WANTED
-    sqlite3_stmt *q = NULL;
     struct job_row *row = NULL;
     size_t n = 0, capacity = 0;
-    pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &q, err, sql, "iiii", (int64_t)query->deleted, (int64_t)query->state,
-                             query->before_serial > 0 ? query->before_serial : INT64_MAX, (int64_t)query->limit);
     int rc = SQLITE_DONE;
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         s = grow(&row, n, &capacity, err);
@@ -232,7 +227,6 @@ status store_job_list(struct store *store, const struct job_query *query, struct
     }
     if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot list jobs", err);
     sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         job_rows_free(row, n);
         return s;
@@ -240,6 +234,45 @@ status store_job_list(struct store *store, const struct job_query *query, struct
     *out = row;
     *n_out = n;
     return STATUS_OK;
+}
+
+status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out,
+                      struct error *err)
+{
+#define WANTED "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND serial < ?3 "
+#define NEWEST " ORDER BY serial DESC LIMIT ?4"
+    /* one statement for each index: with "?2 < 0 OR state = ?2" no index would find the rows */
+    static const char *const sql[2][2] = {
+        {WANTED "AND ?2 < 0 AND ?5 = ''" NEWEST, WANTED "AND ?2 < 0 AND owner = ?5" NEWEST},
+        {WANTED "AND state = ?2 AND ?5 = ''" NEWEST, WANTED "AND state = ?2 AND owner = ?5" NEWEST}};
+#undef WANTED
+#undef NEWEST
+    sqlite3_stmt *q = NULL;
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, sql[query->state >= 0][query->owner != NULL], "iiiis",
+                             (int64_t)query->deleted, (int64_t)query->state,
+                             query->before_serial > 0 ? query->before_serial : INT64_MAX, (int64_t)query->limit,
+                             query->owner == NULL ? "" : query->owner);
+    s = read_rows(store, s, q, out, n_out, err);
+    pthread_mutex_unlock(&store->read.lock);
+    return s;
+}
+
+status store_job_heads(struct store *store, size_t n_each, struct job_row **out, size_t *n_out, struct error *err)
+{
+    sqlite3_stmt *q = NULL;
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(
+        &store->read, &q, err,
+        "SELECT " COLUMNS(
+            "NULL") " FROM job WHERE serial IN (SELECT i.serial FROM owner_use u "
+                    "CROSS JOIN job i ON i.serial IN (SELECT h.serial FROM job h WHERE h.deleted = 0 AND "
+                    "h.state = 1 AND h.owner = u.owner ORDER BY h.priority DESC, h.queued, h.serial LIMIT ?) "
+                    "WHERE u.queued > 0) ORDER BY owner, priority DESC, queued, serial",
+        "i", (int64_t)n_each);
+    s = read_rows(store, s, q, out, n_out, err);
+    pthread_mutex_unlock(&store->read.lock);
+    return s;
 }
 
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err)

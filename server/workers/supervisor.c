@@ -19,7 +19,7 @@ enum { MAX_WORKER = 64, MAX_WAITING = 256, BURY_AGAIN_S = 60 };
 
 struct slot {
     bool used;
-    char job_id[STORE_ID_BYTES];
+    char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES];
     pid_t pid;
     enum attempt_stop stop; /* reason for the request to stop */
     double seen_heartbeat_unix_s,
@@ -162,8 +162,16 @@ static size_t n_running(const struct supervisor *u)
     return n;
 }
 
-static void launch(struct supervisor *u, const char *job_id)
+static size_t n_running_of(const struct supervisor *u, const char *owner)
 {
+    size_t n = 0;
+    for (size_t i = 0; i < MAX_WORKER; i++) n += u->slot[i].used && strcmp(u->slot[i].owner, owner) == 0;
+    return n;
+}
+
+static void launch(struct supervisor *u, const struct job_row *row)
+{
+    const char *job_id = row->id;
     struct error err = {0};
     char folder[PATH_BYTES], console[PATH_BYTES], speeds[PATH_BYTES];
     path_join(folder, u->v->settings->data, "jobs", job_id, NULL);
@@ -179,6 +187,7 @@ static void launch(struct supervisor *u, const char *job_id)
     while (slot->used) slot++;
     *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s(), .started_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
+    snprintf(slot->owner, sizeof slot->owner, "%s", row->owner);
     path_join(speeds, u->v->settings->data, "speeds.json", NULL);
     const struct worker_paths paths = {u->worker, folder, console, speeds};
     s = worker_launch(&paths, u->v->settings, &slot->pid, &err);
@@ -194,19 +203,43 @@ static void launch(struct supervisor *u, const char *job_id)
     waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
 }
 
+static bool may_start(const struct supervisor *u, const struct job_row *row)
+{
+    const struct waiting *w = waiting_of((struct supervisor *)(uintptr_t)u, row->id, false);
+    return row->state == JOB_QUEUED && !is_running(u, row->id) && (w == NULL || w->until_s <= clock_monotonic_s());
+}
+
+/* The job whose turn it is: the first one, in the order of its owner's queue, of the owner who has the fewest running
+ * jobs; among equals of those, the job that has waited longest. The rows stand owner by owner. NULL: there is none. */
+static struct job_row *next_turn(const struct supervisor *u, struct job_row *row, size_t n)
+{
+    struct job_row *best = NULL, *last = NULL;
+    size_t best_running = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!may_start(u, &row[i]) || (last != NULL && strcmp(last->owner, row[i].owner) == 0)) continue;
+        last = &row[i];
+        size_t running = n_running_of(u, row[i].owner);
+        if (best != NULL &&
+            (running > best_running || (running == best_running && row[i].queued_unix_s >= best->queued_unix_s)))
+            continue;
+        best = &row[i];
+        best_running = running;
+    }
+    return best;
+}
+
 static void fill_slots(struct supervisor *u)
 {
-    struct job_row *row = NULL;
-    size_t n = 0, free_slots = (size_t)u->v->settings->workers;
+    struct job_row *row = NULL, *next;
+    size_t n = 0, n_waiting = 0, free_slots = (size_t)u->v->settings->workers;
     free_slots -= n_running(u) < free_slots ? n_running(u) : free_slots;
     if (free_slots == 0 || u->below_floor) return;
-    struct job_query q = {.state = JOB_QUEUED, .queue_order = true, .limit = MAX_WAITING + free_slots};
-    if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
-    for (size_t i = 0; i < n && free_slots > 0; i++) {
-        const struct waiting *w = waiting_of(u, row[i].id, false);
-        if (is_running(u, row[i].id) || (w != NULL && w->until_s > clock_monotonic_s())) continue;
-        launch(u, row[i].id);
-        free_slots--;
+    for (size_t i = 0; i < MAX_WAITING; i++) n_waiting += u->waiting[i].until_s > clock_monotonic_s();
+    /* as many of each owner as may have to be passed over, or can start */
+    if (store_job_heads(u->v->store, n_waiting + MAX_WORKER, &row, &n, NULL) != STATUS_OK) return;
+    for (; free_slots > 0 && (next = next_turn(u, row, n)) != NULL; free_slots--) {
+        launch(u, next);
+        next->state = JOB_RUNNING; /* tried, whatever came of it */
     }
     job_rows_free(row, n);
 }

@@ -131,7 +131,7 @@ def test_unknown_fields_are_refused_wherever_they_stand(daemon):
         assert "colour" in r.json()["detail"], (path, r.json())
 
 
-def test_every_operation_answers_as_documented(daemon):
+def test_every_operation_answers_as_documented(daemon, daemon_maker):
     """Calls each operation successfully once; the fixture compares every reply with the description."""
     job = daemon.start_job("series 20")
     daemon.wait_state(job, "succeeded")
@@ -174,6 +174,14 @@ def test_every_operation_answers_as_documented(daemon):
     for operation, path in [("about", "/v1/about"), ("options", "/v1/options"), ("openapi", "/v1/openapi.json"),
                             ("livez", "/livez"), ("readyz", "/readyz"), ("metrics", "/metrics")]:
         call(operation, "GET", path)
+    guarded = daemon_maker("guarded")
+    daemon, admin = guarded, guarded.make_token("root")
+    call("signIn", "POST", "/v1/session", json={"token": admin})
+    call("getSession", "GET", "/v1/session")
+    call("makeToken", "POST", "/v1/tokens", json={"name": "user", "scope": "read", "jobs": 3})
+    call("listTokens", "GET", "/v1/tokens")
+    call("revokeToken", "DELETE", "/v1/tokens/user")
+    call("signOut", "DELETE", "/v1/session")
     assert done == {o["operationId"] for _, _, o in OPERATIONS}
 
 

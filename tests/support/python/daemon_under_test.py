@@ -2,6 +2,7 @@
 
 with Daemon(folder) as d: d.post("/v1/jobs", json=document)
 Programs come from SELVEDGE_BUILD (default: build/ of this tree)."""
+import copy
 import hashlib
 import os
 import signal
@@ -117,6 +118,20 @@ class Daemon:
         self.log.close()
         self.session.close()
         self.process = None
+
+    def make_token(self, name, scope=None):
+        """Makes a token by selvedged --make-token, while the daemon runs or not."""
+        made = subprocess.run([program("selvedged"), "--data", self.data, "--make-token", name, *(["--scope", scope] if scope else [])],
+                              capture_output=True, text=True, check=False)
+        assert made.returncode == 0, made.stderr
+        return made.stdout.strip()
+
+    def of(self, token):
+        """The same daemon as whoever has this token sees it."""
+        other = copy.copy(self)
+        other.session = requests.Session()
+        other.session.headers["Authorization"] = f"Bearer {token}"
+        return other
 
     # HTTP
     def request(self, method, path, **more):

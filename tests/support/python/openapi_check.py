@@ -8,8 +8,9 @@ import jsonschema
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 METHODS = ("get", "put", "post", "delete", "head", "patch", "options")
-# replies that any request can get (docs/api.md, Errors): bad framing, Host or Origin, and errors of the machine
-GENERAL = {"400", "403", "500", "503", "507"}
+# replies that any request can get (docs/api.md, Errors): bad framing, Host or Origin, no valid token, a quota, and errors
+# of the machine
+GENERAL = {"400", "401", "403", "429", "500", "503", "507"}
 
 HEADERS = ("Idempotency-Key", "If-Match")  # fields of errors that are not about the document
 
