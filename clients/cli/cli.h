@@ -38,6 +38,10 @@ status cli_delete(struct cli *cli, int *exit_code, struct error *err);
 
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
 status cli_watch_folder(struct cli *cli, int *exit_code, struct error *err);
+status cli_token(struct cli *cli, int *exit_code, struct error *err);
+/* Reads the first line of a file that other users cannot read: *token, which the caller frees. STATUS_INVALID,
+ * STATUS_NOT_FOUND, STATUS_IO. */
+status cli_token_read(const char *path, char **token, struct error *err);
 
 /* Creates a job of a document, uploads its files from `folder` and starts it. id receives the job's id. */
 enum { CLI_ID_BYTES = 80 };

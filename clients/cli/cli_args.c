@@ -2,6 +2,7 @@
 #include "clients/cli/tools/cli_tool.h"
 
 #include <getopt.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -24,14 +25,20 @@ enum {
     OPT_TEMPLATE = 32768,
     OPT_MARKER = 65536,
     OPT_QUIET = 131072,
-    OPT_ONCE = 262144
+    OPT_ONCE = 262144,
+    OPT_SCOPE = 524288,
+    OPT_OWNER = 1048576,
+    OPT_REQUESTS = 2097152,
+    OPT_BYTES = 4194304,
+    OPT_JOBS = 8388608
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
 static const struct cli_command {
     const char *name, *operand, *what, *more;
     int option;
-    const char *needs; /* what the operand is, for the message when it is missing; NULL: a job id */
+    const char *needs;  /* what the operand is, for the message when it is missing; NULL: a job id */
+    const char *second; /* a second operand that may follow; NULL: none */
 } command_table[CLI_N_COMMAND] = {
     [CLI_SUBMIT] =
         {"submit", "JOB.json", "send a job document and its files, and start the job",
@@ -77,37 +84,61 @@ static const struct cli_command {
          "NAME.selvedge\n"
          "beside it. Runs until it is stopped; what is known is on disk, so it may be killed at any time.\n",
          OPT_TEMPLATE | OPT_MARKER | OPT_QUIET | OPT_ONCE, "a folder"},
+    [CLI_TOKEN] =
+        {"token", "ACTION", "make, list or revoke access tokens",
+         "selvedge token make NAME --scope SCOPE    prints the token, which is shown only once (--out: into a file)\n"
+         "selvedge token list                       all tokens, newest first\n"
+         "selvedge token revoke NAME                or its id; the next request with it is refused\n"
+         "These need a token with scope admin; the first one is made by `selvedged --make-token NAME`.\n",
+         OPT_SCOPE | OPT_OWNER | OPT_REQUESTS | OPT_BYTES | OPT_JOBS | OPT_JSON | OPT_OUT, "make, list or revoke",
+         "NAME"},
 };
 
 static const struct cli_option {
     int bit;
     char letter;
     const char *name, *value, *what;
+    size_t at; /* where it goes in struct cli_args: a text if it has a value, else a bool */
 } option_table[] = {
-    {OPT_INPUT, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)"},
-    {OPT_WATCH, 'w', "watch", NULL, "follow the job until it ends"},
+    {OPT_INPUT, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)",
+     offsetof(struct cli_args, input_dir)},
+    {OPT_WATCH, 'w', "watch", NULL, "follow the job until it ends", offsetof(struct cli_args, watch)},
     {OPT_RESUME, 0, "resume", "ID",
      "continue an interrupted submit of job ID (JOB.json is then not needed\n"
-     "                      if the files are in the current folder or --input-dir)"},
-    {OPT_DRAFT, 0, "draft", NULL, "upload everything but do not start the job"},
-    {OPT_ID_FILE, 0, "id-file", "FILE", "write the job's id to FILE as soon as there is one (for scripts)"},
-    {OPT_VOXEL, 0, "voxel-um", "UM", "edge of a voxel in micrometres, or three, such as 2,2,3 (default: the file's)"},
-    {OPT_AXES, 0, "axes", "XYZ", "which axis of the file is weft, warp and height, such as xzy (default: xyz)"},
-    {OPT_ALIGN, 0, "align", NULL, "turn weft and warp to x and y, and crop to what repeats"},
+     "                      if the files are in the current folder or --input-dir)",
+     offsetof(struct cli_args, resume_id)},
+    {OPT_DRAFT, 0, "draft", NULL, "upload everything but do not start the job", offsetof(struct cli_args, draft)},
+    {OPT_ID_FILE, 0, "id-file", "FILE", "write the job's id to FILE as soon as there is one (for scripts)",
+     offsetof(struct cli_args, id_file)},
+    {OPT_VOXEL, 0, "voxel-um", "UM", "edge of a voxel in micrometres, or three, such as 2,2,3 (default: the file's)",
+     offsetof(struct cli_args, voxel_um)},
+    {OPT_AXES, 0, "axes", "XYZ", "which axis of the file is weft, warp and height, such as xzy (default: xyz)",
+     offsetof(struct cli_args, axes)},
+    {OPT_ALIGN, 0, "align", NULL, "turn weft and warp to x and y, and crop to what repeats",
+     offsetof(struct cli_args, align)},
     {OPT_TEMPLATE, 0, "template", "JOB.json",
-     "job document of samples that have no job.json; '*' in names of files is filled in"},
-    {OPT_MARKER, 0, "marker", "NAME", "file that says that a sample is complete (default: READY)"},
-    {OPT_QUIET, 0, "quiet", "S", "seconds without a change after which it is complete, too (default: 60; 0: never)"},
-    {OPT_ONCE, 0, "once", NULL, "end when all samples that are there have ended; status 1 if one failed"},
-    {OPT_JSON, 0, "json", NULL, "print JSON"},
-    {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)"},
-    {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends"},
-    {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")"},
-    {OPT_TOKEN, 0, "token", "TOKEN",
-     "access token for a proxy in front of the daemon (default: SELVEDGE_TOKEN;\n"
-     "                      visible to other users in the process list, so prefer the variable)"},
-    {OPT_HELP, 'h', "help", NULL, "show this text"},
-    {OPT_VERSION, 'V', "version", NULL, "show the version"},
+     "job document of samples that have no job.json; '*' in names of files is filled in",
+     offsetof(struct cli_args, template)},
+    {OPT_MARKER, 0, "marker", "NAME", "file that says that a sample is complete (default: READY)",
+     offsetof(struct cli_args, marker)},
+    {OPT_QUIET, 0, "quiet", "S", "seconds without a change after which it is complete, too (default: 60; 0: never)",
+     offsetof(struct cli_args, quiet_s)},
+    {OPT_ONCE, 0, "once", NULL, "end when all samples that are there have ended; status 1 if one failed",
+     offsetof(struct cli_args, once)},
+    {OPT_JSON, 0, "json", NULL, "print JSON", offsetof(struct cli_args, json)},
+    {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)", offsetof(struct cli_args, out_dir)},
+    {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends", offsetof(struct cli_args, follow)},
+    {OPT_SCOPE, 0, "scope", "SCOPE", "what the token may do: read, submit or admin", offsetof(struct cli_args, scope)},
+    {OPT_OWNER, 0, "owner", "OWNER", "whose jobs it makes and sees (default: NAME)", offsetof(struct cli_args, owner)},
+    {OPT_REQUESTS, 0, "requests", "N", "requests a minute; 0: no limit", offsetof(struct cli_args, requests)},
+    {OPT_BYTES, 0, "bytes", "N", "bytes of input files that its owner may keep", offsetof(struct cli_args, bytes)},
+    {OPT_JOBS, 0, "jobs", "N", "jobs that its owner may keep", offsetof(struct cli_args, jobs)},
+    {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")",
+     offsetof(struct cli_args, server)},
+    {OPT_TOKEN, 0, "token-file", "FILE", "file with the access token (default: SELVEDGE_TOKEN_FILE, SELVEDGE_TOKEN)",
+     offsetof(struct cli_args, token_file)},
+    {OPT_HELP, 'h', "help", NULL, "show this text", offsetof(struct cli_args, help)},
+    {OPT_VERSION, 'V', "version", NULL, "show the version", offsetof(struct cli_args, version)},
 };
 enum { N_OPTION = sizeof option_table / sizeof option_table[0], OPTION_CODE = 256 };
 
@@ -159,66 +190,13 @@ static const struct cli_option *option_of(int code)
     return NULL;
 }
 
-/* Where the value of an option goes; NULL: it has none. */
-static const char **text_of(struct cli_args *a, int bit)
+static void apply(struct cli_args *a, const struct cli_option *o, const char *value)
 {
-    switch (bit) {
-    case OPT_SERVER:
-        return &a->server;
-    case OPT_TOKEN:
-        return &a->token;
-    case OPT_INPUT:
-        return &a->input_dir;
-    case OPT_RESUME:
-        return &a->resume_id;
-    case OPT_OUT:
-        return &a->out_dir;
-    case OPT_ID_FILE:
-        return &a->id_file;
-    case OPT_VOXEL:
-        return &a->voxel_um;
-    case OPT_AXES:
-        return &a->axes;
-    case OPT_TEMPLATE:
-        return &a->template;
-    case OPT_MARKER:
-        return &a->marker;
-    case OPT_QUIET:
-        return &a->quiet_s;
-    default:
-        return NULL;
-    }
-}
-
-static bool *flag_of(struct cli_args *a, int bit)
-{
-    switch (bit) {
-    case OPT_ONCE:
-        return &a->once;
-    case OPT_ALIGN:
-        return &a->align;
-    case OPT_WATCH:
-        return &a->watch;
-    case OPT_JSON:
-        return &a->json;
-    case OPT_FOLLOW:
-        return &a->follow;
-    case OPT_DRAFT:
-        return &a->draft;
-    case OPT_HELP:
-        return &a->help;
-    default:
-        return &a->version;
-    }
-}
-
-static void apply(struct cli_args *a, int bit, const char *value)
-{
-    const char **text = text_of(a, bit);
-    if (text != NULL)
-        *text = value;
+    void *at = (char *)a + o->at;
+    if (o->value != NULL)
+        *(const char **)at = value;
     else
-        *flag_of(a, bit) = true;
+        *(bool *)at = true;
 }
 
 /* Letters ("-": operands are returned in their place; ":": a missing value gives a code of its own) and names for
@@ -250,7 +228,7 @@ static status take_option(struct cli_args *a, int code, const char *word, int *g
     if (o->value != NULL && optarg[0] == '\0')
         return error_set(err, STATUS_INVALID, "option '--%s' has an empty value", o->name);
     *given |= o->bit;
-    apply(a, o->bit, optarg);
+    apply(a, o, optarg);
     return STATUS_OK;
 }
 
@@ -261,6 +239,10 @@ static status take_word(struct cli_args *a, const char *word, struct error *err)
         status s = find_command(word, &a->command, err);
         a->has_command = s == STATUS_OK;
         return s;
+    }
+    if (a->operand != NULL && a->second == NULL && command_table[a->command].second != NULL) {
+        a->second = word;
+        return STATUS_OK;
     }
     if (a->operand != NULL) {
         const char *operand = command_table[a->command].operand;
@@ -291,11 +273,16 @@ static status check(const struct cli_args *a, int given, struct error *err)
     return STATUS_OK;
 }
 
-status cli_args_parse(int argc, char *const *argv, const char *server_env, const char *token_env, struct cli_args *args,
+/* The value of a variable of the environment, or NULL if it is unset or empty. */
+static const char *set(const char *value) { return value != NULL && value[0] != '\0' ? value : NULL; }
+
+status cli_args_parse(int argc, char *const *argv, const struct cli_environment *env, struct cli_args *args,
                       struct error *err)
 {
-    *args = (struct cli_args){.server = server_env != NULL && server_env[0] != '\0' ? server_env : CLI_DEFAULT_SERVER,
-                              .token = token_env != NULL && token_env[0] != '\0' ? token_env : NULL};
+    const char *server = set(env->server);
+    *args = (struct cli_args){.server = server != NULL ? server : CLI_DEFAULT_SERVER,
+                              .token = set(env->token),
+                              .token_file = set(env->token_file)};
     char letters[2 * N_OPTION + 3];
     struct option named[N_OPTION + 1];
     int given = 0;

@@ -24,16 +24,18 @@ enum cli_command_id {
     CLI_SERIES,
     CLI_DELETE,
     CLI_WATCH_FOLDER,
+    CLI_TOKEN,
     CLI_N_COMMAND
 };
 
 /* All that the command line says. The strings point into argv or the environment; NULL if not given. */
 struct cli_args {
     enum cli_command_id command;
-    const char *server, *token;
+    const char *server, *token, *token_file; /* a token in a file goes before one of the environment */
     const char *
         operand; /* a job document for submit and check, a scan for reconstruct, a folder for watch-folder, a job id for
-                     the other commands */
+                     the other commands, an action for token */
+    const char *second;    /* the name that follows an action of token */
     const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */
@@ -43,16 +45,21 @@ struct cli_args {
     const char *template;  /* --template */
     const char *marker;    /* --marker */
     const char *quiet_s;   /* --quiet */
+    const char *scope, *owner, *requests, *bytes, *jobs; /* of a token to be made */
     bool watch, json, follow, draft, align, once;
     bool help; /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;
 };
 
-/* server_env and token_env are the values of SELVEDGE_SERVER and SELVEDGE_TOKEN, NULL if unset; options override
- * them. STATUS_INVALID for an unknown command or option (the text names the nearest known one) and for a missing or
- * extra operand. */
-status cli_args_parse(int argc, char *const *argv, const char *server_env, const char *token_env, struct cli_args *args,
+/* The values of SELVEDGE_SERVER, SELVEDGE_TOKEN and SELVEDGE_TOKEN_FILE, NULL if unset. */
+struct cli_environment {
+    const char *server, *token, *token_file;
+};
+
+/* Options override the environment. A token is never an option: other users see the list of processes. STATUS_INVALID
+ * for an unknown command or option (the text names the nearest known one) and for a missing or extra operand. */
+status cli_args_parse(int argc, char *const *argv, const struct cli_environment *env, struct cli_args *args,
                       struct error *err);
 
 const char *cli_command_name(enum cli_command_id id);

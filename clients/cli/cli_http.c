@@ -268,7 +268,12 @@ status http_problem(const struct http_reply *reply, struct error *err)
     const char *name = json_string_value(json_object_get(problem, "code"));
     if (name != NULL && strcmp(name, status_name(STATUS_CHECKSUM)) == 0) code = STATUS_CHECKSUM;
     const char *text = detail != NULL ? detail : title;
-    if (reply->code == 401 && text == NULL) text = "the server requires an access token; set SELVEDGE_TOKEN";
+    char hint[600];
+    if (reply->code == 401 && text != NULL) {
+        snprintf(hint, sizeof hint, "%.400s (--token-file FILE, SELVEDGE_TOKEN_FILE or SELVEDGE_TOKEN)", text);
+        text = hint;
+    }
+    if (reply->code == 401 && text == NULL) text = "the server requires an access token; set SELVEDGE_TOKEN_FILE";
     size_t n_more = json_array_size(json_object_get(problem, "errors"));
     if (text != NULL && n_more > 1)
         error_set_field(err, code, field == NULL ? "" : field,

@@ -34,6 +34,7 @@ static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) =
     [CLI_SERIES] = cli_series,
     [CLI_DELETE] = cli_delete,
     [CLI_WATCH_FOLDER] = cli_watch_folder,
+    [CLI_TOKEN] = cli_token,
 };
 
 static void print_error(const struct error *err)
@@ -53,7 +54,11 @@ static int execute(const struct cli_args *args)
     struct error err = {0};
     int exit_code = CLI_EXIT_OK;
     struct cli cli = {.args = args, .out = stdout, .note = stderr, .note_is_terminal = isatty(STDERR_FILENO) == 1};
-    status s = http_new(args->server, args->token, &interrupted, &cli.http, &err);
+    char *token = NULL;
+    status s = args->token_file == NULL ? STATUS_OK : cli_token_read(args->token_file, &token, &err);
+    if (s == STATUS_OK) s = http_new(args->server, token != NULL ? token : args->token, &interrupted, &cli.http, &err);
+    if (token != NULL) sodium_memzero(token, strlen(token));
+    free(token);
     if (s == STATUS_OK) s = run[args->command](&cli, &exit_code, &err);
     http_free(cli.http);
     if (s == STATUS_OK && (fflush(stdout) != 0 || ferror(stdout)))
@@ -73,7 +78,9 @@ int main(int argc, char **argv)
         print_error(&err);
         return CLI_EXIT_ERROR;
     }
-    if (cli_args_parse(argc, argv, getenv("SELVEDGE_SERVER"), getenv("SELVEDGE_TOKEN"), &args, &err) != STATUS_OK) {
+    const struct cli_environment env = {getenv("SELVEDGE_SERVER"), getenv("SELVEDGE_TOKEN"),
+                                        getenv("SELVEDGE_TOKEN_FILE")};
+    if (cli_args_parse(argc, argv, &env, &args, &err) != STATUS_OK) {
         print_error(&err);
         return CLI_EXIT_USAGE;
     }

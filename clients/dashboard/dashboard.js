@@ -2,13 +2,16 @@
 import { el } from "./page_parts.js";
 import { listPage } from "./list_page.js";
 import { jobPage } from "./job_page.js";
+import { showUser, signInPage } from "./sign_in.js";
 
 const page = document.getElementById("page");
 const crumb = document.getElementById("crumb");
-let leave = null;
+const user = document.getElementById("user");
+let leave = null, signingIn = false;
 
 function route() {
   if (leave) leave();
+  signingIn = false;
   const id = decodeURIComponent(location.hash.slice(1));
   page.replaceChildren();
   crumb.replaceChildren();
@@ -22,5 +25,18 @@ function route() {
   }
 }
 
+function askForToken() {
+  if (signingIn) return;
+  if (leave) leave();
+  leave = null;
+  signingIn = true;
+  page.replaceChildren();
+  crumb.replaceChildren();
+  user.replaceChildren();
+  signInPage(page, () => { showUser(user, askForToken); route(); });
+}
+
 window.addEventListener("hashchange", route);
+window.addEventListener("sign-in", askForToken);
+showUser(user, askForToken);
 route();

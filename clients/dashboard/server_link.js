@@ -14,19 +14,10 @@ export class Problem extends Error {
 const cached = new Map(); // url -> {etag, value}; a page requests only a few addresses
 const KEEP = 40;
 
-let token = sessionStorage.getItem("selvedge-token");
-export function setToken(value) {
-  token = value || null;
-  if (token) sessionStorage.setItem("selvedge-token", token);
-  else sessionStorage.removeItem("selvedge-token");
-}
-
-export function headers(more = {}) {
-  return token ? { Authorization: `Bearer ${token}`, ...more } : more;
-}
-
+// A 401 shows the page that asks for a token; the cookie that it gets is sent by the browser, and no script can read it.
 export async function raw(method, url, { body = null, header = {} } = {}) {
-  const answer = await fetch(url, { method, body, headers: headers(header), cache: "no-store", credentials: "omit" });
+  const answer = await fetch(url, { method, body, headers: header, cache: "no-store", credentials: "same-origin" });
+  if (answer.status === 401 && url !== "/v1/session") window.dispatchEvent(new Event("sign-in"));
   if (!answer.ok && answer.status !== 304) {
     let problem = null;
     try { problem = await answer.json(); } catch { /* not a problem document */ }
@@ -34,6 +25,9 @@ export async function raw(method, url, { body = null, header = {} } = {}) {
   }
   return answer;
 }
+
+// Forgets all answers, because another user may see others.
+export const forget = () => cached.clear();
 
 export async function getJson(url) {
   const known = cached.get(url);

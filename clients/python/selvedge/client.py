@@ -14,14 +14,25 @@ from .transport import Answer, Transport
 PIECE = 16 << 20
 
 
-class Client:
-    """One server. `url`: http://..., https://... or unix:/path, by default SELVEDGE_SERVER. `token`: access token, by default
-    SELVEDGE_TOKEN, sent as `Authorization: Bearer`. `ca_file`: certificates that https trusts instead of the system's. May be
-    shared between threads."""
+def read_token(path: Optional[str] = None) -> Optional[str]:
+    """The token in a file, by default that of SELVEDGE_TOKEN_FILE; else SELVEDGE_TOKEN. A file that others may read is refused."""
+    path = path or os.environ.get("SELVEDGE_TOKEN_FILE")
+    if not path:
+        return os.environ.get("SELVEDGE_TOKEN")
+    if os.stat(path).st_mode & 0o066:
+        raise ValueError(f"other users may read the token in '{path}'; forbid it with: chmod 600 '{path}'")
+    with open(path, encoding="ascii") as f:
+        return f.readline().strip() or None
 
-    def __init__(self, url: Optional[str] = None, token: Optional[str] = None, timeout_s: float = 60, ca_file: Optional[str] = None) -> None:
-        self.transport = Transport(url or os.environ.get("SELVEDGE_SERVER") or "http://127.0.0.1:7878", token or os.environ.get("SELVEDGE_TOKEN"),
-                                   timeout_s, ca_file)
+
+class Client:
+    """One server. `url`: http://..., https://... or unix:/path, by default SELVEDGE_SERVER. `token`: access token, sent as
+    `Authorization: Bearer`; by default the first line of `token_file` or of the file SELVEDGE_TOKEN_FILE, else SELVEDGE_TOKEN.
+    `ca_file`: certificates that https trusts instead of the system's. May be shared between threads."""
+
+    def __init__(self, url: Optional[str] = None, token: Optional[str] = None, timeout_s: float = 60, ca_file: Optional[str] = None,
+                 *, token_file: Optional[str] = None) -> None:
+        self.transport = Transport(url or os.environ.get("SELVEDGE_SERVER") or "http://127.0.0.1:7878", token or read_token(token_file), timeout_s, ca_file)
         self._piece: Optional[int] = None
 
     @property

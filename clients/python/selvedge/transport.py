@@ -142,14 +142,16 @@ class Transport:
             try:
                 answer = self._once(method, path, data, sent, self.timeout_s + more_s)
             except BROKEN as broken:
-                why = broken
+                why, pause_s = broken, 0.0
             else:
                 if answer.status not in (429, 503) or "Retry-After" not in answer.headers:
                     return self._checked(answer)
                 why = f"it answers with status {answer.status}"
+                wait = answer.headers["Retry-After"]
+                pause_s = min(60.0, float(wait)) if wait.isdigit() else 0.0
                 answer.read()
             if i + 1 < n_try:
-                time.sleep(0.05 * 3 ** i)  # the first failure may be that of a connection that was idle for too long
+                time.sleep(max(pause_s, 0.05 * 3 ** i))  # the first failure may be that of a connection that was idle for too long
         raise Unreachable(f"the server at {self.url} cannot be reached: {why}")
 
     def _checked(self, answer: Answer) -> Answer:

@@ -20,7 +20,7 @@ static status parse(char *const *argv)
     int argc = 0;
     while (argv[argc] != NULL) argc++;
     memset(&err, 0, sizeof err);
-    return cli_args_parse(argc, argv, NULL, NULL, &args, &err);
+    return cli_args_parse(argc, argv, &(struct cli_environment){NULL, NULL, NULL}, &args, &err);
 }
 
 static void test_commands(void **state)
@@ -54,15 +54,26 @@ static void test_environment(void **state)
 {
     (void)state;
     char *const argv[] = {"selvedge", "list", NULL};
-    assert_int_equal(cli_args_parse(2, argv, "http://h:1", "secret", &args, &err), STATUS_OK);
+    assert_int_equal(cli_args_parse(2, argv, &(struct cli_environment){"http://h:1", "secret", "file"}, &args, &err),
+                     STATUS_OK);
     assert_string_equal(args.server, "http://h:1");
     assert_string_equal(args.token, "secret");
-    assert_int_equal(cli_args_parse(2, argv, "", "", &args, &err), STATUS_OK);
+    assert_string_equal(args.token_file, "file");
+    assert_int_equal(cli_args_parse(2, argv, &(struct cli_environment){"", "", ""}, &args, &err), STATUS_OK);
     assert_string_equal(args.server, CLI_DEFAULT_SERVER);
     assert_null(args.token);
-    char *const over[] = {"selvedge", "list", "--server", "http://o:2", NULL};
-    assert_int_equal(cli_args_parse(4, over, "http://h:1", NULL, &args, &err), STATUS_OK);
+    assert_null(args.token_file);
+    char *const over[] = {"selvedge", "list", "--server", "http://o:2", "--token-file", "t", NULL};
+    assert_int_equal(cli_args_parse(6, over, &(struct cli_environment){"http://h:1", NULL, "file"}, &args, &err),
+                     STATUS_OK);
     assert_string_equal(args.server, "http://o:2");
+    assert_string_equal(args.token_file, "t");
+    assert_int_equal(PARSE("token", "make", "ann", "--scope", "submit", "--jobs=3"), STATUS_OK);
+    assert_int_equal(args.command, CLI_TOKEN);
+    assert_string_equal(args.operand, "make");
+    assert_string_equal(args.second, "ann");
+    assert_string_equal(args.scope, "submit");
+    assert_string_equal(args.jobs, "3");
 }
 
 static void expect_error(status s, const char *part)

@@ -1,0 +1,49 @@
+"""The dashboard of a daemon with access tokens: signing in, seeing the own jobs, and signing out."""
+import os
+import subprocess
+
+import pytest
+
+pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
+import selvedge  # noqa: E402
+from browser_page import BIN, keep, wait_for  # noqa: E402
+from selenium.webdriver.common.by import By  # noqa: E402
+
+DOCUMENT = {"sample": "of ann", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}
+
+
+def test_signing_in_and_out(stub, browser):
+    url, folder = stub
+    made = subprocess.run([os.path.join(BIN, "selvedged"), "--data", str(folder), "--make-token", "root"], capture_output=True, text=True, check=True)
+    admin = selvedge.Client(url, token=made.stdout.strip())
+    token = {name: admin.request("POST", "/v1/tokens", json_body={"name": name, "scope": "submit"}).json()["token"] for name in ("ann", "bob")}
+    selvedge.Client(url, token=token["ann"]).create(DOCUMENT)
+    selvedge.Client(url, token=token["bob"]).create({**DOCUMENT, "sample": "of bob"})
+
+    browser.get(url + "/")
+    wait_for(browser, "document.querySelector('#sign-in input')")
+    keep(browser, "sign_in")
+    field = browser.find_element(By.CSS_SELECTOR, "#sign-in input")
+    assert field.get_attribute("type") == "password"
+    field.send_keys("selvedge_wrong\n")
+    wait_for(browser, "document.querySelector('.fault').textContent.includes('unknown or was revoked')")
+    field.clear()
+    field.send_keys(token["ann"] + "\n")
+    wait_for(browser, "document.querySelector('#jobs tbody tr')")
+    wait_for(browser, "document.getElementById('user').textContent.includes('ann')")
+    keep(browser, "signed_in")
+    text = browser.find_element(By.ID, "jobs").text
+    assert "of ann" in text and "of bob" not in text
+    # no script of a page can read what stands for the token
+    assert browser.execute_script("return document.cookie + JSON.stringify(sessionStorage) + JSON.stringify(localStorage)") == "{}{}"
+    browser.get(url + "/")
+    wait_for(browser, "document.querySelector('#jobs tbody tr')")  # the cookie stays
+    admin.request("DELETE", "/v1/tokens/ann")
+    wait_for(browser, "document.querySelector('#sign-in input')")  # the next poll is refused
+    browser.find_element(By.CSS_SELECTOR, "#sign-in input").send_keys(token["bob"] + "\n")
+    wait_for(browser, "document.getElementById('user').textContent.includes('bob')")
+    wait_for(browser, "document.querySelector('#jobs tbody tr')")
+    assert "of bob" in browser.find_element(By.ID, "jobs").text
+    browser.find_element(By.ID, "sign-out").click()
+    wait_for(browser, "document.querySelector('#sign-in input')")
+    assert browser.execute_script("return fetch('/v1/jobs').then((r) => r.status)") == 401
