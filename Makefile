@@ -125,6 +125,7 @@ generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows fr
 	@/usr/bin/python3 config/generate_options.py $(PRINT_OPTIONS)
 	@/usr/bin/python3 config/generate_model_tables.py $(BUILD)/bin/selvedge-worker
 
+include config/install.mk
 include tests/tests.mk
 include tests/mutants/mutants.mk
 include tests/bench/bench.mk

@@ -77,6 +77,10 @@ static const struct setting table[] = {
     NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2,
            "limit on a worker's address space, which includes the files that it maps (see volume_memory_bytes); 0: no "
            "limit"),
+    NUMBER("jobs", "resident_limit_bytes", resident_limit_bytes, 0, 0, INT64_MAX / 2,
+           "memory that a worker may hold, in RAM and swap, without files that it maps; a job that holds more fails; "
+           "0: no "
+           "limit"),
     NUMBER("jobs", "volume_memory_bytes", volume_memory_bytes, 2 * GIB, 256 * MIB, INT64_MAX / 2,
            "resident memory for scans; larger scans are processed in files of the job's folder (22 bytes per voxel)"),
     NUMBER(

@@ -68,8 +68,8 @@ static void add_folder(struct static_files *f, const char *folder, const char *u
     closedir(d);
 }
 
-/* Finds a file of the source tree or of the installation, relative to the folder of this program. Returns false if
- * there is none. */
+/* Finds a file of the installation or of the source tree, relative to the folder of this program. The installation
+ * comes first: above its folder there may be others' files. Returns false if there is none. */
 static bool find_beside(const char *in_tree, const char *installed, char out[1024])
 {
     char program[800];
@@ -78,13 +78,14 @@ static bool find_beside(const char *in_tree, const char *installed, char out[102
     program[n] = '\0';
     char *slash = strrchr(program, '/');
     if (slash != NULL) *slash = '\0';
+    snprintf(out, 1024, "%s/../share/selvedge/%s", program, installed);
+    if (access(out, R_OK) == 0) return true;
     static const char *const up[] = {"../..", "../../.."};
     for (size_t i = 0; i < 2; i++) {
         snprintf(out, 1024, "%s/%s/%s", program, up[i], in_tree);
         if (access(out, R_OK) == 0) return true;
     }
-    snprintf(out, 1024, "%s/../share/selvedge/%s", program, installed);
-    return access(out, R_OK) == 0;
+    return false;
 }
 
 static status add_dashboard(struct static_files *f, const char *web, struct log *log, struct error *err)

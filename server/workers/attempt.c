@@ -189,6 +189,17 @@ static void time_is_up(const struct job_service *v, struct job_row *row)
     set_error(row, "time_limit", "", text);
 }
 
+static void memory_is_out(const struct job_service *v, struct job_row *row)
+{
+    char text[240];
+    snprintf(text, sizeof text,
+             "the worker held more than %.1f MB of memory, the limit of this service (jobs.resident_limit_bytes); with "
+             "a higher limit, retry resumes the job",
+             (double)v->settings->resident_limit_bytes / 1e6);
+    row->state = JOB_FAILED;
+    set_error(row, "memory_limit", "", text);
+}
+
 static void apply_end(struct job_service *v, struct job_row *row, const struct worker_end *end, enum attempt_stop stop,
                       struct attempt_outcome *outcome)
 {
@@ -199,6 +210,8 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
         failed(v, row);
     else if (stop == STOP_TIME && !row->cancel_requested)
         time_is_up(v, row);
+    else if (stop == STOP_MEMORY && !row->cancel_requested)
+        memory_is_out(v, row);
     else if (asked || row->cancel_requested)
         row->state = stop == STOP_PAUSE && !row->cancel_requested      ? JOB_PAUSED
                      : stop == STOP_SHUTDOWN && !row->cancel_requested ? JOB_QUEUED

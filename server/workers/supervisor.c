@@ -111,6 +111,18 @@ static void trim_console(struct supervisor *u, const struct slot *slot)
     console_trim(path);
 }
 
+/* What made the worker hold so much would do it again, so it is killed at once and its job fails. */
+static void check_memory(struct supervisor *u, struct slot *slot)
+{
+    const int64_t limit_bytes = u->v->settings->resident_limit_bytes;
+    if (limit_bytes <= 0 || slot->killed) return;
+    int64_t held_bytes = worker_memory_bytes(slot->pid);
+    if (held_bytes <= limit_bytes) return;
+    log_warning(u->v->log, "job %s: the worker holds %.1f MB of memory, more than %.1f MB, and is killed", slot->job_id,
+                (double)held_bytes / 1e6, (double)limit_bytes / 1e6);
+    kill_now(slot, STOP_MEMORY);
+}
+
 static void watch(struct supervisor *u, struct slot *slot)
 {
     if (!slot->ended) slot->ended = worker_ended(slot->pid, &slot->end);
@@ -130,6 +142,7 @@ static void watch(struct supervisor *u, struct slot *slot)
         request_stop(slot, STOP_PAUSE);
     const int64_t limit_s = u->v->settings->time_limit_s;
     if (limit_s > 0 && now - slot->started_s > (double)limit_s) request_stop(slot, STOP_TIME);
+    check_memory(u, slot);
     /* measured with our own clock between heartbeats: the wall clock may be set meanwhile, and one failed read is
      * not silence */
     if (request.heartbeat_unix_s > 0 && request.heartbeat_unix_s != slot->seen_heartbeat_unix_s) {

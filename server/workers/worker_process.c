@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -165,6 +166,21 @@ bool worker_ended(pid_t pid, struct worker_end *end)
     end->peak_rss_bytes = (int64_t)usage.ru_maxrss * 1024;
     if (end->by_signal || end->code != 0) kill(-pid, SIGKILL); /* processes that it may have left in its group */
     return true;
+}
+
+int64_t worker_memory_bytes(pid_t pid)
+{
+    static const char *const part[] = {"RssAnon:", "RssShmem:", "VmSwap:"};
+    char path[NUMBER_BYTES + 16], line[128];
+    long long sum_kib = 0;
+    snprintf(path, sizeof path, "/proc/%d/status", (int)pid);
+    FILE *f = fopen(path, "re");
+    if (f == NULL) return 0;
+    while (fgets(line, sizeof line, f) != NULL)
+        for (size_t i = 0; i < sizeof part / sizeof *part; i++)
+            if (strncmp(line, part[i], strlen(part[i])) == 0) sum_kib += strtoll(line + strlen(part[i]), NULL, 10);
+    fclose(f);
+    return sum_kib * 1024;
 }
 
 void worker_signal(pid_t pid, int signal_number)

@@ -30,6 +30,10 @@ struct worker_end {
 status worker_launch(const struct worker_paths *paths, const struct settings *settings, pid_t *pid, struct error *err);
 /* Returns false while the worker runs. */
 bool worker_ended(pid_t pid, struct worker_end *end);
+/* Memory that a running worker holds and that only its end gives back: anonymous and shared pages, in RAM or swapped
+ * out. Pages of files that it maps are left out, because the kernel takes them back when memory is short. 0: not
+ * known. */
+int64_t worker_memory_bytes(pid_t pid);
 /* Sends a signal to the worker and all processes that it started. */
 void worker_signal(pid_t pid, int signal_number);
 

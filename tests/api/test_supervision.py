@@ -266,3 +266,13 @@ def test_a_job_that_runs_too_long_fails_and_can_be_resumed(daemon_maker, behavio
     d.put(f"/v1/jobs/{job}/document", json=document("succeed"))
     d.post(f"/v1/jobs/{job}/start")
     assert d.wait_state(job, "succeeded")["error"] is None
+
+
+def test_a_worker_that_holds_too_much_memory_is_ended(daemon_maker):
+    d = daemon_maker(options={"jobs.resident_limit_bytes": 128 << 20})
+    job = d.start_job("hold 300")
+    failed = d.wait_state(job, "failed")
+    assert failed["error"]["code"] == "memory_limit" and "jobs.resident_limit_bytes" in failed["error"]["text"]
+    assert failed["attempt"] == 1 and failed["lost_attempts"] == 0
+    # pages of files can be taken back, so they do not count
+    d.wait_state(d.start_job("map 300"), "succeeded")

@@ -3,6 +3,7 @@
 layout of job folders. It counts its runs in work/runs to distinguish "once" from "always"."""
 import fcntl
 import json
+import mmap
 import os
 import resource
 import signal
@@ -115,6 +116,18 @@ elif behaviour == "chatter":  # writes to the console without end, and dies
     sys.exit(1) if os.remove(os.path.join(job, "status.json")) is None else None
 elif behaviour == "work":
     work(float(argument or 3600))
+    finish()
+elif behaviour == "hold":  # holds so many MB of memory of its own
+    held = b"\1" * (int(argument) << 20)
+    work(1)
+    finish()
+elif behaviour == "map":  # maps a file of so many MB, and reads all of it
+    with open(os.path.join(job, "work", "mapped"), "wb") as f:
+        for _ in range(int(argument)):
+            f.write(b"\1" * (1 << 20))
+    with open(os.path.join(job, "work", "mapped"), "rb") as f, mmap.mmap(f.fileno(), 0, prot=mmap.PROT_READ) as pages:
+        total = sum(pages[::4096])
+        work(1)
     finish()
 elif behaviour == "climb":  # makes progress until it is stopped
     for i in range(100000):

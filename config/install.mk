@@ -1,0 +1,65 @@
+# Installation below PREFIX, and the Debian package that is made of it. docs/operating.md says what goes where.
+.PHONY: install uninstall deb deps-package test-deb
+PREFIX ?= /usr/local
+DESTDIR ?=
+# where systemd and administrators look, whatever the prefix of a system-wide installation
+SYSCONFDIR ?= $(if $(filter /usr /usr/local,$(PREFIX)),/etc,$(PREFIX)/etc)
+UNITDIR ?= $(PREFIX)/lib/systemd/system
+SYSUSERSDIR ?= $(PREFIX)/lib/sysusers.d
+SHAREDIR := $(PREFIX)/share/selvedge
+DOCDIR := $(PREFIX)/share/doc/selvedge
+MANDIR := $(PREFIX)/share/man
+INSTALL ?= install
+
+# what `selvedge-NAME --help` says as a manual page: page, and the line that whatis shows
+MAN_PAGES := $(BUILD)/man/selvedge.1 $(BUILD)/man/selvedged.8 $(BUILD)/man/selvedge-worker.1 \
+	$(BUILD)/man/selvedge-phantom.1 $(BUILD)/man/selvedge-camera.1
+purpose_selvedge := client of the service that makes digital twins of cloth
+purpose_selvedged := service that makes digital twins of cloth
+purpose_selvedge-worker := run one job of Selvedge in its folder
+purpose_selvedge-phantom := make artificial cloth with known fibers and scattering
+purpose_selvedge-camera := show how Selvedge reads photographs, and calibrate cameras
+HELP2MAN := $(shell command -v help2man)
+
+##@ Installation
+# configuration: kept where there is one; the default is beside the dashboard
+install: all       ## install below PREFIX (/usr/local) of DESTDIR: programs, dashboard, documents, unit, configuration
+	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(SHAREDIR)/dashboard $(DOCDIR)/docs/images $(DOCDIR)/examples)
+	$(INSTALL) $(PROGRAMS) "$(DESTDIR)$(PREFIX)/bin"
+	$(INSTALL) -m 644 $(filter-out %.md,$(wildcard clients/dashboard/*)) "$(DESTDIR)$(SHAREDIR)/dashboard"
+	$(INSTALL) -m 644 config/openapi.json config/result.schema.json config/selvedge.conf "$(DESTDIR)$(SHAREDIR)"
+	$(INSTALL) -m 644 README.md CHANGELOG.md LICENSE "$(DESTDIR)$(DOCDIR)"
+	$(INSTALL) -m 644 docs/*.md "$(DESTDIR)$(DOCDIR)/docs"
+	$(INSTALL) -m 644 docs/images/* "$(DESTDIR)$(DOCDIR)/docs/images"
+	$(INSTALL) -m 644 config/examples/* config/nginx.conf "$(DESTDIR)$(DOCDIR)/examples"
+	$(INSTALL) -d "$(DESTDIR)$(UNITDIR)" "$(DESTDIR)$(SYSUSERSDIR)" "$(DESTDIR)$(SYSCONFDIR)/selvedge"
+	$(INSTALL) -d -m 700 "$(DESTDIR)$(SYSCONFDIR)/selvedge/secrets"
+	sed -e 's|/usr/bin/|$(PREFIX)/bin/|g' -e 's|/usr/share/doc/|$(PREFIX)/share/doc/|g' \
+		-e 's|/etc/selvedge|$(SYSCONFDIR)/selvedge|g' config/selvedge.service > $(BUILD)/selvedge.service
+	$(INSTALL) -m 644 $(BUILD)/selvedge.service "$(DESTDIR)$(UNITDIR)/selvedge.service"
+	$(INSTALL) -m 644 config/selvedge.sysusers "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
+	[ -e "$(DESTDIR)$(SYSCONFDIR)/selvedge/selvedge.conf" ] || \
+		$(INSTALL) -m 644 config/selvedge.conf "$(DESTDIR)$(SYSCONFDIR)/selvedge/selvedge.conf"
+ifneq ($(HELP2MAN),)
+	@$(MAKE) --no-print-directory $(MAN_PAGES)
+	$(INSTALL) -d "$(DESTDIR)$(MANDIR)/man1" "$(DESTDIR)$(MANDIR)/man8"
+	$(INSTALL) -m 644 $(filter %.1,$(MAN_PAGES)) "$(DESTDIR)$(MANDIR)/man1"
+	$(INSTALL) -m 644 $(filter %.8,$(MAN_PAGES)) "$(DESTDIR)$(MANDIR)/man8"
+else
+	@echo "no manual pages: help2man is not installed"
+endif
+
+# data and configuration are the administrator's
+uninstall:         ## remove what install has put there, but neither configuration nor data
+	rm -f $(patsubst %,"$(DESTDIR)$(PREFIX)/bin/%",$(notdir $(PROGRAMS)))
+	rm -rf "$(DESTDIR)$(SHAREDIR)" "$(DESTDIR)$(DOCDIR)"
+	rm -f "$(DESTDIR)$(UNITDIR)/selvedge.service" "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
+	rm -f $(foreach p,$(notdir $(MAN_PAGES)),"$(DESTDIR)$(MANDIR)/man$(patsubst .%,%,$(suffix $(p)))/$(p)")
+	@echo "kept: $(DESTDIR)$(SYSCONFDIR)/selvedge, the data and the user 'selvedge'"
+
+$(BUILD)/man/%.1: $(BUILD)/bin/%
+	@mkdir -p $(@D)
+	@help2man --no-info --section=1 --name="$(purpose_$*)" --output=$@ $<
+$(BUILD)/man/%.8: $(BUILD)/bin/%
+	@mkdir -p $(@D)
+	@help2man --no-info --section=8 --name="$(purpose_$*)" --output=$@ $<
