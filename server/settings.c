@@ -32,6 +32,7 @@ struct setting {
 #define GIB (INT64_C(1) << 30)
 
 static const char *const sandbox_words[] = {"auto", "required", "off", NULL};
+static const char *const required_words[] = {"auto", "always", NULL};
 
 static const struct setting table[] = {
     TEXT("server", "listen", listen, "127.0.0.1",
@@ -107,6 +108,8 @@ static const struct setting table[] = {
     NUMBER("webhook", "max_tries", webhook_max_tries, 16, 1, 1000, "tries after which a delivery is given up"),
     NUMBER("jobs", "time_limit_s", time_limit_s, 0, 0, 31536000,
            "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
+    WORD("access", "required", access_required, "auto", required_words,
+         "whether requests need a token: auto, once one was ever made; always, also with a database that has none"),
     NUMBER("access", "requests_per_minute", requests_per_minute, 0, 0, 1000000,
            "requests that a token may make in a minute, unless it was made with a number of its own; 0: no limit"),
     NUMBER("access", "stored_bytes", stored_bytes, 0, 0, INT64_MAX / 2,

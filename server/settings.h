@@ -28,6 +28,7 @@ struct settings {
     char webhook_url[SETTING_TEXT_BYTES], webhook_secret_file[SETTING_TEXT_BYTES];
     int64_t webhook_timeout_s, webhook_retry_s, webhook_max_tries;
     /* [access] */
+    char access_required[SETTING_TEXT_BYTES];
     int64_t requests_per_minute, stored_bytes, jobs_of_owner, session_s;
     /* [disk] */
     int64_t floor_bytes, ballast_bytes;

@@ -40,7 +40,7 @@ asan: | deps-test  ## unit and quick API tests under the address and undefined-b
 
 # the requests of these tests come from many threads; a report ends the daemon with a code that no test accepts. The
 # worker and the client, other processes, are those of the normal build
-THREADED_TESTS ?= api/service api/test_jobs_api api/test_uploads_api api/test_results_api api/test_supervision api/test_durable_replies
+THREADED_TESTS ?= api/service api/access api/test_jobs_api api/test_uploads_api api/test_results_api api/test_supervision api/test_durable_replies
 tsan: | deps-test  ## tests of the daemon under the thread sanitizer (three minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/tsan SANITIZE=thread OPTIMIZE=-O1 build/tsan/bin/selvedged

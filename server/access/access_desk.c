@@ -55,7 +55,7 @@ void access_desk_free(struct access_desk *d)
 
 status access_required(struct access_desk *d, bool *required, struct error *err)
 {
-    *required = atomic_load(&d->required);
+    *required = atomic_load(&d->required) || strcmp(d->settings->access_required, "always") == 0;
     if (*required) return STATUS_OK;
     status s = store_token_any(d->store, required, err);
     if (s == STATUS_OK && *required) atomic_store(&d->required, true);

@@ -25,7 +25,7 @@ status access_desk_new(struct store *store, const struct settings *settings, str
 /* Writes the last uses that are not stored yet. NULL is accepted. */
 void access_desk_free(struct access_desk *desk);
 
-/* Whether a token is needed: from the first one on that was ever made. */
+/* Whether a token is needed: from the first one on that was ever made, or always by access.required. */
 status access_required(struct access_desk *desk, bool *required, struct error *err);
 /* The grant when no token is needed. */
 struct access_grant access_grant_of_everyone(void);

@@ -74,6 +74,13 @@ def test_the_first_token(daemon_maker, running):
     assert again.returncode == 1 and "a token named 'root' exists" in again.stderr and again.stdout == ""
 
 
+def test_tokens_can_be_asked_for_from_the_beginning(daemon_maker):
+    d = daemon_maker(options={"access.required": "always"})
+    problem(d.get("/v1/jobs"), 401, "token")
+    problem(d.post("/v1/session", json={"token": "x"}), 401, "token")
+    assert d.of(d.make_token("root")).get("/v1/jobs").status_code == 200
+
+
 def test_a_daemon_of_another_version_is_not_migrated_under_its_feet(daemon_maker):
     d = daemon_maker()
     with database(d) as db:
