@@ -16,6 +16,7 @@
 #include "geometry/grade/scan_trial.h"
 #include "geometry/orientation/alignment.h"
 #include "geometry/orientation/lumen_evidence.h"
+#include "geometry/scan_densities.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
 #include "geometry/volume/volume_source.h"
@@ -65,7 +66,7 @@ struct reconstruct_report {
     size_t n_seam_joined;
     double density_low, density_high; /* scanner values */
     double separability;              /* of void and material in the histogram, 0..1 (density_map.h) */
-    double noise_sd;                  /* of the mapped density in voxels without material */
+    struct scan_noise noise;          /* of the scan, and after smoothing */
     double lumen_share;               /* filled lumens over material; 0 if the fibers are solid */
     struct lumen_evidence lumen;      /* whether the fibers look hollow */
     double fiber_diameter_voxel;      /* given, or measured from the volume before the filter */

@@ -263,7 +263,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     const bool low_alone = !isnan(o->density_low) && isnan(o->density_high);
     if (isnan(o->density_low)) o->density_low = m.low;
     if (isnan(o->density_high)) o->density_high = m.high;
-    s = density_map_apply(v, o->density_low, o->density_high, pool, err);
+    s = scan_densities_map(v, o->density_low, o->density_high, o->fiber_diameter_voxel, pool, &report->noise, err);
     if (s == STATUS_INVALID && low_alone && err != NULL) snprintf(err->field, sizeof err->field, OPTION_DENSITY_LOW);
     if (s != STATUS_OK) return s;
     double threshold = isnan(o->eps_d) ? 0.5 : o->eps_d;
@@ -280,10 +280,9 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->density_low = o->density_low;
     report->density_high = o->density_high;
     report->separability = m.separability;
-    report->noise_sd = density_noise_sd(v);
     report->lumen_share = 0.0;
-    s = lumen_evidence_measure(v, report->noise_sd, &report->lumen, err);
-    if (s == STATUS_OK && o->hollow_fibers) s = lumens_fill(v, report->noise_sd, &report->lumen_share, err);
+    s = lumen_evidence_measure(v, report->noise.mapped_sd, &report->lumen, err);
+    if (s == STATUS_OK && o->hollow_fibers) s = lumens_fill(v, report->noise.mapped_sd, &report->lumen_share, err);
     if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;

@@ -121,8 +121,8 @@ static status cut_fibers(const struct fiber_set *f, const size_t from[3], const 
 static void measure(const struct volume *v, const struct reconstruct_report *report, struct scan_trial *t)
 {
     double blur = report->profile_blur_m / v->voxel_size_m[0];
-    t->snr = report->noise_sd > 0.0 ? 1.0 / report->noise_sd : 0.0;
-    t->noise_sd_voxel = scan_noise_blur(scan_noise_correlation(v, report->noise_sd));
+    t->snr = report->noise.mapped_sd > 0.0 ? 1.0 / report->noise.mapped_sd : 0.0;
+    t->noise_sd_voxel = scan_noise_blur(scan_noise_correlation(v, report->noise.mapped_sd));
     t->blur_sd_voxel = sqrt(fmax(0.0, blur * blur - VOXEL_VARIANCE));
 }
 
@@ -171,7 +171,7 @@ static status reconstruct(struct volume *v, const struct fiber_set *truth, struc
     fiber_set_init(&found);
     status s = density_modes_find(v, &m, err);
     if (s == STATUS_OK) s = density_map_apply(v, m.low, m.high, pool, err);
-    if (s == STATUS_OK) report.noise_sd = density_noise_sd(v);
+    if (s == STATUS_OK) report.noise.mapped_sd = density_noise_sd(v, 0.0, 1.0);
     *part = (struct progress_part){part->outer, 0.1, 0.3};
     if (s == STATUS_OK) s = reconstruct_orientation(v, o, pool, &inner, &d, &report, err);
     *part = (struct progress_part){part->outer, 0.4, 0.6};

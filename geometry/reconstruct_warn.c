@@ -66,10 +66,10 @@ void reconstruct_warn_volume(const struct reconstruct_option *o, const struct re
             "void and material cannot be distinguished (separability %.2f; noise alone has 0.64, a clear scan more "
             "than 0.8); check that this is the right file, and its type and byte order",
             r->separability);
-    else if (r->noise_sd > 0.5)
+    else if (r->noise.scan_sd > 0.5)
         warning_send(warn, OPTION_SCAN_FILES,
                      "the scan is very noisy: its standard deviation is %.2f of the step from void to material",
-                     r->noise_sd);
+                     r->noise.scan_sd);
     if (!o->hollow_fibers && r->lumen.middle_share > LUMEN_MIDDLE_SHARE)
         warning_send(warn, OPTION_HOLLOW_FIBERS,
                      "the fibers look hollow: voids in the middle of fibers are %.2f %% of the material (solid fibers "

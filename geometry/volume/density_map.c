@@ -205,7 +205,7 @@ bool density_threshold(const float *value, size_t n, double *threshold)
 
 struct mapping {
     struct volume *v;
-    float low, scale;
+    float low, scale, least, most;
 };
 
 static void map_slice(void *context, size_t k, size_t i_thread)
@@ -215,17 +215,29 @@ static void map_slice(void *context, size_t k, size_t i_thread)
     scratch_keep_within(m->v->space);
     size_t n = m->v->n[0] * m->v->n[1];
     float *d = m->v->density + k * n;
-    for (size_t i = 0; i < n; i++) d[i] = fminf(1.0f, fmaxf(0.0f, (d[i] - m->low) * m->scale));
+    for (size_t i = 0; i < n; i++) /* VOLUME_OUTSIDE is not finite */
+        d[i] = isfinite(d[i]) ? fminf(m->most, fmaxf(m->least, (d[i] - m->low) * m->scale)) : 0.0f;
 }
 
-status density_map_apply(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err)
+static status map_within(struct volume *v, double low, double high, const float limit[2], struct thread_pool *pool,
+                         struct error *err)
 {
     if (!(high > low) || !isfinite(high - low))
         return error_set_field(
             err, STATUS_INVALID, OPTION_DENSITY_HIGH,
             "cannot map densities: the value for solid material, %g, is not above the one for void, %g", high, low);
-    struct mapping m = {v, (float)low, (float)(1.0 / (high - low))};
+    struct mapping m = {v, (float)low, (float)(1.0 / (high - low)), limit[0], limit[1]};
     return thread_pool_run(pool, v->n[2], map_slice, &m, NULL);
+}
+
+status density_map_apply(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err)
+{
+    return map_within(v, low, high, (const float[2]){0.0f, 1.0f}, pool, err);
+}
+
+status density_map_wide(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err)
+{
+    return map_within(v, low, high, (const float[2]){-1.0f, 2.0f}, pool, err);
 }
 
 static int compare_float(const void *a, const void *b)
@@ -234,9 +246,10 @@ static int compare_float(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-double density_noise_sd(const struct volume *v)
+double density_noise_sd(const struct volume *v, double low, double high)
 {
     enum { MAX_VALUE = 100000 };
+    const float from = (float)low, scale = (float)(1.0 / (high - low));
     float *value = malloc(MAX_VALUE * sizeof *value);
     if (value == NULL) return NAN;
     size_t n = 0, step = lattice_stride(v->n) + 1;
@@ -244,9 +257,12 @@ double density_noise_sd(const struct volume *v)
         scratch_keep_within(v->space);
         for (size_t j = 1; j + 1 < v->n[1]; j += step)
             for (size_t i = 1; i + 2 < v->n[0] && n < MAX_VALUE; i += step) {
-                float mean = mean27(v, i, j, k), x = v->density[volume_index(v->n, i, j, k)];
-                /* A value clamped at 0 or 1 has lost its noise. The others have a half-normal distribution. */
-                if ((mean < 0.15f || mean > 0.85f) && x > 0.0f && x < 1.0f) value[n++] = fminf(x, 1.0f - x);
+                const float x = (v->density[volume_index(v->n, i, j, k)] - from) * scale;
+                const float mean = (mean27(v, i, j, k) - from) * scale;
+                /* Values of void at 0 and of material at 1 may be clamped. Those on the other side of them have a
+                 * half-normal distribution. */
+                if (isfinite(mean) && mean < 0.15f && x > 0.0f) value[n++] = x;
+                if (mean > 0.85f && x < 1.0f) value[n++] = 1.0f - x;
             }
     }
     double sd = 0.0;

@@ -31,10 +31,13 @@ bool density_threshold(const float *value, size_t n, double *threshold);
  * symmetric about 1/2, so surfaces at half density do not move. STATUS_INVALID, field OPTION_DENSITY_HIGH, if high
  * <= low. */
 status density_map_apply(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err);
+/* The same with a clamp at -1 and 2, which leaves all but the strongest noise as it is. */
+status density_map_wide(struct volume *v, double low, double high, struct thread_pool *pool, struct error *err);
 
-/* Returns the standard deviation of the mapped density where the 3 x 3 x 3 mean is below 0.15 or above 0.85. It
- * comes from the median distance to 0 or 1 of up to 100,000 values that were not clamped, beginning at the lowest
- * slices. 0 if there are hardly any such values, NaN if memory is out. */
-double density_noise_sd(const struct volume *v);
+/* Returns the standard deviation of the noise over the step from low to high, the values of void and material (0 and 1
+ * in a volume that is mapped, clamped or not), from where the 3 x 3 x 3 mean lies outside of 0.15 .. 0.85 of the step.
+ * It comes from the median distance from low of values above it in void, and from high of values below it in material:
+ * up to 100,000 values, beginning at the lowest slices. 0 if there are hardly any such values, NaN if memory is out. */
+double density_noise_sd(const struct volume *v, double low, double high);
 
 #endif

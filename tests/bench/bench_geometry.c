@@ -16,8 +16,10 @@
  *       cpu_us_per_material_voxel                processor time of the reconstruction
  *   geometry.weave_ct.axis_class_accuracy        share of the labelled tow voxels of a real weave in the right class
  *
- * bench_geometry [--pictures DIR] [--weaves NAMES] [--conditions NAMES] [TEXT...]
+ * bench_geometry [--pictures DIR] [--weaves NAMES] [--conditions NAMES] [--seed N] [--yarns N] [TEXT...]
  *   NAMES  comma-separated; run only these weaves, and only these conditions (d7.snr5 and the like are conditions too)
+ *   seed   of cloth and scan, 1 by default
+ *   yarns  in x and y of the tile, a multiple of the weave's repeat; fewer than by default are quicker
  *   TEXT   run only those of plain.d4.snr2 ... felt.thick and weave_ct whose name contains a TEXT
  *   DIR    slices with the fibers drawn on them are written there
  * Progress, times and counts go to standard error.
@@ -66,7 +68,7 @@ static const struct condition condition[] = {
 struct selection {
     char **text;
     int n;
-    const char *pictures, *weaves, *conditions; /* NULL: all */
+    const char *pictures, *weaves, *conditions, *seed, *yarns; /* NULL: none, all, by default */
 };
 
 /* Whether a comma-separated list has the name; NULL has all. */
@@ -166,6 +168,9 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
     scan.noise_sd_voxel = k->noise_sd_voxel;
     scan.beam_hardening = k->beam_hardening;
     scan.phase_fringes = k->phase_fringes;
+    if (s->seed != NULL) o.seed = scan.seed = strtoull(s->seed, NULL, 10);
+    if (s->seed != NULL && o.section.seed != 0) o.section.seed = o.seed;
+    if (s->yarns != NULL) o.n_yarn[0] = o.n_yarn[1] = strtoul(s->yarns, NULL, 10);
     reconstruct_option_default(&r.option);
     r.option.hollow_fibers = k->section.lumen > 0.0;
     status st = phantom_reconstruct_scan(&o, &scan, &r, err);
@@ -173,9 +178,10 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
     const struct compare_report *c = &r.compare;
     if (st == STATUS_OK) {
         fprintf(stderr,
-                "%s: %zu x %zu x %zu voxels, %zu true fibers (%zu pieces), %zu found, %.1f s, diameter measured %.2f, "
-                "radius %+.1f %%\n",
+                "%s: %zu x %zu x %zu voxels, %zu true fibers (%zu pieces), %zu found, %.1f s, noise %.3f, smoothed by "
+                "%.2f voxels to %.3f, diameter measured %.2f, radius %+.1f %%\n",
                 name, r.v.n[0], r.v.n[1], r.v.n[2], c->n_true, c->n_true_piece, c->n_found, r.wall_s,
+                r.report.noise.scan_sd, r.report.noise.smooth_voxel, r.report.noise.mapped_sd,
                 r.report.fiber_diameter_voxel, c->radius_bias_percent);
         print_directions(name, &r);
         print_figures(name, k, &r);
@@ -239,11 +245,17 @@ int main(int argc, char **argv)
     struct selection select = {0};
     struct error err = {0};
     status s = STATUS_OK;
+    const struct {
+        const char *name, **value;
+    } setting[] = {{"--pictures", &select.pictures},
+                   {"--weaves", &select.weaves},
+                   {"--conditions", &select.conditions},
+                   {"--seed", &select.seed},
+                   {"--yarns", &select.yarns}};
     int at = 1;
     for (; at + 1 < argc && strncmp(argv[at], "--", 2) == 0; at += 2)
-        *(strcmp(argv[at], "--pictures") == 0 ? &select.pictures
-          : strcmp(argv[at], "--weaves") == 0 ? &select.weaves
-                                              : &select.conditions) = argv[at + 1];
+        for (size_t i = 0; i < sizeof setting / sizeof *setting; i++)
+            if (strcmp(argv[at], setting[i].name) == 0) *setting[i].value = argv[at + 1];
     select.text = argv + at;
     select.n = argc - at;
     for (size_t w = 0; w < sizeof weave / sizeof *weave; w++)

@@ -43,10 +43,10 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     struct direction_volume d = {0};
     struct density_modes m;
     status s = density_modes_find(&r->v, &m, err);
-    if (s == STATUS_OK) s = density_map_apply(&r->v, m.low, m.high, pool, err);
-    if (s == STATUS_OK) r->report.noise_sd = density_noise_sd(&r->v);
+    if (s == STATUS_OK)
+        s = scan_densities_map(&r->v, m.low, m.high, r->option.fiber_diameter_voxel, pool, &r->report.noise, err);
     if (s == STATUS_OK && r->option.hollow_fibers)
-        s = lumens_fill(&r->v, r->report.noise_sd, &r->report.lumen_share, err);
+        s = lumens_fill(&r->v, r->report.noise.mapped_sd, &r->report.lumen_share, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &r->option, pool, NULL, &d, &r->report, err);
     if (s == STATUS_OK) s = compare(r, &d, pool, &r->filtered, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &r->option, pool, NULL, &r->found, &r->report, err);

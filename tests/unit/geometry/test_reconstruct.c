@@ -64,10 +64,10 @@ static void test_chain(void **state)
     const struct cylinder_result x = reference;
     print_message("low %.0f high %.0f noise %.3f diameter %.2f radius %.3f um (7.0) rms %.3f voxels length %.1f um "
                   "dice %.3f change %.2f\n",
-                  x.r.density_low, x.r.density_high, x.r.noise_sd, x.r.fiber_diameter_voxel, x.r.radius_m[0] * 1e6,
+                  x.r.density_low, x.r.density_high, x.r.noise.scan_sd, x.r.fiber_diameter_voxel, x.r.radius_m[0] * 1e6,
                   rms_from_axes(&x.f), x.r.total_length_m * 1e6, x.r.dice, x.r.direction_change_mean_deg);
     assert_true(fabs(x.r.density_low - 20000.0) < 500.0 && fabs(x.r.density_high - 30000.0) < 1500.0);
-    assert_true(fabs(x.r.noise_sd - 0.2) < 0.04);
+    assert_true(fabs(x.r.noise.scan_sd - 0.2) < 0.04);
     assert_int_equal(x.f.n_fiber, CYLINDER_N);
     assert_true(rms_from_axes(&x.f) < 0.3);
     assert_true(fabs(x.r.radius_m[0] / 7e-6 - 1.0) < 0.03);

@@ -32,7 +32,7 @@ static struct reconstruct_option clean_option(void)
 
 static struct reconstruct_report clean_report(void)
 {
-    struct reconstruct_report r = {.n = {100, 100, 50}, .separability = 0.9, .noise_sd = 0.2, .dice = 0.9};
+    struct reconstruct_report r = {.n = {100, 100, 50}, .separability = 0.9, .noise.scan_sd = 0.2, .dice = 0.9};
     for (int a = 0; a < 3; a++) r.voxel_size_m[a] = r.file_voxel_size_m[a] = 2e-6;
     r.fiber_diameter_voxel = 7.0;
     r.other_diameter_voxel = r.other_diameter_noise_share = NAN;
@@ -139,13 +139,13 @@ static void test_densities(void **state)
     const struct reconstruct_option o = clean_option();
     struct reconstruct_report r = clean_report();
     (void)state;
-    r.noise_sd = 0.51;
+    r.noise.scan_sd = 0.51;
     expect_volume(&o, &r, OPTION_SCAN_FILES, "its standard deviation is 0.51");
     r.separability = 0.69; /* says more than that it is noisy */
     expect_volume(&o, &r, OPTION_SCAN_FILES, "separability 0.69");
     r = clean_report();
     r.separability = 0.7;
-    r.noise_sd = 0.5;
+    r.noise.scan_sd = 0.5;
     expect_volume(&o, &r, NULL, NULL);
 }
 

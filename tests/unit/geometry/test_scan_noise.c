@@ -62,7 +62,7 @@ static void test_known_standard_deviation(void **state)
         make_scan(1.0 / sd, 0.0, &v);
         if (i == 1)
             for (size_t k = 0; k < 48 * 48 * 48; k++) v.density[k] = 1.0f - v.density[k];
-        double found = density_noise_sd(&v);
+        double found = density_noise_sd(&v, 0.0, 1.0);
         print_message("noise of %.3f: %.4f\n", sd, found);
         assert_true(fabs(found / sd - 1.0) < 4.0 * 1.17 / sqrt(20000.0));
         volume_release(&v);

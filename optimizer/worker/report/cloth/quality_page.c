@@ -101,7 +101,10 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     row(out, "direction noise, transferred", "after taking the fibers' directions", "%.2f&deg;",
         g->direction_noise_deg[1]);
     row(out, "change by the transfer", "mean angle between the two", "%.2f&deg;", g->direction_change_mean_deg);
-    row(out, "noise of the scan", "standard deviation over the step from void to material", "%.3f", g->noise_sd);
+    row(out, "noise of the scan", "standard deviation over the step from void to material", "%.3f", g->noise.scan_sd);
+    if (g->noise.smooth_voxel > 0.0)
+        row(out, "smoothing of the scan", "standard deviation of the Gaussian, because of the noise", "%.2f voxels",
+            g->noise.smooth_voxel);
     row(out, "separability", "of void and material: 0.64 noise alone, above 0.8 clear", "%.2f", g->separability);
     close_table(out);
 }

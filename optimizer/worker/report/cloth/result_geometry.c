@@ -137,6 +137,16 @@ static void set_radii(json_t *json, const struct reconstruct_report *g)
     json_object_set_new(json, "section_axis_ratio_spread", json_number(g->axis_ratio_spread));
 }
 
+static void set_densities(json_t *json, const struct reconstruct_report *g)
+{
+    json_object_set_new(json, "density_low", json_number(g->density_low));
+    json_object_set_new(json, "density_high", json_number(g->density_high));
+    json_object_set_new(json, "separability", json_number(g->separability));
+    json_object_set_new(json, "noise_sd", json_number(g->noise.scan_sd));
+    json_object_set_new(json, "noise_smoothing_voxel", json_number(g->noise.smooth_voxel));
+    json_object_set_new(json, "smoothed_noise_sd", json_number(g->noise.mapped_sd));
+}
+
 json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -163,10 +173,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));
     json_object_set_new(json, "voxel_size_um", json_number_list(g->voxel_size_m, 3, um));
     json_object_set_new(json, "file_voxel_size_um", json_number_list(g->file_voxel_size_m, 3, um));
-    json_object_set_new(json, "density_low", json_number(g->density_low));
-    json_object_set_new(json, "density_high", json_number(g->density_high));
-    json_object_set_new(json, "separability", json_number(g->separability));
-    json_object_set_new(json, "noise_sd", json_number(g->noise_sd));
+    set_densities(json, g);
     json_object_set_new(json, "lumen_share", json_number(g->lumen_share));
     json_object_set_new(json, "lumen_evidence", json_number(g->lumen.middle_share));
     json_object_set_new(json, "fiber_diameter_voxel", json_number(g->fiber_diameter_voxel));
