@@ -5,10 +5,11 @@ import { submitPanel } from "./submit_panel.js";
 
 const PAGE_SIZE = 100;
 
-function row(job) {
+// mixed: the list has jobs of several owners, so each row states its own.
+function row(job, mixed) {
   const busy = job.state === "running" || job.state === "queued" || job.state === "paused";
   return el("tr", { class: "link", onclick: () => { location.hash = job.id; } },
-    el("td", {}, el("a", { href: `#${job.id}` }, job.sample || "(no name)")),
+    el("td", {}, el("a", { href: `#${job.id}` }, job.sample || "(no name)"), mixed && job.owner ? el("span", { class: "hint" }, ` ${job.owner}`) : null),
     el("td", {}, stateTag(job.state)),
     el("td", { class: "verdict" }, verdictTag(job.verdict)),
     el("td", {}, busy ? el("progress", { max: 1, value: job.fraction, title: `${Math.round(100 * job.fraction)} %` }) : null),
@@ -31,7 +32,8 @@ export function listPage(page) {
     submitPanel());
   const poller = poll(async () => {
     const { jobs, next_cursor: next } = await getJson(`/v1/jobs?limit=${Math.min(limit, 500)}`);
-    refill(body, jobs, () => jobs.map(row));
+    const mixed = new Set(jobs.map((j) => j.owner)).size > 1;
+    refill(body, jobs, () => jobs.map((j) => row(j, mixed)));
     empty.classList.toggle("hidden", jobs.length > 0);
     more.classList.toggle("hidden", next === null || next === undefined || limit >= 500);
     return jobs.some((j) => j.state === "running" || j.state === "queued") ? 2 : 8;

@@ -46,4 +46,10 @@ def test_signing_in_and_out(stub, browser):
     assert "of bob" in browser.find_element(By.ID, "jobs").text
     browser.find_element(By.ID, "sign-out").click()
     wait_for(browser, "document.querySelector('#sign-in input')")
+    browser.find_element(By.CSS_SELECTOR, "#sign-in input").send_keys(made.stdout.strip() + "\n")
+    wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 2")  # an administrator sees whose each job is
+    assert browser.find_element(By.ID, "jobs").text.split().count("ann") == 2
+    keep(browser, "all_owners")
+    browser.find_element(By.ID, "sign-out").click()
+    wait_for(browser, "document.querySelector('#sign-in input')")
     assert browser.execute_script("return fetch('/v1/jobs').then((r) => r.status)") == 401

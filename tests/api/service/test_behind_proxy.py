@@ -1,6 +1,7 @@
 """The daemon on a unix socket, and behind a proxy that publishes it under another address."""
 import http.client
 import os
+import re
 import shutil
 import socket
 import stat
@@ -133,8 +134,8 @@ def free_port():
         return s.getsockname()[1]
 
 
-def nginx_configuration(folder, sock, port):
-    """config/nginx.conf with the paths of this test."""
+def nginx_configuration(folder, sock, port, with_tokens):
+    """config/nginx.conf with the paths of this test; with access tokens in place of passwords, as it says itself."""
     with open(os.path.join(ROOT, "config", "nginx.conf")) as f:
         text = f.read()
     for old, new in [("/run/selvedge/http.sock", sock), ("listen 443 ssl", f"listen 127.0.0.1:{port} ssl"),
@@ -142,13 +143,16 @@ def nginx_configuration(folder, sock, port):
                      ("/etc/ssl/certs/selvedge.example.org.pem", folder / "cert.pem"), ("/etc/ssl/private/selvedge.example.org.key", folder / "key.pem")]:
         assert old in text
         text = text.replace(old, str(new))
+    if with_tokens:
+        text = re.sub(r"(?m)^ *(auth_basic.*|proxy_set_header Authorization.*)\n", "", text)
     own = "".join(f"{name}_temp_path {folder}/{name};" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
     user = "user root;" if os.geteuid() == 0 else ""
     (folder / "nginx.conf").write_text(f"{user} daemon off; pid {folder}/pid; error_log stderr; events {{}} http {{ access_log off; {own} {text} }}")
     return str(folder / "nginx.conf")
 
 
-def test_the_nginx_example(tmp_path):
+@pytest.mark.parametrize("with_tokens", [False, True])
+def test_the_nginx_example(tmp_path, with_tokens):
     nginx = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
     if nginx is None or shutil.which("openssl") is None:
         pytest.skip("nginx or openssl is not installed")
@@ -156,14 +160,15 @@ def test_the_nginx_example(tmp_path):
     hashed = subprocess.run(["openssl", "passwd", "-apr1", "secret"], check=True, capture_output=True, text=True).stdout
     (tmp_path / "passwords").write_text(f"ada:{hashed}")
     with UnixDaemon(tmp_path, **{"server.public_origin": ORIGIN}) as d:
+        token = d.daemon.make_token("root") if with_tokens else None
         proxy, port = None, 0
         for _ in range(5):  # another program may take the port first
             port = free_port()
-            proxy = subprocess.Popen([nginx, "-p", tmp_path, "-c", nginx_configuration(tmp_path, d.socket, port)], stderr=subprocess.DEVNULL)
+            proxy = subprocess.Popen([nginx, "-p", tmp_path, "-c", nginx_configuration(tmp_path, d.socket, port, with_tokens)], stderr=subprocess.DEVNULL)
             if wait_until(lambda: proxy.poll() is not None or answers(port), what="nginx answers") and proxy.poll() is None:
                 break
         try:
-            use(port, tmp_path / "cert.pem")
+            use(port, tmp_path / "cert.pem", token)
         finally:
             proxy.terminate()
             proxy.wait(20)
@@ -177,12 +182,15 @@ def answers(port):
         return False
 
 
-def use(port, trusted):
+def use(port, trusted, token):
     session, url = requests.Session(), f"https://127.0.0.1:{port}"
     session.trust_env, session.verify = False, str(trusted)
     session.headers.update({"Host": "selvedge.example.org", "Origin": ORIGIN})
     assert session.get(url + "/v1/jobs", timeout=20).status_code == 401
-    session.auth = ("ada", "secret")
+    if token:
+        session.headers["Authorization"] = f"Bearer {token}"
+    else:
+        session.auth = ("ada", "secret")
     page = session.get(url + "/", timeout=20)
     assert page.status_code == 200 and "Selvedge" in page.text
     job = session.post(url + "/v1/jobs", json=DOCUMENT, timeout=20).json()["id"]
