@@ -8,6 +8,7 @@
 #include "server/http/static_files.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
+#include "server/retention/retention_watch.h"
 #include "server/workers/supervisor.h"
 
 #include <errno.h>
@@ -212,6 +213,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     struct job_service *service = NULL;
     struct supervisor *supervisor = NULL;
     struct webhook *webhook = NULL;
+    struct retention_watch *retention = NULL;
     struct static_files *files = NULL;
     struct http_server *server = NULL;
     char worker[PATH_BYTES];
@@ -222,6 +224,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r != STATUS_OK) goto out;
     r = webhook_start(service, &webhook, err);
     if (r == STATUS_OK) r = supervisor_start(service, worker, &supervisor, err);
+    if (r == STATUS_OK) r = retention_watch_start(service, &retention, err);
     if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, url, err);
     if (r == STATUS_OK) {
         announce(s, url, log);
@@ -229,7 +232,8 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     }
     if (service != NULL) atomic_store(&service->stopping, true);
 out:
-    http_server_stop(server); /* first, because its threads wake the supervisor */
+    http_server_stop(server);        /* first, because its threads wake the supervisor */
+    retention_watch_stop(retention); /* before the supervisor, because it wakes it */
     supervisor_stop(supervisor);
     webhook_stop(webhook);
     job_service_close(service);

@@ -118,6 +118,13 @@ static const struct setting table[] = {
            "jobs that the owner of a token may keep, unless the token has a number of its own; 0: no limit"),
     NUMBER("access", "session_s", session_s, 43200, 60, 31536000,
            "time in seconds after which a browser must sign in again"),
+    NUMBER("retention", "max_age_days", retention_max_age_days, 0, 0, 36500,
+           "days after its end at which a job is removed, unless it is kept; 0: never (docs/operating.md)"),
+    NUMBER("retention", "max_bytes", retention_max_bytes, 0, 0, INT64_MAX / 2,
+           "disk that all jobs may take; while they take more, the jobs that ended first are removed, unless they are "
+           "kept; 0: no limit"),
+    NUMBER("retention", "check_s", retention_check_s, 600, 1, 86400,
+           "time in seconds after which the daemon looks at both, and to the next look"),
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
            "free space below which new work is refused and running jobs pause"),
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,

@@ -30,6 +30,8 @@ struct settings {
     /* [access] */
     char access_required[SETTING_TEXT_BYTES];
     int64_t requests_per_minute, stored_bytes, jobs_of_owner, session_s;
+    /* [retention] */
+    int64_t retention_max_age_days, retention_max_bytes, retention_check_s;
     /* [disk] */
     int64_t floor_bytes, ballast_bytes;
 };

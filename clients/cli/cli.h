@@ -36,6 +36,10 @@ status cli_log(struct cli *cli, int *exit_code, struct error *err);
 status cli_series(struct cli *cli, int *exit_code, struct error *err);
 status cli_delete(struct cli *cli, int *exit_code, struct error *err);
 
+status cli_keep(struct cli *cli, int *exit_code, struct error *err);
+status cli_unkeep(struct cli *cli, int *exit_code, struct error *err);
+status cli_retention(struct cli *cli, int *exit_code, struct error *err);
+
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
 status cli_watch_folder(struct cli *cli, int *exit_code, struct error *err);
 status cli_token(struct cli *cli, int *exit_code, struct error *err);

@@ -30,7 +30,10 @@ enum {
     OPT_OWNER = 1048576,
     OPT_REQUESTS = 2097152,
     OPT_BYTES = 4194304,
-    OPT_JOBS = 8388608
+    OPT_JOBS = 8388608,
+    OPT_MAX_AGE = 16777216,
+    OPT_MAX_BYTES = 33554432,
+    OPT_YES = 67108864
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
@@ -92,6 +95,14 @@ static const struct cli_command {
          "These need a token with scope admin; the first one is made by `selvedged --make-token NAME`.\n",
          OPT_SCOPE | OPT_OWNER | OPT_REQUESTS | OPT_BYTES | OPT_JOBS | OPT_JSON | OPT_OUT, "make, list or revoke",
          "NAME"},
+    [CLI_KEEP] = {"keep", "ID", "keep a job, whatever the limits of retention say", "", 0},
+    [CLI_UNKEEP] = {"unkeep", "ID", "take that back", "", 0},
+    [CLI_RETENTION] =
+        {"retention", NULL, "list the finished jobs that limits of age and size would remove; --yes removes them",
+         "Without options the limits are those of the service's settings. Only jobs that have ended are removed, but\n"
+         "not those that are kept (`selvedge keep ID`), nor those whose geometry an unfinished job asks for. With\n"
+         "--yes exactly the listed jobs are removed, and each is named.\n",
+         OPT_MAX_AGE | OPT_MAX_BYTES | OPT_YES | OPT_JSON},
 };
 
 static const struct cli_option {
@@ -133,6 +144,12 @@ static const struct cli_option {
     {OPT_REQUESTS, 0, "requests", "N", "requests a minute; 0: no limit", offsetof(struct cli_args, requests)},
     {OPT_BYTES, 0, "bytes", "N", "bytes of input files that its owner may keep", offsetof(struct cli_args, bytes)},
     {OPT_JOBS, 0, "jobs", "N", "jobs that its owner may keep", offsetof(struct cli_args, jobs)},
+    {OPT_MAX_AGE, 0, "max-age-days", "N", "remove jobs that ended more than N days ago",
+     offsetof(struct cli_args, max_age)},
+    {OPT_MAX_BYTES, 0, "max-bytes", "N",
+     "remove the jobs that ended first until all jobs together have at most N bytes",
+     offsetof(struct cli_args, max_bytes)},
+    {OPT_YES, 0, "yes", NULL, "remove them; without this nothing is removed", offsetof(struct cli_args, yes)},
     {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")",
      offsetof(struct cli_args, server)},
     {OPT_TOKEN, 0, "token-file", "FILE", "file with the access token (default: SELVEDGE_TOKEN_FILE, SELVEDGE_TOKEN)",

@@ -25,6 +25,9 @@ enum cli_command_id {
     CLI_DELETE,
     CLI_WATCH_FOLDER,
     CLI_TOKEN,
+    CLI_KEEP,
+    CLI_UNKEEP,
+    CLI_RETENTION,
     CLI_N_COMMAND
 };
 
@@ -46,7 +49,8 @@ struct cli_args {
     const char *marker;    /* --marker */
     const char *quiet_s;   /* --quiet */
     const char *scope, *owner, *requests, *bytes, *jobs; /* of a token to be made */
-    bool watch, json, follow, draft, align, once;
+    const char *max_age, *max_bytes;                     /* of retention */
+    bool watch, json, follow, draft, align, once, yes;
     bool help; /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;

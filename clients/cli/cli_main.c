@@ -35,6 +35,9 @@ static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) =
     [CLI_DELETE] = cli_delete,
     [CLI_WATCH_FOLDER] = cli_watch_folder,
     [CLI_TOKEN] = cli_token,
+    [CLI_KEEP] = cli_keep,
+    [CLI_UNKEEP] = cli_unkeep,
+    [CLI_RETENTION] = cli_retention,
 };
 
 static void print_error(const struct error *err)

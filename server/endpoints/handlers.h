@@ -42,6 +42,12 @@ void handle_revoke_token(struct http_request *r);
 void handle_get_session(struct http_request *r);
 void handle_sign_in(struct http_request *r);
 void handle_sign_out(struct http_request *r);
+/* handle_retention.c */
+void handle_plan_retention(struct http_request *r);
+void handle_remove_by_retention(struct http_request *r);
+void handle_list_removals(struct http_request *r);
+void handle_keep_job(struct http_request *r);
+void handle_unkeep_job(struct http_request *r);
 /* handle_service.c */
 void handle_about(struct http_request *r);
 void handle_options(struct http_request *r);

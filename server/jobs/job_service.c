@@ -111,9 +111,17 @@ out:
 
 status job_delete(struct job_service *v, const char *id, struct error *err)
 {
+    return job_remove(v, id, NULL, NULL, err);
+}
+
+status job_remove(struct job_service *v, const char *id,
+                  status (*may_remove)(void *context, const struct job_row *row, struct error *err), void *context,
+                  struct error *err)
+{
     struct job_row row;
     pthread_mutex_lock(&v->change);
     status s = job_get(v, id, &row, err);
+    if (s == STATUS_OK && may_remove != NULL) s = may_remove(context, &row, err);
     if (s == STATUS_OK) {
         row.deleted = true;
         s = job_update_surely(v, &row, err);

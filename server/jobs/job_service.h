@@ -65,6 +65,10 @@ status job_retry(struct job_service *v, const char *id, const int64_t *priority,
                  struct job_refusal *refusal, struct error *err);
 status job_cancel(struct job_service *v, const char *id, bool *changed, struct error *err);
 status job_delete(struct job_service *v, const char *id, struct error *err);
+/* The same if may_remove returns STATUS_OK. It receives the job, which does not change until it is removed. */
+status job_remove(struct job_service *v, const char *id,
+                  status (*may_remove)(void *context, const struct job_row *row, struct error *err), void *context,
+                  struct error *err);
 
 /* Reads a job that exists and is not a tombstone. The caller releases the row. STATUS_NOT_FOUND. */
 status job_get(struct job_service *v, const char *id, struct job_row *row, struct error *err);

@@ -4,6 +4,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "server/jobs/job_paths.h"
+#include "server/retention/job_keep.h"
 #include "server/workers/attempt.h"
 
 #include <sodium.h>
@@ -135,6 +136,7 @@ static status put_details(struct job_service *v, const struct job_row *row, json
     json_object_update(out, files);
     json_decref(files);
     char identity[80];
+    json_object_set_new(out, "kept", json_boolean(job_is_kept(v, row->id)));
     json_object_set_new(out, "result_url", result_url(v, row, identity, sizeof identity));
     return STATUS_OK;
 }

@@ -171,6 +171,11 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
     call("retryJob", "POST", f"/v1/jobs/{other}/retry")
     call("deleteJob", "DELETE", f"/v1/jobs/{draft}")
     call("listDeliveries", "GET", "/v1/deliveries")
+    call("keepJob", "PUT", f"/v1/jobs/{job}/keep")
+    call("unkeepJob", "DELETE", f"/v1/jobs/{job}/keep")
+    call("planRetention", "GET", "/v1/retention?max_bytes=1")
+    call("removeByRetention", "POST", "/v1/retention", json={"jobs": [job, "nonsense"]})
+    call("listRemovals", "GET", "/v1/removals")
     for operation, path in [("about", "/v1/about"), ("options", "/v1/options"), ("openapi", "/v1/openapi.json"),
                             ("livez", "/livez"), ("readyz", "/readyz"), ("metrics", "/metrics")]:
         call(operation, "GET", path)

@@ -62,3 +62,10 @@ def test_unit_is_valid_and_hardened(prefix):
     assert said.returncode == 0 and said.stderr == "", said.stderr
     said = subprocess.run(["systemd-analyze", "security", "--no-pager", "--offline=true", unit], capture_output=True, text=True, timeout=60)
     assert float(re.search(r"exposure level for \S+ ([0-9.]+)", said.stdout).group(1)) <= 2.0, said.stdout
+
+
+def test_metrics_that_the_documents_name_exist(daemon):
+    with open(os.path.join(ROOT, "docs", "operating.md"), encoding="utf-8") as text:
+        named = set(re.findall(r"\b(?:selvedge|process)_[a-z_]+_(?:total|bytes|seconds|connections)\b|\bselvedge_jobs\b", text.read()))
+    there = set(re.findall(r"^# TYPE (\S+)", daemon.get("/metrics").text, flags=re.M))
+    assert len(named) >= 6 and named <= there, named - there
