@@ -63,3 +63,31 @@ $(BUILD)/man/%.1: $(BUILD)/bin/%
 $(BUILD)/man/%.8: $(BUILD)/bin/%
 	@mkdir -p $(@D)
 	@help2man --no-info --section=8 --name="$(purpose_$*)" --output=$@ $<
+
+# ---- the Debian package, built from the files of the tree in a copy of it
+VERSION := $(shell sed -n 's/^\#define SELVEDGE_VERSION "\(.*\)"/\1/p' base/version.h)
+# higher than that of the package before; a release has VERSION itself
+DEB_VERSION ?= $(VERSION)
+DEB_SOURCE := build/deb/selvedge
+DEB_DATE := $(shell git log -1 --format=%cD 2>/dev/null || date -R)
+
+deps-package:
+	@./config/install-dependencies package
+
+# WITHOUT_DEPS=1: packages are not installed here, for machines whose administrator does that
+deb: $(if $(WITHOUT_DEPS),,deps-package) ## build the Debian package build/deb/selvedge_VERSION_ARCH.deb, and check it by lintian
+	@mkdir -p $(DEB_SOURCE)
+	@find $(DEB_SOURCE) -mindepth 1 -maxdepth 1 ! -name build -exec rm -rf {} +
+	@git ls-files -z --cached --others --exclude-standard | tar --create --null --files-from=- --ignore-failed-read | \
+		tar --extract --directory=$(DEB_SOURCE)
+	@cp -r config/debian $(DEB_SOURCE)/debian
+	@mkdir -p $(DEB_SOURCE)/debian/source && echo "3.0 (native)" > $(DEB_SOURCE)/debian/source/format
+	@printf 'selvedge (%s) unstable; urgency=medium\n\n  * /usr/share/doc/selvedge/CHANGELOG.md lists the changes.\n\n -- %s  %s\n' \
+		"$(DEB_VERSION)" "$$(sed -n 's/^Maintainer: //p' config/debian/control)" "$(DEB_DATE)" > $(DEB_SOURCE)/debian/changelog
+	@cd $(DEB_SOURCE) && dpkg-buildpackage --build=binary --no-sign --no-pre-clean
+	@cd build/deb && lintian --fail-on error,warning --display-info selvedge_$(DEB_VERSION)_*.changes
+	@ls -l build/deb/selvedge_$(DEB_VERSION)_*.deb
+
+# minutes: a chroot is made and packages are downloaded
+test-deb: deb      ## the Debian package in a fresh Debian 12: install, run a job, upgrade, remove, purge (as root; some minutes)
+	@/usr/bin/python3 tests/package/deb_lifecycle.py
