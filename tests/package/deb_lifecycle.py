@@ -77,7 +77,7 @@ class Chroot:
         self.run("install", "-d", "-m", "700", "-o", user, "-g", user, "/" + DATA)
         with open(self.path.parent / "daemon.log", "ab") as log:
             process = subprocess.Popen(["chroot", f"--userspec={user}:{user}", self.path, *command], stdout=subprocess.PIPE, stderr=log, text=True,
-                                       env={"PATH": "/usr/bin:/bin", "LC_ALL": "C.UTF-8"})
+                                       env={"PATH": "/usr/sbin:/usr/bin:/bin", "LC_ALL": "C.UTF-8"})
         try:
             line = process.stdout.readline()
             assert line.startswith("selvedged listens on "), f"no start; see {self.path.parent / 'daemon.log'}"
