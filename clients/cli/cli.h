@@ -41,6 +41,7 @@ status cli_unkeep(struct cli *cli, int *exit_code, struct error *err);
 status cli_retention(struct cli *cli, int *exit_code, struct error *err);
 
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
+status cli_render(struct cli *cli, int *exit_code, struct error *err);
 status cli_watch_folder(struct cli *cli, int *exit_code, struct error *err);
 status cli_token(struct cli *cli, int *exit_code, struct error *err);
 /* Reads the first line of a file that other users cannot read: *token, which the caller frees. STATUS_INVALID,

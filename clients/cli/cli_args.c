@@ -33,7 +33,8 @@ enum {
     OPT_JOBS = 8388608,
     OPT_MAX_AGE = 16777216,
     OPT_MAX_BYTES = 33554432,
-    OPT_YES = 67108864
+    OPT_YES = 67108864,
+    OPT_PICTURE = 134217728 /* each of several */
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
@@ -60,6 +61,11 @@ static const struct cli_command {
          "geometry; a later job goes on from it (\"geometry\": {\"job\": ID} in its document). The results go to the\n"
          "folder of --out (default: selvedge-ID).\n",
          OPT_VOXEL | OPT_AXES | OPT_ALIGN | OPT_OUT | OPT_ID_FILE, "a scan"},
+    [CLI_RENDER] =
+        {"render", "ID", "show the cloth of a finished job on a surface, and download the picture",
+         "A job of its own renders the job's fibers with the fitted parameters, fiber by fiber. The results go to the\n"
+         "folder of --out (default: selvedge-ID): pictures/on-1.png, and on-1.exr with the radiance.\n",
+         OPT_PICTURE | OPT_OUT | OPT_ID_FILE},
     [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
     [CLI_WATCH] =
         {"watch", "ID", "follow a job until it ends",
@@ -127,6 +133,20 @@ static const struct cli_option {
      offsetof(struct cli_args, axes)},
     {OPT_ALIGN, 0, "align", NULL, "turn weft and warp to x and y, and crop to what repeats",
      offsetof(struct cli_args, align)},
+    {OPT_PICTURE, 0, "on", "SURFACE", "flat, cylinder, or a mesh NAME.obj with texture coordinates (default: cylinder)",
+     offsetof(struct cli_args, on)},
+    {OPT_PICTURE, 0, "lamp", "THETA,PHI", "angles of the lamp in degrees (default: 45,0; docs/sample-preparation.md)",
+     offsetof(struct cli_args, lamp)},
+    {OPT_PICTURE, 0, "camera", "THETA,PHI", "angles of the camera (default: 30,180)",
+     offsetof(struct cli_args, camera)},
+    {OPT_PICTURE, 0, "px", "N", "width and height of the picture (default: 512)", offsetof(struct cli_args, px)},
+    {OPT_PICTURE, 0, "samples", "N", "paths of a pixel (default: 16)", offsetof(struct cli_args, samples)},
+    {OPT_PICTURE, 0, "width-mm", "MM", "width of what it shows (default: 40)", offsetof(struct cli_args, width_mm)},
+    {OPT_PICTURE, 0, "size-mm", "MM", "edge of the flat piece, length of the cylinder (default: 40)",
+     offsetof(struct cli_args, size_mm)},
+    {OPT_PICTURE, 0, "radius-mm", "MM", "radius of the cylinder (default: 15)", offsetof(struct cli_args, radius_mm)},
+    {OPT_PICTURE, 0, "mesh-unit-mm", "MM", "length of a unit of the mesh (default: 1)",
+     offsetof(struct cli_args, mesh_unit_mm)},
     {OPT_TEMPLATE, 0, "template", "JOB.json",
      "job document of samples that have no job.json; '*' in names of files is filled in",
      offsetof(struct cli_args, template)},
@@ -270,13 +290,19 @@ static status take_word(struct cli_args *a, const char *word, struct error *err)
     return STATUS_OK;
 }
 
+static bool is_given(const struct cli_args *a, const struct cli_option *o)
+{
+    const void *at = (const char *)a + o->at;
+    return o->value != NULL ? *(const char *const *)at != NULL : *(const bool *)at;
+}
+
 /* Options and operands must belong to the command. */
 static status check(const struct cli_args *a, int given, struct error *err)
 {
     const struct cli_command *c = &command_table[a->command];
     int foreign = given & ~(c->option | OPT_EVERYWHERE | OPT_VERSION);
     for (size_t i = 0; i < N_OPTION; i++)
-        if (foreign & option_table[i].bit)
+        if ((foreign & option_table[i].bit) != 0 && is_given(a, &option_table[i]))
             return error_set(err, STATUS_INVALID, "'selvedge %s' has no option '--%s'", c->name, option_table[i].name);
     bool may_lack = a->command == CLI_SUBMIT && a->resume_id != NULL;
     if (c->operand != NULL && a->operand == NULL && !may_lack)

@@ -24,6 +24,7 @@ static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) =
     [CLI_SUBMIT] = cli_submit,
     [CLI_CHECK] = cli_check,
     [CLI_RECONSTRUCT] = cli_reconstruct,
+    [CLI_RENDER] = cli_render,
     [CLI_STATUS] = cli_status,
     [CLI_WATCH] = cli_watch,
     [CLI_LIST] = cli_list,

@@ -42,11 +42,6 @@ void job_document_free(struct job_document *doc)
     free(doc);
 }
 
-bool job_document_geometry_only(const struct job_document *doc)
-{
-    return doc->n_photograph == 0 && doc->measurement_file[0] == '\0';
-}
-
 /* The text as JSON; NULL with an error. */
 static json_t *read_json(const char *text, size_t n_bytes, struct error *err)
 {

@@ -35,6 +35,7 @@ struct job_model {
     char id[64];
     double fixed[JOB_MAX_PARAM], start[JOB_MAX_PARAM]; /* file units, one value for each parameter; NaN: not given */
     struct job_fit_option option;
+    int first_free; /* the first parameter that neither "fixed" nor "tied" holds; -1: all are held */
 };
 
 enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
@@ -198,8 +199,12 @@ struct job_document {
  * job_document_free. */
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
-/* Whether the job ends with the geometry of its scan, because it has neither photographs nor measurements. */
+/* Whether the job has photographs or a table of measurements, so that there is something to fit. */
+bool job_document_has_rows(const struct job_document *doc);
+/* Whether a job without rows ends with the geometry of its scan, or renders pictures of its cloth with the parameters
+ * that the document holds fixed. */
 bool job_document_geometry_only(const struct job_document *doc);
+bool job_document_pictures_only(const struct job_document *doc);
 
 /* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text
  * too. */
@@ -207,7 +212,8 @@ void job_cloth_name_field(struct error *err);
 
 struct param_info;
 /* Bounds, start and fixed flag of each parameter of a model, with ties, bounds and priors taken into account. out has
- * n_param elements. Returns STATUS_INVALID with the field at fault when they contradict each other. */
+ * n_param elements; all of them may be fixed. Returns STATUS_INVALID with the field at fault when they contradict each
+ * other. */
 status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
                        struct job_fit_parameter *out, struct error *err);
 

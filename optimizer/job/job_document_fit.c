@@ -166,19 +166,12 @@ static status check_radius(const struct model_info *const *model, const struct j
                : STATUS_OK;
 }
 
-static status check_free_parameters(const struct model_info *m, const struct job_model *given, struct error *err)
+static status check_starts(const struct model_info *m, const struct job_model *given, struct error *err)
 {
-    size_t n_free = 0;
-    for (size_t p = 0; p < m->n_param; p++) {
-        bool fixed = !isnan(given->fixed[p]);
-        if (fixed && !isnan(given->start[p]))
+    for (size_t p = 0; p < m->n_param; p++)
+        if (!isnan(given->fixed[p]) && !isnan(given->start[p]))
             return error_set_field(err, STATUS_INVALID, "fit.start",
                                    "'fit.start' has '%s', which 'fit.fixed' holds fixed", m->param[p].name);
-        if (!fixed) n_free++;
-    }
-    if (n_free == 0)
-        return error_set_field(err, STATUS_INVALID, "fit.fixed",
-                               "'fit.fixed' holds every parameter of model '%s': leave at least one free", m->id);
     return STATUS_OK;
 }
 
@@ -209,8 +202,7 @@ static status parse_parameters(const struct json_field *f, const struct model_in
     if (s == STATUS_OK) s = parse_values(f, false, model, doc, err);
     if (s == STATUS_OK) s = set_density(f, model, doc, err);
     if (s == STATUS_OK) s = check_radius(model, doc, err);
-    for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
-        s = check_free_parameters(model[i], &doc->model[i], err);
+    for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++) s = check_starts(model[i], &doc->model[i], err);
     return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
 }
 

@@ -249,7 +249,11 @@ status job_parse_fit_options(const struct json_field *f, const struct model_info
     if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
     if (s == STATUS_OK) s = share_common(doc, err);
     if (s == STATUS_OK) s = check_method(doc, err);
-    for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++)
+    for (size_t i = 0; i < doc->n_model && s == STATUS_OK; i++) {
         s = job_fit_resolve(model[i]->param, model[i]->n_param, &doc->model[i], resolved, err);
+        doc->model[i].first_free = -1;
+        for (size_t p = model[i]->n_param; p-- > 0 && s == STATUS_OK;)
+            if (!resolved[p].fixed) doc->model[i].first_free = (int)p;
+    }
     return s;
 }

@@ -154,7 +154,6 @@ static status resolve_group(const struct param_info *info, size_t n_param, const
 status job_fit_resolve(const struct param_info *info, size_t n_param, const struct job_model *given,
                        struct job_fit_parameter *out, struct error *err)
 {
-    size_t n_free = 0;
     if (n_param > JOB_MAX_PARAM)
         return error_set_field(err, STATUS_INVALID, "fit.model", "model '%s' has %zu parameters: allowed are %d",
                                given->id, n_param, JOB_MAX_PARAM);
@@ -163,10 +162,5 @@ status job_fit_resolve(const struct param_info *info, size_t n_param, const stru
         status s = resolve_group(info, n_param, given, p, out, err);
         if (s != STATUS_OK) return s;
     }
-    for (size_t p = 0; p < n_param; p++) n_free += !out[p].fixed;
-    if (n_free > 0) return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, "fit.fixed",
-                           "'fit.fixed' and 'fit.tied' together hold every parameter of model '%s': leave at least one "
-                           "free",
-                           given->id);
+    return STATUS_OK;
 }

@@ -13,19 +13,20 @@ struct stage_code {
     status (*run)(struct pipeline_context *c, struct error *err);
     status (*load)(struct pipeline_context *c, struct error *err); /* NULL: the stage is cheap, or always runs */
     bool of_volume;                                                /* skipped when the job gives fibers */
-    bool of_fit;                                                   /* skipped when the job ends with the geometry */
+    bool of_scene;                                                 /* skipped when the job ends with the geometry */
+    bool of_fit;                                                   /* skipped when the job has no measurements */
 };
 
 /* In the order of pipeline_stage_table (a test compares the names). */
 static const struct stage_code stage_code[] = {
-    {"volume", stage_volume, stage_volume_load, true, false},
-    {"orientation", stage_orientation, stage_orientation_load, true, false},
-    {"fibers", stage_fibers, stage_fibers_load, false, false},
-    {"directions", stage_directions, stage_directions_load, true, false},
-    {"scene", stage_scene, NULL, false, true},
-    {"fit", stage_fit, stage_fit_load, false, true},
-    {"validation", stage_validation, stage_validation_load, false, true},
-    {"report", stage_report, NULL, false, false},
+    {"volume", stage_volume, stage_volume_load, .of_volume = true},
+    {"orientation", stage_orientation, stage_orientation_load, .of_volume = true},
+    {"fibers", stage_fibers, stage_fibers_load},
+    {"directions", stage_directions, stage_directions_load, .of_volume = true},
+    {"scene", stage_scene, NULL, .of_scene = true},
+    {"fit", stage_fit, stage_fit_load, .of_scene = true, .of_fit = true},
+    {"validation", stage_validation, stage_validation_load, .of_scene = true, .of_fit = true},
+    {"report", stage_report, NULL},
 };
 
 static void report_fraction(void *context, double fraction)
@@ -57,7 +58,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
             *loaded = true;
             return STATUS_OK;
         }
-        if (c->doc->geometry_job[0] != '\0' && !code->of_fit)
+        if (c->doc->geometry_job[0] != '\0' && !code->of_scene)
             return job_option_name_field(pipeline_geometry_lost(c, why.text, err), err);
         log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
     }
@@ -74,7 +75,8 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
 static bool is_skipped(const struct pipeline_context *c, size_t i)
 {
     return (stage_code[i].of_volume && !c->doc->has_volume) ||
-           (stage_code[i].of_fit && job_document_geometry_only(c->doc));
+           (stage_code[i].of_scene && job_document_geometry_only(c->doc)) ||
+           (stage_code[i].of_fit && !job_document_has_rows(c->doc));
 }
 
 status pipeline_run(struct pipeline_context *c, struct error *err)

@@ -208,10 +208,28 @@ static status read_document(struct pipeline_context *c, struct error *err)
     return s;
 }
 
+/* Of a job that fits nothing: the parameters are those that the document holds fixed. */
+static status take_values(struct pipeline_context *c, struct error *err)
+{
+    struct pipeline_model *m = c->model;
+    status s = pipeline_cloth_inputs(c, err);
+    if (s == STATUS_OK && c->number.n > 0)
+        s = error_set_field(err, STATUS_INVALID, OPTION_CLOTH,
+                            "numbers of the cloth are to be fitted, which needs photographs: give their values");
+    for (size_t p = 0; p < m->sets.info.n_param; p++) {
+        m->fit.param[p] = m->parameter[p].start;
+        m->fit.uncertainty.se_param[p] = NAN;
+        m->fit.uncertainty.determined[p] = true;
+    }
+    if (s == STATUS_OK) s = claim_inputs(c, err);
+    return s == STATUS_OK ? load_environment(c, err) : s;
+}
+
 static status read_rows(struct pipeline_context *c, struct error *err)
 {
     if (job_document_geometry_only(c->doc)) return claim_inputs(c, err);
     status s = set_models(c, err);
+    if (s == STATUS_OK && job_document_pictures_only(c->doc)) return take_values(c, err);
     if (s == STATUS_OK) s = pipeline_read_texture(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_inputs(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);

@@ -103,7 +103,7 @@ static status make_grid(struct job_document *doc, struct error *err)
 status job_check_export(const struct option_value *v, struct error *err)
 {
     const bool *wanted = v->target;
-    if (!*wanted || v->doc->n_photograph > 0 || v->doc->measurement_file[0] != '\0') return STATUS_OK;
+    if (!*wanted || job_document_has_rows(v->doc)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
 }
@@ -111,9 +111,6 @@ status job_check_export(const struct option_value *v, struct error *err)
 status job_check_pictures(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
-    if (doc->n_photograph == 0 && doc->measurement_file[0] == '\0')
-        return error_set_field(err, STATUS_INVALID, v->path,
-                               "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
     for (size_t i = 0; i < doc->n_surface_picture; i++) {
         const struct job_surface_picture *p = &doc->surface_picture[i];
         char field[64];

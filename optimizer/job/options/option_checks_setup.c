@@ -170,22 +170,74 @@ static status check_one_cloth(const struct option_value *v, struct error *err)
         "file ('fibers') or a description ('cloth')");
 }
 
+/* Of a job without photographs and measurements: it ends with the geometry of a scan, or renders pictures. */
+static status check_no_measurement(const struct option_value *v, struct error *err)
+{
+    static const char missing[] = "'photographs' is missing: ";
+    bool pictures = given(v, "pictures");
+    if (!given(v, "volume") && !pictures)
+        return error_set_field(err, STATUS_INVALID, "photographs",
+                               "%sgive a list of photographs, or 'measurements' with a table", missing);
+    if (given(v, "correction") || (given(v, "fit") && !pictures))
+        return error_set_field(err, STATUS_INVALID, "photographs",
+                               "%s'%s' is given, so the job fits, and needs a list of photographs, or 'measurements' "
+                               "with a table; without all of them the job ends with the geometry of the scan",
+                               missing, given(v, "correction") ? "correction" : "fit");
+    return STATUS_OK;
+}
+
 static status check_one_measurement(const struct option_value *v, struct error *err)
 {
     if (given(v, "measurements") && given(v, "photographs"))
         return error_set_field(err, STATUS_INVALID, "photographs",
                                "'measurements' and 'photographs' are both given: a job takes one of them");
-    if (given(v, "measurements") || given(v, "photographs")) return STATUS_OK;
-    if (!given(v, "volume"))
-        return error_set_field(err, STATUS_INVALID, "photographs",
-                               "'photographs' is missing: give a list of photographs, or 'measurements' with a table");
-    for (int i = 0; i < 2; i++)
-        if (given(v, i == 0 ? "fit" : "correction"))
-            return error_set_field(err, STATUS_INVALID, "photographs",
-                                   "'photographs' is missing: '%s' is given, so the job fits, and needs a list of "
-                                   "photographs, or 'measurements' with a table; without all of them the job ends with "
-                                   "the geometry of the scan",
-                                   i == 0 ? "fit" : "correction");
+    return given(v, "measurements") || given(v, "photographs") ? STATUS_OK : check_no_measurement(v, err);
+}
+
+/* Pictures without a fit show the parameters that the document holds fixed. */
+static status check_values_shown(const struct option_value *v, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    const struct job_model *m = &doc->model[0];
+    struct model_sets sets;
+    if (!given(v, "fit"))
+        return error_set_field(err, STATUS_INVALID, "pictures",
+                               "'pictures' needs 'photographs' or 'measurements', to which a model is fitted, or its "
+                               "parameters: give 'fit.model' and 'fit.fixed'");
+    if (doc->n_model > 1)
+        return error_set_field(err, STATUS_INVALID, "fit.models",
+                               "'fit.models' has %zu models, but pictures without photographs show one: give "
+                               "'fit.model'",
+                               doc->n_model);
+    if (doc->fit_radius || doc->fit_density)
+        return error_set_field(err, STATUS_INVALID, doc->fit_radius ? "fit.fit_radius" : "fit.fit_density",
+                               "'%s' needs photographs", doc->fit_radius ? "fit.fit_radius" : "fit.fit_density");
+    const struct model_info *info = model_catalogue_find(m->id);
+    status s = model_sets_init(&sets, info, doc->group, doc->n_group, err);
+    if (s != STATUS_OK) return s;
+    if (info->kind != MODEL_SURFACE)
+        return error_set_field(err, STATUS_INVALID, "fit.model",
+                               "'fit.model' is '%s', a volume model: pictures show the fibers of surface models",
+                               m->id);
+    if (m->first_free >= 0)
+        return error_set_field(err, STATUS_INVALID, "fit.fixed",
+                               "'fit.fixed' lacks '%s': pictures without photographs show the values that it has for "
+                               "every parameter of '%s'",
+                               sets.info.param[m->first_free].name, m->id);
+    return STATUS_OK;
+}
+
+/* A fit needs something to find. */
+static status check_free(const struct option_value *v, struct error *err)
+{
+    const struct job_document *doc = v->doc;
+    if (job_document_pictures_only(doc)) return check_values_shown(v, err);
+    for (size_t i = 0; i < doc->n_model; i++)
+        if (doc->model[i].first_free < 0)
+            return error_set_field(err, STATUS_INVALID, "fit.fixed",
+                                   "'fit.fixed' and 'fit.tied' together hold every parameter of model '%s': leave at "
+                                   "least one free",
+                                   doc->model[i].id);
     return STATUS_OK;
 }
 
@@ -279,6 +331,7 @@ status job_check_document(const struct option_value *v, struct error *err)
 {
     status s = check_one_cloth(v, err);
     if (s == STATUS_OK) s = check_one_measurement(v, err);
+    if (s == STATUS_OK) s = check_free(v, err);
     if (s == STATUS_OK) s = check_density(v->doc, err);
     return s == STATUS_OK ? check_files(v->doc, err) : s;
 }

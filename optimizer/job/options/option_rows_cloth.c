@@ -12,6 +12,11 @@ static const char *const none_auto[] = {"none", "auto", NULL};
 #define ONE_OF(a, b) "{\"oneOf\": [" REQUIRED(a) ", " REQUIRED(b) "]}"
 #define NONE_OF_FOUR(a, b, c, d)                                                                                       \
     "{\"not\": {\"anyOf\": [" REQUIRED(a) ", " REQUIRED(b) ", " REQUIRED(c) ", " REQUIRED(d) "]}}"
+/* A job of pictures only: parameters that are given, without photographs. */
+#define PICTURES_ONLY                                                                                                  \
+    "{\"allOf\": [{\"required\": [\"pictures\", \"fit\"]}, "                                                           \
+    "{\"not\": {\"anyOf\": [" REQUIRED("measurements") ", " REQUIRED("photographs") ", " REQUIRED(                     \
+        "correction") "]}}]}"
 /* A job of geometry only: a scan without photographs. */
 #define GEOMETRY_ONLY                                                                                                  \
     "{\"allOf\": [" REQUIRED("volume") ", " NONE_OF_FOUR("measurements", "photographs", "fit", "correction") "]}"
@@ -21,7 +26,7 @@ const struct job_option option_rows_cloth[] = {
      .kind = OPTION_SECTION,
      .check = job_check_document,
      .schema = "{\"allOf\": [" ONE_OF_FOUR("volume", "geometry", "fibers", "cloth") ", {\"anyOf\": [" ONE_OF(
-         "measurements", "photographs") ", " GEOMETRY_ONLY "]}]}",
+         "measurements", "photographs") ", " GEOMETRY_ONLY ", " PICTURES_ONLY "]}]}",
      .meaning = "Units, defaults and meaning: docs/sample-preparation.md, section 4. The daemon checks every field and "
                 "names the one at fault."},
     {.path = "sample",
@@ -38,7 +43,8 @@ const struct job_option option_rows_cloth[] = {
      INTO(has_volume),
      .check = job_check_volume,
      .left_out = "this, `geometry`, `fibers` or `cloth`",
-     .meaning = "The cloth as a micro-CT scan. Without photographs and measurements the job ends with the geometry."},
+     .meaning = "The cloth as a micro-CT scan. Without photographs, measurements and pictures the job ends with the "
+                "geometry."},
     {.path = "volume.files",
      .kind = OPTION_FILE_NAMES,
      .id = OPTION_SCAN_FILES,

@@ -154,7 +154,7 @@ void input_check_rows(struct input_check *c)
     struct photograph_process process;
     struct error fault = {0};
     bool usable;
-    if (job_document_geometry_only(c->doc)) return;
+    if (!job_document_has_rows(c->doc)) return;
     photograph_process_init(&process);
     if (c->doc->measurement_file[0] != '\0')
         usable = check_table(c);

@@ -16,7 +16,7 @@
 /* Seconds that a unit takes on one thread of a common processor of 2023, for a machine that has run no job yet: means
  * of the demo's scan and of two real ones, which need up to 1.5 times more or less. */
 static const double read_s_per_voxel = 1e-7, orientation_s_per_voxel = 5e-7, fibers_s_per_voxel = 1e-5,
-                    transfer_s_per_voxel = 4e-7, fit_s_per_path = 9e-6;
+                    transfer_s_per_voxel = 4e-7, fit_s_per_path = 9e-6, render_s_per_path = 6e-6;
 /* Share of the voxels that is material, before the volume is known. */
 static const double usual_material = 0.4;
 /* Of a fit with the budget of its method, the share of the paths that it takes; most take far less or nearly all. Of
@@ -121,6 +121,15 @@ static void plan_after_fit(struct pipeline_context *c, size_t i, size_t i_fit, d
         worker_status_plan_share(c->status, i, own, n_path * of_fit / ((double)c->n_model * fit_paths(c)), i_fit);
 }
 
+static void plan_pictures(struct pipeline_context *c, size_t i)
+{
+    const struct job_clock_work work = {.key = "report.pictures",
+                                        .units = surface_pictures_paths(c) / n_thread(c),
+                                        .usual_s = render_s_per_path,
+                                        .log_sd = sd_of_fit};
+    worker_status_plan(c->status, i, &work);
+}
+
 void pipeline_plan_fit_paths(struct pipeline_context *c, double n_path)
 {
     size_t n_stage;
@@ -147,6 +156,8 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
         plan_fit(c, i);
     else if (strcmp(name, "validation") == 0)
         plan_after_fit(c, i, i - 1, validation_paths(c));
+    else if (strcmp(name, "report") == 0 && job_document_pictures_only(c->doc))
+        plan_pictures(c, i);
     else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
         plan_voxels(c, i, "report.geometry", n_voxel(c), report_s_per_voxel);
     else if (strcmp(name, "report") == 0)

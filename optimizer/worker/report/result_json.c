@@ -355,6 +355,17 @@ status result_geometry_json_write(struct pipeline_context *c, struct error *err)
     return write_result(c, json, err);
 }
 
+status result_pictures_json_write(struct pipeline_context *c, struct error *err)
+{
+    const struct pipeline_model *m = c->model;
+    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I}", "format", 1, "sample", c->doc->sample,
+                             "model", m->appearance.id, "method", "parameters", parameters_json(m), "rows", "models",
+                             "seed", (json_int_t)c->doc->seed);
+    json_object_set(json, "pictures", c->surface_pictures);
+    put_job(json, c);
+    return write_result(c, json, err);
+}
+
 status result_json_write(struct pipeline_context *c, struct error *err)
 {
     picture_name *picture = NULL;

@@ -55,6 +55,8 @@ double result_row_error(const struct pipeline_context *c, const struct pipeline_
 
 /* The same of a job that ends with the geometry: without parameters, rows and models. */
 status result_geometry_json_write(struct pipeline_context *c, struct error *err);
+/* The same of a job that renders given parameters: without rows, models and a method. */
+status result_pictures_json_write(struct pipeline_context *c, struct error *err);
 status result_json_write(struct pipeline_context *c, struct error *err);
 status result_summary_write(struct pipeline_context *c, struct error *err);
 

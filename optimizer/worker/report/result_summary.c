@@ -18,13 +18,14 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
         const struct param_info *info = &m->sets.info.param[p];
         const struct fit_parameter *k = &m->parameter[p];
         const struct uncertainty *u = &m->fit.uncertainty;
-        char allowed[64];
+        char allowed[64], error[32];
         bool begins = info->set != NULL && (p == 0 || info->set != m->sets.info.param[p - 1].set);
         if (begins) fprintf(out, "%s%s\n", p > 0 ? "\n" : "", info->set);
+        snprintf(error, sizeof error, isnan(u->se_param[p]) ? "-" : "%.4f", param_to_file_unit(info, u->se_param[p]));
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
                  param_to_file_unit(info, k->upper), param_unit_name(info->unit));
-        fprintf(out, "%-18s %10.4f %10.4f  %-22s %s%s%s\n", param_own_name(info),
-                param_to_file_unit(info, m->fit.param[p]), param_to_file_unit(info, u->se_param[p]), allowed,
+        fprintf(out, "%-18s %10.4f %10s  %-22s %s%s%s\n", param_own_name(info),
+                param_to_file_unit(info, m->fit.param[p]), error, allowed,
                 k->fixed                    ? "fixed "
                 : m->option->leader[p] != p ? "tied "
                                             : "",
@@ -200,6 +201,18 @@ static void print_geometry(struct pipeline_context *c, FILE *out)
     print_warnings(c, out);
 }
 
+/* Of a job that renders given parameters. */
+static void print_pictures(struct pipeline_context *c, FILE *out)
+{
+    const struct pipeline_model *m = c->model;
+    fprintf(out, "%s\n\nmodel    %s (%s), with given parameters: the job has no photographs\n", c->doc->sample,
+            m->appearance.id, m->appearance.title);
+    print_cloth(c, out);
+    print_parameters(m, out);
+    fprintf(out, "\n%zu pictures in the folder pictures\n", c->doc->n_surface_picture);
+    print_warnings(c, out);
+}
+
 status result_summary_write(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
@@ -208,6 +221,8 @@ status result_summary_write(struct pipeline_context *c, struct error *err)
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the summary: out of memory");
     if (job_document_geometry_only(c->doc))
         print_geometry(c, out);
+    else if (job_document_pictures_only(c->doc))
+        print_pictures(c, out);
     else
         print_summary(c, out);
     fclose(out);

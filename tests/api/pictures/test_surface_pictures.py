@@ -101,6 +101,63 @@ def test_bad_pictures_are_refused_at_submission(real, picture, field, word):
     assert word in problem(real.post("/v1/jobs", json=document(picture)), 422, "invalid", field)["detail"]
 
 
-def test_pictures_need_a_fitted_model(real):
-    doc = {"sample": "s", "volume": {"files": ["a.tif"], "voxel_size_um": 1}, "pictures": [{"on": "flat", **VIEW}]}
-    problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures")
+def test_pictures_of_given_parameters(real):
+    """What a fit has found, given as fixed parameters, makes the same picture, but for the noise; nothing is fitted."""
+    flat = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
+    job, done = run(real, document(flat))
+    fitted = done["result"]
+    values = {p["name"]: p["value"] for p in fitted["parameters"]}
+    given = {"sample": "given", "fibers": {"file": "cloth.hair"}, "pictures": [flat], "fit": {"model": "two_lobe.v1", "fixed": values}}
+    second = real.create(given)
+    real.upload(second, "cloth.hair", real.get(f"/v1/jobs/{job}/results/fibers.hair").content, "fibers")
+    assert real.post(f"/v1/jobs/{second}/start").status_code == 202
+    shown = real.wait_state(second, "succeeded", timeout_s=60)["result"]
+    assert shown["model"] == "two_lobe.v1" and shown["method"] is None and shown["rows"] == shown["models"] == []
+    assert {p["name"]: p["value"] for p in shown["parameters"]} == pytest.approx(values, rel=1e-12)
+    assert all(p["fixed"] and p["standard_error"] is None for p in shown["parameters"])
+    wall_s = {s["name"]: s["wall_s"] for s in shown["stages"]}
+    assert wall_s["fit"] is None and wall_s["validation"] is None and wall_s["scene"] is not None
+    a, b = fitted["pictures"][0], shown["pictures"][0]
+    for x, y in zip(a["mean"], b["mean"]):  # 16 x 16 pixels, and the file's rounding of the axes
+        assert abs(x - y) < 5 * math.hypot(a["noise"], b["noise"]) * sum(a["mean"]) / 3 / 16 + 1e-3 * x
+    page = real.get(f"/v1/jobs/{second}/results/report.html").text
+    assert "Given parameters" in page and "The cloth on surfaces" in page and page.count("data:image/png") == 1
+    assert "with given parameters" in real.get(f"/v1/jobs/{second}/results/summary.txt").text
+
+
+def render(real, *words):
+    return subprocess.run([program("selvedge"), "render", *map(str, words)], env=dict(os.environ, SELVEDGE_SERVER=real.url),
+                          capture_output=True, text=True, timeout=120)
+
+
+def test_the_command_renders_a_finished_job(real, tmp_path):
+    job, done = run(real, {k: v for k, v in document().items() if k != "pictures"})
+    (tmp_path / "sheet.obj").write_text(SHEET + "f 1/1 2/2 3/3 4/4\n")
+    shown = render(real, job, "--on", tmp_path / "sheet.obj", "--lamp", "45,0", "--camera", "45,180", "--px", 16, "--samples", 64,
+                   "--width-mm", 3, "--out", tmp_path / "out")
+    assert shown.returncode == 0, shown.stderr
+    picture = json.loads((tmp_path / "out/pictures/on-1.json").read_text())
+    row = next(r for r in done["result"]["rows"] if (r["light_theta_deg"], r["camera_theta_deg"], r["camera_phi_deg"]) == (45, 45, 180))
+    se = picture["noise"] * sum(picture["mean"]) / 3 / 16
+    for mean, rendered, rendered_se in zip(picture["mean"], row["rendered"], row["rendered_se"]):
+        assert abs(mean - rendered) < 5 * math.hypot(se, rendered_se)
+    assert sorted(f for f in os.listdir(tmp_path)) == ["out", "sheet.obj"]
+
+
+def test_what_the_command_refuses(real, tmp_path):
+    draft = real.create(document({"on": "flat", **VIEW}))
+    for words, said in ([draft], "no fitted model"), ([draft, "--on", "sphere"], "NAME.obj"), ([draft, "--lamp", "45"], "such as 45,180"), \
+            ([draft, "--px", "1.5"], "whole number"), ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense"):
+        refused = render(real, *words)
+        assert refused.returncode != 0 and said in refused.stderr, refused.stderr
+
+
+@pytest.mark.parametrize("change, field, word", [
+    ({"fit": None}, "pictures", "fit.fixed"), ({"fit": {"fixed": {"C_R": 0.2}}}, "fit.fixed", "lacks"),
+    ({"fit": {"models": ["two_lobe.v1", "textile.v3"]}}, "fit.models", "show one"),
+    ({"fit": {"model": "microflake.v1"}}, "fit.model", "volume model"), ({"correction": {"radius": {"fit": True}}}, "photographs", "missing"),
+    ({"export": {"mitsuba": True}}, "export.mitsuba", "fitted model")])
+def test_what_pictures_without_photographs_need(real, change, field, word):
+    doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW}], "fit": {"model": "two_lobe.v1"}, **change}
+    doc = {k: v for k, v in doc.items() if v is not None}
+    assert word in problem(real.post("/v1/jobs", json=doc), 422, "invalid", field)["detail"]

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 /* Rows with pictures, and the largest edge of a picture in the page. */
-enum { MAX_ROWS = 64, MAX_EDGE = 160, PNG_LIMIT_BYTES = 4 << 20 };
+enum { MAX_ROWS = 64, MAX_EDGE = 160, MAX_SURFACE_EDGE = 480, PNG_LIMIT_BYTES = 4 << 20 };
 
 static int compare_float(const void *a, const void *b)
 {
@@ -88,14 +88,14 @@ static void subtract(const struct image *photograph, struct image *rendering)
         rendering->pixel[i] = (float)fmax(0.2 + 0.4 * scale * (double)rendering->pixel[i], 0.0);
 }
 
-static size_t edge_of(size_t n) { return n < MAX_EDGE ? n : MAX_EDGE; }
+static size_t least(size_t a, size_t b) { return a < b ? a : b; }
 
 /* Photograph (NULL for a row of a table), rendering and difference of one row. */
 static status put_row(const struct pipeline_context *c, const struct image *photograph, const struct image *rendering,
                       FILE *out, struct error *err)
 {
     struct image small[2] = {{0}, {0}};
-    size_t width = edge_of(rendering->width), height = edge_of(rendering->height);
+    size_t width = least(rendering->width, MAX_EDGE), height = least(rendering->height, MAX_EDGE);
     status s = shrink(rendering, width, height, &small[1], err);
     if (s == STATUS_OK && photograph != NULL) s = shrink(photograph, width, height, &small[0], err);
     if (s == STATUS_OK) {
@@ -144,6 +144,36 @@ status page_pictures(const struct pipeline_context *c, const json_t *rows, FILE 
                                      : "Renderings; the measurements are a table and have no pictures.",
             n_shown, n);
     for (size_t i = 0; i < n_shown && s == STATUS_OK; i++) s = put_figure(c, i, json_array_get(rows, i), out, err);
+    fputs("</div>\n", out);
+    return s;
+}
+
+static status put_surface(const struct pipeline_context *c, const json_t *picture, FILE *out, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct image im, small = {0};
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, page_string(picture, "file"), path);
+    if (image_read_exr(&im, path, (size_t)1 << 28, NULL) != STATUS_OK) return STATUS_OK;
+    status s = shrink(&im, least(im.width, MAX_SURFACE_EDGE), least(im.height, MAX_SURFACE_EDGE), &small, err);
+    fputs("<figure>", out);
+    if (s == STATUS_OK) s = put_image(c, &small, page_number(picture, "png_exposure"), "the cloth", out, err);
+    fputs("<figcaption>", out);
+    page_escaped(page_string(picture, "on"), out);
+    fprintf(out, ", exposure &times; %.3g, noise of a pixel ", page_number(picture, "png_exposure"));
+    page_with_error(json_object_get(picture, "noise"), NULL, 100.0, " %", out);
+    fputs("</figcaption></figure>\n", out);
+    image_release(&small);
+    image_release(&im);
+    return s;
+}
+
+status page_surface_pictures(const struct pipeline_context *c, const json_t *list, FILE *out, struct error *err)
+{
+    size_t i;
+    const json_t *picture;
+    status s = STATUS_OK;
+    fputs("<div class=\"pictures\">\n", out);
+    json_array_foreach(list, i, picture) if (s == STATUS_OK) s = put_surface(c, picture, out, err);
     fputs("</div>\n", out);
     return s;
 }

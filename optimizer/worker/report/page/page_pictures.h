@@ -12,4 +12,7 @@
  * (rendering minus photograph about grey). Pictures that cannot be read are left out. STATUS_NO_MEMORY, STATUS_IO. */
 status page_pictures(const struct pipeline_context *c, const json_t *rows, FILE *out, struct error *err);
 
+/* list: "pictures" of result.json, the cloth on surfaces. Errors as above. */
+status page_surface_pictures(const struct pipeline_context *c, const json_t *list, FILE *out, struct error *err);
+
 #endif

@@ -201,6 +201,17 @@ static status print_fit(struct pipeline_context *c, const json_t *data, FILE *ou
     return s;
 }
 
+/* The cloth on surfaces, and the parameters if they were given. */
+static status print_surfaces(struct pipeline_context *c, const json_t *result, FILE *out, struct error *err)
+{
+    const json_t *list = json_object_get(result, "pictures");
+    if (job_document_pictures_only(c->doc))
+        print_parameters("Given parameters", json_object_get(result, "parameters"), out);
+    if (json_array_size(list) == 0) return STATUS_OK;
+    heading("The cloth on surfaces", out);
+    return page_surface_pictures(c, list, out, err);
+}
+
 static void print_inputs(const json_t *inputs, FILE *out)
 {
     size_t i;
@@ -272,7 +283,8 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
     fputs("The same as data: report.json.</p>\n", out);
     print_verdict(json_object_get(result, "verdict"), out);
     print_warnings(json_object_get(result, "warnings"), out);
-    if (!job_document_geometry_only(c->doc)) s = print_fit(c, data, out, err);
+    if (job_document_has_rows(c->doc)) s = print_fit(c, data, out, err);
+    if (s == STATUS_OK) s = print_surfaces(c, result, out, err);
     print_settings(data, out);
     fputs("</body>\n</html>\n", out);
     return s;

@@ -45,9 +45,25 @@ static status report_geometry(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? report_pdf_write(c, err) : s;
 }
 
+/* Of a job that renders given parameters. */
+static status report_pictures(struct pipeline_context *c, struct error *err)
+{
+    warn_of_overlap(c);
+    report_pdf_warn(c);
+    status s = result_geometry_write(c, err);
+    if (s == STATUS_OK) s = quality_write(c, err);
+    if (s == STATUS_OK) s = surface_pictures_write(c, 0.0, err);
+    if (s == STATUS_OK) pipeline_reach_verdict(c);
+    if (s == STATUS_OK) s = result_pictures_json_write(c, err);
+    if (s == STATUS_OK) s = result_summary_write(c, err);
+    if (s == STATUS_OK) s = report_write(c, err);
+    return s == STATUS_OK ? report_pdf_write(c, err) : s;
+}
+
 status stage_report(struct pipeline_context *c, struct error *err)
 {
     if (job_document_geometry_only(c->doc)) return report_geometry(c, err);
+    if (job_document_pictures_only(c->doc)) return report_pictures(c, err);
     status s = pipeline_certify(c, err);
     if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);

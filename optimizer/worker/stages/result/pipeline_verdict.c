@@ -102,7 +102,7 @@ void pipeline_reach_verdict(struct pipeline_context *c)
                                   .n_input_warning = c->n_input_warning,
                                   .not_determined = not_determined,
                                   .at_bound = at_bound};
-    if (!job_document_geometry_only(c->doc)) {
+    if (job_document_has_rows(c->doc)) {
         const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
         list_parameters(c, best, not_determined, at_bound);
         add_fit(c, best, &facts);

@@ -1,0 +1,175 @@
+/* selvedge render ID: a picture of a finished job's cloth on a surface, as a job of its own. Its document has the
+ * fibers and the fitted parameters of the first job, which is not run again and may be deleted. */
+#include "clients/cli/cli.h"
+
+#include <ftw.h>
+#include <libgen.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char fiber_file[] = "fibers.hair";
+
+/* "30,180": two angles in degrees. */
+static status read_angles(const char *option, const char *text, double fallback_theta, double fallback_phi,
+                          json_t *picture, const char *prefix, struct error *err)
+{
+    double theta = fallback_theta, phi = fallback_phi;
+    char key[64], rest;
+    if (text != NULL && sscanf(text, "%lf,%lf%c", &theta, &phi, &rest) != 2)
+        return error_set(err, STATUS_INVALID, "option '--%s' takes two angles in degrees, such as 45,180: '%s'", option,
+                         text);
+    snprintf(key, sizeof key, "%s_theta_deg", prefix);
+    json_object_set_new(picture, key, json_real(theta));
+    snprintf(key, sizeof key, "%s_phi_deg", prefix);
+    json_object_set_new(picture, key, json_real(phi));
+    return STATUS_OK;
+}
+
+static status read_number(const char *option, const char *text, const char *key, bool whole, json_t *picture,
+                          struct error *err)
+{
+    char *end;
+    if (text == NULL) return STATUS_OK;
+    double value = strtod(text, &end);
+    if (end == text || *end != '\0' || !isfinite(value) || (whole && value != floor(value)))
+        return error_set(err, STATUS_INVALID, "option '--%s' takes a %snumber: '%s'", option, whole ? "whole " : "",
+                         text);
+    json_object_set_new(picture, key, whole ? json_integer((json_int_t)value) : json_real(value));
+    return STATUS_OK;
+}
+
+/* The picture that the command line describes; *mesh is the path of its mesh, or NULL. */
+static status read_picture(const struct cli_args *a, json_t *picture, const char **mesh, struct error *err)
+{
+    const char *on = a->on != NULL ? a->on : "cylinder";
+    bool shape = strcmp(on, "flat") == 0 || strcmp(on, "cylinder") == 0;
+    size_t n = strlen(on);
+    *mesh = shape ? NULL : on;
+    if (!shape && (n < 5 || strcmp(on + n - 4, ".obj") != 0))
+        return error_set(err, STATUS_INVALID, "option '--on' takes flat, cylinder or a mesh NAME.obj: '%s'", on);
+    json_object_set_new(picture, "on", json_string(shape ? on : "mesh"));
+    status s = read_angles("lamp", a->lamp, 45.0, 0.0, picture, "light", err);
+    if (s == STATUS_OK) s = read_angles("camera", a->camera, 30.0, 180.0, picture, "camera", err);
+    if (s == STATUS_OK) s = read_number("px", a->px, "px", true, picture, err);
+    if (s == STATUS_OK) s = read_number("samples", a->samples, "samples", true, picture, err);
+    if (s == STATUS_OK) s = read_number("width-mm", a->width_mm, "width_mm", false, picture, err);
+    if (s == STATUS_OK) s = read_number("size-mm", a->size_mm, "size_mm", false, picture, err);
+    if (s == STATUS_OK) s = read_number("radius-mm", a->radius_mm, "radius_mm", false, picture, err);
+    return s == STATUS_OK ? read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err) : s;
+}
+
+/* The section "fit" of the new document: the model of a result, with its parameters. groups: names of their sets. */
+static json_t *fixed_fit(const json_t *result, json_t *groups)
+{
+    const json_t *list = json_object_get(result, "parameters"), *p;
+    json_t *fixed = json_object();
+    const char *last = NULL;
+    size_t i;
+    json_array_foreach(list, i, p)
+    {
+        const char *set = json_string_value(json_object_get(p, "set"));
+        json_object_set(fixed, json_string_value(json_object_get(p, "name")), json_object_get(p, "value"));
+        if (set != NULL && (last == NULL || strcmp(last, set) != 0)) json_array_append_new(groups, json_string(set));
+        last = set;
+    }
+    return json_pack("{s:O, s:o}", "model", json_object_get(result, "model"), "fixed", fixed);
+}
+
+/* Sections that a picture shares with the photographs. */
+static void copy_light(const json_t *from, json_t *to)
+{
+    static const char *const key[] = {"lamp", "black_sheet"};
+    for (size_t i = 0; i < sizeof key / sizeof *key; i++)
+        if (json_object_get(from, key[i]) != NULL) json_object_set(to, key[i], json_object_get(from, key[i]));
+    const json_t *camera = json_object_get(from, "camera");
+    static const char *const of_camera[] = {"distance_cm", "far_field"};
+    for (size_t i = 0; i < sizeof of_camera / sizeof *of_camera; i++)
+        if (json_object_get(camera, of_camera[i]) != NULL) {
+            if (json_object_get(to, "camera") == NULL) json_object_set_new(to, "camera", json_object());
+            json_object_set(json_object_get(to, "camera"), of_camera[i], json_object_get(camera, of_camera[i]));
+        }
+}
+
+static status make_document(const json_t *job, json_t *picture, json_t **out, struct error *err)
+{
+    const json_t *result = json_object_get(job, "result"), *from = json_object_get(job, "document");
+    const char *id = json_string_value(json_object_get(job, "id")),
+               *sample = json_string_value(json_object_get(job, "sample"));
+    char name[200];
+    if (json_array_size(json_object_get(result, "parameters")) == 0)
+        return error_set(err, STATUS_INVALID, "job %s has no fitted model to show (its state is %s)", id,
+                         json_string_value(json_object_get(job, "state")));
+    json_t *groups = json_array(), *fibers = json_pack("{s:s}", "file", fiber_file);
+    json_t *fit = fixed_fit(result, groups);
+    if (json_array_size(groups) > 1) json_object_set(fibers, "groups", groups);
+    json_decref(groups);
+    snprintf(name, sizeof name, "%.*s on %s", 150, sample, json_string_value(json_object_get(picture, "on")));
+    json_t *d = json_pack("{s:s, s:o, s:o, s:[O]}", "sample", name, "fibers", fibers, "fit", fit, "pictures", picture);
+    if (d == NULL) /* the name was cut inside of a character */
+        return error_set(err, STATUS_INVALID, "the result of job %s cannot be used", id);
+    copy_light(from, d);
+    *out = d;
+    return STATUS_OK;
+}
+
+static int remove_entry(const char *path, const struct stat *st, int kind, struct FTW *at)
+{
+    (void)st, (void)kind, (void)at;
+    return remove(path);
+}
+
+/* Puts the fibers of the job and the mesh into a folder, from which they are uploaded. */
+static status gather_files(struct cli *cli, const char *id, const char *mesh, const char *folder, json_t *picture,
+                           struct error *err)
+{
+    char url[256], path[4096], target[4096];
+    status s = cli_job_path(id, "/results/fibers.hair", url, sizeof url, err);
+    snprintf(path, sizeof path, "%s/%s", folder, fiber_file);
+    if (s == STATUS_OK) s = http_download(cli->http, url, path, NULL, NULL, err);
+    if (s != STATUS_OK || mesh == NULL) return s;
+    snprintf(target, sizeof target, "%s", mesh);
+    const char *name = basename(target);
+    json_object_set_new(picture, "mesh_file", json_string(name));
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    char whole[4096];
+    if (realpath(mesh, whole) == NULL) return error_set_errno(err, "cannot read the mesh '%s'", mesh);
+    return symlink(whole, path) == 0 ? STATUS_OK : error_set_errno(err, "cannot use the mesh '%s'", mesh);
+}
+
+/* Submits the job of the picture and waits for it. */
+static status render(struct cli *cli, const json_t *document, const char *folder, int *exit_code, struct error *err)
+{
+    char id[CLI_ID_BYTES] = "";
+    status s = cli_submit_document(cli, document, folder, id, err);
+    if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
+    if (s != STATUS_OK && id[0] != '\0')
+        fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
+    return s;
+}
+
+status cli_render(struct cli *cli, int *exit_code, struct error *err)
+{
+    const char *mesh = NULL, *temporary = getenv("TMPDIR");
+    char path[256], folder[4000];
+    json_t *picture = json_object(), *job = NULL, *document = NULL;
+    status s = read_picture(cli->args, picture, &mesh, err);
+    if (s == STATUS_OK) s = cli_job_path(cli->args->operand, "", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &job, err);
+    if (s == STATUS_OK) s = cli_add_result(cli, job, err);
+    snprintf(folder, sizeof folder, "%s/selvedge-render-XXXXXX", temporary != NULL ? temporary : "/tmp");
+    if (s == STATUS_OK && mkdtemp(folder) == NULL)
+        s = error_set_errno(err, "cannot make a folder in '%s'", temporary != NULL ? temporary : "/tmp");
+    else if (s == STATUS_OK) {
+        s = make_document(job, picture, &document, err);
+        if (s == STATUS_OK) s = gather_files(cli, cli->args->operand, mesh, folder, picture, err);
+        if (s == STATUS_OK) s = render(cli, document, folder, exit_code, err);
+        nftw(folder, remove_entry, 8, FTW_DEPTH | FTW_PHYS);
+    }
+    json_decref(picture);
+    json_decref(document);
+    json_decref(job);
+    return s;
+}
